@@ -265,6 +265,6 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
 
 template class CycleModel<double>;
 template class CycleModel<Dual<4>>;
-template class CycleModel<Dual<5>>;
+template class CycleModel<Dual<8>>;
 
 }  // namespace mgdd::engine

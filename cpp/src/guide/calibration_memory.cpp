@@ -52,12 +52,14 @@ bool OnlineCalibration::take_mean() noexcept {
   const double before = known ? residual_power(x_, mean_, mean_bar_) : 0.0;
   taken_ = window_.accepted();
   mean_ = window_.mean(mean_bar_);
-  mean_.soc_sd_cad = std::hypot(mean_.soc_sd_cad, settings_.soc_scatter_cad);
+  mean_.scatter_cad = settings_.soc_scatter_cad;
   has_mean_ = true;
   if (!known) return true;
   earlier_.information = settings_.forgetting * (earlier_.information + block_.information);
   earlier_.pull = settings_.forgetting * (earlier_.pull + block_.pull);
-  let_timing_wander();
+  const double m = settings_.window.window_cycles;
+  let_wander(Calibrated::soc_offset, 2.0 * std::pow(settings_.soc_scatter_cad, 2) / m);
+  let_wander(Calibrated::soc_variance, 2.0 * chance_of_soc_variance());
   const double usual = std::max(before, std::pow(unremarkable * highest_bar(), 2));
   if (settled_updates_ < settled_after ||
       residual_power(x_, mean_, mean_bar_) <= std::pow(settings_.jump_factor, 2) * usual) {
@@ -68,20 +70,33 @@ bool OnlineCalibration::take_mean() noexcept {
   return false;
 }
 
-// Two means of M cycles differ by sqrt(2/M) of the scatter: as much variance for the offset of the timing (matrix
-// inversion lemma), while the mean of the earlier data stays.
-void OnlineCalibration::let_timing_wander() noexcept {
-  constexpr int soc = Calibrated::soc_offset;
-  const double variance = 2.0 * std::pow(settings_.soc_scatter_cad, 2) / settings_.window.window_cycles;
-  if (!beforehand_.unknown[place(soc)] || !(variance > 0.0)) return;
-  const CalibrationVector column = earlier_.information.col(soc);
-  const double divisor = 1.0 / variance + column[soc];
-  earlier_.pull -= column * (earlier_.pull[soc] / divisor);
+// The mean and the variance of the timings of M cycles are those of other cycles in the next window: as much variance
+// for the parameter (matrix inversion lemma), while the mean of the earlier data stays.
+void OnlineCalibration::let_wander(int parameter, double variance) noexcept {
+  if (!beforehand_.unknown[place(parameter)] || !(variance > 0.0)) return;
+  const CalibrationVector column = earlier_.information.col(parameter);
+  const double divisor = 1.0 / variance + column[parameter];
+  earlier_.pull -= column * (earlier_.pull[parameter] / divisor);
   earlier_.information -= column * column.transpose() / divisor;
+}
+
+// Variance of the variance of M timings, in that of the scatter: of their scatter itself, and of its chance correlation
+// with what was told.
+double OnlineCalibration::chance_of_soc_variance() const noexcept {
+  if (!(mean_.scatter_cad > 0.0)) return 0.0;
+  return (2.0 + 4.0 * std::pow(mean_.soc_sd_cad / mean_.scatter_cad, 2)) / settings_.window.window_cycles;
+}
+
+Beforehand OnlineCalibration::beforehand() const noexcept {
+  constexpr int i = Calibrated::soc_variance;
+  Beforehand out = beforehand_;
+  if (out.unknown[place(i)]) out.information[i] = 1.0 / (1.0 / out.information[i] + chance_of_soc_variance());
+  return out;
 }
 
 // What belongs to the old point is integrated out of the earlier data (Schur complement), with what was known of it.
 void OnlineCalibration::forget_point() noexcept {
+  const Beforehand known = beforehand();
   points_seen_ = window_.points_seen();
   if (has_block_) {
     EarlierData all{earlier_.information + block_.information, earlier_.pull + block_.pull};
@@ -97,10 +112,10 @@ void OnlineCalibration::forget_point() noexcept {
     CalibrationMatrix mixed = CalibrationMatrix::Zero();  // row: kept, column: of the point
     for (int i = 0; i < n_calibrated; ++i) {
       if (!info_of(i).at_point) continue;
-      pull[i] = all.pull[i] + beforehand_.information[i] * beforehand_.start[i];
+      pull[i] = all.pull[i] + known.information[i] * known.start[i];
       for (int j = 0; j < n_calibrated; ++j) {
         if (info_of(j).at_point) {
-          own(i, j) = all.information(i, j) + (i == j ? beforehand_.information[i] : 0.0);
+          own(i, j) = all.information(i, j) + (i == j ? known.information[i] : 0.0);
         } else {
           mixed(j, i) = all.information(j, i);
         }

@@ -9,6 +9,8 @@
 namespace mgdd::guide {
 namespace {
 
+constexpr double least_variance_share = 0.01;
+
 // The number itself, or the variable in its direction.
 template <class T>
 T variable(const CalibrationVector& x, int parameter) noexcept {
@@ -17,6 +19,12 @@ T variable(const CalibrationVector& x, int parameter) noexcept {
   } else {
     return x[parameter];
   }
+}
+
+// Of the timings in the window; a dither and the scatter about it may by chance cancel, but never to less than nothing.
+double soc_variance(const CalibrationVector& x, const CalibrationConditions& at) noexcept {
+  const double scatter = at.scatter_cad * at.scatter_cad, told = at.soc_sd_cad * at.soc_sd_cad;
+  return std::max(told + x[Calibrated::soc_variance] * scatter, least_variance_share * (told + scatter));
 }
 
 template <class T>
@@ -65,10 +73,14 @@ bool CalibrationModel::run(engine::CycleModel<T>& model, engine::CycleWorkspace<
                            const CalibrationConditions& at, double soc_cad) noexcept {
   engine::BasicCylinder<T> own = base;
   own.wall_heat.wall_heat_scale = variable<T>(x, Calibrated::wall_heat_scale);
+  own.wall_heat.wall_temperature_k += variable<T>(x, Calibrated::wall_temperature);
+  own.geometry.compression_ratio += variable<T>(x, Calibrated::compression_ratio);
   T& gamma = gamma_in_force(own.gas);
   gamma += variable<T>(x, Calibrated::gamma);
   model.set_cylinder(own);
   engine::Charge<T> charge = model.charge(engine::lift<T>(at.point));
+  const T energy = charge.pressure_pa * model.volume_m3()[0];
+  charge.gas_j_per_k = energy / (energy / charge.gas_j_per_k + variable<T>(x, Calibrated::charge_temperature));
   charge.fuel_heat_j *= variable<T>(x, Calibrated::fuel_heat);
   charge.burn_duration_cad *= variable<T>(x, Calibrated::burn_duration);
   model.run(charge, soc_cad + variable<T>(x, Calibrated::soc_offset), work);
@@ -78,8 +90,9 @@ bool CalibrationModel::run(engine::CycleModel<T>& model, engine::CycleWorkspace<
 bool CalibrationModel::predict(const CalibrationVector& x, const CalibrationConditions& at,
                                std::span<double> reading_bar) noexcept {
   shift_to(x[Calibrated::tdc]);
-  const std::array<double, 2> nodes{at.soc_cad - at.soc_sd_cad, at.soc_cad + at.soc_sd_cad};
-  const std::size_t n_nodes = at.soc_sd_cad > 0.0 ? 2 : 1;
+  const double sd = std::sqrt(soc_variance(x, at));
+  const std::array<double, 2> nodes{at.soc_cad - sd, at.soc_cad + sd};
+  const std::size_t n_nodes = sd > 0.0 ? 2 : 1;
   const double share = x[Calibrated::gain] / (units::pa_per_bar * static_cast<double>(n_nodes));
   std::fill(reading_bar.begin(), reading_bar.end(), x[Calibrated::offset]);
   for (std::size_t node = 0; node < n_nodes; ++node) {
@@ -91,10 +104,12 @@ bool CalibrationModel::predict(const CalibrationVector& x, const CalibrationCond
 }
 
 bool CalibrationModel::differentiate(const CalibrationVector& x, const CalibrationConditions& at,
-                                     CalibrationColumns& out) noexcept {
+                                     std::span<const double> reading_bar, CalibrationColumns& out) noexcept {
   shift_to(x[Calibrated::tdc]);
   if (!run(dual_, dual_work_, lifted_, x, at, at.soc_cad)) return false;
   const double gain = x[Calibrated::gain];
+  const double variance = soc_variance(x, at);
+  const double blur = variance > 0.0 ? at.scatter_cad * at.scatter_cad / variance : 0.0;
   for (std::size_t k = 0; k < weights_.size(); ++k) {
     const CubicWeights& w = weights_[k];
     double pressure = 0.0, slope = 0.0;
@@ -112,6 +127,9 @@ bool CalibrationModel::differentiate(const CalibrationVector& x, const Calibrati
     out(row, Calibrated::tdc) = -gain * slope / units::pa_per_bar;
     out(row, Calibrated::gain) = pressure / units::pa_per_bar;
     out(row, Calibrated::offset) = 1.0;
+    // The mean of two timings less the cycle at their mean is the bend times half the variance.
+    out(row, Calibrated::soc_variance) =
+        blur * (reading_bar[k] - gain * pressure / units::pa_per_bar - x[Calibrated::offset]);
   }
   return true;
 }
@@ -121,6 +139,8 @@ engine::Cylinder CalibrationModel::cylinder(const CalibrationVector& x,
   engine::Cylinder own = base_;
   const auto is = [&](int parameter) { return taken[static_cast<std::size_t>(parameter)]; };
   if (is(Calibrated::wall_heat_scale)) own.wall_heat.wall_heat_scale = x[Calibrated::wall_heat_scale];
+  if (is(Calibrated::wall_temperature)) own.wall_heat.wall_temperature_k += x[Calibrated::wall_temperature];
+  if (is(Calibrated::compression_ratio)) own.geometry.compression_ratio += x[Calibrated::compression_ratio];
   if (is(Calibrated::gamma)) gamma_in_force(own.gas) += x[Calibrated::gamma];
   if (is(Calibrated::burn_duration)) own.burn.burn_duration_ref_cad *= x[Calibrated::burn_duration];
   if (is(Calibrated::fuel_heat)) own.gas.lower_heating_value_mj_per_kg *= x[Calibrated::fuel_heat];

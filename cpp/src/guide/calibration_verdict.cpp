@@ -77,9 +77,10 @@ CalibrationVerdict OnlineCalibration::verdict(int parameter) const noexcept {
       out.culprit = i;
     }
   }
+  const Beforehand known = beforehand();
   for (int i = 0; i < n_calibrated; ++i) {
-    if (settings_.wanted[place(i)] || !beforehand_.unknown[place(i)]) continue;
-    const double sds = std::abs(x_[i] - beforehand_.start[i]) * std::sqrt(beforehand_.information[i]);
+    if (settings_.wanted[place(i)] || !known.unknown[place(i)]) continue;
+    const double sds = std::abs(x_[i] - known.start[i]) * std::sqrt(known.information[i]);
     if (sds > contradiction_sds) return {Knowledge::contradicted, i};
   }
   const Domain& domain = info_of(parameter).field.domain;

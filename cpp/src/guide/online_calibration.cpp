@@ -106,7 +106,7 @@ double OnlineCalibration::residual_power(const CalibrationVector& x, const Calib
 }
 
 CalibrationStatus OnlineCalibration::step() noexcept {
-  if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, columns_)) {
+  if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, reading_bar_, columns_)) {
     x_ = beforehand_.start;
     return CalibrationStatus::unphysical;
   }
@@ -115,7 +115,7 @@ CalibrationStatus OnlineCalibration::step() noexcept {
                            resolution * highest_bar(), scratch_);
   };
   // What the data want beyond its bound stays, then what they do not show; the rest moves as if that were known.
-  Beforehand moving = beforehand_;
+  Beforehand moving = beforehand();
   CorrelatedStep s = stepped(moving);
   covariance_ = s.covariance;
   for (int i = 0; i < n_calibrated; ++i) {
@@ -164,11 +164,12 @@ CalibrationStatus OnlineCalibration::step() noexcept {
 
 CalibrationStatus OnlineCalibration::seek(optimize::ExtremumSeeking& seeker) noexcept {
   constexpr int wall = Calibrated::wall_heat_scale;
-  if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, columns_)) {
+  if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, reading_bar_, columns_)) {
     return CalibrationStatus::unphysical;
   }
   // Moving one parameter alone, the errors of all others act in full ("consider" covariance).
-  Beforehand alone = beforehand_;
+  const Beforehand known = beforehand();
+  Beforehand alone = known;
   alone.unknown.fill(false);
   alone.unknown[place(wall)] = true;
   const CorrelatedStep s = correlated_step(columns_, residual_bar_, first_row_, last_row_, x_, alone, EarlierData{},
@@ -178,8 +179,8 @@ CalibrationStatus OnlineCalibration::seek(optimize::ExtremumSeeking& seeker) noe
   samples_ = s.samples;
   covariance_ = s.covariance;
   for (int i = 0; i < n_calibrated; ++i) {
-    if (i == wall || !beforehand_.unknown[place(i)]) continue;
-    const double variance = 1.0 / beforehand_.information[i];
+    if (i == wall || !known.unknown[place(i)]) continue;
+    const double variance = 1.0 / known.information[i];
     const double pull = s.information(wall, i) / s.information(wall, wall);
     covariance_(wall, wall) += pull * pull * variance;
     covariance_(i, i) = variance;

@@ -67,7 +67,7 @@ Beforehand beforehand_of(const OnlineCalibrationSettings& s) {
     out.start[i] = info.field.domain.clamped(start);
     const double width = info.field.domain.upper - info.field.domain.lower;
     const double sd = s.wanted[place(i)] ? width : s.uncertainty[place(i)];
-    out.unknown[place(i)] = sd > 0.0;
+    out.unknown[place(i)] = sd > 0.0 && (i != Calibrated::soc_variance || s.soc_scatter_cad > 0.0);
     if (sd > 0.0) out.information[i] = 1.0 / (sd * sd);
   }
   return out;

@@ -136,6 +136,6 @@ class CycleModel {
 
 extern template class CycleModel<double>;
 extern template class CycleModel<Dual<4>>;
-extern template class CycleModel<Dual<5>>;
+extern template class CycleModel<Dual<8>>;
 
 }  // namespace mgdd::engine

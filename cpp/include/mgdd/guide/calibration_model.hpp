@@ -15,7 +15,7 @@
 
 namespace mgdd::guide {
 
-inline constexpr int model_directions = 5;  ///< parameters inside the cycle model
+inline constexpr int model_directions = 8;  ///< parameters inside the cycle model
 using CalibrationScalar = Dual<model_directions>;
 using CalibrationColumns = Eigen::Matrix<double, Eigen::Dynamic, n_calibrated>;
 
@@ -24,6 +24,7 @@ struct CalibrationConditions {
   engine::OperatingPoint point{};
   double soc_cad = 0.0;     ///< mean start of combustion as told
   double soc_sd_cad = 0.0;  ///< its standard deviation among these cycles: a dither moves it on purpose
+  double scatter_cad = 0.0;  ///< standard deviation of the true timing about the told one
 };
 
 class CalibrationModel {
@@ -35,8 +36,10 @@ class CalibrationModel {
   /// exact to third order. False where no such cycle exists.
   bool predict(const CalibrationVector& x, const CalibrationConditions& at, std::span<double> reading_bar) noexcept;
 
-  /// d reading / d x, one row per angle, at the mean timing. False where no such cycle exists.
-  bool differentiate(const CalibrationVector& x, const CalibrationConditions& at, CalibrationColumns& out) noexcept;
+  /// d reading / d x, one row per angle, at the mean timing; `reading_bar` as predicted there. False where no such
+  /// cycle exists.
+  bool differentiate(const CalibrationVector& x, const CalibrationConditions& at, std::span<const double> reading_bar,
+                     CalibrationColumns& out) noexcept;
 
   /// The cylinder of the guide with the parameters for which `taken` is set.
   engine::Cylinder cylinder(const CalibrationVector& x, const std::array<bool, n_calibrated>& taken) const noexcept;

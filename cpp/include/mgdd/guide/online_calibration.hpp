@@ -90,6 +90,7 @@ class OnlineCalibration {
     v("mean_pressure_bar", self.mean_bar_);
     v("mean_soc_cad", self.mean_.soc_cad);
     v("mean_soc_sd_cad", self.mean_.soc_sd_cad);
+    v("mean_scatter_cad", self.mean_.scatter_cad);
     for (const auto& field : engine::operating_point_fields<double>())
       v("mean_" + std::string(field.info.name), field.in(self.mean_.point));
     v("mean_burn_duration_cad", self.mean_.point.burn_duration_cad);
@@ -120,7 +121,9 @@ class OnlineCalibration {
   bool newest_is_suspect() noexcept;
   bool take_mean() noexcept;  // false: the new mean contradicts what was learnt
   void forget_point() noexcept;
-  void let_timing_wander() noexcept;
+  void let_wander(int parameter, double variance) noexcept;
+  double chance_of_soc_variance() const noexcept;
+  Beforehand beforehand() const noexcept;  ///< for the mean in work
   CalibrationStatus step() noexcept;
   CalibrationStatus seek(optimize::ExtremumSeeking& seeker) noexcept;
   /// Mean square of measured less predicted over the rows in use; negative where the model has no such cycle.
