@@ -11,7 +11,6 @@ namespace {
 
 constexpr double unremarkable = 1e-3;    // of the highest pressure: a residual that is never a jump
 constexpr std::int64_t jump_cycles = 3;  // suspects in a row
-constexpr std::int64_t settled_after = 3;
 
 }  // namespace
 
@@ -24,13 +23,17 @@ void OnlineCalibration::restart() noexcept {
   taken_ = checked_ = window_.accepted();
 }
 
+// Mean square of a residual that nobody need wonder at, where the timing scatters by that share of its variance.
+double OnlineCalibration::expected_power(double share) const noexcept {
+  return std::pow(unremarkable * highest_bar(), 2) + share * std::pow(settings_.soc_scatter_cad, 2) * soc_power_;
+}
+
 // A cycle unlike those before it does not reach the calibration; three in a row are the new truth.
 bool OnlineCalibration::newest_is_suspect() noexcept {
   if (settled_updates_ < settled_after) return false;
   const CalibrationConditions at = window_.newest(newest_bar_);
   const double power = residual_power(x_, at, newest_bar_);
-  const double floor = std::pow(unremarkable * highest_bar(), 2);
-  if (usual_power_ > 0.0 && power > std::pow(settings_.jump_factor, 2) * std::max(usual_power_, floor)) {
+  if (usual_power_ > 0.0 && power > std::pow(settings_.jump_factor, 2) * std::max(usual_power_, expected_power(1.0))) {
     window_.drop_newest();
     if (++suspects_ >= jump_cycles) {
       restart();
@@ -60,7 +63,7 @@ bool OnlineCalibration::take_mean() noexcept {
   const double m = settings_.window.window_cycles;
   let_wander(Calibrated::soc_offset, 2.0 * std::pow(settings_.soc_scatter_cad, 2) / m);
   let_wander(Calibrated::soc_variance, 2.0 * chance_of_soc_variance());
-  const double usual = std::max(before, std::pow(unremarkable * highest_bar(), 2));
+  const double usual = std::max(before, expected_power(2.0 / settings_.window.window_cycles));
   if (settled_updates_ < settled_after ||
       residual_power(x_, mean_, mean_bar_) <= std::pow(settings_.jump_factor, 2) * usual) {
     return true;

@@ -105,9 +105,26 @@ double OnlineCalibration::residual_power(const CalibrationVector& x, const Calib
   return power / static_cast<double>(last_row_ - first_row_);
 }
 
+// Columns of one window after the other, each at its own estimate, would together know a direction that none of them
+// sees; so all that add up are taken at the first settled estimate (Huang, Mourikis and Roumeliotis 2010).
+bool OnlineCalibration::linearise() noexcept {
+  const bool alone = settings_.method != CalibrationMethod::recursive || earlier_.information.isZero(0.0);
+  for (int i = 0; i < n_calibrated; ++i) {
+    if (alone || (info_of(i).at_point && settled_updates_ < settled_after)) anchor_[i] = x_[i];
+  }
+  if (residual_power(anchor_, mean_, mean_bar_) < 0.0 ||
+      !model_.differentiate(anchor_, mean_, reading_bar_, columns_)) {
+    return false;
+  }
+  soc_power_ = columns_.col(Calibrated::soc_offset).squaredNorm() / static_cast<double>(columns_.rows());
+  return anchor_ == x_ || residual_power(x_, mean_, mean_bar_) >= 0.0;
+}
+
 CalibrationStatus OnlineCalibration::step() noexcept {
-  if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, reading_bar_, columns_)) {
+  if (!linearise()) {
     x_ = beforehand_.start;
+    block_ = earlier_ = EarlierData{};
+    has_block_ = false;
     return CalibrationStatus::unphysical;
   }
   const auto stepped = [&](const Beforehand& moving) {
@@ -164,9 +181,7 @@ CalibrationStatus OnlineCalibration::step() noexcept {
 
 CalibrationStatus OnlineCalibration::seek(optimize::ExtremumSeeking& seeker) noexcept {
   constexpr int wall = Calibrated::wall_heat_scale;
-  if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, reading_bar_, columns_)) {
-    return CalibrationStatus::unphysical;
-  }
+  if (!linearise()) return CalibrationStatus::unphysical;
   // Moving one parameter alone, the errors of all others act in full ("consider" covariance).
   const Beforehand known = beforehand();
   Beforehand alone = known;

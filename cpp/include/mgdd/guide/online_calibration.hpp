@@ -100,6 +100,8 @@ class OnlineCalibration {
     v("sigma_bar", self.sigma_bar_);
     v("samples", self.samples_);
     v("usual_power_bar2", self.usual_power_);
+    v("soc_power_bar2_per_cad2", self.soc_power_);
+    v("anchor", self.anchor_);
     v("updates", self.updates_);
     v("settled_updates", self.settled_updates_);
     v("taken", self.taken_);
@@ -116,6 +118,7 @@ class OnlineCalibration {
 
  private:
   static constexpr std::int64_t statuses = 12;
+  static constexpr std::int64_t settled_after = 3;  // updates
 
   CalibrationStatus advance() noexcept;
   bool newest_is_suspect() noexcept;
@@ -125,12 +128,14 @@ class OnlineCalibration {
   double chance_of_soc_variance() const noexcept;
   Beforehand beforehand() const noexcept;  ///< for the mean in work
   CalibrationStatus step() noexcept;
+  bool linearise() noexcept;  // false where the model has no such cycle
   CalibrationStatus seek(optimize::ExtremumSeeking& seeker) noexcept;
   /// Mean square of measured less predicted over the rows in use; negative where the model has no such cycle.
   double residual_power(const CalibrationVector& x, const CalibrationConditions& at,
                         std::span<const double> measured_bar) noexcept;
   bool is_held(int parameter) const noexcept;
   double highest_bar() const noexcept;
+  double expected_power(double share) const noexcept;
 
   OnlineCalibrationSettings settings_;
   CalibrationModel model_;
@@ -142,12 +147,14 @@ class OnlineCalibration {
   std::size_t first_row_, last_row_;  // rows that a shift of TDC leaves inside the closed part
 
   CalibrationVector x_;
+  CalibrationVector anchor_ = CalibrationVector::Zero();  // where the model is linearised
   CalibrationMatrix covariance_ = CalibrationMatrix::Zero();
   EarlierData block_, earlier_;  // of the mean in work, and of the windows before it
   std::vector<double> mean_bar_;
   CalibrationConditions mean_{};
   double rms_bar_ = 0.0, sigma_bar_ = 0.0, samples_ = 0.0;
   double usual_power_ = 0.0;  // mean square of a cycle's residual
+  double soc_power_ = 0.0;    // the same by one degree of timing
   std::int64_t updates_ = 0, settled_updates_ = 0, taken_ = 0, checked_ = 0, points_seen_ = 0, jumps_ = 0,
                suspects_ = 0;
   bool has_mean_ = false, has_block_ = false;
