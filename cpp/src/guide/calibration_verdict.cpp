@@ -90,8 +90,8 @@ CalibrationVerdict OnlineCalibration::verdict(int parameter) const noexcept {
   } else if (x_[parameter] <= domain.lower + margin || x_[parameter] >= domain.upper - margin) {
     out.knowledge = Knowledge::at_bound;
   } else {
-    const bool known = std::sqrt(variance) <= determined_below(parameter, x_[parameter]);
-    out.knowledge = known ? Knowledge::determined : Knowledge::uncertain;
+    const bool sure = std::sqrt(variance) <= determined_below(parameter, x_[parameter]);
+    out.knowledge = sure ? Knowledge::determined : Knowledge::uncertain;
   }
   return out;
 }

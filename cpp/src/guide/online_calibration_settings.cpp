@@ -10,7 +10,10 @@
 namespace mgdd::guide {
 namespace {
 
-constexpr double gamma_lower = 1.15, gamma_upper = 1.6;  // the offset of gamma must leave a gas
+// What is off must leave a gas and an engine.
+constexpr double gamma_lower = 1.15, gamma_upper = 1.6;
+constexpr double compression_lower = 3.0, compression_upper = 99.0;
+constexpr double wall_lower_k = 300.0, wall_upper_k = 1700.0;
 
 constexpr std::array<std::pair<CalibrationMethod, std::string_view>, 3> calibration_method_names{{
     {CalibrationMethod::extremum_seeking, "extremum_seeking"},
@@ -38,6 +41,8 @@ int parse_calibrated(std::string_view field, std::string_view name) {
 void validate(const OnlineCalibrationSettings& s) {
   engine::validate(s.cylinder);
   require_within("gamma", s.cylinder.gas.gamma, gamma_lower, gamma_upper);
+  require_within("compression_ratio", s.cylinder.geometry.compression_ratio, compression_lower, compression_upper);
+  require_within("wall_temperature_k", s.cylinder.wall_heat.wall_temperature_k, wall_lower_k, wall_upper_k, "K");
   require_within("forgetting", s.forgetting, 0.0, 1.0);
   require_within("soc_scatter_cad", s.soc_scatter_cad, 0.0, 5.0, "°CA");
   require_within("jump_factor", s.jump_factor, 1.5, 100.0);
@@ -53,6 +58,9 @@ void validate(const OnlineCalibrationSettings& s) {
       throw about("parameters", ParameterError("parameters: extremum seeking adapts wall_heat_scale alone, not " +
                                                std::string(field.name) + "; use 'gauss_newton' or 'recursive'"));
     }
+  }
+  if (s.wanted[place(Calibrated::soc_variance)] && !(s.soc_scatter_cad > 0.0)) {
+    throw ParameterError("soc_scatter_cad", s.soc_scatter_cad, "must be above 0 where soc_variance_scale is adapted");
   }
   if (s.method == CalibrationMethod::extremum_seeking && !s.wanted[place(Calibrated::wall_heat_scale)]) {
     throw about("parameters", ParameterError("parameters: extremum seeking adapts wall_heat_scale, name it"));

@@ -18,6 +18,7 @@ namespace {
 using test_support::cycle_of;
 using test_support::run;
 using test_support::steady_bench;
+using test_support::sure_of_the_engine;
 using test_support::sure_of_the_rest;
 using test_support::wall;
 using test_support::wrong_guide;
@@ -99,7 +100,7 @@ TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
       for (const auto& s : {with(0.5, 0.0, 0.0, noise), with(-0.5, 0.0, 0.0, noise), with(0.0, 0.01, 0.0, noise),
                             with(0.0, -0.01, 0.0, noise), with(0.0, 0.0, 0.1, noise), with(0.3, 0.005, -0.1, noise)}) {
         loop::EngineBench bench(s);
-        OnlineCalibration calibration(wrong_guide(method));
+        OnlineCalibration calibration(sure_of_the_engine(wrong_guide(method)));
         run(bench, calibration, 150);
         const double bias = calibration.parameters()[wall] / 0.5 - 1.0;
         EXPECT_TRUE(std::abs(bias) < 0.05 || !calibration.determined())
@@ -145,7 +146,8 @@ TEST(OnlineCalibration, AModelOfAnotherShapeIsNotBelieved) {
 struct Coverage {
   double within_95 = 0.0, spread = 0.0;
 };
-// Errors over stated standard errors, 100 seeds; the sensor's own errors are drawn from what is known of them.
+// Errors over stated standard errors, 100 seeds; what is off of sensor, engine and fuel is drawn from what is known of
+// it.
 Coverage coverage_of(CalibrationMethod method, double noise_bar, double correlation, int cycles) {
   constexpr int seeds = 100;
   Coverage out;
@@ -158,6 +160,9 @@ Coverage coverage_of(CalibrationMethod method, double noise_bar, double correlat
     s.cylinder.gas.gamma += 0.01 * drawn(3);
     s.schedule[0].point.fuel_mg *= 1.0 + 0.02 * drawn(4);
     s.schedule[0].point.burn_duration_cad = 30.0 * (1.0 + 0.05 * drawn(5));
+    s.cylinder.geometry.compression_ratio += 0.1 * drawn(7);
+    s.cylinder.wall_heat.wall_temperature_k += 70.0 * drawn(8);
+    s.schedule[0].point.intake_temperature_k += 10.0 * drawn(9);
     loop::EngineBench bench(s);
     OnlineCalibration calibration(wrong_guide(method, 0.8));
     std::vector<double> shown;

@@ -244,7 +244,7 @@ TEST(OnlineCalibrationLoop, ARefusedStateChangesNothing) {
   bad["parameters"][0] = 9.0;
   EXPECT_THROW(restore_state(calibration, bad), ParameterError);
   bad = good;
-  bad["covariance"][9] = -1.0;
+  bad["covariance"][n_calibrated + 1] = -1.0;  // a diagonal place
   EXPECT_THROW(restore_state(calibration, bad), ParameterError);
   EXPECT_EQ(save_state(calibration), good);
 }
@@ -272,6 +272,14 @@ TEST(OnlineCalibrationLoop, RefusesByName) {
   holds([](auto& s) { s.jump_factor = 1.0; }, "jump_factor = 1");
   holds([](auto& s) { s.trials_per_update = 0; }, "trials_per_update = 0");
   holds([](auto& s) { s.cylinder.geometry.bore_mm = -1.0; }, "bore_mm = -1");
+  holds([](auto& s) { s.cylinder.geometry.compression_ratio = 1.5; }, "compression_ratio = 1.5");
+  holds([](auto& s) { s.cylinder.wall_heat.wall_temperature_k = 200.0; }, "wall_temperature_k = 200");
+  holds(
+      [](auto& s) {
+        s.wanted[Calibrated::soc_variance] = true;
+        s.soc_scatter_cad = 0.0;
+      },
+      "soc_scatter_cad = 0: must be above 0 where soc_variance_scale is adapted");
   holds(
       [](auto& s) {
         s.method = CalibrationMethod::extremum_seeking;

@@ -33,6 +33,14 @@ inline guide::OnlineCalibrationSettings wrong_guide(guide::CalibrationMethod met
   return s;
 }
 
+/// Compression ratio and temperatures exactly as the guide has them, as those of a virtual engine may be.
+inline guide::OnlineCalibrationSettings sure_of_the_engine(guide::OnlineCalibrationSettings s) {
+  for (const int i : {guide::Calibrated::compression_ratio, guide::Calibrated::charge_temperature,
+                      guide::Calibrated::wall_temperature})
+    s.uncertainty[guide::place(i)] = 0.0;
+  return s;
+}
+
 /// Everything beside the wall heat exactly as the guide has it.
 inline guide::OnlineCalibrationSettings sure_of_the_rest(guide::OnlineCalibrationSettings s) {
   s.uncertainty.fill(0.0);

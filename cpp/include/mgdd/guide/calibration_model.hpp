@@ -22,8 +22,8 @@ using CalibrationColumns = Eigen::Matrix<double, Eigen::Dynamic, n_calibrated>;
 /// Mean conditions of the cycles whose mean pressure is compared.
 struct CalibrationConditions {
   engine::OperatingPoint point{};
-  double soc_cad = 0.0;     ///< mean start of combustion as told
-  double soc_sd_cad = 0.0;  ///< its standard deviation among these cycles: a dither moves it on purpose
+  double soc_cad = 0.0;      ///< mean start of combustion as told
+  double soc_sd_cad = 0.0;   ///< its standard deviation among these cycles: a dither moves it on purpose
   double scatter_cad = 0.0;  ///< standard deviation of the true timing about the told one
 };
 
