@@ -20,18 +20,9 @@ from mgdd.optimize import ExtremumSeeking
 from mgdd.results.labels import check_labels
 
 WRONG = Cylinder(wall_heat_scale=1.0)  # twice that of the engine
-SURE = dict.fromkeys(
-    [
-        "soc_offset_cad",
-        "burn_duration_scale",
-        "gamma_offset",
-        "fuel_heat_scale",
-        "tdc_offset_cad",
-        "pressure_gain",
-        "pressure_offset_bar",
-    ],
-    0.0,
-)
+SURE = {name: 0.0 for name in OnlineCalibration(WRONG).parameters if name != "wall_heat_scale"}
+# Of the engine itself, as of one whose compression ratio and temperatures are measured.
+ENGINE = dict.fromkeys(["compression_ratio_offset", "charge_temperature_offset_k", "wall_temperature_offset_k"], 0.0)
 
 
 def drive(bench: EngineBench, calibration: OnlineCalibration, cycles: int, soc_cad: float = -6.0) -> list[str]:
@@ -48,7 +39,7 @@ def drive(bench: EngineBench, calibration: OnlineCalibration, cycles: int, soc_c
 def test_it_follows_an_engine_that_seeks_its_best_timing(method: str) -> None:
     bench = EngineBench(seed=3)
     alone = method == "extremum_seeking"  # then the timing must be measured: nothing else is fitted
-    calibration = OnlineCalibration(WRONG, method=method, uncertainty=SURE if alone else None)
+    calibration = OnlineCalibration(WRONG, method=method, uncertainty=SURE if alone else ENGINE)
     seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
     for _ in range(120):
         (soc_cad,) = seeker.ask()
@@ -77,7 +68,7 @@ def test_the_best_timing_of_the_guide_comes_right() -> None:
 
 def test_history_and_summary_say_what_happened() -> None:
     bench = EngineBench(pressure_noise_bar=0.1, misfire_probability=0.1, seed=1)
-    calibration = OnlineCalibration("puma_single")
+    calibration = OnlineCalibration("puma_single", uncertainty=ENGINE)
     empty = calibration.history
     check_labels(empty)
     assert empty.sizes["update"] == 0
@@ -115,21 +106,51 @@ def test_state_and_pickle_go_on_bit_for_bit(method: str) -> None:
     assert twin.parameters == calibration.parameters == other.parameters
     assert twin.history.identical(calibration.history)
     with pytest.raises(ParameterError, match="state column"):
-        other.state = {**calibration.state, "parameters": [float("nan")] * 8}
+        other.state = {**calibration.state, "parameters": [float("nan")] * len(other.parameters)}
     assert other.state == calibration.state
 
 
 def test_several_parameters_and_a_measured_fuel() -> None:
     bench = EngineBench(pressure_noise_bar=0.1, tdc_error_cad=0.8, soc_scatter_cad=0.0, seed=4)
     names = ("wall_heat_scale", "tdc_offset_cad", "soc_offset_cad")
-    told = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty={"fuel_heat_scale": 0.0})
-    free = OnlineCalibration(WRONG, method="recursive", parameters=names)
+    told = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty=ENGINE | {"fuel_heat_scale": 0.0})
+    free = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty=ENGINE)
     for calibration in (told, free):
         drive(copy.deepcopy(bench), calibration, 100)
     assert list(told.verdicts) == ["wall_heat_scale", "soc_offset_cad", "tdc_offset_cad"]
     assert told.parameters["tdc_offset_cad"] == pytest.approx(0.8, abs=0.1)
     assert told.parameters["fuel_heat_scale"] == 1.0
     assert told.standard_errors["tdc_offset_cad"] < 0.8 * free.standard_errors["tdc_offset_cad"]
+
+
+# An engine within what is known of it by default, while a seeker's dither moves the timing.
+@pytest.mark.parametrize("method", ["gauss_newton", "recursive"])
+@pytest.mark.parametrize(
+    ("cylinder", "point"),
+    [
+        (Cylinder(compression_ratio=18.3), OperatingPoint()),
+        (Cylinder(), OperatingPoint(intake_temperature_k=303.0)),
+        (Cylinder(wall_temperature_k=520.0), OperatingPoint()),
+    ],
+    ids=["compression ratio", "intake", "walls"],
+)
+def test_an_engine_that_is_not_quite_the_guide_is_in_the_interval(
+    method: str, cylinder: Cylinder, point: OperatingPoint
+) -> None:
+    z = []
+    for seed in range(6):
+        bench = EngineBench(cylinder, point, pressure_noise_bar=0.1, seed=seed)
+        calibration = OnlineCalibration(WRONG, method=method)
+        for k in range(60):
+            asked = -6.0 + np.sin(0.2 * np.pi * k)
+            bench.step(asked)
+            calibration.offer(bench.pressure()[1], OperatingPoint(), asked)
+            calibration.update()
+        verdict = calibration.verdicts["wall_heat_scale"]
+        z.append((verdict.value - 0.5) / verdict.standard_error)
+        assert verdict.knowledge == "uncertain", verdict.sentence
+        assert "mostly because" in verdict.sentence
+    assert np.mean(np.abs(z) < 1.96) >= 0.8, z
 
 
 # Wall heat is not to be had from one measured trace: fuel, gamma and sensor are not known well enough, and the burn law
@@ -187,6 +208,7 @@ def test_a_refused_cycle_says_why() -> None:
         ({"window_cycles": 1}, "window_cycles = 1 cycles"),
         ({"method": "extremum_seeking", "parameters": ("tdc_offset_cad",)}, "wall_heat_scale alone"),
         ({"forgetting": 2.0}, "forgetting = 2"),
+        ({"parameters": ("soc_variance_scale",), "soc_scatter_cad": 0.0}, "soc_scatter_cad = 0: must be above 0"),
     ],
 )
 def test_settings_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:

@@ -33,7 +33,7 @@ class OnlineCalibration:
 
     Offer every cycle, then update once: a refused cycle is left out and says why. What stands between model and
     measurement and is not adapted counts as known to its `uncertainty` only, so that an error of TDC, gain, pegging,
-    gamma, fuel or timing widens the standard error instead of passing for wall heat.
+    gamma, fuel, timing, compression ratio or temperature widens the standard error instead of passing for wall heat.
 
     Parameters
     ----------
@@ -44,12 +44,16 @@ class OnlineCalibration:
         extremum seeking on the pressure error, which moves the wall heat alone.
     parameters : sequence of str
         What is adapted: ``"wall_heat_scale"``, ``"soc_offset_cad"``, ``"burn_duration_scale"``, ``"gamma_offset"``,
-        ``"fuel_heat_scale"``, ``"tdc_offset_cad"``, ``"pressure_gain"``, ``"pressure_offset_bar"``.
+        ``"fuel_heat_scale"``, ``"compression_ratio_offset"``, ``"charge_temperature_offset_k"``,
+        ``"wall_temperature_offset_k"``, ``"tdc_offset_cad"``, ``"pressure_gain"``, ``"pressure_offset_bar"``,
+        ``"soc_variance_scale"``.
     uncertainty : mapping of str to float, optional
         Standard deviation of what is known of the parameters that are not adapted, in their units; 0: exactly as the
         model has it. Left out:
-        0.3 °CA of SOC, 5 % of burn duration, 0.01 of gamma, 2 % of fuel heat, 0.3 °CA of TDC, 0.5 % of pressure
-        gain, 0.1 bar of pegging. Where the fuel is measured, give ``{"fuel_heat_scale": 0.0}``.
+        0.3 °CA of SOC, 5 % of burn duration, 0.01 of gamma, 2 % of fuel heat, 0.1 of compression ratio, 10 K of
+        charge at IVC (3 % of trapped mass), 70 K of wall, 0.3 °CA of TDC, 0.5 % of pressure gain, 0.1 bar of pegging,
+        100 % of the variance of SOC. So the wall heat is known to 3 % at best; where fuel, mass or temperatures are
+        measured, say how well: ``{"fuel_heat_scale": 0.0, "charge_temperature_offset_k": 3.0}``.
     window_cycles : int
         Cycles whose mean is compared, in [2, 500].
     steady_cycles : int
@@ -83,7 +87,8 @@ class OnlineCalibration:
     >>> from mgdd.guide import OnlineCalibration
     >>> from mgdd.loop import EngineBench
     >>> bench = EngineBench(pressure_noise_bar=0.05)  # its wall heat is 0.5
-    >>> calibration = OnlineCalibration(Cylinder(wall_heat_scale=1.0))
+    >>> known = {"charge_temperature_offset_k": 2.0, "wall_temperature_offset_k": 10.0, "compression_ratio_offset": 0.0}
+    >>> calibration = OnlineCalibration(Cylinder(wall_heat_scale=1.0), uncertainty=known)
     >>> for _ in range(40):
     ...     soc_cad = bench.step(-6.0)["soc_cad"]
     ...     status = calibration.offer(bench.pressure()[1], bench.point, soc_cad)

@@ -110,9 +110,9 @@ def run_online_calibration(
 
     The engine is ``puma_single`` with 0.3 °CA of scatter that nobody measures. Extremum seeking moves the timing from
     -12 °CA aTDC, every cycle is offered to `OnlineCalibration` with the timing that was asked for, and one update is
-    made per cycle. Three methods, and two more ways to use them: extremum seeking where the timing is measured, and
-    Gauss-Newton that takes everything but the wall heat as exact. Each with a clean and a noisy sensor, then with
-    errors of TDC, gain and pegging and 0.1 bar of noise.
+    made per cycle. Compression ratio and temperatures of the engine count as known. Three methods, and two more ways to
+    use them: extremum seeking where the timing is measured, and Gauss-Newton that takes everything but the wall heat as
+    exact. Each with a clean and a noisy sensor, then with errors of TDC, gain and pegging and 0.1 bar of noise.
 
     Parameters
     ----------
