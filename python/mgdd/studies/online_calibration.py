@@ -13,7 +13,7 @@ from mgdd.loop import EngineBench
 from mgdd.optimize import ExtremumSeeking
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.calibration_facts import EXACT, TRUE_SCALE, WRONG, calibration_facts, fact_bars
+from mgdd.studies.calibration_facts import ENGINE_KNOWN, EXACT, TRUE_SCALE, WRONG, calibration_facts, fact_bars
 from mgdd.studies.guide_cases import BOUNDS_CAD, first_within, stays_within, verdict_on
 from mgdd.studies.online_calibration_figures import draw
 from mgdd.studies.statistics import with_interval, with_median_interval
@@ -41,7 +41,7 @@ class Way:
     def calibration(self) -> OnlineCalibration:
         """Make the calibration, with a guide of twice the wall heat."""
         return OnlineCalibration(
-            WRONG, method=self.method, uncertainty=EXACT if self.exact else None,
+            WRONG, method=self.method, uncertainty=EXACT if self.exact else ENGINE_KNOWN,
             soc_scatter_cad=0.0 if self.timing_measured else _SCATTER_CAD,
         )  # fmt: skip
 
