@@ -87,21 +87,24 @@ LABEL_COLUMNS = {
 def online_calibration() -> Rows:
     alone = {name: 0.0 for name in OnlineCalibration("puma_single").parameters if name != "wall_heat_scale"}
     rows = {}
-    for label, sensor, told_late_cad in (
+    for label, off, told_late_cad in (
         ("nothing", {}, 0.0),
         ("timing told 0.5 °CA late", {}, 0.5),
         ("TDC read 0.5 °CA late", {"tdc_error_cad": 0.5}, 0.0),
         ("pressure 1 % high", {"pressure_gain_error": 0.01}, 0.0),
         ("pegging 0.1 bar high", {"pressure_offset_bar": 0.1}, 0.0),
+        ("compression ratio 0.1 higher", {"engine": Cylinder(compression_ratio=18.3)}, 0.0),
+        ("intake 10 K warmer", {"point": OperatingPoint(intake_temperature_k=323.0)}, 0.0),
+        ("walls 70 K hotter", {"engine": Cylinder(wall_temperature_k=520.0)}, 0.0),
     ):
         row: list[float] = []
         for method, uncertainty in (("gauss_newton", alone), ("gauss_newton", None), ("recursive", None)):
-            bench = EngineBench(pressure_noise_bar=0.1, soc_scatter_cad=0.0, seed=2, **sensor)
+            bench = EngineBench(pressure_noise_bar=0.1, soc_scatter_cad=0.0, seed=2, **off)
             settings = {"method": method, "uncertainty": uncertainty, "soc_scatter_cad": 0.0}
             guide = OnlineCalibration(Cylinder(wall_heat_scale=1.0), **settings)
             for _ in range(100):
                 bench.step(-6.0)
-                guide.offer(bench.pressure()[1], bench.point, -6.0 + told_late_cad)
+                guide.offer(bench.pressure()[1], OperatingPoint(), -6.0 + told_late_cad)
                 guide.update()
             row += [guide.parameters["wall_heat_scale"], guide.standard_errors["wall_heat_scale"]]
         rows[label] = row
