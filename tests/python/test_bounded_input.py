@@ -256,8 +256,8 @@ def test_units_with_a_degree_sign() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "said"),
     [
-        ("Cmd: 8 PC", "Cmd: 1000000 PC", "message 2566848766 Cmd has 1000000 bytes: a frame has 0 to 64"),
-        ("Cmd: 8 PC", "Cmd: 65 PC", "65 bytes"),
+        ("Cmd: 8 PC", "Cmd: 1000000 PC", "message 2566848766 Cmd has 1000000 bytes: a message has 0 to 1785"),
+        ("Cmd: 8 PC", "Cmd: 1786 PC", "1786 bytes"),
         ("2566848766 Cmd: 8 PC", "2566848766Cmd\n:1000000 PC", "1000000 bytes"),
         ("7|8@0+", "7|1000000000@0+", "signal Check has 1000000000 bits from bit 7"),
         ("7|8@0+", "1000000000|8@0+", "from bit 1000000000"),
@@ -273,6 +273,19 @@ def test_a_dbc_is_bounded_before_it_is_parsed(right: str, wrong: str, said: str,
     dbc = sample_file("dbc", tmp_path)
     dbc.write_text(dbc.read_text(encoding="utf-8").replace(right, wrong), encoding="utf-8")
     assert said in refused(DbcFile.read, dbc)
+
+
+def test_messages_in_several_frames_and_long_texts_of_a_dbc_stand_in_nobodys_way(tmp_path: Path) -> None:
+    """Databases of SAE J1939 hold some; who maps one is told."""
+    dbc = sample_file("dbc", tmp_path)
+    cmd, long = "BO_ 2566848766 Cmd", 'BO_ 2566850000 Faults: 200 PC\n SG_ Name : 0|1600@1+ (1,0) [0|0] "" PC\n\n'
+    dbc.write_text(dbc.read_text(encoding="utf-8").replace(cmd, long + cmd), encoding="utf-8")
+    read = DbcFile.read(dbc)
+    assert set(read.messages) == {"Cmd", "Answer", "Done", "Faults"}
+    assert read.messages["Cmd"].signals
+    assert not read.messages["Faults"].signals
+    with pytest.raises(DataError, match="Faults has 200 bytes: a frame has at most 64"):
+        read.message("Faults")
 
 
 def test_sizes_in_comments_and_texts_of_a_dbc_are_nobodys(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from file_mutants import judged, mutant_of_bytes, mutant_of_text
 from map_cases import timing_table
 from mgdd.identify import FirstPrincipleModel, load_throttle_model
 from mgdd.io import read_conditions
@@ -21,7 +22,6 @@ from mgdd.maps import CalibrationMap, read_map, write_map
 from mgdd.maps.cells import MapTask
 from mgdd.results.units import attribute_units
 from mgdd.throttle import PseudoWiener
-from mutants import judged, mutant_of_bytes, mutant_of_text
 from sample_files import CONDITIONS, SAMPLES, SLOW, sample_file
 
 FEW, MANY = 250, 5000

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from file_mutants import judged, mutant_of_bytes
 from mgdd.rig import read_record, repair_record
-from mutants import judged, mutant_of_bytes
 from recorded_rig import independent, write
 
 

@@ -44,7 +44,8 @@ inline constexpr std::size_t cov_window_cycles = 50;
 
 struct BenchSettings {
   engine::Cylinder cylinder{};
-  std::vector<ScheduledPoint> schedule{ScheduledPoint{}};  ///< first at cycle 0, cycles increasing, fuel > 0
+  /// First at cycle 0, cycles increasing, fuel > 0.
+  std::vector<ScheduledPoint> schedule = std::vector<ScheduledPoint>(1);
   double step_cad = engine::default_step_cad;
   engine::Integrator integrator = engine::Integrator::trapezoid;
 

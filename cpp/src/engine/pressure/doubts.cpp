@@ -187,7 +187,7 @@ void doubt_expansion(TraceAnalysis& a, const BurnWindow& burn) {
   const FreePolytrope free =
       free_polytrope(a.angle_cad, a.pressure_bar, a.volume_l, burn.end_cad + after_burn_cad, a.angle_cad.back());
   if (std::isnan(free.offset_bar)) return;
-  const double most = expansion_offset_high * a.pressure_bar.back() + free.offset_stderr_bar;
+  const double most = expansion_offset_high * a.pressure_bar.back() + 2.0 * free.offset_stderr_bar;
   if (free.offset_bar <= most) return;
   a.warnings.push_back({"expansion", "expansion follows p + " + shown(free.offset_bar) +
                                          " bar = C V^-n best, where sound traces give at most " + shown(most) +

@@ -28,6 +28,7 @@ _RANGE = re.compile(r"(\d+)\s*-\s*(\d+)")
 _LONG_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d{41,}|\d+\.?\d*[eE][-+]?\d{4,})")
 _QUOTED_NUMBER = re.compile(r'"\s*[-+\d._]+[eE][-+]?[\d_]{4,}\s*"')
 _BYTES, _BITS, _BRANCHES = 64, 64, 1 << 16  # of a CAN FD frame, of a signal, and values of all multiplexers together
+_PARTS_BYTES = 1785  # of a message in several frames, SAE J1939-21
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +98,7 @@ class DbcMessage:
     cycle_s : float or None
         Time between two frames [s]; None where it is sent on events.
     signals : mapping of str to DbcSignal
-        By name.
+        By name; without those longer than 64 bits, and none of a message in several frames.
     """
 
     name: str
@@ -140,7 +141,7 @@ class DbcFile:
         FileNotFoundError
             No such file.
         mgdd.errors.DataError
-            Not a DBC, overlapping signals, signals beyond their message, or a message beyond 64 bytes.
+            Not a DBC, overlapping signals, signals beyond their message, or a message beyond 1785 bytes.
         """
         cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
@@ -164,7 +165,13 @@ class DbcFile:
     def message(self, name: str) -> DbcMessage:
         """Return a message; DataError guesses which one was meant."""
         if name in self.messages:
-            return self.messages[name]
+            message = self.messages[name]
+            if message.size > _BYTES:
+                raise DataError(
+                    f"{self.file.name}: message {name} has {message.size} bytes: a frame has at most {_BYTES}, and "
+                    "what comes in several is not put together here; map another one"
+                )
+            return message
         raise DataError(f"{self.file.name} has no message {name!r}: {near(name, self.messages)}")
 
 
@@ -174,13 +181,15 @@ def _require_bounded(file: Path, text: str) -> None:
     if number := _LONG_NUMBER.search(plain) or _QUOTED_NUMBER.search(text):
         raise DataError(f"{file}: the number {number[0]} is beyond all signals: correct it")
     for name, size in _MESSAGE.findall(plain):
-        if "SG_" not in name and (not re.fullmatch(r"\d{1,2}", size) or int(size) > _BYTES):
-            raise DataError(f"{file}: message {name.strip()} has {size} bytes: a frame has 0 to {_BYTES}; correct it")
-    for name, start, length in _SIGNAL.findall(plain):
-        if int(length) > _BITS or int(start) >= 8 * _BYTES:
+        if "SG_" not in name and (not re.fullmatch(r"\d{1,4}", size) or int(size) > _PARTS_BYTES):
             raise DataError(
-                f"{file}: signal {name.strip()} has {length} bits from bit {start}: a signal has up to {_BITS}, "
-                f"a frame {8 * _BYTES}; correct it"
+                f"{file}: message {name.strip()} has {size} bytes: a message has 0 to {_PARTS_BYTES}; correct it"
+            )
+    for name, start, length in _SIGNAL.findall(plain):
+        if max(int(length), int(start) + 1) > 8 * _PARTS_BYTES:
+            raise DataError(
+                f"{file}: signal {name.strip()} has {length} bits from bit {start}: a message has up to "
+                f"{8 * _PARTS_BYTES}; correct it"
             )
     branches = 0
     for ranges in _RANGES.findall(plain):
@@ -208,7 +217,8 @@ def near(name: str, known: Mapping[str, Any]) -> str:
 
 
 def _message(file: Path, message: Any) -> DbcMessage:
-    signals = {signal.name: _signal(signal) for signal in message.signals}
+    whole = [] if message.length > _BYTES else message.signals
+    signals = {signal.name: _signal(signal) for signal in whole if signal.length <= _BITS}
     selecting = [signal.name for signal in signals.values() if signal.multiplexer]
     if len(selecting) > 1:
         raise DataError(

@@ -1,5 +1,5 @@
-// The scale of J, from readings about the start, for a seeker whose gain the user leaves open: start, `reach` c above it,
-// start, c below it, per input, six times over. Their slope, bend and scatter give the curvature to reckon with,
+// The scale of J, from readings about the start, for a seeker whose gain the user leaves open: start, `reach` c above
+// it, start, c below it, per input, six times over. Their slope, bend and scatter give the curvature to reckon with,
 //   |J''| = max(share sigma/c^2, measured |J''| less 1.5 standard errors, slope/(20 c)),
 // so that gains made of it lead along the same path when J is told in another unit. noexcept and allocation-free.
 #pragma once
