@@ -127,6 +127,8 @@ def test_bad_options_are_refused(argv: tuple[str, ...], message: str, capsys: py
         ("time_s,duty\n0,0\n0.001,0.1\n", ("--sample-s", "1"), "--sample-s goes with --duty"),
         ("0,0\n0.001,0.1\n", (), "no header: name the columns, at least time_s,duty"),
         ("time_s,u\n0,0\n0.001,0.1\n", (), "no column 'duty': the header has 'time_s', 'u'"),
+        ("time_s,duty\nms,-\n0,0\n1,0.1\n", (), "in.csv, column 'time_s': unit 'ms': must be 's'; convert the values"),
+        ("time_s,duty\ns,%\n0,0\n1,0.1\n", (), "in.csv, column 'duty': unit '%': must be '-'; convert the values"),
         ("time_s,duty\n0,0\n0.001,x\n", (), "line 3, column 'duty': 'x' is not a number"),
         ("time_s,duty\n0,0\n0.001,\n", (), "line 3, column 'duty': the cell is empty"),
         (

@@ -100,6 +100,7 @@ def _from_file(args: argparse.Namespace) -> dict[str, Any]:
     header = table.header
     if header is None:
         raise DataError(f"{args.input}: no header: name the columns, at least time_s,duty")
+    table.require_units_of_names()
     out: dict[str, Any] = {name: table.numbers(table.index(name)) for name in ("time_s", "duty")}
     for name, option in _SIGNALS.items():
         value = getattr(args, name)

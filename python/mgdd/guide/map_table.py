@@ -25,7 +25,6 @@ __all__ = ["SETTINGS", "read_map_table", "write_map_table"]
 SETTINGS = {"prior_sd_cad": 3.0, "forgetting": 0.95}  # of a map where nothing is said
 _CELLS = {"timing_cad": (-180.0, 180.0), "sd_cad": (0.0, math.inf), "support": (0.0, math.inf)}
 _KNOWN = (*_CELLS, *SETTINGS, "source")
-_ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 
 
 def write_map_table(dataset: xr.Dataset, path: str | os.PathLike[str], source: ArrayLike) -> None:
@@ -92,12 +91,7 @@ def _names(table: TextTable) -> tuple[str, ...]:
         near = did_you_mean("timing_cad", table.header)
         had = ", ".join(map(repr, table.header))
         raise DataError(f"{table.source}: no column 'timing_cad': the header has {had}; {near or 'add the timings'}")
-    for name in table.header:
-        said, unit = table.unit(table.index(name)), unit_of(name)
-        if said in (None, "", "-", unit) or name == "source" or (unit in _ANGLES and said in _ANGLES):
-            continue
-        remedy = "convert the values, units stand in the names"
-        raise DataError(f"{table.source}, column {name!r}: unit {said!r}: must be {unit!r}; {remedy}")
+    table.require_units_of_names("source")
     return table.header
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.plain_text import read_plain_text
+from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     import os
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TextTable", "parse_number", "read_table"]
 
+_ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
 
 
@@ -69,6 +71,17 @@ class TextTable:
         if self.units is None or index >= len(self.units):
             return None
         return self.units[index].strip("[]() ")
+
+    def require_units_of_names(self, *texts: str) -> None:
+        """Refuse a units row that contradicts the names, which say the units; columns of `texts` have none."""
+        for name in self.header or ():
+            said, unit = self.unit(self.index(name)), unit_of(name)
+            if said in (None, "", "-", unit) or name in texts or (unit in _ANGLES and said in _ANGLES):
+                continue
+            raise DataError(
+                f"{self.source}, column {name!r}: unit {said!r}: must be {unit!r}; convert the values, units stand in "
+                "the names"
+            )
 
     def called(self, index: int) -> str:
         """Return what a message calls a column: its name in the header, or its number."""
