@@ -49,6 +49,7 @@ TEST(OnlineCalibrationLoop, FollowsAnEngineThatSeeks) {
       OnlineCalibration calibration(g);
       optimize::ExtremumSeekingSettings seeking;
       seeking.space = {optimize::scalar_input(-15.0), optimize::scalar_input(-30.0), optimize::scalar_input(10.0)};
+      seeking.curvature = -0.051;
       optimize::ExtremumSeeking seeker(seeking);
       int late = 0;
       for (int k = 0; k < 300; ++k) {
