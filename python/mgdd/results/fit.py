@@ -216,8 +216,6 @@ class Fit:
         """
         import xarray as xr
 
-        from mgdd.io.netcdf_file import write_netcdf
-
         dataset = self.report.to_dataset()
         for name in self.__dataclass_fields__:
             if isinstance(own := getattr(self, name), xr.Dataset):
@@ -231,7 +229,7 @@ class Fit:
             for name, value in self.to_dict().items()
             if value is not None
         }
-        write_netcdf(dataset, path)
+        dataset.to_netcdf(path, engine="scipy")
 
     def to_toml(self) -> str:
         """Write the model as TOML with the standard errors, the quality and the name of the record.

@@ -72,7 +72,7 @@ class Reception:
             message = self._next(timeout_s)
         if message is None:
             return None
-        if not message.is_rx or (self._echoes is not None and self._echoes.take(message)):
+        if self._is_own(message):
             self.counts["own"] += 1
             return None
         try:
@@ -80,6 +80,12 @@ class Reception:
         except DataError:
             self.counts["malformed"] += 1
             return None
+
+    def _is_own(self, message: can.Message) -> bool:
+        if self._echoes is not None and self._echoes.take(message):
+            return True
+        # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
+        return not message.is_rx and self._interface != "socketcan"
 
     def _arrival_ns(self, stamp_s: float) -> int:
         now_ns = time.monotonic_ns()
