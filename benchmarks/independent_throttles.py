@@ -8,9 +8,12 @@ excitation log (8.3 s across limp-home: levels, then a chirp) and a fresh log of
 told. Every fit is a call of `identify_throttle` with its own defaults; one row of PW-R also asks for a set per side and
 for delays of 0 to 5 samples.
 
-Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval of delay, lag, preloads and
-springs holds the true value, processor seconds. First the package's groups at the true values must
-follow the fresh logs of the undelayed Coulomb bodies: otherwise truths and estimates do not mean the same.
+Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval of delay, time constant, gain,
+lag, preloads and springs holds the true value and how wide it is, whether the finding ``below_ceiling`` is given where
+the fit misses its own log by more than the noise that was added to it, processor seconds. First the package's groups at
+the true values must follow the fresh logs of the undelayed Coulomb bodies: otherwise truths and estimates do not mean
+the same. Time constant and gain are those of a plate that moves with its motor: all inertia, all viscous damping; with
+a gap, while it is closed.
 """
 
 from __future__ import annotations
@@ -46,6 +49,8 @@ CALLS: dict[str, dict[str, Any]] = {
 }
 TRUTHS = {  # shown name: truth's name, then the names that fits use
     "delay": ("delay_samples", "delay_samples"),
+    "time constant": ("tau_s", "tau_s"),
+    "gain": ("gain_deg_per_s2_per_duty", "gain_deg_per_s2_per_duty"),
     "lag": ("electrical_s", "electrical_s"),
     "preload above": ("beta_above_duty", "beta_above_duty", "above_preload_duty"),
     "preload below": ("beta_below_duty", "beta_below_duty", "below_preload_duty"),
@@ -53,6 +58,7 @@ TRUTHS = {  # shown name: truth's name, then the names that fits use
     "spring below": ("kappa_below_duty_per_deg", "kappa_below_duty_per_deg", "below_spring_duty_per_deg"),
 }
 LOWEST_PERCENT = 98.0  # of the groups at the truth
+MISSED_POINTS = 3.0  # below what the noise that was added would leave
 
 
 def check_agreement(bodies: list[tuple[Body, Any, Any]]) -> None:
@@ -84,8 +90,10 @@ def identify(body: Body, train: Any, test: Any, call: dict[str, Any]) -> dict[st
                 "value": fit.parameters[name], "stderr": fit.stderr[name], "truth": truths[truth],
                 "interval": intervals[name],
             }  # fmt: skip
-    assert fit.test is not None  # noqa: S101
+    assert fit.test is not None and fit.train is not None  # noqa: S101, PT018
     return {
+        "missed_points": ceiling_of(body, train) - float(fit.train.nrmse_fit_percent or -math.inf),
+        "doubted": "below_ceiling" in {finding.code for finding in fit.findings},
         "percent": fit.test.nrmse_fit_percent,
         "kind": fit.kind,
         # What was not searched was not found.
@@ -96,6 +104,12 @@ def identify(body: Body, train: Any, test: Any, call: dict[str, Any]) -> dict[st
         "estimates": estimates,
         "seconds": seconds,
     }
+
+
+def ceiling_of(body: Body, log: Any) -> float:
+    """Return what noise and converter leave of the fit of a perfect model [%]."""
+    noise = math.hypot(body.noise_deg, body.converter_deg / math.sqrt(12.0))
+    return 100.0 * (1.0 - noise / float(log["angle_deg"].std()))
 
 
 def fit_figures(rows: list[dict[str, Any]]) -> str:
@@ -110,7 +124,11 @@ def covered(rows: list[dict[str, Any]], shown: str) -> str:
     inside = sum(one["interval"][0] <= one["truth"] <= one["interval"][1] for one in own)
     error = statistics.median(abs(one["value"] / one["truth"] - 1.0) if one["truth"] else 0.0 for one in own)
     apart = statistics.median(abs(one["value"] - one["truth"]) / one["stderr"] for one in own)
-    return f"{inside} of {len(own)} ({100 * error:.2g} %, {apart:.2g} standard errors)"
+    half = statistics.median(
+        0.5 * (one["interval"][1] - one["interval"][0]) / (1.0 if shown == "delay" else one["truth"]) for one in own
+    )
+    width = f"half width {half:.2g} samples" if shown == "delay" else f"half width {100 * half:.2g} %"
+    return f"{inside} of {len(own)} ({100 * error:.2g} %, {apart:.2g} standard errors, {width})"
 
 
 def lag_error_by_delay(rows: list[dict[str, Any]]) -> str:
@@ -131,10 +149,15 @@ def report(name: str, rows: dict[str, list[dict[str, Any]]]) -> None:
     told = [row for row in everything if row.get("delay") is not None]
     found = sum(row["delay"] == row["delay_truth"] for row in told)
     print(f"  delay found: {f'{found} of {len(everything)}' if told else 'not estimated'}")
-    print("  95 % intervals that hold the truth (median error), Coulomb | all:")
+    print("  95 % intervals that hold the truth (median error, median half width):")
+    gap, others = rows.get("backlash", []), [row for family, own in rows.items() if family != "backlash" for row in own]
     for shown in TRUTHS:
-        if (text := covered(everything, shown)) != "-":
-            print(f"    {shown:14s} {covered(rows.get('coulomb', []), shown)} | {text}")
+        if covered(everything, shown) != "-":
+            print(f"    {shown:14s} without a gap {covered(others, shown)} | with {covered(gap, shown)}")
+    far = [row["doubted"] for row in everything if row.get("missed_points", 0.0) > MISSED_POINTS]
+    near = [row["doubted"] for row in everything if row.get("missed_points", math.inf) <= MISSED_POINTS]
+    counts = f"{sum(far)} of {len(far)} that miss {MISSED_POINTS:g} points, {sum(near)} of {len(near)} others"
+    print(f"  below_ceiling: {counts}")
     if text := lag_error_by_delay(everything):
         print(f"  lag minus truth [ms] by the true delay, median (bodies): {text}")
     seconds = [row["seconds"] for row in everything]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from mgdd import _core
 from mgdd.errors import Interrupted, hand_over
 from mgdd.identify.starts import spread_starts
-from mgdd.identify.throttle.damping_share import SHARE, TYPICAL_SHARE, with_unknown_share
 from mgdd.identify.throttle.delay_report import delay_at_end, with_delay
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
@@ -25,7 +24,14 @@ from mgdd.identify.throttle.hunt import (
     independent_samples,
     missed,
     names_of,
-    noise_of,
+)
+from mgdd.identify.throttle.noise_ceiling import below_ceiling, noise_of
+from mgdd.identify.throttle.nuisances import (
+    SHARE,
+    TYPICAL_SHARE,
+    delay_weights,
+    independent_values,
+    with_nuisances,
 )
 from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
@@ -109,8 +115,11 @@ def fit_groups(
             found = hunt.fine(found.values, list(dict.fromkeys([*names_of(found), *STOPS])))
         findings = _told(found, terms, by_delay, delays)
         report = FitReport.from_core(found.report, problem.angle)
-        if LAG in terms and SHARE not in known:
-            report = with_unknown_share(hunt, found, report)
+        n = independent_values(problem, report)
+        weights = delay_weights(by_delay.rivals, found.values["delay_samples"], n)
+        report = with_nuisances(
+            problem, found.values, report, substeps=FINE, share_known=SHARE in known, delays=weights
+        )
     except Interrupted as stop:
         if hunt.best is None:
             raise
@@ -120,19 +129,19 @@ def fit_groups(
             report = FitReport.from_core(found.report, problem.angle)
     if by_delay is not None and len(by_delay.rmse) > 1:
         kept = found.values["delay_samples"]
-        alike = dict.fromkeys(by_delay.ties, by_delay.rmse[kept])
-        report = with_delay(report, kept, {**by_delay.rmse, **alike}, independent_samples(found), delays)
+        report = with_delay(report, kept, by_delay.rivals, independent_values(problem, report), delays)
     model = FirstPrincipleModel(
         parameters=found.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=FINE, sample_s=problem.step_s
     )
     run = free_run(model, log)
+    train = quality_of([run])
     fit = Fit(
         report=report,
         model=model,
         kind=model.kind,
-        train=quality_of([run]),
+        train=train,
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
-        findings=(*problem.findings, *report.findings, *findings),
+        findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)),
         source=source_of(log),
         start_rmse=tuple(sorted(one.rmse for one in hunt.done)),
         n_best=sum(one.rmse <= 1.005 * found.rmse for one in hunt.done),

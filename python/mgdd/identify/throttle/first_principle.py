@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,8 @@ from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrinc
 from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
 from mgdd.identify.throttle.first_principle_start import group_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.noise_ceiling import below_ceiling
+from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.results import Finding, Fit, FitReport
@@ -67,7 +70,8 @@ def fit_first_principle(
         Groups that are known and not estimated.
     free : sequence of str, optional
         Further groups to estimate: ``electrical_s ramp_deg stribeck_drop stribeck_deg_per_s presliding_deg
-        presliding_damping half_gap_deg delay_samples``. Otherwise they keep their start values.
+        presliding_damping half_gap_deg delay_samples viscous_share``. Otherwise they keep their start values; with a
+        lag ``viscous_share`` is 0.25 where it is not given, and its range counts in the errors.
     closed_deg, open_deg : float
         Mechanical stops [deg].
     options : FitOptions, optional
@@ -110,7 +114,10 @@ def fit_first_principle(
     True
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
+    share_known = any(SHARE in given for given in (start_values or {}, fixed or {}, free))
     problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed, stops_deg=(closed_deg, open_deg))
+    if not share_known and ("electrical_s" in problem.free or problem.values["electrical_s"] > 0.0):
+        problem = dataclasses.replace(problem, values={**problem.values, SHARE: TYPICAL_SHARE})
     if whole_shift(problem.values["delay_samples"]):
         text = "within [0, 5] here; identify_throttle(log, 'first_principle') knows delays of up to 20 samples"
         raise ParameterError.of("delay_samples", problem.values["delay_samples"], text)
@@ -171,15 +178,17 @@ def fit_first_principle(
         )
         text = "physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items())
         findings.append(Finding("physical_parameters", tuple(physical), text))
+    report = with_nuisances(problem, model.parameters, report, substeps=SUBSTEPS, share_known=share_known)
     run = free_run(model, log)
+    train = quality_of([run])
     fit = Fit(
         report=report,
         model=model,
         kind=model.kind,
-        train=quality_of([run]),
+        train=train,
         test=None if test is None else quality_of([free_run(model, test)]),
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
-        findings=tuple(findings),
+        findings=(*findings, *below_ceiling([log], train)),
         source=source_of(log),
         start_rmse=tuple(sorted(map(float, errors))),
         n_best=n_reached,

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.errors import Interrupted
 from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 __all__ = [
     "AT_NOISE",
@@ -28,7 +24,6 @@ __all__ = [
     "independent_samples",
     "missed",
     "names_of",
-    "noise_of",
 ]
 
 # Steps per sample of the look at bristles, and of what is handed over.
@@ -39,7 +34,6 @@ AT_NOISE = 1.05  # a residual that small leaves nothing to explain
 WORTH = 0.99  # what explains less than a hundredth of the error is left out, however certain it is
 # What a search has found absent begins here in the next, not where one begins that was never searched.
 _ABSENT = {"electrical_s": 1e-4, "stribeck_drop": 1e-3, "delay_samples": 1e-3, "half_gap_deg": 1e-3}
-_LEAST_FOUR_FIFTHS = 0.4377  # mean square of the least four fifths of a normal variable, over its variance
 FLOOR_DEG = 5e-3  # a 14-bit converter steps by as much: a residual below it is as good as any
 
 
@@ -85,17 +79,6 @@ def independent_samples(found: Search) -> float:
     """Return how many independent samples the residual is worth: samples over its integrated correlation time."""
     residual = np.asarray(found.report.residual)
     return residual.size / _core.optimize.autocorrelation_time(residual)
-
-
-def noise_of(angle: NDArray[np.float64]) -> float:
-    """Return the standard deviation of white noise on an angle, from its second differences, which motion hardly has.
-
-    The mean square of the smaller four fifths, over what it is of a normal distribution: a median would be a whole
-    number of steps of the converter.
-    """
-    second = np.sort(np.abs(np.diff(angle, 2)))
-    least = second[: max(4 * second.size // 5, 1)]
-    return float(np.sqrt(np.mean(least**2) / (_LEAST_FOUR_FIFTHS * 6.0)))
 
 
 def missed(smaller: Search, larger: Search, size: int, n: float) -> bool:

@@ -11,7 +11,6 @@ from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle_problem import shows_limp_home
 from mgdd.identify.throttle.fits import CHOICES, PSEUDO_WIENER, check_kind, fit_kind
 from mgdd.identify.throttle.free_run import free_run, quality_of
-from mgdd.identify.throttle.hunt import noise_of
 from mgdd.identify.throttle.limp_home import doubts, read_off, stuck_elsewhere
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["identify_throttle"]
 
 _LOST_PERCENT = 10.0
-_MISSED_PERCENT = 3.0  # points of the fit below what noise alone would leave
 _SIDE_DEG = 2.0
 _PLATEAU_DEG, _PLATEAU_VISITS = 0.4, 3
 
@@ -134,26 +132,8 @@ def identify_throttle(
     if limp_home_deg is None:
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    missed = _below_ceiling(log, fit.train)
-    findings = unique((*own, *missed, *_carried_over(fit.train, tested), *read, *stops, *asked))
+    findings = unique((*own, *_carried_over(fit.train, tested), *read, *stops, *asked))
     return dataclasses.replace(fit, test=tested, findings=findings)
-
-
-def _below_ceiling(log: xr.Dataset, train: FitQuality | None) -> tuple[Finding, ...]:
-    """Report a fit that misses far more of its own log than the noise of the angle."""
-    own = None if train is None else train.nrmse_fit_percent
-    if own is None:
-        return ()
-    angle = log["angle_deg"].to_numpy()
-    ceiling = 100.0 * (1.0 - noise_of(angle) / float(np.std(angle)))
-    if ceiling - own <= _MISSED_PERCENT:
-        return ()
-    text = (
-        f"the fit meets its own log at {own:.1f} %, and the noise of the angle alone would leave {ceiling:.1f} %: the "
-        "plate does what the model does not have, and the intervals hold for the model only"
-    )
-    remedy = "compare with the other kinds of model, look at the residuals, and check the stops and the log"
-    return (Finding("below_ceiling", (), text, remedy),)
 
 
 def _carried_over(train: FitQuality | None, test: FitQuality | None) -> tuple[Finding, ...]:

@@ -12,6 +12,7 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError, hand_over, or_partial
 from mgdd.identify.throttle.delay_report import delay_at_end
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
 from mgdd.signals.even_grid import common_step
@@ -146,13 +147,14 @@ def fit_pseudo_wiener(
     if kind == "pw_r" and sides == "shared":
         text = "one set of values serves both sides of limp-home"
         found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
+    train = quality_of(runs)
     fit = Fit(
         report=wrapped,
         model=model,
         kind=kind,
-        train=quality_of(runs),
+        train=train,
         unidentifiable=wrapped.unidentifiable,
-        findings=tuple(found),
+        findings=(*found, *below_ceiling(logs, train)),
         source=source_of(logs[0]),
         start_rmse=tuple(errors.tolist()),
         n_best=int(n_best),

@@ -21,8 +21,8 @@ from mgdd.identify.throttle.hunt import (
     Hunt,
     best_of,
     names_of,
-    noise_of,
 )
+from mgdd.identify.throttle.noise_ceiling import noise_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,6 +45,11 @@ class Delays:
     found: Search
     rmse: Mapping[float, float]
     ties: tuple[float, ...]
+
+    @property
+    def rivals(self) -> dict[float, float]:
+        """Errors by delay [deg], equals with that of the delay taken."""
+        return {**self.rmse, **dict.fromkeys(self.ties, self.rmse[self.found.values["delay_samples"]])}
 
 
 def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
