@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,21 +68,44 @@ def test_an_independent_throttle_is_followed_on_a_fresh_log(family: str, seed: i
     if family == "lugre":
         bent = np.degrees(body.coulomb_nm / body.bristle_nm_per_rad)
         assert fit.parameters["presliding_deg"] == pytest.approx(bent, rel=0.1)
+    if family == "coulomb":  # asked for, the groups are those that the choice has kept, errors included
+        asked = identify_throttle(train, "first_principle", closed_deg=body.closed_deg, open_deg=body.open_deg)
+        np.testing.assert_array_equal(asked.report.covariance, fit.report.covariance)
     file = tmp_path / "fit.toml"
     file.write_text(fit.to_toml(), encoding="utf-8")
     assert load_throttle_model(file) == fit.model
 
 
-@pytest.mark.parametrize("seed", one_of(8, 4, 7))
-def test_intervals_hold_the_lag_and_what_few_samples_below_limp_home_show(seed: int) -> None:
-    body = draw_body("coulomb", seed)
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    one_of(("coulomb", 8), ("coulomb", 4), ("coulomb", 7), ("lugre", 101), ("lugre", 4), ("backlash", 1)),
+)
+def test_intervals_hold_what_is_fixed_or_missed_and_what_few_samples_below_limp_home_show(
+    family: str, seed: int
+) -> None:
+    body = draw_body(family, seed)
     train, _ = (throttle_log(*log) for log in make_logs(body, seed))
     fit = identify_throttle(train, "first_principle", closed_deg=body.closed_deg, open_deg=body.open_deg)
     intervals, truth = fit.report.interval(), body.groups()
-    for name in ("tau_s", "electrical_s", "beta_below_duty", "kappa_below_duty_per_deg"):
+    names = ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s", "beta_below_duty", "kappa_below_duty_per_deg")
+    for name in names:
         assert intervals[name][0] <= truth[name] <= intervals[name][1], name
-    assert intervals["electrical_s"][1] < 1.05 * truth["electrical_s"]
+    assert intervals["tau_s"][1] < {"coulomb": 1.04, "lugre": 1.1, "backlash": 1.3}[family] * truth["tau_s"]
+    if family == "coulomb":
+        assert intervals["electrical_s"][1] < 1.05 * truth["electrical_s"]
     assert fit.parameters["viscous_share"] == 0.25
+    assert "below_ceiling" not in {finding.code for finding in fit.findings}
+
+
+@pytest.mark.slow
+def test_an_independent_throttle_that_the_groups_do_not_describe_is_doubted() -> None:
+    """Bristles that bend by degrees: 87 % of the log, where its noise would leave 99.8."""
+    body = draw_body("lugre", 1)
+    body = replace(body, bristle_nm_per_rad=0.02 * body.bristle_nm_per_rad, static_nm=1.9 * body.coulomb_nm)
+    train, _ = (throttle_log(*log) for log in make_logs(body, 5))
+    fit = identify_throttle(train, closed_deg=body.closed_deg, open_deg=body.open_deg)
+    assert fit.train.nrmse_fit_percent < 96.0
+    assert "would leave 99.8 %" in said(fit, "below_ceiling")
 
 
 @pytest.mark.slow

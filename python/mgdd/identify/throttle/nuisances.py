@@ -28,7 +28,7 @@ SHARE, _DELAY = "viscous_share", "delay_samples"
 _SHARES = (0.0, 0.5)
 TYPICAL_SHARE = 0.5 * sum(_SHARES)
 _START = ("start_angle_deg", "start_speed_deg_per_s")  # as the core names them in a report
-_STEP = 2e-3  # of a difference, over the value or what is usual
+_STEP = 5e-3  # of a difference, over the value or what is usual
 _USUAL = {
     "limp_home_deg": 5.0, "electrical_s": 5e-4, "stribeck_drop": 0.05, "presliding_damping": 0.3, "half_gap_deg": 0.1,
     SHARE: 0.3, _DELAY: 1.0, "start_angle_deg": 5.0, "start_speed_deg_per_s": 10.0,
