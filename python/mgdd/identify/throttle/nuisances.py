@@ -71,7 +71,7 @@ def with_nuisances(
 
     References
     ----------
-    Schmidt (1966), Künsch (1989); Buckland et al. (1997) for the weights of rivals.
+    Schmidt (1966), Kuensch (1989); Buckland et al. (1997) for the weights of rivals.
     """
     known = np.flatnonzero(np.isfinite(report.stderr))
     if known.size == 0:
