@@ -124,7 +124,7 @@ TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
   FirstReadings flat(scalar_input(1.0), 0.4, true);
   EXPECT_EQ(bend_of(flat, 0.0, 0.0, 0.0, 0.0, 1), 0.0);
   EXPECT_TRUE(flat.open());
-  FirstReadings known(scalar_input(1.0), 0.4, true, -0.7);
+  const FirstReadings known(scalar_input(1.0), 0.4, true, -0.7);
   EXPECT_FALSE(known.open());
   EXPECT_EQ(known.largest_bend(), 0.7);
 }

@@ -112,9 +112,9 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
   };
   EXPECT_FALSE(made(SpsaForm::first_order).gain || made(SpsaForm::one_measurement).gain);
   EXPECT_EQ(made(SpsaForm::second_order).gain, 3.0);
-  EXPECT_DOUBLE_EQ(*made(SpsaForm::first_order).step_max, 1.2);
-  EXPECT_DOUBLE_EQ(*made(SpsaForm::second_order).step_max, 1.2);
-  EXPECT_DOUBLE_EQ(*made(SpsaForm::one_measurement).step_max, 0.18);
+  EXPECT_DOUBLE_EQ(made(SpsaForm::first_order).step_max.value_or(0.0), 1.2);
+  EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max.value_or(0.0), 1.2);
+  EXPECT_DOUBLE_EQ(made(SpsaForm::one_measurement).step_max.value_or(0.0), 0.18);
 }
 
 TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {

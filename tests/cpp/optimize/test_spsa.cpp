@@ -226,7 +226,7 @@ TEST(Spsa, RefusesAndAdvises) {
   EXPECT_TRUE(s.advice().empty());
   s.gain.reset();  // made of the curvature
   EXPECT_TRUE(s.advice().empty());
-  EXPECT_DOUBLE_EQ(*Spsa(s).gain(), 1.0 / std::abs(bend));
+  EXPECT_DOUBLE_EQ(Spsa(s).gain().value_or(0.0), 1.0 / std::abs(bend));
 }
 
 }  // namespace

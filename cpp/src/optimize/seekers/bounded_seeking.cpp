@@ -101,7 +101,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
     }
     estimate_ /= static_cast<double>(period);
   }
-  const double phase_per_j = *kappa();
+  const double phase_per_j = kappa().value_or(0.0);
   const Inputs largest = settings_.dither.amplitude.cwiseProduct(omega_);
   Inputs step(n);
   for (Eigen::Index i = 0; i < n; ++i)

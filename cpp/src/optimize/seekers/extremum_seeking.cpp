@@ -94,7 +94,7 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
-      held_(*settings_.hold_cycles),
+      held_(settings_.hold_cycles.value_or(0)),
       mean_(component_count(), 0.0),
       sum_(gradient_),
       smooth_(gradient_),
@@ -248,7 +248,7 @@ void ExtremumSeeking::end_of_window() noexcept {
 void ExtremumSeeking::restart() noexcept {
   seen_ = 0;
   phase_ = 0;
-  held_ = *settings_.hold_cycles;
+  held_ = settings_.hold_cycles.value_or(0);
   share_ = 1.0;
   smooth_.setZero();
   slow_.setZero();

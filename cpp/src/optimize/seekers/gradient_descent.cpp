@@ -90,7 +90,7 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   if (++stage_ < 2 * estimate_.size()) return status;
   stage_ = 0;
   clamp_.close_window();
-  const double moved = move(*step_size() * gradient_);
+  const double moved = move(step_size().value_or(0.0) * gradient_);
   ++iteration_;
   if (converged_at_ < 0 && iteration_ <= settings_.iterations && moved < settings_.tolerance) {
     converged_at_ = iteration_;

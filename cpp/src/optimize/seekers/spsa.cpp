@@ -143,7 +143,7 @@ std::optional<double> Spsa::gain() const noexcept {
 }
 
 double Spsa::gain_now() const noexcept {
-  const double first = *gain();
+  const double first = gain().value_or(0.0);
   if (settings_.schedule == GainSchedule::constant) return first;
   return first / std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
 }
@@ -288,7 +288,7 @@ void Spsa::finish_iteration() noexcept {
     if (!settings_.limits.empty()) metric_ = bent.solve(InputMatrix::Identity(direction.size(), direction.size()));
   }
   Inputs step = gain_now() * share_ * share_ * direction;
-  const Inputs most = Inputs::Constant(step.size(), *settings_.step_max);
+  const Inputs most = Inputs::Constant(step.size(), settings_.step_max.value_or(unlimited));
   const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
   const Inputs widest = Inputs::Constant(step.size(), settings_.perturbation * (second ? 2.0 : 1.0));
   step = filter_.project(estimate_, step, {settings_.space, widest, reach, most, most, metric_});

@@ -80,8 +80,8 @@ class CausingInputs {
     double delay() const noexcept { return static_cast<double>(whole) + fraction; }
   };
   struct Source {
-    std::int64_t first, count, taken;  // its paths, one per delay, and which of them is taken
-    double judged = 0.0;               // readings behind `error`
+    std::int64_t first = 0, count = 0, taken = 0;  // its paths, one per delay, and which of them is taken
+    double judged = 0.0;                           // readings behind `error`
   };
   const Path& path(std::size_t i) const noexcept {
     return paths_[static_cast<std::size_t>(sources_[i].first + sources_[i].taken)];
