@@ -162,7 +162,7 @@ double CurveBank::noise_guess(const Prior& prior, std::size_t k) const noexcept 
 // Between two looks at everything only the places that may count are looked at.
 void CurveBank::find_places(double total) noexcept {
   const auto counts = [&](std::int64_t i) {
-    return share_[i] + share_[i + places] + share_[i + 2 * places] > negligible_place * total;
+    return share_[i] + share_[i + places] + share_[i + std::int64_t{2} * places] > negligible_place * total;
   };
   from_ = 0;
   to_ = places;

@@ -52,7 +52,8 @@ Figures figures_of(const Plant& plant) {
       EXPECT_EQ(seeker.tell({j, {}, false}), optimize::TellStatus::accepted);
       const double off = seeker.estimate()[0] - best;
       if (k < 100) out.early_loss -= share * plant.drop(asked - best);
-      if (k >= plant.cycles / 2) out.late_loss -= share * plant.drop(asked - best) / (plant.cycles - plant.cycles / 2);
+      const int half = plant.cycles / 2;
+      if (k >= half) out.late_loss -= share * plant.drop(asked - best) / (plant.cycles - half);
       at_bound = at_bound || (k > 30 && std::abs(seeker.estimate()[0]) > 19.5);
       if (k < 200 || k % 20 > 0 || seeker.handed_over()) continue;
       inside += std::abs(off) <= 1.96 * seeker.estimate_sd() ? 1.0 : 0.0;

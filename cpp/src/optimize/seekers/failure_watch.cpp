@@ -47,7 +47,7 @@ const Inputs& FailureWatch::pass(const Inputs& input) noexcept {
   probe_ = -1;
   differs_ = false;
   sent_ = input;
-  return input;
+  return input;  // NOLINT(bugprone-return-const-ref-from-parameter)
 }
 
 Inputs FailureWatch::keep(const Inputs& input) const noexcept {
@@ -82,7 +82,7 @@ const Inputs& FailureWatch::admit(const Inputs& wanted) noexcept {
     }
   }
   differs_ = sent_ != wanted;
-  return differs_ ? sent_ : wanted;
+  return differs_ ? sent_ : wanted;  // NOLINT(bugprone-return-const-ref-from-parameter)
 }
 
 void FailureWatch::worked() noexcept {
