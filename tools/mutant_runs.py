@@ -14,6 +14,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
@@ -186,6 +187,7 @@ class Cpp:
                 "cmake", "-S", "..", "-B", ".", "-G", "Ninja", "-DMGDD_BUILD_TESTS=ON", "-DMGDD_UNITY=OFF",
                 "-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1 -w -D_GLIBCXX_ASSERTIONS",
                 "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
+                f"-DPython_EXECUTABLE={sys.executable}", f"-DCMAKE_PREFIX_PATH={sysconfig.get_path('purelib')}",
                 *([f"-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}"] if launcher else []),
             ],
             self._build,

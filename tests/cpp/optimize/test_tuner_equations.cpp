@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "mgdd/optimize/seekers/tuner.hpp"
 
@@ -27,6 +28,10 @@ struct Dithered {
   double tau_least, gain, phase;  // of the sensor at the dither
 };
 
+double told(std::optional<double> wish) {
+  return wish.value_or(std::nan(""));
+}
+
 void expect_dithered(const TuningSpec& w, const Dithered& known) {
   const Tuning t = tune(w);
   const bool batch = w.method == TunedMethod::batch;
@@ -36,20 +41,21 @@ void expect_dithered(const TuningSpec& w, const Dithered& known) {
   EXPECT_NEAR(t.sensor_gain, known.gain, 1e-9);
   EXPECT_NEAR(t.sensor_phase_rad, known.phase, 1e-9);
   const double echo = w.compensated ? known.gain : known.gain * std::cos(known.phase);
-  const double decades = std::log(*w.distance / *w.arrival);
-  const double tau = std::max(known.tau_least, (0.85 * *w.cycles - known.period) / decades);
+  const double decades = std::log(told(w.distance) / told(w.arrival));
+  const double tau = std::max(known.tau_least, (0.85 * told(w.cycles) - known.period) / decades);
   EXPECT_NEAR(t.time_constant_cycles, tau, 1e-9);
   const double stepping = batch ? std::sqrt(1.0 - known.period / (2.0 * tau)) : 1.0;
   const double unit = w.noise_sd / (echo * bend * std::sqrt(tau) * stepping);  // rms at an amplitude of one
-  EXPECT_NEAR(t.amplitude, std::min(*w.amplitude_max, unit / *w.rms), 1e-9);
+  EXPECT_NEAR(t.amplitude, std::min(told(w.amplitude_max), unit / told(w.rms)), 1e-9);
   EXPECT_NEAR(t.rms, unit / t.amplitude, 1e-9);
   EXPECT_NEAR(t.gain, 2.0 / (t.amplitude * bend * tau) / (w.compensated ? 1.0 : echo), 1e-9);
   EXPECT_NEAR(t.rate, (batch ? 1.0 : 3.0) * t.amplitude / known.period, 1e-12);
-  const double linear = std::clamp(t.rate * tau, *w.arrival, *w.distance);
-  EXPECT_NEAR(t.cycles, known.period + (*w.distance - linear) / t.rate + tau * std::log(linear / *w.arrival), 1e-9);
+  const double linear = std::clamp(t.rate * tau, told(w.arrival), told(w.distance));
+  EXPECT_NEAR(t.cycles, known.period + (told(w.distance) - linear) / t.rate + tau * std::log(linear / told(w.arrival)),
+              1e-9);
   EXPECT_NEAR(t.dither_cost, 0.5 * bend * 0.5 * t.amplitude * t.amplitude, 1e-12);
   EXPECT_NEAR(t.jitter_cost, 0.5 * bend * t.rms * t.rms, 1e-12);
-  EXPECT_EQ(t.met, t.rms <= *w.rms * (1.0 + 1e-9) && t.cycles <= *w.cycles);
+  EXPECT_EQ(t.met, t.rms <= told(w.rms) * (1.0 + 1e-9) && t.cycles <= told(w.cycles));
 }
 
 TEST(TunerEquations, ADitherWithoutLag) {
