@@ -141,6 +141,23 @@ TEST(FirstReadings, APlantThatDoesNotFollowBendsNothing) {
   EXPECT_NEAR(first.bend()[1], 1e-3 / 4.0, 1e-12);
 }
 
+TEST(FirstReadings, UnequalStepsAndARestartBendTheSame) {
+  FirstReadings first(scalar_input(1.0), 0.4, true);
+  const auto told = [&](int cycles) {
+    for (int k = 0; first.open() && k < cycles; ++k) {
+      const Inputs x = first.ask(scalar_input(3.0)).cwiseMin(3.6);
+      first.learn(x, 0.2 * x[0] - 0.35 * (x[0] - 3.0) * (x[0] - 3.0));
+    }
+  };
+  told(7);
+  first.restart();
+  told(23);
+  EXPECT_TRUE(first.open());
+  told(1);
+  EXPECT_FALSE(first.open());
+  EXPECT_NEAR(first.largest_bend(), 0.7, 1e-12);
+}
+
 TEST(FirstReadings, StateGoesOnInTheMiddle) {
   for (auto& [name, any] : own_gains(from(-12.0), 5)) {
     SCOPED_TRACE(name);
