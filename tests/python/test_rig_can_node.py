@@ -102,7 +102,7 @@ def test_a_late_command_opens_the_bridge_and_only_arming_closes_it(host: Host) -
 
 
 def test_a_node_that_stood_still_trusts_nothing_that_waited(host: Host) -> None:
-    """Below the time limit of the commands a gap is no fault."""
+    """Below the time limit of the commands a gap is not a fault."""
     assert host.core.patience_s == 0.02
     running(host)
     begin_ns, waited = host.now_ns, [host.frame(None) for _ in range(8)] + [host.frame(0.5)]

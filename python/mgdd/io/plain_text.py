@@ -1,4 +1,4 @@
-"""The one reader of text files: which encoding they have, and what is no text."""
+"""The one reader of text files: which encoding they have, and what is not text."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) ->
     mgdd.errors.ParameterError
         A folder, or a path that cannot be looked up.
     mgdd.errors.DataError
-        No text, or of no known encoding.
+        Not text, or of no known encoding.
     """
     file = existing_file(path)
     return decoded(file.read_bytes(), str(file), only_utf8=only_utf8)
@@ -66,7 +66,7 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False) -> str:
     Raises
     ------
     mgdd.errors.DataError
-        No text, damaged UTF-8, or of no known encoding.
+        Not text, damaged UTF-8, or of no known encoding.
 
     Examples
     --------

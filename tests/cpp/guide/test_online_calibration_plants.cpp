@@ -191,7 +191,7 @@ TEST(OnlineCalibrationPlants, AnAdaptedCompressionRatioGoesIntoTheCylinder) {
             s.cylinder.wall_heat.wall_temperature_k + calibration.parameters()[Calibrated::wall_temperature]);
 }
 
-// A cycle that the stated scatter explains is no jump; three of them in a row would make the calibration begin anew.
+// A cycle that the stated scatter explains is not a jump; three of them in a row would make the calibration begin anew.
 TEST(OnlineCalibrationPlants, ScatterOfTheTimingIsNotTakenForAJump) {
   for (const CalibrationMethod method : stepping) {
     std::int64_t jumps = 0;

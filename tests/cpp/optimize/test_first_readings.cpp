@@ -158,6 +158,23 @@ TEST(FirstReadings, UnequalStepsAndARestartBendTheSame) {
   EXPECT_NEAR(first.largest_bend(), 0.7, 1e-12);
 }
 
+TEST(FirstReadings, AStateThatMakesNoGainIsRefused) {
+  for (auto& [name, any] : own_gains(from(-12.0), 5)) {
+    SCOPED_TRACE(name);
+    std::visit(
+        [](auto& seeker) {
+          for (int k = 0; k < 30; ++k)
+            cycle_of(seeker, [](const Inputs& x) { return quadratic(x[0]); });
+          for (const double bad : {0.0, -1.0, std::nan(""), unlimited}) {
+            StateColumns state = save_state(seeker);
+            state["first_bend"] = {bad};
+            EXPECT_THROW(restore_state(seeker, state), ParameterError) << bad;
+          }
+        },
+        any);
+  }
+}
+
 TEST(FirstReadings, StateGoesOnInTheMiddle) {
   for (auto& [name, any] : own_gains(from(-12.0), 5)) {
     SCOPED_TRACE(name);

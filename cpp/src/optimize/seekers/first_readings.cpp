@@ -100,7 +100,9 @@ void FirstReadings::require_usable() const {
   if (open_ && !(told_ < whole)) {
     throw ParameterError("state column 'first_open' holds 1: must be 0, as these settings give the gain");
   }
-  if (!(bend_.array() >= 0.0).all()) throw ParameterError("state column 'first_bend' must hold numbers >= 0");
+  if (!open_ && !readings_.empty() && !((bend_.array() > 0.0).all() && bend_.allFinite())) {
+    throw ParameterError("state column 'first_bend' must hold finite numbers > 0: the gain is made of them");
+  }
 }
 
 }  // namespace mgdd::optimize

@@ -141,7 +141,7 @@ class _Slopes:
         known: NDArray[np.int_],
         substeps: int,
     ) -> _Slopes:
-        """Take central differences: wide enough that a plate which sticks a sample sooner is no slope."""
+        """Take central differences: wide enough that a plate which sticks a sample sooner is not a slope."""
         begin = {**values, **dict(zip(report.names, report.values, strict=True))}
         columns = []
         for name in (report.names[index] for index in known):
