@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from mgdd._arguments import shown
 from mgdd.errors import ParameterError, did_you_mean
-
-if TYPE_CHECKING:
-    import os
 
 __all__ = ["existing_file"]
 
@@ -48,6 +46,13 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     ...         print(error.strerror)
     no such file: did you mean 'chirp.csv'?
     """
+    given: object = path
+    if not isinstance(given, str | os.PathLike):
+        bound = (
+            "the path of a file; data in memory go as they are to what uses them, as mgdd.engine.analyze(frame, "
+            "cylinder) or mgdd.identify.identify_throttle(frame)"
+        )
+        raise ParameterError(f"path = {shown(path)}: must be {bound}", field="path", value=path, bound=bound)
     file = Path(path)
     try:
         mode = file.stat().st_mode

@@ -6,12 +6,12 @@ import itertools
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd.errors import DataError, argument
+from mgdd.io.existing_file import existing_file
 from mgdd.io.plain_text import read_plain_text
 from mgdd.results.units import unit_of
 
@@ -152,7 +152,7 @@ def read_table(
         raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
-    file = Path(path)
+    file = existing_file(path)
     content = [
         (number, line.strip())
         for number, line in enumerate(read_plain_text(path).splitlines(), start=1)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.existing_file import existing_file
 from mgdd.io.mat_file import read_mat
 from mgdd.io.plain_csv import write_columns
 from mgdd.io.table import read_table
@@ -243,7 +244,7 @@ def _read(
     called: dict[str, str] = {}
     units = {key: given[key] or usual_unit(key) for key in wanted}
     columns: dict[str, NDArray[np.float64]] = {}
-    if Path(path).suffix.lower() == ".mat":
+    if existing_file(path).suffix.lower() == ".mat":
         mat = read_mat(path)
         for key, column in wanted.items():
             chosen = key if column is None and mat.has(key) else column

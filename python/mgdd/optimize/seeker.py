@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -15,6 +16,7 @@ from mgdd.errors import DataError, Error, Interrupted, ParameterError
 from mgdd.io.nesting import parsed
 from mgdd.io.plain_text import read_plain_text
 from mgdd.io.whole_file import write_whole_text
+from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
@@ -85,6 +87,13 @@ class Seeker(SeekerFindings, _CoreSeeker):
     """
 
     kind: ClassVar[str]
+
+    if not TYPE_CHECKING:  # the constructors of the core say what they take
+
+        def __init__(self, *given: Any, **settings: Any) -> None:
+            if isinstance(settings.get("limits"), Mapping):
+                settings["limits"] = list(limits_of(settings["limits"]))
+            super().__init__(*given, **settings)
 
     def run(self, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
         """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.

@@ -17,14 +17,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from mgdd.results import Result
+
 __all__ = ["seeking"]
 
 _NEEDED = ("cycle", "estimate_cad", "soc_requested_cad", "j")
+_MADE_BY = "mgdd.loop.run_seeker"
 _SLOPE = "gradient_per_cad"
 
 
 def seeking(
-    run: xr.Dataset,
+    run: xr.Dataset | Result,
     *,
     optimum_cad: float | None = None,
     limit_values: Mapping[str, float] | None = None,
@@ -39,7 +42,7 @@ def seeking(
 
     Parameters
     ----------
-    run : xarray.Dataset
+    run : xarray.Dataset or Result
         ``estimate_cad``, ``soc_requested_cad`` [°CA aTDC] and ``j`` over ``cycle``, as `mgdd.loop.run_seeker` gives;
         optional are ``gradient_per_cad`` [unit of J per °CA], NOx of the sensor that ``attrs["nox_sensor"]`` names, and
         ``limits`` over ``limit``.
@@ -71,10 +74,11 @@ def seeking(
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
     ['timing [°CA aTDC]', 'J [unit of J]']
     """
+    run = require("run", run, (), _MADE_BY)
     sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")
     third = _SLOPE if _SLOPE in run else sensor if sensor in run else None
     limited = [str(name) for name in run["limit"].to_numpy()] if "limits" in run else []
-    require(run, (*_NEEDED, *([third] if third else []), *(["limits"] if limited else [])), "mgdd.loop.run_seeker")
+    require("run", run, (*_NEEDED, *([third] if third else []), *(["limits"] if limited else [])), _MADE_BY)
     for name in limit_values or {}:
         if name not in limited:
             raise DataError(f"limit_values: {name!r} was not measured as a limit in this run, which has {limited}")

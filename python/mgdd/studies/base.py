@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, Pool
-from mgdd.results.describe import described
+from mgdd.results.describe import Row, rows_of
+from mgdd.results.result import Figures, Result
 from mgdd.studies.sections import Section, standard_sections
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ Progress = Callable[[str], None]
 Part = TypeVar("Part")
 
 
-@dataclass(frozen=True, kw_only=True)
-class StudyResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class StudyResult(Result):
     """Data, figures, summary and sections of a study; `mgdd.report.write_report` makes a page of any of them.
 
     Parameters
@@ -57,7 +58,7 @@ class StudyResult:
     name: str
     dataset: xr.Dataset
     figures: Mapping[str, Figure] = field(default_factory=dict)
-    summary: Mapping[str, Any] = field(default_factory=dict)
+    summary: Figures = field(default_factory=Figures)
     sections: tuple[Section, ...] = ()
     title: str = ""
 
@@ -65,19 +66,20 @@ class StudyResult:
         if not self.sections:
             object.__setattr__(self, "sections", standard_sections(self.summary, self.figures, self.dataset))
 
+    def _title(self) -> str:
+        return f"StudyResult {self.name}" + (f": {self.title}" if self.title else "")
 
-described(
-    StudyResult,
-    title=lambda result: f"StudyResult {result.name}" + (f": {result.title}" if result.title else ""),
-    rows=lambda result: {
-        "seeds": result.summary.get("seeds"),
-        "rows": len(result.summary.get("rows", ())),
-        "sections": tuple(section.title for section in result.sections),
-        "figures": len(result.figures),
-        "dataset": result.dataset,
-        "interrupted": bool(result.summary.get("interrupted", False)),
-    },
-)
+    def _rows(self) -> list[Row]:
+        return rows_of(
+            {
+                "seeds": self.summary.get("seeds"),
+                "rows": len(self.summary.get("rows", ())),
+                "sections": tuple(section.title for section in self.sections),
+                "figures": len(self.figures),
+                "dataset": self.dataset,
+                "interrupted": bool(self.summary.get("interrupted", False)),
+            }
+        )
 
 
 def check_seeds(seeds: int) -> int:
@@ -175,7 +177,7 @@ def finish(
 ) -> StudyResult:
     """Return a whole result; raise one that was cut short as the part of the error that did it."""
     figures = {} if draw is None else draw(dataset)
-    result = StudyResult(name=summary["study"], dataset=dataset, figures=figures, summary=summary)
+    result = StudyResult(name=summary["study"], dataset=dataset, figures=figures, summary=Figures(summary))
     workers = _workers.get()
     stop: Interrupted | WorkerLostError | None = None if workers is None else workers.lost
     if stop is None and summary["interrupted"]:

@@ -19,6 +19,7 @@ from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER
 from mgdd.results.labels import to_jsonable
+from mgdd.results.result import Figures
 from mgdd.studies.base import StudyResult
 from mgdd.studies.measured_figures import draw
 from mgdd.studies.measured_sections import measured_sections
@@ -125,7 +126,7 @@ def run_measured_traces(
         title="Measured pressure, calibrated cycle model, best timing",
         dataset=law_table(fits),
         figures=drawn,
-        summary=plain,
+        summary=Figures(plain),
         sections=measured_sections(plain, drawn),
     )
     return hand_over(result, stop)

@@ -15,8 +15,8 @@ from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
-from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,9 +34,8 @@ _UNITS = {"gamma": "", "pegging_bar": " bar", "tdc_cad": " CAD"}
 _CORRELATION = float(_core.identify.correlation_limit)
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class WallHeatProfile:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WallHeatProfile(Result):
     """What the traces say about the wall-heat scale.
 
     Parameters

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.results.describe import described
+from mgdd.results.describe import Row, rows_of
+from mgdd.results.result import Result
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
 from mgdd.rig.experiment.core_replay import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
@@ -29,12 +30,13 @@ from mgdd.rig.experiment.watched import Cycle, Watched
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 __all__ = ["ExperimentResult", "run_experiment"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ExperimentResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ExperimentResult(Result):
     """What an experiment came to.
 
     Parameters
@@ -67,6 +69,30 @@ class ExperimentResult:
     interrupted: bool = False
     folder: Path | None = None
 
+    def _rows(self) -> list[Row]:
+        return rows_of({**self.figures, "folder": str(self.folder)})
+
+    def plot(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the signals: a seeker's cycles, a track, or a log of the throttle.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes of the first panel.
+        """
+        from mgdd.plot import seeking
+        from mgdd.plot.throttle_run import throttle_run
+        from mgdd.plot.throttle_track import throttle_track
+
+        if "cycle" in self.dataset.dims:
+            return seeking(self, ax=ax)
+        return (throttle_track if "reference_deg" in self.dataset else throttle_run)(self, ax=ax)
+
     def to_dict(self) -> dict[str, Any]:
         """Give all but the signals.
 
@@ -85,9 +111,6 @@ class ExperimentResult:
             "counters": self.counters,
             "events": list(self.events),
         }
-
-
-described(ExperimentResult, rows=lambda result: {**result.to_dict()["result"], "folder": str(result.folder)})
 
 
 def run_experiment(
