@@ -74,6 +74,11 @@ else:
 class Seeker(SeekerFindings, _CoreSeeker):
     """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
 
+    Parameters
+    ----------
+    *given, **settings
+        As each kind says them; ``limits`` is a sequence of `Limit`, or a mapping of names to upper values.
+
     Examples
     --------
     >>> import tempfile

@@ -57,7 +57,7 @@ class Result:
     >>> from mgdd.results import Result
     >>> best = find_optimum("puma_single")
     >>> isinstance(best, Result), round(float(best.dataset["soc_cad"]), 1)
-    (True, -5.5)
+    (True, -5.6)
     """
 
     if TYPE_CHECKING:
