@@ -49,7 +49,7 @@ def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
     meant = _loaded(given, "engine")
     if isinstance(meant, Preset):
         return meant.cylinder
-    meant = meant.model if isinstance(meant, Fit) else meant
+    meant = getattr(meant, "model", meant)  # of a fit
     if isinstance(meant, Cylinder):
         return meant
     raise _refusal(argument, given, "a Cylinder", "engine")
@@ -146,7 +146,7 @@ def throttle_of(given: Any, argument: str = "throttle") -> Throttle:
 def throttle_model_of(given: Any) -> Any:
     """Return the throttle of a preset or of its name, the model of a fit, and everything else as it is."""
     meant = _loaded(given, "throttle")
-    return meant.throttle if isinstance(meant, Preset) else meant.model if isinstance(meant, Fit) else meant
+    return meant.throttle if isinstance(meant, Preset) else getattr(meant, "model", meant)
 
 
 def _loaded(given: Any, kind: str) -> Any:

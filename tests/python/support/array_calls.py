@@ -227,6 +227,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
     "maps.CalibrationMap.replaced": (lambda t: table(FUEL, TIMING, 0.2).replaced(t).values, (TIMING - 1.0,)),
     "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
+    "maps.CalibrationMap.__call__": (lambda x: table(FUEL, TIMING, 0.2)(fuel_mg=x), (OPEN,)),
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
     "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
     "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
