@@ -23,7 +23,7 @@ from mgdd import datasets, identify, plot, presets
 from mgdd.engine import find_optimum, ignition_delay, simulate
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
-from mgdd.loop import EngineBench, run_seeker, tune_controller
+from mgdd.loop import EngineBench, SurrogatePlant, run_seeker, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.results import Result
@@ -32,7 +32,7 @@ from mgdd.rig import Experiment, Recorder, read_record, run_experiment
 from mgdd.rig.experiment.self_test import WAYS_OF, SelfTest
 from mgdd.signals import chirp
 from mgdd.studies import run_study
-from mgdd.surrogate import fit_response
+from mgdd.surrogate import fit_response, fit_surrogate, random_step_records
 from mgdd.throttle import Throttle
 from mgdd.throttle import simulate as simulate_throttle
 
@@ -220,3 +220,15 @@ def test_a_figure_takes_a_result_or_its_dataset_and_nothing_else(name: str) -> N
         assert info.value.field == first.name
     with pytest.raises(Error, match=r"mgdd|no variable"):
         draw(xr.Dataset(), *more)
+
+
+def test_a_run_of_several_inputs_has_a_panel_each() -> None:
+    surrogate = fit_surrogate(random_step_records(1500))
+    start = [surrogate.medians[name] for name in ("soi_cad", "doi_main_ms")]
+    seeker = ExtremumSeeking(
+        start=start, lower=[start[0] - 5.0, start[1] - 0.2], upper=[start[0] + 5.0, start[1] + 0.2],
+        amplitude=[0.5, 0.02], period=40, harmonics=[4, 5],
+    )  # fmt: skip
+    run = run_seeker(SurrogatePlant(surrogate, inputs=["soi_cad", "doi_main_ms"]), seeker, 40)
+    labels = [panel.get_ylabel() for panel in run.plot().figure.axes]
+    assert labels[:3] == ["soi_cad [°CA aTDC]", "doi_main_ms [ms]", "J [unit of J]"]
