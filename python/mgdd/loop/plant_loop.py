@@ -81,19 +81,7 @@ class LoopRun(Result):
     interrupted: bool = False
     findings: tuple[Finding, ...] = ()
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the cycles, as `mgdd.plot.seeking` does.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes of the first panel.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot import seeking
 
         return seeking(self, ax=ax)

@@ -107,19 +107,7 @@ class MapForms(Result):
         """The same as `to_dataset` gives."""
         return self.to_dataset()
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the cells, as `mgdd.plot.map_cells` does.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot import map_cells
 
         return map_cells(self, ax=ax)

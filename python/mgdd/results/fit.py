@@ -187,24 +187,7 @@ class Fit(Result):
         extra = self._extra()
         return "\n".join([*lines, *(["", "findings:", *(f"  {finding}" for finding in extra)] if extra else [])])
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw the measurement and the free run of the model.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes.
-
-        Raises
-        ------
-        DataError
-            A fit that keeps no run.
-        """
+    def _draw(self, ax: Any) -> Any:
         if self.draw is None:
             raise DataError(f"a fit of {self.kind} keeps no run to draw: simulate its model")
         return self.draw(self, ax)

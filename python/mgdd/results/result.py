@@ -89,7 +89,7 @@ class Result:
         return as_text(self._title(), self._rows())
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the result; one that is a few numbers is drawn as their table.
+        """Draw the result: runs, maps and scans as figures of `mgdd.plot` do, a few numbers as their table.
 
         Parameters
         ----------
@@ -100,7 +100,15 @@ class Result:
         -------
         matplotlib.axes.Axes
             The axes, the first where there are several.
+
+        Raises
+        ------
+        DataError
+            A result that has nothing to draw, as a fit that keeps no run or a motored estimate.
         """
+        return self._draw(ax)
+
+    def _draw(self, ax: Axes | None) -> Axes:
         return as_figure(self._title(), self._rows(), ax)
 
     def to_netcdf(self, path: str | os.PathLike[str]) -> None:

@@ -82,19 +82,7 @@ class WallHeatProfile(Result):
     reasons: tuple[str, ...]
     dataset: xr.Dataset
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw the best reachable RMSE over the scale: a flat curve means the traces do not fix it.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes; the shaded band holds the scales within 10 % of the best RMSE.
-        """
+    def _draw(self, ax: Any) -> Any:
         from mgdd.plot.calibration import wall_heat_profile as draw
 
         return draw(self.dataset, ax=ax)

@@ -87,19 +87,7 @@ class Load(Result):
         """The overlay, its figures beside it."""
         return self.overlay
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw measured points under the model's line, and their difference in a panel below.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The upper axes; the residual panel is ``ax.figure.axes[-1]``.
-        """
+    def _draw(self, ax: Any) -> Any:
         from mgdd.plot.calibration import calibration_overlay
 
         return calibration_overlay(self.overlay, ax=ax)

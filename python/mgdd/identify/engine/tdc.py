@@ -105,24 +105,7 @@ class TdcEstimate(Result):
         said = f"the {self.method} has the angles {self.tdc_offset_cad:+.2f} °CA too large ({how}): suspect TDC"
         return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off"]
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the least RMSE over the TDC offset.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The band is the range of possible offsets.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            A motored estimate, which has no scan.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.calibration import tdc_scan
 
         if "rmse_percent" not in self.dataset:

@@ -163,19 +163,7 @@ class BestTiming(Result):
             "members": [member.to_dict() for member in self.members],
         }
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw each member's best CA50 as a strip: filled where plausible, ringed the best.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            One row per member; the shaded band is the range of the plausible ones.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.family import family_strip
 
         return family_strip(self, ax=ax)

@@ -67,19 +67,7 @@ class ExcitationCheck(Result):
         """The prediction."""
         return self.prediction
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw what the plate would do.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes of the angle; those of duty and current stand below.
-        """
+    def _draw(self, ax: Any) -> Any:
         from mgdd.plot.throttle_run import throttle_run
 
         return throttle_run(self.prediction, ax=ax)

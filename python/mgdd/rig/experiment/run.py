@@ -72,19 +72,7 @@ class ExperimentResult(Result):
     def _rows(self) -> list[Row]:
         return rows_of({**self.figures, "folder": str(self.folder)})
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the signals: a seeker's cycles, a track, or a log of the throttle.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes of the first panel.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot import seeking
         from mgdd.plot.throttle_run import throttle_run
         from mgdd.plot.throttle_track import throttle_track
