@@ -190,3 +190,29 @@ def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
 def test_a_wrong_guess_is_told_the_right_one(wrong: Callable[[], Any], match: str) -> None:
     with pytest.raises(ParameterError, match=match):
         wrong()
+
+
+def test_a_signal_keeps_its_own_time() -> None:
+    signal = xr.DataArray(DUTY, {"time_s": 2.0 * TIME}, ["time_s"])
+    np.testing.assert_array_equal(mgdd.throttle.simulate("P1", signal)["time_s"], 2.0 * TIME)
+    wanted = xr.DataArray([20.0, 21.0, 22.0], {"time_s": [0.0, 2e-3, 4e-3]}, ["time_s"])
+    run = mgdd.loop.track(mgdd.control.Pid(sample_s=2e-3), wanted)
+    np.testing.assert_allclose(run["time_s"], wanted["time_s"], rtol=1e-12)
+
+
+def test_limits_have_one_grammar() -> None:
+    by_name, objects = {"p_max_bar": 95}, [mgdd.optimize.Limit("p_max_bar", 95)]
+    start = {"start": -2.0, "lower": -30.0, "upper": 10.0}
+    made = []
+    for limits in (by_name, objects):
+        seeker = mgdd.optimize.ExtremumSeeking(**start, limits=limits)
+        assert seeker.settings["limits"][0].upper == 95
+        bench = mgdd.loop.EngineBench("puma_single", limits=limits)
+        assert bench.limit_names == ("p_max_bar",)
+        guard = mgdd.rig.ActuatorGuard(bench, start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)}, limits=limits)
+        assert [limit.name for limit in guard.limits] == ["p_max_bar"]
+        tuned = mgdd.optimize.tune(0.25, -0.05).seeker(**start, limits=limits)
+        assert tuple(tuned.limit_names) == ("p_max_bar",)
+        criteria = mgdd.loop.LoopCriteria(limits=limits)
+        made.append(mgdd.loop.run_seeker(bench, seeker, 40, criteria=criteria).summary)
+    assert made[0]["limit_p_max_bar"] == made[1]["limit_p_max_bar"] == 95
