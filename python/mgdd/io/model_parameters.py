@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from mgdd.io.parameter_entries import Wanted, entries, wanted
+from mgdd.io.parameter_entries import Wanted, entries, wanted, written
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters
 
 __all__ = ["ModelParameters"]
@@ -24,9 +24,8 @@ class ModelParameters(Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give parameters and settings, as `to_toml` writes them."""
-        own = {name: getattr(self, name) for name in self.settings}
-        numbers = {name: float(own[name]) for name, want in self.settings.items() if want.form == "number"}
-        tables = {"parameters": entries(self._written()), "settings": entries({**own, **numbers})}
+        settings = written({name: getattr(self, name) for name in self.settings}, self.settings)
+        tables = {"parameters": entries(self._written()), "settings": settings}
         return ParameterFile(kind=self.kind, tables=tables)
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
@@ -12,7 +12,19 @@ import numpy as np
 
 from mgdd.results.units import unit_of
 
-__all__ = ["FORMS", "PARTS", "Entry", "Wanted", "entries", "entry_of", "fits", "key_line", "quoted", "wanted"]
+__all__ = [
+    "FORMS",
+    "PARTS",
+    "Entry",
+    "Wanted",
+    "entries",
+    "entry_of",
+    "fits",
+    "key_line",
+    "quoted",
+    "wanted",
+    "written",
+]
 
 Form = Literal["number", "integer", "flag", "text", "numbers", "texts"]
 PARTS = ("value", "unit", "stderr", "source")
@@ -71,6 +83,13 @@ class Entry:
 def entries(values: Mapping[str, Any], units: Mapping[str, str] = MappingProxyType({})) -> dict[str, Entry]:
     """Make the entries of a table: units as given, else as the names end."""
     return {name: Entry(value=_plain(value), unit=units.get(name, unit_of(name))) for name, value in values.items()}
+
+
+def written(values: Mapping[str, Any], wanted: Mapping[str, Wanted]) -> dict[str, Entry]:
+    """Make the entries of a table that `ParameterFile.values` takes with the same `wanted`."""
+    cast: dict[str, Callable[[Any], Any]] = {"number": float, "integer": int, "flag": bool, "texts": list}
+    cast["numbers"] = lambda rows: np.asarray(rows, dtype=np.float64).tolist()
+    return {name: Entry(value=cast.get(form, str)(values[name]), unit=unit) for name, (unit, form, _) in wanted.items()}
 
 
 def wanted(

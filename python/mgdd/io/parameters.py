@@ -13,13 +13,25 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
-from mgdd.io.parameter_entries import FORMS, PARTS, Entry, Wanted, entries, entry_of, fits, key_line, quoted, wanted
+from mgdd.io.parameter_entries import (
+    FORMS,
+    PARTS,
+    Entry,
+    Wanted,
+    entries,
+    entry_of,
+    fits,
+    key_line,
+    quoted,
+    wanted,
+    written,
+)
 from mgdd.io.toml_text import text_of, toml_of
 
 if TYPE_CHECKING:
     import os
 
-__all__ = ["Entry", "ParameterFile", "Parameters", "Wanted", "entries", "wanted"]
+__all__ = ["Entry", "ParameterFile", "Parameters", "Wanted", "entries", "wanted", "written"]
 
 FORMAT = 1
 FIT_NOTES = ("source", "unidentifiable")  # what a fit says beside its model, in a table [fit] too
