@@ -10,11 +10,9 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted, written
 from mgdd.results.labels import Label
-from mgdd.surrogate.polynomial import PolynomialSurface
+from mgdd.surrogate.polynomial import PolynomialBasis, PolynomialSurface, Support
 from mgdd.surrogate.process import ProcessSurface
-from mgdd.surrogate.response_surface import PolynomialBasis, Support
-from mgdd.surrogate.sensor_lag import SensorLag
-from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.signal_model import SensorLag, SignalModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,9 +11,8 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import Label, label_of
 from mgdd.signals.even_grid import check_count
-from mgdd.surrogate.response_surface import PolynomialBasis, least_squares_of, r_squared, support_of
-from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
-from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.polynomial import PolynomialBasis, least_squares_of, r_squared, support_of
+from mgdd.surrogate.signal_model import SensorLag, SignalModel, find_sensor_lag, lagged
 from mgdd.surrogate.surrogate import STEERED, EngineSurrogate
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError
 from mgdd.optimize import Optimum
-from mgdd.surrogate.response_surface import Support
+from mgdd.surrogate.polynomial import Support
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,7 +18,7 @@ from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
 from mgdd.surrogate.file import read_surrogate, surrogate_file
 from mgdd.surrogate.optimum import best_along
-from mgdd.surrogate.response_surface import PolynomialBasis, Support
+from mgdd.surrogate.polynomial import PolynomialBasis, Support
 from mgdd.surrogate.signal_model import SignalModel
 
 if TYPE_CHECKING:
