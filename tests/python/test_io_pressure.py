@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ShapeError
 from mgdd.io import pressure_trace, read_conditions, read_pressure, write_pressure
-from mgdd.io.checks import check_trace
+from mgdd.io.pressure_checks import check_trace
 from mgdd.results.labels import ANGLE, check_labels
 
 ANGLES = np.arange(-143.0, 124.0)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.angles import turned
 from mgdd.io.cycle_phase import CYCLE_DEG, repetition
+from mgdd.io.pressure_checks import turned
 from mgdd.signals.even_grid import wide_steps
 
 if TYPE_CHECKING:

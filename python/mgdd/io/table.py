@@ -1,9 +1,11 @@
-"""Text tables: CSV (comma, semicolon, tab) or blank-separated columns, with optional header and units row."""
+"""Text tables: CSV or blank-separated columns with optional header and units row, and the one writer of plain CSV."""
 
 from __future__ import annotations
 
 import itertools
+import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,17 +13,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
-from mgdd.io.plain_text import read_plain_text
+from mgdd.errors import DataError, ShapeError, argument
+from mgdd.io.files import read_plain_text, write_whole_text
+from mgdd.results.labels import check_labels
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["TextTable", "parse_number", "read_table"]
+__all__ = [
+    "TextTable",
+    "parse_number",
+    "read_table",
+    "write_columns",
+    "write_traces",
+]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
@@ -225,3 +234,70 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
         return float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:
         return None
+
+
+def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]) -> None:
+    r"""Write columns of one length; numbers come back bit for bit, texts stand as they are.
+
+    Parameters
+    ----------
+    columns : mapping of str to array_like
+        By name, which says the unit by its ending; a text holds no comma, quote or line break.
+    path : path-like
+        The file; an existing one is replaced.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.io.table import write_columns
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "map.csv"
+    ...     write_columns({"fuel_mg": [6.0, 20.0], "source": ["idle", "model"]}, file)
+    ...     file.read_text()
+    'fuel_mg,source\n6.0,idle\n20.0,model\n'
+    """
+    cells = [
+        column.tolist() if column.dtype.kind == "U" else [repr(value) for value in column.astype(np.float64).tolist()]
+        for column in map(np.asarray, columns.values())
+    ]
+    rows = [",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]
+    write_whole_text(path, "\n".join(rows) + "\n")
+
+
+def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write every one-dimensional variable of a Dataset as CSV: a header, then numbers in full precision.
+
+    The file is plain, so that any reader takes it without options; a name says its unit by its ending. What a table
+    cannot hold, scalars and attributes, stands in the Dataset: ``to_netcdf`` writes all of it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With one dimension, or several of which the variables share none; scalars are not written.
+    path : path-like
+        The file; an existing one is replaced once the Dataset has passed its checks.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        A variable without units.
+    mgdd.errors.ShapeError
+        Variables over different dimensions.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
+    >>> from mgdd.io.table import write_traces
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "cycle.csv"
+    ...     write_traces(simulate(Cylinder(), OperatingPoint()), file)
+    ...     file.read_text().splitlines()[0][:28]
+    'crank_angle_cad,pressure_bar'
+    """
+    check_labels(dataset)
+    dims = [dim for dim in dataset.dims if any(v.dims == (dim,) for v in dataset.data_vars.values())]
+    if len(dims) != 1 or any(v.ndim > 1 for v in dataset.variables.values()):
+        raise ShapeError(f"a CSV holds columns over one dimension; this result has {dict(dataset.sizes)}")
+    names = [str(dims[0]), *(str(n) for n, v in dataset.data_vars.items() if v.dims == (dims[0],))]
+    write_columns({name: dataset[name].to_numpy() for name in names}, path)

@@ -13,7 +13,7 @@ from idle_loop import idle_loop
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import DiscreteModel, Pid, RecedingHorizon
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
-from mgdd.io.checks import check_trace
+from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
 from mgdd.rig import RigRecord

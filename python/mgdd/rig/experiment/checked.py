@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mgdd.errors import DataError, Error, ParameterError, RigError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.files import existing_file
 from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap

@@ -1,4 +1,4 @@
-"""Is this a cylinder pressure trace? Every refusal names the place, the value and the remedy."""
+"""Is this a cylinder pressure trace, in this unit? Every refusal names the place, the value and the remedy."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
-from mgdd.io.angles import CONVENTION, pair
-from mgdd.io.pressure_units import PRESSURE_UNITS, check_unit, to_bar
+from mgdd.errors import DataError, ShapeError, argument
 from mgdd.signals.even_grid import wide_steps
 
 if TYPE_CHECKING:
@@ -17,7 +15,174 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["MIN_SAMPLES", "check_choice", "check_span", "check_trace"]
+__all__ = [
+    "CONVENTION",
+    "MIN_SAMPLES",
+    "PRESSURE_UNITS",
+    "check_choice",
+    "check_span",
+    "check_trace",
+    "check_unit",
+    "level_bar",
+    "level_warning",
+    "pair",
+    "steep_warning",
+    "to_bar",
+    "turned",
+]
+
+CONVENTION = "crank angle is in °CA aTDC: firing TDC = 0, compression negative"
+
+
+def pair(angle: ArrayLike, pressure: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return new float64 arrays: the angle, and the pressure over it or (cycle, angle); or raise ShapeError."""
+    first = np.array(angle, dtype=np.float64)
+    second = np.array(pressure, dtype=np.float64)
+    if (
+        first.ndim != 1
+        or second.ndim not in (1, 2)
+        or second.shape[-1:] != first.shape
+        or second.shape[0] == 0 < first.size
+    ):
+        remedy = "give two one-dimensional arrays of one length, or one row of pressures per cycle"
+        if second.ndim == 2 and second.shape[:1] == first.shape:
+            remedy = "one row per cycle is needed: pass the transpose"
+        raise ShapeError(f"crank angle has shape {first.shape} and pressure {second.shape}: {remedy}")
+    return first, second
+
+
+def turned(
+    angle_deg: NDArray[np.float64], firing_tdc_deg: float | None, before_tdc: bool
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the order that sorts angles of a 0..720 record, or before TDC, and the sorted angles in °CA aTDC."""
+    if firing_tdc_deg is None:
+        order = np.argsort(-angle_deg, kind="stable") if before_tdc else np.arange(angle_deg.size)
+        return order, 0.0 - angle_deg[order] if before_tdc else angle_deg
+    if before_tdc:
+        raise DataError("firing_tdc_deg, before_tdc: angles are in one convention: give one of them")
+    if not 0.0 <= firing_tdc_deg <= 720.0:
+        raise DataError.of("firing_tdc_deg", firing_tdc_deg, "in [0, 720]")
+    step = np.diff(angle_deg)
+    if not np.all(step > 0.0):
+        index = int(np.argmin(step > 0.0)) + 1
+        raise DataError(f"angle_deg[{index}] = {angle_deg[index]:g} follows {angle_deg[index - 1]:g}: angles must rise")
+    if angle_deg.size and angle_deg[-1] - angle_deg[0] > 720.0:
+        span = angle_deg[-1] - angle_deg[0]
+        raise DataError(f"angles span {span:g} degrees: one cycle of at most 720 degrees is needed")
+    shifted = angle_deg - firing_tdc_deg
+    wrapped = np.where(shifted > 360.0, shifted - 720.0, np.where(shifted < -360.0, shifted + 720.0, shifted))
+    order = np.argsort(wrapped, kind="stable")
+    return order, wrapped[order]
+
+
+# An exact integer keeps the value in bar correctly rounded: units per bar here, bar per unit below.
+_PER_BAR = {"bar": 1.0, "mbar": 1000.0, "kPa": 100.0, "Pa": 100000.0}
+# 1 psi = 1 lbf/in² with 1 lbf = 0.45359237 kg of 9.80665 m/s² and 1 in = 0.0254 m, all exact.
+# 1 kgf = 9.80665 N, 1 atm = 101325 Pa = 760 torr, exact as well.
+_BAR_PER = {
+    "MPa": 10.0, "psi": 4.4482216152605 / 0.0254**2 / 1e5,
+    "kgf/cm2": 0.980665, "atm": 1.01325, "torr": 1.01325 / 760.0,
+}  # fmt: skip
+PRESSURE_UNITS = (*_PER_BAR, *_BAR_PER)
+# That a remedy names: the others are too near to one of these to be told by a number.
+_USUAL = PRESSURE_UNITS[:6]
+# Peak pressure from a throttled motored engine to twice today's diesels; traces without TDC get a floor.
+PEAK_BAR = (4.0, 500.0)
+FLOOR_BAR = 0.2
+# Absolute pressure early in compression, from a throttled spark-ignition engine to two-stage charging.
+LEVEL_BAR = (0.25, 6.0)
+# Later than this [°CA aTDC] compression has raised the pressure too far to judge the unit by it.
+_EARLY_CAD = -120.0
+# Combustion before TDC raises the pressure by less than this factor; a pressure below this [bar] may be an offset.
+_BURNT, _PRESSED_BAR = 3.0, 0.5
+
+
+def to_bar(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+    """Return pressures in bar."""
+    return values / _PER_BAR[unit] if unit in _PER_BAR else values * _BAR_PER[unit]
+
+
+def level_bar(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> tuple[float, float] | None:
+    """Return angle and pressure that say how high the intake pressure is; None for traces that start too late.
+
+    It is the mean within 5° of intake bottom dead centre, or the first sample of a trace that starts behind it.
+    """
+    if degrees[0] > _EARLY_CAD:
+        return None
+    near = np.abs(degrees + 180.0) <= 5.0
+    if degrees[0] <= -180.0 and near.any():
+        return -180.0, float(bar[..., near].mean())
+    return float(degrees[0]), float(bar[..., 0].mean())
+
+
+def check_unit(
+    degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str, source: str, unit_of_file: bool
+) -> None:
+    """Refuse a unit that the highest pressure excludes, and name those that peak and intake level allow."""
+    low = _low(degrees)
+    peak = float(values.max())
+    if _peak_fits(peak, unit, low):
+        return
+    likely = [
+        other
+        for other in _USUAL
+        if other != unit and _peak_fits(peak, other, low) and _level_fits(level_bar(degrees, to_bar(values, other)))
+    ]
+    if likely:
+        hint = " or ".join(argument("pressure_unit", repr(other)) for other in likely)
+        remedy = f"this looks like {' or '.join(likely)}; "
+        remedy += f"the file says {unit}: correct it there" if unit_of_file else f"pass {hint}"
+    else:
+        remedy = f"no unit of {', '.join(_USUAL)} fits a cylinder pressure; check column and scale"
+    raise DataError(
+        f"{source}: the highest pressure {peak:g} {unit} is outside {low:g} to {PEAK_BAR[1]:g} bar: {remedy}"
+    )
+
+
+def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str) -> list[str]:
+    """Doubt a unit that the peak allows and the intake level does not; one line, or none."""
+    level = level_bar(degrees, to_bar(values, unit))
+    if level is None or _level_fits(level):
+        return []
+    angle, bar = level
+    peak, low = float(values.max()), _low(degrees)
+    fitting = []
+    for other in _USUAL:
+        there = level_bar(degrees, to_bar(values, other))
+        if other != unit and there and _peak_fits(peak, other, low) and _level_fits(there):
+            fitting.append(f"{argument('pressure_unit', repr(other))} would make it {there[1]:.3g} bar")
+    remedy = f"; {' or '.join(fitting)}" if fitting else ": check unit and offset"
+    usual = f"{LEVEL_BAR[0]:g} to {LEVEL_BAR[1]:g} bar"
+    return [f"the pressure at {angle:g} °CA aTDC is {bar:.3g} bar, an intake pressure of {usual} is usual{remedy}"]
+
+
+def steep_warning(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> list[str]:
+    """Doubt an angle over which a short trace rises more than any compression; one line, or none."""
+    first, start = float(np.atleast_2d(bar).mean(axis=0)[0]), float(degrees[0])
+    if not -60.0 <= start <= -5.0 or degrees[-1] < 0.0 or first < _PRESSED_BAR:
+        return []
+    rise = float(np.interp(0.0, degrees, np.atleast_2d(bar).mean(axis=0))) / first
+    # Volume over clearance volume is at most 1 + (r - 1)/2 (1 + 1/R) (1 - cos), here with r = 25 and R = 3.3.
+    volumes = 1.0 + 12.0 * 1.3 * (1.0 - np.cos(np.deg2rad(start)))
+    if rise <= _BURNT * volumes**1.4:
+        return []
+    remedy = f"pass {argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
+    what = f"the pressure rises {rise:.3g} times from {start:g} to 0 °CA aTDC, more than compression can"
+    return [f"{what}: if the column is a time, {remedy}"]
+
+
+def _low(degrees: NDArray[np.float64]) -> float:
+    return PEAK_BAR[0] if degrees[0] <= -5.0 and degrees[-1] >= 5.0 else FLOOR_BAR
+
+
+def _peak_fits(peak: float, unit: str, low: float) -> bool:
+    return low <= float(to_bar(np.float64(peak), unit)) <= PEAK_BAR[1]  # type: ignore[arg-type]
+
+
+def _level_fits(level: tuple[float, float] | None) -> bool:
+    """Return whether an intake level is possible; a relative pressure below zero says nothing."""
+    return level is None or level[1] <= 0.0 or LEVEL_BAR[0] <= level[1] <= LEVEL_BAR[1]
+
 
 MIN_SAMPLES = 20
 # A four-stroke cycle is 4 pi = 12.57 rad.
@@ -78,7 +243,7 @@ def check_trace(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.io.checks import check_trace
+    >>> from mgdd.io.pressure_checks import check_trace
     >>> angle = np.arange(-30.0, 31.0)
     >>> _, pressure = check_trace(angle, 6e6 - 1000.0 * angle**2, unit="Pa")
     >>> float(pressure.max())
