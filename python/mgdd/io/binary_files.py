@@ -28,24 +28,7 @@ _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 
 
 def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a netCDF file of the classic formats (version 3) into memory.
-
-    Parameters
-    ----------
-    path : path-like
-        The file; it is closed when this returns.
-
-    Returns
-    -------
-    xarray.Dataset
-        Everything in it.
-
-    Raises
-    ------
-    FileNotFoundError
-        No such file.
-    mgdd.errors.DataError
-        Another format, or a file that was cut off.
+    """Read a netCDF file of the classic formats (version 3) into memory; another format or a cut file is a DataError.
 
     Examples
     --------
@@ -79,20 +62,7 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a Dataset as classic netCDF, under another name first.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of numbers and texts.
-    path : path-like
-        The file; an existing one is replaced in one step.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written; one that was there is as before.
-    """
+    """Write a Dataset of numbers and texts as classic netCDF, as `write_whole` does."""
     write_whole(path, lambda half: dataset.to_netcdf(half, engine="scipy"))
 
 

@@ -8,73 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError, argument
+from mgdd.io.column_names import check_choice
+from mgdd.io.table import Place
 from mgdd.signals.even_grid import wide_steps
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "CONVENTION",
-    "MIN_SAMPLES",
-    "PRESSURE_UNITS",
-    "check_choice",
-    "check_span",
-    "check_trace",
-    "check_unit",
-    "level_bar",
-    "level_warning",
-    "pair",
-    "steep_warning",
-    "to_bar",
-    "turned",
-]
+    "CONVENTION", "MIN_SAMPLES", "PRESSURE_UNITS", "check_span", "check_trace", "level_warning", "pair", "steep_warning"
+]  # fmt: skip
 
 CONVENTION = "crank angle is in °CA aTDC: firing TDC = 0, compression negative"
-
-
-def pair(angle: ArrayLike, pressure: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return new float64 arrays: the angle, and the pressure over it or (cycle, angle); or raise ShapeError."""
-    first = np.array(angle, dtype=np.float64)
-    second = np.array(pressure, dtype=np.float64)
-    if (
-        first.ndim != 1
-        or second.ndim not in (1, 2)
-        or second.shape[-1:] != first.shape
-        or second.shape[0] == 0 < first.size
-    ):
-        remedy = "give two one-dimensional arrays of one length, or one row of pressures per cycle"
-        if second.ndim == 2 and second.shape[:1] == first.shape:
-            remedy = "one row per cycle is needed: pass the transpose"
-        raise ShapeError(f"crank angle has shape {first.shape} and pressure {second.shape}: {remedy}")
-    return first, second
-
-
-def turned(
-    angle_deg: NDArray[np.float64], firing_tdc_deg: float | None, before_tdc: bool
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the order that sorts angles of a 0..720 record, or before TDC, and the sorted angles in °CA aTDC."""
-    if firing_tdc_deg is None:
-        order = np.argsort(-angle_deg, kind="stable") if before_tdc else np.arange(angle_deg.size)
-        return order, 0.0 - angle_deg[order] if before_tdc else angle_deg
-    if before_tdc:
-        raise DataError("firing_tdc_deg, before_tdc: angles are in one convention: give one of them")
-    if not 0.0 <= firing_tdc_deg <= 720.0:
-        raise DataError.of("firing_tdc_deg", firing_tdc_deg, "in [0, 720]")
-    step = np.diff(angle_deg)
-    if not np.all(step > 0.0):
-        index = int(np.argmin(step > 0.0)) + 1
-        raise DataError(f"angle_deg[{index}] = {angle_deg[index]:g} follows {angle_deg[index - 1]:g}: angles must rise")
-    if angle_deg.size and angle_deg[-1] - angle_deg[0] > 720.0:
-        span = angle_deg[-1] - angle_deg[0]
-        raise DataError(f"angles span {span:g} degrees: one cycle of at most 720 degrees is needed")
-    shifted = angle_deg - firing_tdc_deg
-    wrapped = np.where(shifted > 360.0, shifted - 720.0, np.where(shifted < -360.0, shifted + 720.0, shifted))
-    order = np.argsort(wrapped, kind="stable")
-    return order, wrapped[order]
-
-
 # An exact integer keeps the value in bar correctly rounded: units per bar here, bar per unit below.
 _PER_BAR = {"bar": 1.0, "mbar": 1000.0, "kPa": 100.0, "Pa": 100000.0}
 # 1 psi = 1 lbf/in² with 1 lbf = 0.45359237 kg of 9.80665 m/s² and 1 in = 0.0254 m, all exact.
@@ -95,6 +42,32 @@ LEVEL_BAR = (0.25, 6.0)
 _EARLY_CAD = -120.0
 # Combustion before TDC raises the pressure by less than this factor; a pressure below this [bar] may be an offset.
 _BURNT, _PRESSED_BAR = 3.0, 0.5
+MIN_SAMPLES = 20
+# A four-stroke cycle is 4 pi = 12.57 rad.
+RADIAN_SPAN = 13.0
+# No encoder is as coarse as this: degrees that were taken for radians have such a step.
+MAX_STEP_DEG = 5.0
+# Below this [rad] no trace is worth an analysis: it is a time in seconds.
+MIN_RADIANS = 2.0
+# At firing TDC even a strongly boosted compression has reached this share of any peak.
+TDC_SHARE = 0.15
+
+
+def pair(angle: ArrayLike, pressure: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return new float64 arrays: the angle, and the pressure over it or (cycle, angle); or raise ShapeError."""
+    first = np.array(angle, dtype=np.float64)
+    second = np.array(pressure, dtype=np.float64)
+    if (
+        first.ndim != 1
+        or second.ndim not in (1, 2)
+        or second.shape[-1:] != first.shape
+        or second.shape[0] == 0 < first.size
+    ):
+        remedy = "give two one-dimensional arrays of one length, or one row of pressures per cycle"
+        if second.ndim == 2 and second.shape[:1] == first.shape:
+            remedy = "one row per cycle is needed: pass the transpose"
+        raise ShapeError(f"crank angle has shape {first.shape} and pressure {second.shape}: {remedy}")
+    return first, second
 
 
 def to_bar(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
@@ -102,7 +75,7 @@ def to_bar(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
     return values / _PER_BAR[unit] if unit in _PER_BAR else values * _BAR_PER[unit]
 
 
-def level_bar(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> tuple[float, float] | None:
+def _level_bar(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> tuple[float, float] | None:
     """Return angle and pressure that say how high the intake pressure is; None for traces that start too late.
 
     It is the mean within 5° of intake bottom dead centre, or the first sample of a trace that starts behind it.
@@ -115,7 +88,7 @@ def level_bar(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> tuple[f
     return float(degrees[0]), float(bar[..., 0].mean())
 
 
-def check_unit(
+def _check_unit(
     degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str, source: str, unit_of_file: bool
 ) -> None:
     """Refuse a unit that the highest pressure excludes, and name those that peak and intake level allow."""
@@ -126,7 +99,7 @@ def check_unit(
     likely = [
         other
         for other in _USUAL
-        if other != unit and _peak_fits(peak, other, low) and _level_fits(level_bar(degrees, to_bar(values, other)))
+        if other != unit and _peak_fits(peak, other, low) and _level_fits(_level_bar(degrees, to_bar(values, other)))
     ]
     if likely:
         hint = " or ".join(argument("pressure_unit", repr(other)) for other in likely)
@@ -141,14 +114,14 @@ def check_unit(
 
 def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str) -> list[str]:
     """Doubt a unit that the peak allows and the intake level does not; one line, or none."""
-    level = level_bar(degrees, to_bar(values, unit))
+    level = _level_bar(degrees, to_bar(values, unit))
     if level is None or _level_fits(level):
         return []
     angle, bar = level
     peak, low = float(values.max()), _low(degrees)
     fitting = []
     for other in _USUAL:
-        there = level_bar(degrees, to_bar(values, other))
+        there = _level_bar(degrees, to_bar(values, other))
         if other != unit and there and _peak_fits(peak, other, low) and _level_fits(there):
             fitting.append(f"{argument('pressure_unit', repr(other))} would make it {there[1]:.3g} bar")
     remedy = f"; {' or '.join(fitting)}" if fitting else ": check unit and offset"
@@ -184,17 +157,6 @@ def _level_fits(level: tuple[float, float] | None) -> bool:
     return level is None or level[1] <= 0.0 or LEVEL_BAR[0] <= level[1] <= LEVEL_BAR[1]
 
 
-MIN_SAMPLES = 20
-# A four-stroke cycle is 4 pi = 12.57 rad.
-RADIAN_SPAN = 13.0
-# No encoder is as coarse as this: degrees that were taken for radians have such a step.
-MAX_STEP_DEG = 5.0
-# Below this [rad] no trace is worth an analysis: it is a time in seconds.
-MIN_RADIANS = 2.0
-# At firing TDC even a strongly boosted compression has reached this share of any peak.
-TDC_SHARE = 0.15
-
-
 def check_trace(
     angle: ArrayLike,
     pressure: ArrayLike,
@@ -210,27 +172,9 @@ def check_trace(
     Pressure relative to an unknown offset (a piezo signal before pegging) is accepted, so single values may
     be negative; the unit is judged by the highest value.
 
-    Parameters
-    ----------
-    angle : array_like
-        Crank angle, firing TDC = 0 and compression negative, strictly rising in even steps [`angle_unit`].
-    pressure : array_like
-        Cylinder pressure [`unit`], over angle or (cycle, angle).
-    unit : {"bar", "mbar", "kPa", "Pa", "MPa", "psi", "kgf/cm2", "atm", "torr"}
-        Unit of `pressure`.
-    angle_unit : {"deg", "rad"}
-        Unit of `angle`.
-    source : str
-        Name for the messages, for example the file.
-    rows : sequence of int, optional
-        Line number of each sample for the messages; without it they give the array index.
-    unit_of_file : bool
-        The file says `unit`: where it cannot be, the file is to be corrected.
-
-    Returns
-    -------
-    tuple of ndarray
-        Crank angle [°CA aTDC] and pressure [bar], new float64 arrays.
+    The angle [`angle_unit`] rises strictly in even steps; the pressure [`unit`] stands over it or (cycle, angle).
+    Messages call the trace `source`, a sample by its line in `rows` or else by its index, and a unit that cannot be
+    is to be corrected in the file where the `unit_of_file` says it.
 
     Raises
     ------
@@ -252,16 +196,13 @@ def check_trace(
     check_choice("pressure_unit", unit, PRESSURE_UNITS)
     check_choice("angle_unit", angle_unit, ("deg", "rad"))
     degrees, values = pair(angle, pressure)
-
-    def place(index: int) -> str:
-        return f"{source}, line {rows[index]}" if rows is not None else f"{source}, sample {index}"
-
+    place = Place(source, rows)
     if degrees.size < MIN_SAMPLES:
         raise DataError(f"{source}: {degrees.size} samples; at least {MIN_SAMPLES} are needed")
     for name, column in (("crank angle", degrees), *(("pressure", row) for row in np.atleast_2d(values))):
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
-            where, value = place(int(bad[0])), column[bad[0]]
+            where, value = place.row(int(bad[0])), column[bad[0]]
             raise DataError(f"{where}: {name} = {value}: must be finite; remove or repair it")
     if angle_unit == "rad":
         degrees = np.rad2deg(degrees)
@@ -270,24 +211,14 @@ def check_trace(
     _check_convention(degrees, source)
     _check_gap(degrees, place)
     bar = to_bar(values, unit)
-    check_unit(degrees, values, unit, source, unit_of_file)
+    _check_unit(degrees, values, unit, source, unit_of_file)
     if bar.ndim == 2:
         for cycle, row in enumerate(values, start=1):
-            check_unit(degrees, row, unit, f"{source}, cycle {cycle}", unit_of_file)
+            _check_unit(degrees, row, unit, f"{source}, cycle {cycle}", unit_of_file)
     mean = bar if bar.ndim == 1 else bar.mean(axis=0)
     _check_peak(degrees, mean, source)
     _check_tdc(degrees, mean, source)
     return degrees, bar
-
-
-def _remedy_0_720() -> str:
-    return f"pass {argument('firing_tdc_deg', '')} with the angle of firing TDC"
-
-
-def check_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    """Refuse a keyword value outside its list, naming both."""
-    if value not in allowed:
-        raise DataError.of(name, value, f"one of {', '.join(map(repr, allowed))}")
 
 
 def check_span(degrees: NDArray[np.float64], angle_unit: str, source: str, *, several: bool = False) -> None:
@@ -311,28 +242,32 @@ def check_span(degrees: NDArray[np.float64], angle_unit: str, source: str, *, se
         )
 
 
-def _check_order(degrees: NDArray[np.float64], place: Callable[[int], str]) -> None:
+def _remedy_0_720() -> str:
+    return f"pass {argument('firing_tdc_deg', '')} with the angle of firing TDC"
+
+
+def _check_order(degrees: NDArray[np.float64], place: Place) -> None:
     step = np.diff(degrees)
     if np.all(step > 0.0):
         return
     if np.all(step < 0.0):
         raise DataError(
-            f"{place(0)}: crank angles fall from {degrees[0]:g} to {degrees[-1]:g}: this looks like °bTDC; "
+            f"{place.row(0)}: crank angles fall from {degrees[0]:g} to {degrees[-1]:g}: this looks like °bTDC; "
             f"{CONVENTION}; pass {argument('before_tdc', 'True')}"
         )
     if np.mean(step < 0.0) > 0.9:
         raise DataError(
-            f"{place(0)}: crank angles fall, and jump back: this looks like °bTDC in several cycles; {CONVENTION}; "
+            f"{place.row(0)}: crank angles fall, and jump back: this looks like °bTDC in several cycles; {CONVENTION}; "
             f"pass {argument('before_tdc', 'True')}"
         )
     index = int(np.argmin(step > 0.0)) + 1
     before, here = degrees[index - 1], degrees[index]
     if here == before:
-        raise DataError(f"{place(index)}: crank angle {here:g} is repeated: keep one sample per angle")
+        raise DataError(f"{place.row(index)}: crank angle {here:g} is repeated: keep one sample per angle")
     remedy = "sort the rows by crank angle"
     if before - here > 300.0:
         remedy = "this looks like the start of another cycle; mgdd.io.pressure_trace cuts cycles"
-    raise DataError(f"{place(index)}: crank angle {here:g} follows {before:g}: angles must rise; {remedy}")
+    raise DataError(f"{place.row(index)}: crank angle {here:g} follows {before:g}: angles must rise; {remedy}")
 
 
 def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
@@ -346,12 +281,12 @@ def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
         )
 
 
-def _check_gap(degrees: NDArray[np.float64], place: Callable[[int], str]) -> None:
+def _check_gap(degrees: NDArray[np.float64], place: Place) -> None:
     wide, median = wide_steps(degrees)
     if wide:
         index = wide[0]
         raise DataError(
-            f"{place(index)}: gap in the crank angle from {degrees[index - 1]:g} to {degrees[index]:g}: "
+            f"{place.row(index)}: gap in the crank angle from {degrees[index - 1]:g} to {degrees[index]:g}: "
             f"the usual step is {median:g}; fill it or cut the trace there"
         )
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "Place",
     "TextTable",
     "parse_number",
     "read_table",
@@ -34,6 +35,38 @@ __all__ = [
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
+
+
+@dataclass(frozen=True)
+class Place:
+    """How a message calls a sample and a column of a source: by line of a file, or by index."""
+
+    source: str
+    rows: Sequence[int] | None = None
+    columns: Mapping[str, str] | None = None
+
+    def row(self, index: int) -> str:
+        """Return "FILE, line 7" or "log, sample 5"."""
+        return f"{self.source}, " + (f"sample {index}" if self.rows is None else f"line {self.rows[index]}")
+
+    def span(self, first: int, last: int) -> str:
+        """Return "FILE, lines 2 to 1001" or "log, samples 0 to 999"."""
+        if self.rows is None:
+            return f"{self.source}, samples {first} to {last}"
+        return f"{self.source}, lines {self.rows[first]} to {self.rows[last]}"
+
+    def column(self, name: str) -> str:
+        """Return how the source calls a column."""
+        return f"column {(self.columns or {}).get(name, repr(name))}"
+
+    def cell(self, index: int, name: str) -> str:
+        """Return row and column."""
+        return f"{self.row(index)}, {self.column(name)}"
+
+    def only(self, kept: NDArray[np.intp]) -> Place:
+        """Return the place of some of the samples, in this order."""
+        rows = None if self.rows is None else [self.rows[i] for i in kept.tolist()]
+        return Place(self.source, rows, self.columns)
 
 
 @dataclass(frozen=True)
@@ -237,14 +270,9 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
 
 
 def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]) -> None:
-    r"""Write columns of one length; numbers come back bit for bit, texts stand as they are.
+    r"""Write columns of one length as CSV that any reader takes without options: a header, then rows.
 
-    Parameters
-    ----------
-    columns : mapping of str to array_like
-        By name, which says the unit by its ending; a text holds no comma, quote or line break.
-    path : path-like
-        The file; an existing one is replaced.
+    Numbers come back bit for bit; texts, which hold no comma, quote or line break, stand as they are.
 
     Examples
     --------
@@ -265,24 +293,9 @@ def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]
 
 
 def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write every one-dimensional variable of a Dataset as CSV: a header, then numbers in full precision.
+    """Write every variable of a Dataset over its one dimension by `write_columns`; its scalars are left out.
 
-    The file is plain, so that any reader takes it without options; a name says its unit by its ending. What a table
-    cannot hold, scalars and attributes, stands in the Dataset: ``to_netcdf`` writes all of it.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        With one dimension, or several of which the variables share none; scalars are not written.
-    path : path-like
-        The file; an existing one is replaced once the Dataset has passed its checks.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        A variable without units.
-    mgdd.errors.ShapeError
-        Variables over different dimensions.
+    A variable without units is a DataError, variables over different dimensions are a ShapeError.
 
     Examples
     --------

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, argument
+from mgdd.io.table import Place
 from mgdd.results.labels import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["Place", "check_throttle_log"]
+__all__ = ["check_even", "check_samples", "check_signals", "check_throttle_log"]
 
 MIN_SAMPLES = 50
 _INFINITE = 1e100  # of differences and products something is left below it
@@ -33,33 +33,6 @@ STILL_DUTY = 1e-3
 MANY_FALLS = 0.1
 GAP_WINDOW = 20
 SIDE_DEG, SIDE_S = 0.5, 0.1
-
-
-@dataclass(frozen=True)
-class Place:
-    """How a message calls a sample and a column: by line of a file, or by index."""
-
-    source: str
-    rows: Sequence[int] | None = None
-    columns: Mapping[str, str] | None = None
-
-    def row(self, index: int) -> str:
-        """Return "FILE, line 7" or "log, sample 5"."""
-        return f"{self.source}, " + (f"sample {index}" if self.rows is None else f"line {self.rows[index]}")
-
-    def span(self, first: int, last: int) -> str:
-        """Return "FILE, lines 2 to 1001" or "log, samples 0 to 999"."""
-        if self.rows is None:
-            return f"{self.source}, samples {first} to {last}"
-        return f"{self.source}, lines {self.rows[first]} to {self.rows[last]}"
-
-    def column(self, name: str) -> str:
-        """Return how the source calls a column."""
-        return f"column {(self.columns or {}).get(name, repr(name))}"
-
-    def cell(self, index: int, name: str) -> str:
-        """Return row and column."""
-        return f"{self.row(index)}, {self.column(name)}"
 
 
 def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_deg: float | None = None) -> xr.Dataset:
@@ -107,8 +80,7 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     check_labels(signals)
     place = Place(str(log.attrs.get("file", "log")))
     columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
-    check_finite(columns, place)
-    check_time(columns, place)
+    check_samples(columns, place)
     check_even(columns["time_s"], place)
     check_signals(columns["duty"], columns["angle_deg"], place=place)
     if two_sided:
@@ -116,7 +88,13 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     return log
 
 
-def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+def check_samples(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+    """Refuse columns that are not finite, and a time that is none."""
+    _check_finite(columns, place)
+    _check_time(columns, place)
+
+
+def _check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
     """Refuse NaN, infinity, and numbers whose differences and squares would be infinite."""
     for name, values in columns.items():
         bad = np.flatnonzero(~(np.abs(values) < _INFINITE))
@@ -129,7 +107,7 @@ def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> No
             )
 
 
-def check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+def _check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
     """Refuse time that does not rise, leaves gaps, cannot be in seconds, or is too short.
 
     The other columns show whether one of them is the time.
