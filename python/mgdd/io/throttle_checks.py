@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, argument
+from mgdd.errors import DataError, argument
 from mgdd.io.table import Place
 from mgdd.results.labels import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["check_even", "check_samples", "check_signals", "check_throttle_log"]
+__all__ = ["check_even", "check_samples", "check_sides", "check_signals", "check_throttle_log"]
 
 MIN_SAMPLES = 50
 _INFINITE = 1e100  # of differences and products something is left below it
@@ -35,17 +35,13 @@ GAP_WINDOW = 20
 SIDE_DEG, SIDE_S = 0.5, 0.1
 
 
-def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_deg: float | None = None) -> xr.Dataset:
+def check_throttle_log(log: xr.Dataset) -> xr.Dataset:
     """Refuse what no throttle can be identified from.
 
     Parameters
     ----------
     log : xarray.Dataset
         ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], as `read_throttle_log` gives it.
-    two_sided : bool
-        Whether both sides of limp-home are to be identified: then the plate must have been on both.
-    limp_home_deg : float, optional
-        Limp-home angle [deg]; `two_sided` needs it.
 
     Returns
     -------
@@ -56,10 +52,8 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     ------
     DataError
         NaN, repeated or falling time, gaps, uneven sampling, duty beyond ±1, a duty or an angle that stands still, an
-        angle that cannot be in degrees, exchanged columns, fewer than 50 samples or 0.5 s, or one side only; the
-        message names row, column and remedy.
-    ParameterError
-        `two_sided` without `limp_home_deg`.
+        angle that cannot be in degrees, exchanged columns, fewer than 50 samples or 0.5 s; the message names row,
+        column and remedy.
 
     Examples
     --------
@@ -68,7 +62,7 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     >>> from mgdd.io.throttle_checks import check_throttle_log
     >>> time = np.arange(2000) * 1e-3
     >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> check_throttle_log(log, two_sided=True, limp_home_deg=8.0) is log
+    >>> check_throttle_log(log) is log
     True
     """
     for name in ("time_s", "duty", "angle_deg"):
@@ -78,14 +72,16 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     signals = log[names]
     signals.attrs = {}  # what the user notes beside the log is not ours to judge
     check_labels(signals)
-    place = Place(str(log.attrs.get("file", "log")))
+    place = _place_of(log)
     columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
     check_samples(columns, place)
     check_even(columns["time_s"], place)
     check_signals(columns["duty"], columns["angle_deg"], place=place)
-    if two_sided:
-        _check_sides(columns["time_s"], columns["angle_deg"], limp_home_deg, place)
     return log
+
+
+def _place_of(log: xr.Dataset) -> Place:
+    return Place(str(log.attrs.get("file", "log")))
 
 
 def check_samples(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
@@ -293,12 +289,10 @@ def _exchange() -> str:
     return f"exchange {argument('duty', '')} and {argument('angle', '')}"
 
 
-def _check_sides(
-    time: NDArray[np.float64], angle: NDArray[np.float64], limp_home_deg: float | None, place: Place
-) -> None:
-    if limp_home_deg is None:
-        raise ParameterError(f"{argument('limp_home_deg')} = None: a two-sided check needs the limp-home angle [deg]")
-    step = even_step(time)
+def check_sides(log: xr.Dataset, limp_home_deg: float) -> None:
+    """Refuse a log, checked already, whose plate was not on both sides of limp-home [deg]."""
+    angle, place = log["angle_deg"].to_numpy(), _place_of(log)
+    step = even_step(log["time_s"].to_numpy())
     for side, inside, extreme in (
         ("below", angle < limp_home_deg - SIDE_DEG, int(np.argmin(angle))),
         ("above", angle > limp_home_deg + SIDE_DEG, int(np.argmax(angle))),
