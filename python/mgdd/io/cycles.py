@@ -165,7 +165,8 @@ def _stacked(
                 f"{place.row(b.start)}: the cycle that starts here has other crank angles than the one at "
                 f"{place.row(kept[0].start)}: give all cycles the same angles"
             )
-    notes = [f"{_numbered(dropped)} of {len(blocks)} left out: incomplete"] if dropped else []
+    which = f"cycle{'s' if len(dropped) > 1 else ''} {' and '.join(map(str, dropped))}"
+    notes = [f"{which} of {len(blocks)} left out: incomplete"] if dropped else []
     return Cycles(grid, np.stack([pressure[b] for b in kept]), rows[kept[0]], tuple(notes))
 
 
@@ -221,7 +222,3 @@ def _running(
     cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
     order = np.argsort(cad, kind="stable")
     return Cycles(cad[order], np.ascontiguousarray(values[:, order]), rows[starts[0] : starts[1]][order], tuple(notes))
-
-
-def _numbered(cycles: list[int]) -> str:
-    return f"cycle{'s' if len(cycles) > 1 else ''} {' and '.join(map(str, cycles))}"

@@ -54,7 +54,7 @@ def read_points(
     Parameters
     ----------
     path : path-like
-        ``.csv``, with a header and perhaps a row of units below it, or ``.nc``.
+        ``.csv``, with a header and perhaps a row of units below it, or ``.nc``; another ending is a ParameterError.
     names : sequence of str, optional
         Columns that are wanted, as the header has them, without a unit in brackets; all, if left out. Only these need a
         number in every row.
@@ -69,15 +69,6 @@ def read_points(
     xarray.Dataset
         The columns over ``point``: numbered by the column ``point`` of the file, else from 0. The unit is that of the
         units row, of the brackets behind a name, or of the ending of the name. Inputs of a grid are columns too.
-
-    Raises
-    ------
-    FileNotFoundError
-        No such file.
-    mgdd.errors.ParameterError
-        Another ending.
-    mgdd.errors.DataError
-        A missing column or cell, a unit that contradicts a name; the message has line, column and remedy.
 
     Examples
     --------

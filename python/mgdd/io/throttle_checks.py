@@ -36,17 +36,7 @@ SIDE_DEG, SIDE_S = 0.5, 0.1
 
 
 def check_throttle_log(log: xr.Dataset) -> xr.Dataset:
-    """Refuse what no throttle can be identified from.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], as `read_throttle_log` gives it.
-
-    Returns
-    -------
-    xarray.Dataset
-        The same log.
+    """Refuse what no throttle can be identified from: ``duty`` and ``angle_deg`` over ``time_s``; return the same log.
 
     Raises
     ------
@@ -99,7 +89,8 @@ def _check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> N
             what = "beyond any measurement" if np.isfinite(values[at]) else "not finite"
             more = f" ({bad.size} such cells)" if bad.size > 1 else ""
             raise DataError(
-                f"{place.cell(at, name)}: {values[at]} is {what}{more}: repair it or cut the log; {_window()}"
+                f"{place.cell(at, name)}: {values[at]} is {what}{more}: repair it or cut the log; keep one part with "
+                f"{argument('start_s', '')} or {argument('stop_s', '')}"
             )
 
 
@@ -279,10 +270,6 @@ def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str
             f"{place.cell(0, 'angle_deg')}: the angle stays within {span:.2g} deg of {angle[0]:.4g}: check column and "
             "sensor; if the plate did stick, drive it beyond breakaway (mgdd.identify.design_excitation)"
         )
-
-
-def _window() -> str:
-    return f"keep one part with {argument('start_s', '')} or {argument('stop_s', '')}"
 
 
 def _exchange() -> str:

@@ -203,23 +203,8 @@ def choose_terms(
     """Choose columns of the terms by the least criterion, searching from the constant and from all terms.
 
     A step adds a term with all its factors (the square and the product need their inputs), or drops one that no other
-    term needs; the best step is taken until none helps.
-
-    Parameters
-    ----------
-    terms : ndarray, shape (n, p)
-        Terms of the full polynomial, the constant first.
-    values : ndarray, shape (n,)
-        Response.
-    monomials : ndarray of int, shape (p, degree)
-        What the terms are, as in `PolynomialBasis`.
-    criterion : {"bic", "press"}
-        Schwarz's criterion, or the squared errors of left-out points.
-
-    Returns
-    -------
-    ndarray of int
-        Columns in order.
+    term needs; the best step is taken until none helps. The terms, shape (n, p), are those of the full polynomial, the
+    constant first; the criterion is Schwarz's ("bic") or the squared errors of left-out points ("press").
 
     References
     ----------
@@ -228,11 +213,13 @@ def choose_terms(
     """
     rows: list[Monomial] = [tuple(row) for row in monomials.tolist()]
     place = {row: index for index, row in enumerate(rows)}
-    needs = [frozenset(place[above] for above in _factors(row) if above in place) for row in rows]
+    # The factors of a term: the monomials of one degree less that it contains.
+    above = [[tuple(sorted((*row[:k], 0, *row[k + 1 :]))) for k, own in enumerate(row) if own > 0] for row in rows]
+    needs = [frozenset(place[factor] for factor in factors if factor in place) for factors in above]
 
     @cache
     def with_factors(term: int) -> frozenset[int]:
-        return frozenset({term}).union(*(with_factors(above) for above in needs[term]))
+        return frozenset({term}).union(*map(with_factors, needs[term]))
 
     known: dict[frozenset[int], float] = {}
 
@@ -256,11 +243,6 @@ def choose_terms(
         found.append(searched(frozenset(range(len(rows)))))
     least = min(found, key=worth)
     return np.array(sorted(least), dtype=np.intp)
-
-
-def _factors(row: Monomial) -> set[Monomial]:
-    """Return the monomials of one degree less that a monomial contains."""
-    return {tuple(sorted((*row[:k], 0, *row[k + 1 :]))) for k, place in enumerate(row) if place > 0}
 
 
 def _criterion(terms: NDArray[np.float64], values: NDArray[np.float64], criterion: str) -> float:

@@ -100,7 +100,8 @@ def find_sensor_lag(
     for at, tau in enumerate(_TAUS):
         smooth = _smooth(terms, float(tau))
         for trial in range(max_delay + 1):
-            grams[trial, at] = _grams(_delayed(smooth, trial), values, blocks)
+            both = np.column_stack([_delayed(smooth, trial), values])
+            grams[trial, at] = [both[rows].T @ both[rows] for rows in blocks]
     cost = _costs(grams.sum(axis=2))
     delay, tau, near = _minimum(cost, delays, _TAUS)
     # Resamples search near the best only: far away they would have to miss most of the records.
@@ -134,13 +135,6 @@ def _blocks(use: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
     if len(blocks) < 4:
         raise DataError(f"{int(use.sum())} usable cycles: a sensor lag needs more than {3 * _BLOCK}")
     return blocks
-
-
-def _grams(
-    terms: NDArray[np.float64], values: NDArray[np.float64], blocks: list[NDArray[np.intp]]
-) -> NDArray[np.float64]:
-    both = np.column_stack([terms, values])
-    return np.stack([both[rows].T @ both[rows] for rows in blocks])
 
 
 def _costs(gram: NDArray[np.float64]) -> NDArray[np.float64]:
