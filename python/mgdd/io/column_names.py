@@ -54,6 +54,7 @@ _WORDS = {
     "angle": "angle crank crankangle cad ca phi theta winkel kurbelwinkel",
     "counter": "sample samples index idx row nr count counter",
 }
+_SQUARE = re.compile(r"\[([^\[\]]*)\]")
 _BRACKETS = re.compile(r"[\[({]([^\[\](){}]*)[\])}]")
 # Round brackets hold a unit or a remark: these, numbers and the words above are remarks.
 _REMARKS = set(
@@ -67,7 +68,8 @@ _CYLINDER = re.compile(r"(?:cyl\w*?|zyl\w*?)[\s_.\-#]*(\d+)")
 class Heading(NamedTuple):
     """What is known of a column, None where nothing is said.
 
-    `strange` is a unit that no list here knows, `unclear` a text that may be one: only who reads the file can tell.
+    `other` is a unit of another quantity, `strange` one that no list here knows, `unclear` a text that may be one: only
+    who reads the file can tell.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Heading(NamedTuple):
     quantity: str | None
     series: str
     cylinder: str | None
+    other: str | None
     strange: str | None
     unclear: str | None
     gauge: bool
@@ -94,6 +97,7 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
     if quantity is None or (quantity == "pressure" and found == "other"):
         quantity = found or quantity
     cylinder = _CYLINDER.search(name.lower())
+    units = [units_row or "", *_SQUARE.findall(name)]
     return Heading(
         name=name,
         unit=None if unit == "other" else unit,
@@ -101,14 +105,15 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
         gauge=bool(_GAUGE.search(f"{name} {units_row}")),
-        strange=_first_strange([units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)]),
+        other=next((text.strip() for text in units if _known(text) == "other"), None),
+        strange=_first_strange(units),
         unclear=_first_strange(_maybe_units(name)),
     )
 
 
 def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool]:
     """Return what stands where a unit stands, None for nothing, and whether it can be nothing else."""
-    for texts, sure in (([units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)], True), (_maybe_units(name), False)):
+    for texts, sure in (([units_row or "", *_SQUARE.findall(name)], True), (_maybe_units(name), False)):
         said = next((text.strip() for text in texts if text.strip()), None)
         if said is not None:
             return said, sure

@@ -333,6 +333,11 @@ def _unit_of_pressure(
         )
     (known,) = said
     volts = known in ("V", "mV")
+    foreign = [i for i in columns if heads[i].other]
+    if foreign or (known is not None and known not in PRESSURE_UNITS and not volts):
+        at = (foreign or list(columns))[0]
+        what = f"{table.called(at)} is in {heads[at].other or known}, which is not a pressure"
+        raise DataError(f"{table.source}: {what}: name another")
     if volts and not gain:
         raise DataError(
             f"{table.source}: the file says {known} for the pressure: pass {argument('gain_bar_per_v', '')} and "
@@ -347,10 +352,6 @@ def _unit_of_pressure(
         raise DataError(
             f"{table.source}: the file says {known!r} for the pressure: pass "
             f"{argument('pressure_unit', repr(known))} instead of {unit!r}, or correct the file"
-        )
-    if known is not None and known not in PRESSURE_UNITS and not volts:
-        raise DataError(
-            f"{table.source}: {table.called(columns[0])} is in {known}, which is not a pressure: name another"
         )
     return (known or "V") if gain else (unit or known or "bar"), known is not None
 
