@@ -302,7 +302,7 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "identify.SmoothThrottle.simulate": (run(SMOOTH), (TIME, DUTY)),
     "throttle.PseudoWiener.simulate": (run(MODEL), (TIME, DUTY)),
     "throttle.PseudoWiener.predict": (ahead(MODEL), (TIME, DUTY, ANGLE)),
-    "io.checks.check_trace": (check_trace, (CRANK, BAR)),
+    "io.pressure_checks.check_trace": (check_trace, (CRANK, BAR)),
     "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
     "throttle.characteristics.mass_flow_kg_per_s": (
         lambda area, drop: mass_flow_kg_per_s(area_m2=area, pressure_drop_kpa=drop), (1e-6 * OPEN, 1.0 + OPEN),
