@@ -10,7 +10,7 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace_cycles import is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.trace_forms import as_trace
+from mgdd.io.pressure import as_trace
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE, labelled_dataset
 

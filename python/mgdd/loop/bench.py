@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 
 __all__ = ["EngineBench"]
 
+_RANDOM = (
+    "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
+    "wall_heat_drift_per_kcycle",
+)  # fmt: skip
+
 
 class EngineBench(_core.loop.EngineBench):
     """A virtual engine bench: the cycle model with noise, drift and the sensors of a real one.
@@ -285,7 +290,7 @@ class EngineBench(_core.loop.EngineBench):
         >>> EngineBench().steady_map([-10.0, -5.0])["efficiency_gross"].values.round(3)
         array([0.557, 0.562])
         """
-        return steady_map(self, soc_cad, cycle)
+        return steady_map(self._quiet(cycle), soc_cad)
 
     def find_optimum(
         self,
@@ -325,7 +330,18 @@ class EngineBench(_core.loop.EngineBench):
         >>> round(EngineBench().find_optimum()["soc_cad"], 2)
         -5.63
         """
-        return find_optimum(self, limits, bounds_cad, cycle)
+        return find_optimum(self._quiet(cycle), limits, bounds_cad, float(self.settings["soc_scatter_cad"]))
+
+    def _quiet(self, cycle: int) -> EngineBench:
+        """Copy the bench without anything random or slow, at the operating point of one cycle."""
+        if cycle < 0:
+            raise ParameterError.of("cycle", cycle, ">= 0")
+        settings = self.settings
+        cylinder = settings.pop("cylinder")
+        settings.pop("schedule")
+        silent = SensorDynamics(delay_s=0.0, lag_s=0.0, noise_fraction=0.0)
+        settings |= {"analyser": silent, "fast_sensor": silent} | dict.fromkeys(_RANDOM, 0.0)
+        return EngineBench(cylinder, self.point_at(cycle), **settings)
 
     def _repr_html_(self) -> str:
         return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))

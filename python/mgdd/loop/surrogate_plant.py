@@ -14,7 +14,7 @@ from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.optimize.optimum import limit_names_of
 from mgdd.results.describe import described
 from mgdd.surrogate import EngineSurrogate
-from mgdd.surrogate.sensor_lag import decay_of
+from mgdd.surrogate.signal_model import decay_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
-from mgdd.io.existing_file import existing_file
-from mgdd.io.nesting import parsed
-from mgdd.io.netcdf_file import read_netcdf, write_netcdf
-from mgdd.io.plain_text import read_plain_text
-from mgdd.io.whole_file import write_whole_text
+from mgdd.io.binary_files import read_netcdf, write_netcdf
+from mgdd.io.files import existing_file, parsed, read_plain_text, write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cells import NUMBERS, MapTask
 from mgdd.maps.dcm_files import read_dcm, write_dcm

@@ -13,9 +13,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
-from mgdd.io.nesting import parsed
-from mgdd.io.plain_text import read_plain_text
-from mgdd.io.whole_file import write_whole_text
+from mgdd.io.files import parsed, read_plain_text, write_whole_text
 from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of

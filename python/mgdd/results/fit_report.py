@@ -11,8 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.results.describe import Row
-from mgdd.results.finding import Finding, findings_html
-from mgdd.results.fit_findings import classified
+from mgdd.results.finding import Finding, classified, findings_html
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.results.result import Result
 from mgdd.results.units import unit_of

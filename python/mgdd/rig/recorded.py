@@ -14,8 +14,7 @@ import numpy as np
 
 from mgdd._core import rig as core
 from mgdd.errors import DataError
-from mgdd.io.existing_file import existing_file
-from mgdd.io.nesting import parsed
+from mgdd.io.files import existing_file, parsed
 from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.results.result import Result, merged
 from mgdd.results.units import unit_of

@@ -15,7 +15,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io.trace_forms import one_cycle
+from mgdd.io.pressure import one_cycle
 from mgdd.optimize.fit_options import FitOptions
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE

@@ -15,7 +15,7 @@ from mgdd.identify.throttle.limp_home import doubts, read_off, stuck_elsewhere
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
-from mgdd.io.throttle_checks import check_throttle_log
+from mgdd.io.throttle_checks import check_sides, check_throttle_log
 from mgdd.results import Finding, Fit
 from mgdd.results.finding import unique
 from mgdd.results.fit import FitQuality
@@ -111,12 +111,12 @@ def identify_throttle(
     if test is not None:
         check_throttle_log(test)
     limp_home = limp_home_deg
-    if limp_home is None and (two_sided or model in PSEUDO_WIENER or (model == "auto" and not shows_limp_home(log))):
-        limp_home = read_off(log)
-    if two_sided:
-        check_throttle_log(log, two_sided=True, limp_home_deg=limp_home)
     # What both sides of a log settle is better estimated than read.
-    estimated = limp_home_deg is None and model not in PSEUDO_WIENER and shows_limp_home(log)
+    estimated = limp_home is None and model not in PSEUDO_WIENER and shows_limp_home(log)
+    if limp_home is None and (two_sided or model in PSEUDO_WIENER or (model == "auto" and not estimated)):
+        limp_home = read_off(log)
+    if two_sided and limp_home is not None:
+        check_sides(log, limp_home)
     fit = fit_kind(
         log, model, limp_home_deg=None if estimated else limp_home, two_sided=two_sided, delay_samples=delay_samples,
         stops_deg=(closed_deg, open_deg), options=options,

@@ -206,7 +206,7 @@ def _steered(
             watch(cycle)
 
     if isinstance(checked.plan, TrackPlan):
-        again = loop_rows(checked.record) if checked.record is not None else []
+        again = loop_rows(checked.recorded) if checked.recorded is not None else []
         if again:
             return _again(checked, checked.plan, again, record)
         if checked.loop is not None and checked.loop.name == "core":
