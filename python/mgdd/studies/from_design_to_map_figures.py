@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, minus
-from mgdd.studies.design_to_map_cases import PROCESS
+from mgdd.studies.design_to_map_steps import PROCESS
+from mgdd.studies.figures import new_figure
 from mgdd.studies.statistics import mean_interval
 
 if TYPE_CHECKING:
@@ -39,9 +40,7 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
 
 
 def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
+    return new_figure(width, height)
 
 
 def _bar(values: Any) -> tuple[float, list[list[float]]]:
@@ -51,7 +50,7 @@ def _bar(values: Any) -> tuple[float, list[list[float]]]:
 
 
 def _effort(dataset: xr.Dataset) -> Figure:
-    figure = _figure(9.0, 4.0)
+    figure = new_figure(9.0, 4.0)
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     ways = [str(way) for way in dataset["way"].to_numpy()]
     panels_of = zip(panels, ("lost_percent", "worst_lost_percent"), ("mean of the cells", "worst cell"), strict=True)
@@ -83,7 +82,7 @@ def _effort(dataset: xr.Dataset) -> Figure:
 
 
 def _parts(dataset: xr.Dataset) -> Figure:
-    figure = _figure(6.6, 3.4)
+    figure = new_figure(6.6, 3.4)
     ax = figure.subplots()
     stages = [str(part) for part in dataset["part"].to_numpy()]
     for at, way in enumerate(dataset["parted_way"].to_numpy()):
@@ -101,7 +100,7 @@ def _parts(dataset: xr.Dataset) -> Figure:
 
 
 def _map(dataset: xr.Dataset) -> Figure:
-    figure = _figure(10.0, 4.2)
+    figure = new_figure(10.0, 4.2)
     ways = [str(way) for way in dataset["way"].to_numpy()]
     at = ways.index(PROCESS.label) if PROCESS.label in ways else 0
     left, right = figure.subplots(1, 2, sharey=True)
@@ -126,7 +125,7 @@ def _map(dataset: xr.Dataset) -> Figure:
 
 def _drives(dataset: xr.Dataset) -> Figure:
     engines = [str(engine) for engine in dataset["driven"].to_numpy()]
-    figure = _figure(3.4 * len(engines) + 0.4, 3.8)
+    figure = new_figure(3.4 * len(engines) + 0.4, 3.8)
     panels = figure.subplots(1, len(engines), sharex=True, sharey=True, squeeze=False)[0]
     cycle = dataset["cycle"].to_numpy()
     for at, (ax, engine) in enumerate(zip(panels, engines, strict=True)):
@@ -148,7 +147,7 @@ def _drives(dataset: xr.Dataset) -> Figure:
 
 
 def _other(dataset: xr.Dataset) -> Figure:
-    figure = _figure(8.0, 3.6)
+    figure = new_figure(8.0, 3.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
     names = [str(name) for name in dataset["engine"].to_numpy()]
     _rows(left, names, [[dataset["other_lost_percent"][k] for k in range(len(names))]], ((BLUE, None),))
