@@ -122,7 +122,7 @@ def test_few_seeds(result: StudyResult) -> None:
 def test_a_new_curve_is_drawn_after_the_step() -> None:
     bench = EngineBench(schedule=[(0, MEASURED_AT), (30, LATE)], seed=7)
     guide = InjectionGuide(WATSON)
-    run = drive(bench, curve_seeker(guide.curve(MEASURED_AT)), 31, guide=guide, soc_of=WATSON.soc_of)
+    run = drive(bench, curve_seeker(guide.curve(MEASURED_AT)), 31, curve_at=guide.curve, soc_of=WATSON.soc_of)
     move = guide(LATE)["soi_cad"] - guide(MEASURED_AT)["soi_cad"]
     assert run.estimate[30] - run.estimate[29] == pytest.approx(move, abs=0.8)
 

@@ -165,16 +165,7 @@ class Parts:
     ) -> StudyResult:
         """Return a whole result; raise one that was cut short as the part of the error that did it.
 
-        Parameters
-        ----------
-        name : str
-            Of the study.
-        dataset : xarray.Dataset
-            Its table.
-        draw : callable or None
-            Draws the figures of the dataset by caption.
-        **summary
-            Entries of the summary: at least ``seeds`` and ``rows``.
+        `draw` makes the figures of the dataset by caption; the summary has at least ``seeds`` and ``rows``.
         """
         figures = {} if draw is None else draw(dataset)
         plain = to_jsonable({"study": name, **summary, "interrupted": self.interrupted})

@@ -12,7 +12,7 @@ from mgdd.results.labels import labelled_dataset
 from mgdd.studies import calibrated_guide_cases as cases
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.calibrated_guide_cases import Case, Engine, GuidedRun, Recipe, Runs, Steps
-from mgdd.studies.figures import band, legend_outside, new_figure
+from mgdd.studies.figures import band, legend_outside, names_of, new_figure
 from mgdd.studies.guide_cases import SteadyMap
 from mgdd.studies.statistics import band_variables, with_quantiles
 
@@ -116,12 +116,8 @@ def run_calibrated_guide(
 def _seek(case: Case, maps: dict[str, SteadyMap], seeds: int) -> Runs:
     """Run one case, once per seed."""
     steady = maps[case.engine.name]
-    found = [
-        cases.guided_run(
-            case.engine.bench(seed, tdc_error_cad=case.tdc_error_cad), case.recipe, case.start_cad, case.cycles
-        )
-        for seed in range(seeds)
-    ]  # fmt: skip
+    benches = [case.engine.bench(seed, tdc_error_cad=case.tdc_error_cad) for seed in range(seeds)]
+    found = [cases.guided_run(bench, case.recipe, case.start_cad, case.cycles) for bench in benches]
     return Runs(case=case, best_cad=steady.best_cad, **_errors(found, steady))
 
 
@@ -199,10 +195,10 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
 
 def _starts(dataset: xr.Dataset) -> Figure:
     own = dataset.isel(run=np.flatnonzero(dataset["tdc_error_cad"] == 0.0))
-    cases = list(dict.fromkeys(zip(own["engine"].to_numpy(), own["start_cad"].to_numpy(), strict=True)))
-    figure = new_figure(3.1 * len(cases) + 0.6, 5.4)
-    axes = figure.subplots(2, len(cases), sharex=True, sharey="row", squeeze=False)
-    for (above, below), (engine, start) in zip(axes.T, cases, strict=True):
+    columns = list(dict.fromkeys(zip(own["engine"].to_numpy(), own["start_cad"].to_numpy(), strict=True)))
+    figure = new_figure(3.1 * len(columns) + 0.6, 5.4)
+    axes = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
+    for (above, below), (engine, start) in zip(axes.T, columns, strict=True):
         runs = own.isel(
             run=np.flatnonzero((own["engine"] == engine) & (own["start_cad"] == start)), cycle=slice(_SHOWN)
         )
@@ -221,12 +217,12 @@ def _starts(dataset: xr.Dataset) -> Figure:
 
 
 def _steps(dataset: xr.Dataset) -> Figure:
-    parts = [str(name).rsplit(", ", 2) for name in dataset["step"].to_numpy()]
-    cases = list(dict.fromkeys((engine, form) for engine, form, _ in parts))
-    figure = new_figure(3.1 * len(cases) + 0.6, 3.8)
-    axes = figure.subplots(1, len(cases), sharey=True, squeeze=False)[0]
+    parts = [name.rsplit(", ", 2) for name in names_of(dataset, "step")]
+    columns = list(dict.fromkeys((engine, form) for engine, form, _ in parts))
+    figure = new_figure(3.1 * len(columns) + 0.6, 3.8)
+    axes = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
     cycle = dataset["after_step"].to_numpy()[:_SHOWN_AFTER]
-    for ax, case in zip(axes, cases, strict=True):
+    for ax, case in zip(axes, columns, strict=True):
         for at, (engine, form, name) in enumerate(parts):
             if (engine, form) == case and name in _LOOKS:
                 _band(ax, cycle, dataset.isel(step=at, after_step=slice(_SHOWN_AFTER)), "step_error", name)

@@ -13,7 +13,16 @@ from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import GuidedEngine, ModelOptimum, OnlineCalibration
 from mgdd.loop import EngineBench, run_seeker
 from mgdd.optimize import ExtremumSeeking
-from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT, WRONG, SteadyMap, curve_seeker, seeker_without_clip, verdict_on
+from mgdd.studies.guide_cases import (
+    BOUNDS_CAD,
+    PLANT,
+    WRONG,
+    SteadyMap,
+    curve_seeker,
+    seeker_without_clip,
+    verdict_on,
+    verdicts,
+)
 from mgdd.studies.statistics import first_within, quantile_of, stays_within, with_interval, with_median_interval
 
 if TYPE_CHECKING:
@@ -230,13 +239,9 @@ def uncalibrated(own: Runs, runs: list[Runs]) -> Runs:
     return next(r for r in runs if r.case.recipe == NONE and (r.case.engine.name, r.case.start_cad) == same)
 
 
-def _stays(runs: Runs) -> list[float]:
-    return [stays_within(error, 0.0, _STAY_CAD) for error in runs.error]
-
-
 def setting_row(own: Runs, plain: Runs) -> dict[str, Any]:
     """Put one case into figures, beside the same runs without calibration."""
-    stays = _stays(own)
+    stays = [stays_within(error, 0.0, _STAY_CAD) for error in own.error]
     return {
         "engine": own.case.engine.name,
         "start_cad": own.case.start_cad,
@@ -269,7 +274,7 @@ def refit_row(engine: Engine, recipe: Recipe, found: list[list[Refit]], best: fl
     early = [_change(refit, best) for refits in found for refit in refits if refit.cycle < _NEAR_AFTER]
     late = [[refit for refit in refits if refit.cycle >= _NEAR_AFTER] for refits in found]
     changes = [_change(refit, best) for refits in late for refit in refits]
-    thrown = [_is_thrown_back(refit, best) for refits in late for refit in refits]
+    thrown = [abs(refit.without - best) <= _STAY_CAD < abs(refit.with_it - best) for refits in late for refit in refits]
     return {
         "engine": engine.name,
         "calibrated": recipe.name,
@@ -285,10 +290,6 @@ def refit_row(engine: Engine, recipe: Recipe, found: list[list[Refit]], best: fl
 def _change(refit: Refit, best: float) -> float:
     """Give by how much the calibration made the estimate worse."""
     return abs(refit.with_it - best) - abs(refit.without - best)
-
-
-def _is_thrown_back(refit: Refit, best: float) -> bool:
-    return abs(refit.without - best) <= _STAY_CAD < abs(refit.with_it - best)
 
 
 def step_row(own: Steps, steps: list[Steps]) -> dict[str, Any]:
@@ -342,12 +343,10 @@ def bars(rows: list[dict[str, Any]], refits: list[dict[str, Any]]) -> list[dict[
             if not own:
                 continue
             text = recipe.name + (f", TDC {tdc:g} CAD late" if tdc else "")
-            stays = [row["median_stays"] for row in own]
-            late = [row["late_error_cad"] for row in own]
-            said += [
-                verdict_on(f"{text}: stays within 1.5 CAD, median [cycles]", stays, "at most 8", high=8.0),
-                verdict_on(f"{text}: mean error after 60 cycles [CAD]", late, "at most 0.5", high=0.5),
-            ]
+            said += verdicts([
+                (f"{text}: stays within 1.5 CAD, median [cycles]", [row["median_stays"] for row in own], 8.0),
+                (f"{text}: mean error after 60 cycles [CAD]", [row["late_error_cad"] for row in own], 0.5),
+            ])  # fmt: skip
             if not tdc:
                 better = [row["late_error_less_cad_low"] for row in own]
                 text += ": less error after 60 cycles than without calibration, low end of the interval [CAD]"

@@ -39,7 +39,6 @@ AXES: Mapping[str, Array] = {
 }
 TIMINGS = np.linspace(-24.0, 10.0, 69)
 _FINE = np.linspace(-30.0, 14.0, 441)  # of the truth [°CA aTDC]
-_RESPONSES = (OBJECTIVE, *LIMITS)
 
 
 def _changed(*, heat: float = 1.0, burn: float = 1.0, compression: float = 0.0) -> Cylinder:
@@ -190,7 +189,11 @@ def drive(cylinder: Cylinder, guide: Any, seed: int, *, learns: bool = False) ->
     points = [point_of(*place) for place in zip(*places, strict=True)]
     schedule = [(k * DWELL, point) for k, point in enumerate(points)]
     bench = EngineBench(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed)
-    seeker = FeedForward(_seeker(), guide)
+    plain = ExtremumSeeking(
+        start=_START_CAD, lower=_BOUNDS_CAD[0], upper=_BOUNDS_CAD[1], form="moving_average", gain=_GAIN,
+        limits=[Limit(name, upper) for name, upper in LIMITS.items()],
+    )  # fmt: skip
+    seeker = FeedForward(plain, guide)
     applied, learnt = np.empty((PLACES, DWELL)), 0
     for k, point in enumerate(points):
         seeker.at(point)  # once: it stands still until the next
@@ -214,13 +217,6 @@ def drive_by_map(cylinder: Cylinder, table: Callable[[Any], float | None], seed:
 def rough_model() -> ModelOptimum:
     """Make the model that was there before anything was measured."""
     return ModelOptimum(ROUGH, bounds_cad=_BOUNDS_CAD)
-
-
-def _seeker() -> ExtremumSeeking:
-    return ExtremumSeeking(
-        start=_START_CAD, lower=_BOUNDS_CAD[0], upper=_BOUNDS_CAD[1], form="moving_average", gain=_GAIN,
-        limits=[Limit(name, upper) for name, upper in LIMITS.items()],
-    )  # fmt: skip
 
 
 def _judged(cylinder: Cylinder, places: tuple[Array, Array], applied: Array, learnt: int) -> Drive:

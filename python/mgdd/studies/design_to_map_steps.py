@@ -287,10 +287,11 @@ def make_map(case: Case, seed: int, *, noise_free: bool = False) -> Made:
     stages["smoothing"] = _flat(smoothed)
     checked = check_map(_ENGINE, smoothed, price, predicted, margins, _stream(seed, 1))
     stages["check"] = _flat(checked.table)
+    above = np.any([measured.points[name] > upper for name, upper in LIMITS.items()], axis=0)
     return Made(
         table=checked.table, timings=stages, between=checked.table.lookup(dict(zip(AXES, MIDDLES, strict=True))).values,
         points=measured.points.sizes["point"], cycles=measured.cycles, check_cycles=checked.cycles,
-        broken=_beyond(measured), found=checked.found, price=checked.price,
+        broken=int(above.sum()), found=checked.found, price=checked.price,
         by_model=float(np.nanmax(held.cells["objective"].ravel() - _read(predicted, stages["smoothing"]))),
     )  # fmt: skip
 
@@ -302,11 +303,6 @@ def _flat(table: CalibrationMap) -> Array:
 def _stream(seed: int, part: int) -> int:
     """Give the design's measurement and each check noise of their own."""
     return 1000 * seed + 100 * part
-
-
-def _beyond(measured: Measured) -> int:
-    above = [measured.points[name].to_numpy() > upper for name, upper in LIMITS.items()]
-    return int(np.any(above, axis=0).sum())
 
 
 def _read(predicted: xr.Dataset, timing: Array) -> Array:

@@ -75,22 +75,9 @@ def convergence_panels(panels: Sequence[tuple[str, xr.Dataset]], *, height: floa
 def numbered_plane(
     ax: Axes, speeds: Any, fuels: Any, values: Any, *, numbers: Any, white: Any, cmap: str, span: tuple[float, float]
 ) -> Any:
-    """Colour the cells of a plane of speed and load, and give the mesh.
+    """Colour cells by values of shape (speeds, fuels), write numbers into them, some in white, and give the mesh.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where.
-    speeds, fuels : ndarray
-        Of the cells.
-    values, numbers : ndarray, shape (speeds, fuels)
-        What gives the colour, and what is written into a cell.
-    white : ndarray of bool, shape (speeds, fuels)
-        Cells so dark that their number is white.
-    cmap : str
-        Colour map.
-    span : tuple of float
-        Values of its ends.
+    The colour map ends at the values of `span`.
     """
     mesh = ax.pcolormesh(speeds, fuels, values.T, cmap=cmap, vmin=span[0], vmax=span[1], shading="nearest")
     for i, j in np.ndindex(*values.shape):

@@ -119,27 +119,22 @@ def loss_parts(maps: Maps, cells: Truth) -> dict[str, Array]:
 
 def part_rows(maps: Maps, cells: Truth) -> list[dict[str, Any]]:
     """Say where the loss of a finished map comes from, and what the limits cost even the best map."""
-    rows = [
-        {
+
+    def row(part: str, lost: Array, excess: Array) -> dict[str, Any]:
+        return {
             "way": maps.case.name,
-            "part": "limits, at the best map",
-            **with_interval("lost_percent", np.full(2, (cells.free - cells.best).mean())),
-            "largest_of_a_cell_percent": float((cells.free - cells.best).max()),
-            "cells_above": 0.0,
-            "largest_excess_percent": 0.0,
-        }
-    ]
-    for stage, part in loss_parts(maps, cells).items():
-        excess = cells.excess(maps.timings(stage))
-        rows.append({
-            "way": maps.case.name,
-            "part": stage,
-            **with_interval("lost_percent", part.mean(axis=1)),
-            "largest_of_a_cell_percent": float(part.max()),
+            "part": part,
+            **with_interval("lost_percent", lost.mean(axis=1)),
+            "largest_of_a_cell_percent": float(lost.max()),
             "cells_above": float((excess > 0.0).sum(axis=1).mean()),
             "largest_excess_percent": _largest(excess),
-        })  # fmt: skip
-    return rows
+        }
+
+    limits = np.tile(cells.free - cells.best, (2, 1))
+    return [
+        row("limits, at the best map", limits, np.zeros((2, 1))),
+        *(row(stage, lost, cells.excess(maps.timings(stage))) for stage, lost in loss_parts(maps, cells).items()),
+    ]
 
 
 def worn_row(engine: str, maps: Maps, new: Truth, old: Truth) -> dict[str, Any]:

@@ -128,7 +128,7 @@ def run_guide_accuracy(
         "guide-accuracy", _dataset(done, trouble, maps), _draw if figures else None,
         seeds=seeds,
         rows=rows,
-        trouble=[case.row for case in trouble],
+        trouble=[hard.row for hard in trouble],
         bars=_bars(rows) + hard_bars(trouble),
         optimum_before_cad=maps[0].best_cad,
         optimum_after_cad=maps[1].best_cad,
@@ -137,12 +137,13 @@ def run_guide_accuracy(
 
 def _step(form: str, guide: Guide | None, after: SteadyMap, seeds: int) -> _Step:
     lost, back, final, refused, estimates = [], [], [], [], []
+    curve_at = None if guide is None else guide.curve
     for seed in range(seeds):
         bench = EngineBench(schedule=[(0, LOW), (SETTLED, HIGH)], soc_scatter_cad=0.0, seed=seed)
         seeker = curve_seeker(guide.curve(LOW)) if guide is not None and form == "curve" else trimmed(guide)
-        first = drive(bench, seeker, SETTLED + _TEST_CYCLES, guide=guide)
+        first = drive(bench, seeker, SETTLED + _TEST_CYCLES, curve_at=curve_at)
         refused.append(isinstance(seeker, FeedForward) and seeker.verdict == "wrong")
-        second = drive(bench, seeker, AFTER - _TEST_CYCLES, guide=guide)
+        second = drive(bench, seeker, AFTER - _TEST_CYCLES, curve_at=curve_at)
         estimate = np.concatenate([first.estimate, second.estimate])[SETTLED:]
         applied = np.concatenate([first.applied, second.applied])[SETTLED:]
         lost.append(after.lost(applied[:JUDGED]).sum())
@@ -217,10 +218,10 @@ def _dataset(done: list[_Step], trouble: list[Hard], maps: list[SteadyMap]) -> x
         **band_variables("estimate_{}_cad", ("run", "cycle"), [step.estimates for step in done], cad, said),
     }
     if trouble:
-        errors = [case.error for case in trouble]
+        errors = [hard.error for hard in trouble]
         said = quantiles_of("error", "error of the estimate")
         variables |= {
-            "trouble": ("trouble", [case.name for case in trouble], "-", "unannounced trouble"),
+            "trouble": ("trouble", [hard.case.name for hard in trouble], "-", "unannounced trouble"),
             "trouble_cycle": ("trouble_cycle", np.arange(CYCLES), "-", "cycle"),
             **band_variables("error_{}_cad", ("trouble", "trouble_cycle"), errors, "°CA", said),
         }
@@ -288,11 +289,6 @@ class Hard:
     case: HardCase
     row: dict[str, Any]
     error: NDArray[np.float64]
-
-    @property
-    def name(self) -> str:
-        """Of the case."""
-        return self.case.name
 
 
 def run_hard(case: HardCase, seeds: int) -> Hard:

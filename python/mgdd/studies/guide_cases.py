@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -181,14 +181,6 @@ class SpeedLoadPlane:
         return cls(SPEEDS_RPM[::3], FUELS_MG[::3]) if quick else cls()
 
 
-class DrawsCurve(Protocol):
-    """A guide that draws J over its input at an operating point."""
-
-    def curve(self, point: OperatingPoint) -> Curve:
-        """Draw it."""
-        ...
-
-
 @dataclass(frozen=True)
 class Run:
     """One run, cycle by cycle: estimate and its stated sd before the cycle, start of combustion that was set [°CA]."""
@@ -203,7 +195,7 @@ def drive(
     seeker: FeedForward | CurveSeeking | GuidedEngine,
     cycles: int,
     *,
-    guide: DrawsCurve | None = None,
+    curve_at: Callable[[OperatingPoint], Curve] | None = None,
     late_by_cad: Callable[[int], float] | None = None,
     soc_of: Callable[[OperatingPoint, float], float] | None = None,
     beyond: Callable[[float], float] | None = None,
@@ -214,8 +206,8 @@ def drive(
     ----------
     bench, seeker, cycles
         All seekers but a bare curve are told every operating point.
-    guide : DrawsCurve, optional
-        Draws the curve of a new operating point.
+    curve_at : callable, optional
+        Draws the curve of a new operating point, for a bare curve.
     late_by_cad : callable, optional
         By how much combustion starts later than asked for, by cycle [°CA]; nobody tells the seeker.
     soc_of : callable, optional
@@ -229,8 +221,8 @@ def drive(
         now = bench.point
         if isinstance(seeker, FeedForward | GuidedEngine):
             seeker.at(now)
-        elif guide is not None and now != point:
-            seeker.guide(guide.curve(now))
+        elif curve_at is not None and now != point:
+            seeker.guide(curve_at(now))
         point = now
         asked = float(seeker.ask()[0])
         estimate[k] = seeker.estimate[0]

@@ -71,13 +71,13 @@ class _Engine:
     curve: Curve
     bend: float  # of the parabola
     plant: Callable[[int, float], Any]
-    plain: Callable[[float], ExtremumSeeking]
+    plain: Callable[..., ExtremumSeeking]
 
     def seeker(self, case: str) -> Any:
         """Make the seeker of a case."""
         led_cad = min(max(self.curve.best, self.bounds_cad[0]), self.bounds_cad[1])
         if case in ("unguided", "feed_forward"):
-            return self.plain(self.start_cad if case == "unguided" else led_cad)
+            return self.plain(start=self.start_cad if case == "unguided" else led_cad)
         shape = self.curve
         if case == "parabola":
             shape = Curve.parabola(curvature=self.bend, best=led_cad, reach=_REACH_CAD)
@@ -215,17 +215,13 @@ def _bench_engine() -> _Engine:
         bend=_BEND,
         plant=_bench_plant,
         plain=partial(
-            _seeker_from, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
+            ExtremumSeeking, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
         ),
     )
 
 
 def _bench_plant(seed: int, _: float) -> EngineBench:
     return EngineBench(seed=seed)
-
-
-def _seeker_from(start: float, **settings: Any) -> ExtremumSeeking:
-    return ExtremumSeeking(**{**settings, "start": start})
 
 
 def _measured_engine() -> _Engine:
@@ -241,7 +237,7 @@ def _measured_engine() -> _Engine:
         unit="bar", start_cad=measured.START_CAD, bounds_cad=bounds, best_cad=case.best["soi_cad"],
         best_j=case.best.value, grid_cad=grid, steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
         curve=guide.curve, bend=_BEND * guide.bar_per_point, plant=partial(_measured_plant, surrogate),
-        plain=partial(_seeker_from, **settings),
+        plain=partial(ExtremumSeeking, **settings),
     )  # fmt: skip
 
 

@@ -150,21 +150,25 @@ def _lost(truth: DelayLaw, own: SteadyMap, point: OperatingPoint, soi_cad: float
 def plane_row(plane: Plane) -> dict[str, Any]:
     """Give size of the error and J lost, before and after the trim."""
     left = plane.soi_error_cad + plane.trim_cad
-    fired, fired_trimmed = (np.isfinite(lost) for lost in (plane.lost, plane.lost_trimmed))
+
+    def losses(lost: NDArray[np.float64], end: str = "") -> dict[str, Any]:
+        fired = lost[np.isfinite(lost)]
+        return {
+            f"lost{end}_mean": float(fired.mean()),
+            f"lost{end}_p95": float(np.quantile(fired, 0.95)),
+            f"cells_without_ignition{end}": lost.size - fired.size,
+        }
+
     return {
         "truth": plane.truth,
         "told": plane.told,
         "cells": plane.lost.size,
         "soi_error_median_cad": float(np.median(np.abs(plane.soi_error_cad))),
         "soi_error_largest_cad": float(np.abs(plane.soi_error_cad).max()),
-        "lost_mean": float(plane.lost[fired].mean()),
-        "lost_p95": float(np.quantile(plane.lost[fired], 0.95)),
-        "cells_without_ignition": int(np.sum(~fired)),
+        **losses(plane.lost),
         "trim_cad": plane.trim_cad,
         "left_median_cad": float(np.median(np.abs(left))),
-        "lost_trimmed_mean": float(plane.lost_trimmed[fired_trimmed].mean()),
-        "lost_trimmed_p95": float(np.quantile(plane.lost_trimmed[fired_trimmed], 0.95)),
-        "cells_without_ignition_trimmed": int(np.sum(~fired_trimmed)),
+        **losses(plane.lost_trimmed, "_trimmed"),
     }
 
 
@@ -208,7 +212,7 @@ def _runs(form: str, told: DelayLaw, seeds: int) -> _Runs:
             seeker: Any = CurveSeeking(start=curve.best, lower=low, upper=high, curve=curve)
         else:
             seeker = trimmed(guide)
-        run = drive(bench, seeker, _CYCLES, guide=guide, soc_of=truth.soc_of)
+        run = drive(bench, seeker, _CYCLES, curve_at=guide.curve, soc_of=truth.soc_of)
         estimates[seed] = run.estimate
         lost[seed] = np.concatenate(
             [own.lost(part) for own, part in zip(maps, np.split(run.applied, [_STEP_AT]), strict=True)]

@@ -184,15 +184,10 @@ def _row(run: _Runs) -> dict[str, Any]:
     }
 
 
-def _half_interval(values: NDArray[np.float64]) -> float:
-    mean, _, high = mean_interval(values)
-    return high - mean
-
-
 def _dataset(runs: list[_Runs], surrogate: EngineSurrogate) -> xr.Dataset:
     cad, every, cases = "°CA aTDC", ("case", "seed"), [run.case for run in runs]
     ranges = [case.best.bounds["soi_cad"] for case in cases]
-    half = [_half_interval(run.final) for run in runs]
+    half = [high - mean for mean, _, high in (mean_interval(run.final) for run in runs)]
     arrivals = [np.where(np.isfinite(run.arrivals), run.arrivals, np.nan) for run in runs]
     variables: dict[str, tuple[Any, ...]] = {
         "case": ("case", np.arange(len(cases)), "-", "seeker on objective"),

@@ -149,6 +149,7 @@ _PROVENANCE = (
     "Four cycle-averaged closed-valve pressure traces of a heavy-duty diesel at 25, 50, 75 and 100 % load, from "
     "LibICE-post (F. Ramognino), MIT licence."
 )
+_PER_LOAD = "rmse_percent imep_closed_error_percent soc_cad largest_error_bar largest_error_cad".split()
 _ANALYSIS = (
     "n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar p_max_bar p_max_cad"
 ).split()
@@ -173,6 +174,7 @@ def summarize(
                 "warnings": analysis.attrs["warnings"].splitlines(),
             }
         )
+    unknown = [] if all(profile.identifiable for profile in profiles.values()) else ["wall_heat_scale"]
     return {
         "study": "measured-traces",
         "seeds": 0,
@@ -183,9 +185,7 @@ def summarize(
         "traces": rows,
         "laws": [law_row(fit) for fit in fits],
         "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
-        "unidentifiable": sorted(
-            {*main.fit.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}
-        ),
+        "unidentifiable": sorted({*main.fit.report.unidentifiable, *unknown}),
         "best_timing": [row.to_dict() for row in timing],
     }
 
@@ -226,18 +226,10 @@ def law_row(fit: CylinderFit) -> dict[str, Any]:
         "law": fit.kind,
         **onset,
         "file": [load.file for load in fit.loads],
-        "rmse_percent": [load.rmse_percent for load in fit.loads],
-        "imep_closed_error_percent": [load.imep_closed_error_percent for load in fit.loads],
-        "soc_cad": [load.soc_cad for load in fit.loads],
-        "largest_error_bar": [load.largest_error_bar for load in fit.loads],
-        "largest_error_cad": [load.largest_error_cad for load in fit.loads],
+        **{name: [getattr(load, name) for load in fit.loads] for name in _PER_LOAD},
         "wall_heat_scale": fit.model.wall_heat_scale,
         "warnings": [str(finding) for finding in fit.findings],
     }
-
-
-def _unknown(profiles: Mapping[str, WallHeatProfile]) -> bool:
-    return any(not profile.identifiable for profile in profiles.values())
 
 
 def law_table(fits: Sequence[CylinderFit]) -> xr.Dataset:

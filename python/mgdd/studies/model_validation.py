@@ -144,53 +144,48 @@ def validate_law(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) 
 
 def stage_rows(own: Validated, reference: Validated) -> list[dict[str, Any]]:
     """Give a row per stage and trace; the reference says what a best timing loses."""
-    out = []
-    for stage in STAGES:
-        for at, (burn, met) in enumerate(zip(own.burns[stage], own.met[stage], strict=True)):
-            best, bend = burn.best
-            truth = reference.burns["calibrated"][at]
-            out.append(
-                {
-                    "law": own.law.name,
-                    "stage": stage,
-                    "file": own.fit.loads[at].file,
-                    "rmse_percent": met.rmse_percent,
-                    "imep_closed_error_percent": met.imep_closed_error_percent,
-                    "largest_error_bar": met.largest_error_bar,
-                    "best_ca50_cad": best,
-                    "best_ca50_error_cad": best - truth.best[0],
-                    "lost_percent": truth.lost_percent(best),
-                    "curvature_percent_per_cad2": bend,
-                    "curvature_ratio": bend / truth.best[1],
-                }
-            )
-    return out
+    return [
+        {
+            "law": own.law.name,
+            "stage": stage,
+            "file": load.file,
+            "rmse_percent": met.rmse_percent,
+            "imep_closed_error_percent": met.imep_closed_error_percent,
+            "largest_error_bar": met.largest_error_bar,
+            "best_ca50_cad": burn.best[0],
+            "best_ca50_error_cad": burn.best[0] - truth.best[0],
+            "lost_percent": truth.lost_percent(burn.best[0]),
+            "curvature_percent_per_cad2": burn.best[1],
+            "curvature_ratio": burn.best[1] / truth.best[1],
+        }
+        for stage in STAGES
+        for burn, met, truth, load in zip(
+            own.burns[stage], own.met[stage], reference.burns["calibrated"], own.fit.loads, strict=True
+        )
+    ]
 
 
 def _spread(own: Validated, family: list[tuple[float, float]]) -> list[dict[str, Any]]:
     best = np.array([drawn.best_ca50_cad for drawn in own.block])
     bend = np.array([drawn.curvature_percent for drawn in own.block])
-    stated = stated_sd(own.fit, best_slopes(own.fit))
-    out = []
-    for at, load in enumerate(own.fit.loads):
-        away = best[:, at] - own.best[at]
-        lost = -0.5 * own.curvature[at] * away**2
-        out.append(
-            {
-                "law": own.law.name,
-                "file": load.file,
-                "best_ca50_cad": own.best[at],
-                "stated_sd_cad": float(stated[at]),
-                **_sd_interval("redrawn_sd_cad", best[:, at]),
-                **with_interval("redrawn_bias_cad", away),
-                "family_low_cad": family[at][0] if family else None,
-                "family_high_cad": family[at][1] if family else None,
-                "lost_p95_percent": float(np.quantile(lost, 0.95)),
-                "curvature_percent_per_cad2": own.curvature[at],
-                "curvature_relative_sd_percent": 100.0 * (sd_of(bend[:, at]) / abs(own.curvature[at])),
-            }
-        )
-    return out
+    away, stated = best - own.best, stated_sd(own.fit, best_slopes(own.fit))
+    lost = -0.5 * own.curvature * away**2
+    return [
+        {
+            "law": own.law.name,
+            "file": load.file,
+            "best_ca50_cad": own.best[at],
+            "stated_sd_cad": float(stated[at]),
+            **_sd_interval("redrawn_sd_cad", best[:, at]),
+            **with_interval("redrawn_bias_cad", away[:, at]),
+            "family_low_cad": family[at][0] if family else None,
+            "family_high_cad": family[at][1] if family else None,
+            "lost_p95_percent": float(np.quantile(lost[:, at], 0.95)),
+            "curvature_percent_per_cad2": own.curvature[at],
+            "curvature_relative_sd_percent": 100.0 * (sd_of(bend[:, at]) / abs(own.curvature[at])),
+        }
+        for at, load in enumerate(own.fit.loads)
+    ]
 
 
 def _sd_interval(name: str, values: NDArray[np.float64]) -> dict[str, float | None]:

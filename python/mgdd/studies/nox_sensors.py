@@ -153,13 +153,6 @@ def _step(name: str, fitted: NoxProxy) -> tuple[dict[str, NDArray[np.float64]], 
     return quiet, noisy
 
 
-def _answer_cycles(column: NDArray[np.float64]) -> int:
-    """Count the cycles from the step until 90 % of the way from a sensor's own old to its own new value."""
-    old, new = column[STEP_AT - 1], column[-1]
-    share = (column[STEP_AT:] - old) / (new - old)
-    return int(np.flatnonzero(share >= 0.9)[0])
-
-
 def _correction(seeds: int) -> NDArray[np.float64]:
     """Follow the corrected sensor from its wrong start, over seed and cycle: relative error of its ten-cycle mean."""
     out = np.empty((seeds, SETTLE))
@@ -183,7 +176,8 @@ def _row(sensor: str, sweep: _Sweep, moves: list[dict[str, NDArray[np.float64]]]
     if sensor == "soft_fitted":  # one map of the same temperature: it scatters as the uncorrected one does
         row["scatter_percent"] = sweep.scatter["soft"]
     for name, move in zip(_STEPS, moves, strict=False):
-        cycles = _answer_cycles(move[sensor])
+        old, new = move[sensor][STEP_AT - 1], move[sensor][-1]
+        cycles = int(np.argmax((move[sensor][STEP_AT:] - old) / (new - old) >= 0.9))
         key = name.replace(" ", "_")
         row |= {f"{key}_t90_cycles": cycles, f"{key}_t90_s": cycles * 120.0 / OperatingPoint().speed_rpm}
     return row

@@ -15,7 +15,7 @@ from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, minus
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import band, legend_outside, names_of, new_figure
-from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT, WRONG, verdict_on
+from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT, WRONG, verdict_on, verdicts
 from mgdd.studies.statistics import (
     band_variables,
     first_within,
@@ -72,13 +72,9 @@ def fact_bars(facts: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _steady() -> EngineBench:
-    return EngineBench(soc_scatter_cad=0.0)
-
-
 def _seeking() -> tuple[float, float]:
     """Count trials until the wall heat stays within 2 % of the truth, one trial per update; and where it ends."""
-    bench = _steady()
+    bench = EngineBench(soc_scatter_cad=0.0)
     calibration = OnlineCalibration(
         WRONG, method="extremum_seeking", uncertainty=EXACT, window_cycles=2, soc_scatter_cad=0.0, trials_per_update=1
     )
@@ -93,7 +89,7 @@ def _seeking() -> tuple[float, float]:
 
 def _told(soc_cad: float, late_cad: float) -> float:
     """Fit the wall heat alone where the timing is told wrong."""
-    bench = _steady()
+    bench = EngineBench(soc_scatter_cad=0.0)
     calibration = OnlineCalibration(WRONG, uncertainty=EXACT, soc_scatter_cad=0.0)
     for _ in range(_STEADY_CYCLES):
         bench.step(soc_cad)
@@ -290,20 +286,14 @@ def _bars(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     own = [row for row in rows if "exact" not in row["way"]]
     clean = [abs(row["error_percent"]) for row in own if row["sensor"] == "clean"]
     faulty = [row for row in own if row["sensor"] in names]
-    bars = []
-    if clean:
-        bars.append(verdict_on("clean sensor: mean error of the wall heat [%]", clean, "at most 3", high=3.0))
-    if faulty:
-        # Where the data determine the wall heat, the error counts; where the verdict says that they do not, it is said.
-        said = [abs(row["error_percent"]) if row["determined_percent"] >= 50.0 else 0.0 for row in faulty]
-        wrong = [row["sure_and_wrong_percent"] for row in faulty]
-        bars += [
-            verdict_on("error of the sensor: mean error of a determined wall heat [%]", said, "at most 5", high=5.0),
-            verdict_on(
-                "error of the sensor: determined and more than 5 % off [% of runs]", wrong, "at most 5", high=5.0
-            ),
-        ]
-    return bars
+    # Where the data determine the wall heat, the error counts; where the verdict says that they do not, it is said.
+    said = [abs(row["error_percent"]) if row["determined_percent"] >= 50.0 else 0.0 for row in faulty]
+    wrong = [row["sure_and_wrong_percent"] for row in faulty]
+    return verdicts([
+        ("clean sensor: mean error of the wall heat [%]", clean, 3.0),
+        ("error of the sensor: mean error of a determined wall heat [%]", said, 5.0),
+        ("error of the sensor: determined and more than 5 % off [% of runs]", wrong, 5.0),
+    ])  # fmt: skip
 
 
 def _dataset(done: list[Taught]) -> xr.Dataset:
