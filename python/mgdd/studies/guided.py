@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = ["run_guided"]
 
-_NAMES = {
+_LABELS = {
     "unguided": "extremum seeking, unguided",
     "feed_forward": "extremum seeking from the guide's timing",
     "curve": "guided by the curve",
@@ -352,7 +352,7 @@ def _starts(dataset: xr.Dataset) -> Figure:
     for at, case in enumerate(names_of(dataset, "case")):
         one = dataset.isel(case=at)
         dash, color = LINE_STYLES[at % len(LINE_STYLES)]
-        look: dict[str, Any] = {"linestyle": dash, "color": color, "label": _NAMES[case]}
+        look: dict[str, Any] = {"linestyle": dash, "color": color, "label": _LABELS[case]}
         lines += above.plot(one["cycle"], one["estimate_median_cad"], **look)
         if case in ("unguided", "curve"):
             low, high = one["estimate_low_cad"], one["estimate_high_cad"]
