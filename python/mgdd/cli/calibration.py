@@ -17,7 +17,7 @@ from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.identify.engine.tdc import TdcEstimate
 from mgdd.io.pressure import mean_cycle
 from mgdd.report import write_report
-from mgdd.studies.measured_summary import law_row
+from mgdd.studies.measured_traces import law_row
 
 if TYPE_CHECKING:
     import xarray as xr
