@@ -15,8 +15,8 @@ import numpy as np
 
 from mgdd.loop import Reference, track, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
-from mgdd.studies.throttle_baselines import throttle_of
-from mgdd.studies.throttle_tracking_cases import driving
+from mgdd.studies.throttle_cases import throttle_of
+from mgdd.studies.throttle_tracking import driving
 from mgdd.throttle import Throttle
 
 SEEDS = 11

@@ -35,9 +35,9 @@ from mgdd import engine
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.guide import OnlineCalibration
 from mgdd.loop import EngineBench
-from mgdd.studies import guided_plane as plane_study
+from mgdd.studies import guided_transients as plane_study
 from mgdd.studies import run_study
-from mgdd.studies.guide_cases import SteadyMap
+from mgdd.studies.guide_cases import SpeedLoadPlane
 
 __all__ = [
     "burn_laws",
@@ -149,14 +149,10 @@ def learning() -> Rows:
 
 
 def guided_plane() -> Rows:
-    speeds, fuels = plane_study.SPEEDS_RPM, plane_study.FUELS_MG
-    maps = [
-        [SteadyMap.of(EngineBench(point=OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)))) for m in fuels]
-        for n in speeds
-    ]
-    planes = [plane_study.run_plane(form, name, maps) for form, name in plane_study.PLANE_RUNS]
+    plane = SpeedLoadPlane()
+    planes = [plane_study.run_plane(form, name, plane) for form, name in plane_study.PLANE_RUNS]
     names = ("cells_slower", "cells_costlier", "worst_cost_over_unguided", "mean_cycles", "mean_cycles_saved")
-    rows = [plane_study.plane_row(plane, planes[0]) for plane in planes]
+    rows = [plane_study.plane_row(own, planes[0]) for own in planes]
     return {
         f"{row['form']} {row['guide']}": [float(row[name]) for name in (*names, "lost_over_unguided")] for row in rows
     }

@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd.loop import VirtualThrottle
 from mgdd.studies import run_study
-from mgdd.studies.throttle_baselines import Baseline, Controller, baselines, controller_of, settings_of, throttle_of
+from mgdd.studies.throttle_cases import Baseline, Controller, baselines, controller_of, settings_of, throttle_of
 from mgdd.throttle import SensorPair, Throttle
 
 __all__ = ["Baseline", "baselines", "settings_of", "sine_mse_deg2", "stepped", "throttle_baselines", "throttle_faults"]

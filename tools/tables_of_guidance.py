@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tables_of_measured_traces import measured
 
-from mgdd.engine import OperatingPoint
-from mgdd.loop import EngineBench
-from mgdd.studies.guide_cases import SteadyMap
-from mgdd.studies.guided_plane import FUELS_MG, SPEEDS_RPM
+from mgdd.studies.guide_cases import SpeedLoadPlane
 from mgdd.studies.ignition_cases import TRUTHS, told_laws
 from mgdd.studies.ignition_delay import Plane, plane_of, plane_row, slope_row
 from mgdd.studies.model_validation import stage_rows, validate_law
@@ -25,9 +22,8 @@ __all__ = ["ignition_plane", "ignition_slopes", "model_stages"]
 
 @cache
 def _planes() -> tuple[Plane, ...]:
-    cells = [[OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)) for m in FUELS_MG] for n in SPEEDS_RPM]
-    maps = [[SteadyMap.of(EngineBench(point=point)) for point in row] for row in cells]
-    return tuple(plane_of(truth, told, cells, maps) for truth in TRUTHS for told in told_laws(truth))
+    plane = SpeedLoadPlane()
+    return tuple(plane_of(truth, told, plane) for truth in TRUTHS for told in told_laws(truth))
 
 
 def ignition_plane() -> Rows:

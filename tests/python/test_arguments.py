@@ -99,7 +99,7 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: ExtremumSeeking(start=0.0, period="x"), "period", "period = 'x': must be a whole number"),
         (lambda: ExtremumSeeking(start="x"), "start", "start = 'x': must be"),
         (lambda: Spsa(start=0.0, limits=[3.0]), "limits", r"limits = \[3.0\], a list: must be a sequence of Limits"),
-        (lambda: EngineBench([Cylinder()]), "cylinder", "cylinder = .*: must be a Cylinder"),
+        (lambda: EngineBench([Cylinder()]), "engine", "engine = .*: must be a Cylinder"),
         (lambda: EngineBench(point=[OperatingPoint()]), None, "OperatingPoint"),
         (lambda: EngineBench().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
         (lambda: EngineBench().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),

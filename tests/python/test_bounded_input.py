@@ -16,8 +16,7 @@ import pytest
 import mgdd
 from mgdd import presets
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean, shortened
-from mgdd.io.nesting import parsed
-from mgdd.io.plain_text import decoded
+from mgdd.io.files import decoded, parsed
 from mgdd.results.units import attribute_units
 from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.dbc import DbcFile

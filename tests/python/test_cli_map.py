@@ -15,7 +15,7 @@ from map_commands import ran
 from mgdd import presets
 from mgdd.cli import main
 from mgdd.design import FeasibleRegion, design_points
-from mgdd.io.netcdf_file import write_netcdf
+from mgdd.io.binary_files import write_netcdf
 from mgdd.io.point_table import read_points
 from mgdd.maps import apply_map, compare_maps, optimize_map, read_map, smooth_map
 from mgdd.maps.files import map_content

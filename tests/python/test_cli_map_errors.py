@@ -11,7 +11,7 @@ import pytest
 from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd.cli import main
-from mgdd.io.netcdf_file import write_netcdf
+from mgdd.io.binary_files import write_netcdf
 from mgdd.maps import CalibrationMap, optimize_map, write_map
 from mgdd.surrogate import fit_response
 

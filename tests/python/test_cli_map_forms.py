@@ -14,7 +14,7 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.engine import OperatingPoint
 from mgdd.guide import TimingMap
-from mgdd.io.netcdf_file import write_netcdf
+from mgdd.io.binary_files import write_netcdf
 from mgdd.maps import CalibrationMap, optimize_map, read_dcm, read_map, write_map
 
 

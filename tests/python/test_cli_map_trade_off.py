@@ -12,7 +12,7 @@ from map_cases import FUEL, SOC, SPEED, bend, centre, efficiency, p_max
 from map_cases import sweep as map_sweep
 from map_commands import ran
 from mgdd.cli import main
-from mgdd.io.netcdf_file import write_netcdf
+from mgdd.io.binary_files import write_netcdf
 from mgdd.maps import CalibrationMap, optimize_map, write_map
 
 AXES = ["--right", "p_max_bar", "--up", "efficiency_gross"]

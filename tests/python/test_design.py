@@ -19,7 +19,7 @@ from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import Limit
 from mgdd.results.labels import check_labels
-from mgdd.surrogate.response_surface import PolynomialBasis
+from mgdd.surrogate.polynomial import PolynomialBasis
 
 TWO = {"soi_cad": (-20.0, 4.0), "fuel_mg": (5.0, 45.0)}
 LOW, SPAN = np.array([-20.0, 5.0]), np.array([24.0, 40.0])

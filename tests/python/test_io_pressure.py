@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ShapeError
 from mgdd.io import pressure_trace, read_conditions, read_pressure, write_pressure
-from mgdd.io.checks import check_trace
+from mgdd.io.pressure_checks import check_trace
 from mgdd.results.labels import ANGLE, check_labels
 
 ANGLES = np.arange(-143.0, 124.0)
@@ -249,6 +249,9 @@ FILE_FAULTS = {
     "units row": (text(header="a,p\ndeg,kPa\n"), {}, "looks like bar; the file says kPa: correct it there"),
     "decimal": (text(), {"decimal": "x"}, "decimal = 'x': must be '.' or ','"),
     "delimiter": (text(), {"delimiter": ""}, "delimiter = ''"),
+    "percent": (text(header="a,x [%]\n"), {"pressure_column": "x [%]"}, r"'x \[%\]' is in %, which is not a pressure"),
+    "rpm": (text(header="a,x\ndeg,rpm\n"), {"pressure_column": 1}, "'x' is in rpm, which is not a pressure"),
+    "time": (text(header="a,x [s]\n"), {"pressure_column": 1, "pressure_unit": "bar"}, "in s, which is not a pressure"),
     "gap": (text(*without(9), header="# c\na,p\n"), {}, "line 12: gap in the crank angle from -135 to -133"),
     "unsorted": (text(replaced(ANGLES, 4, -150.0)), {}, "line 5: crank angle -150 follows -140"),
     "pascal": (text(pressure=BAR * 1e5), {}, "looks like Pa; pass pressure_unit='Pa'"),

@@ -17,7 +17,7 @@ from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ShapeError
 from mgdd.io import pressure_trace, read_pressure, write_pressure
 from mgdd.io.column_names import heading
-from mgdd.io.pressure_units import to_bar
+from mgdd.io.pressure_checks import to_bar
 from mgdd.results.labels import ANGLE, check_labels
 
 Array = NDArray[np.float64]

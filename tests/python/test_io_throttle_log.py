@@ -10,7 +10,7 @@ import pytest
 
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io import read_throttle_log, throttle_log, write_throttle_log
-from mgdd.io.throttle_checks import check_throttle_log
+from mgdd.io.throttle_checks import check_sides, check_throttle_log
 
 TIME = np.arange(1200) * 1e-3
 DUTY = 0.25 * np.sin(2.0 * np.pi * 2.0 * TIME)
@@ -364,13 +364,11 @@ def test_a_two_sided_fit_needs_both_sides() -> None:
     with pytest.raises(
         DataError, match=r"column 'angle_deg': 0 s below limp-home \(2 deg; the lowest angle is 4 deg\)"
     ):
-        check_throttle_log(made, two_sided=True, limp_home_deg=2.0)
+        check_sides(made, 2.0)
     with pytest.raises(DataError, match=r"above limp-home .*add positive duty"):
-        check_throttle_log(made, two_sided=True, limp_home_deg=40.0)
-    assert check_throttle_log(made, two_sided=True, limp_home_deg=8.0) is made
-    assert check_throttle_log(made, limp_home_deg=2.0) is made, "the remedy: one side only"
-    with pytest.raises(ParameterError, match="limp_home_deg"):
-        check_throttle_log(made, two_sided=True)
+        check_sides(made, 40.0)
+    check_sides(made, 8.0)
+    assert check_throttle_log(made) is made, "the remedy: one side only"
 
 
 def test_what_is_no_log(file: Path) -> None:

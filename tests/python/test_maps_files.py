@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from map_cases import FUEL, SPEED, sweep, timing_table
 from mgdd.errors import DataError, Error, ParameterError
-from mgdd.io.whole_file import write_whole
+from mgdd.io.files import write_whole
 from mgdd.maps import CalibrationMap, optimize_map, read_dcm, read_map, smooth_map, write_dcm, write_map
 
 FOREIGN = Path(__file__).parents[1] / "data" / "foreign.dcm"

@@ -180,6 +180,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.validate_throttle.free_run": lambda _: validation().free_run,
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
+    "results.FitReport.dataset": lambda _: report().dataset,
+    "results.Fit.dataset": lambda _: identify.fit_first_principle(
+        log(), options=optimize.FitOptions(n_starts=1)
+    ).dataset,
     "results.Fit.run": lambda _: identify.fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "guide.FeedForward.history": lambda _: guided().history,

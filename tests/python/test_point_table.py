@@ -12,7 +12,7 @@ from map_cases import FUEL, SOC, SPEED, p_max
 from map_cases import sweep as map_sweep
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError
-from mgdd.io.netcdf_file import read_netcdf, write_netcdf
+from mgdd.io.binary_files import read_netcdf, write_netcdf
 from mgdd.io.point_table import read_points
 from mgdd.results.labels import check_labels, label_of
 from mgdd.sweep import sweep

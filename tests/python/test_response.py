@@ -19,9 +19,9 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import Fit
 from mgdd.results.labels import check_labels
 from mgdd.surrogate import ResponseModel, fit_response
+from mgdd.surrogate.polynomial import leverage_of
 from mgdd.surrogate.process import ProcessSurface
-from mgdd.surrogate.response_findings import outlier_bound
-from mgdd.surrogate.stepwise import leverage_of
+from mgdd.surrogate.response_diagnostics import outlier_bound
 from mgdd.sweep import sweep
 
 FACTORS = {"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0), "soi_cad": (-20.0, 5.0)}

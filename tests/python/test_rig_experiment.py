@@ -21,7 +21,7 @@ from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.identify import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
-from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, run_experiment
+from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, recorded, run_experiment
 from mgdd.rig.experiment.throttle_tasks import TrackPlan
 from mgdd.rig.experiment.watched import Cycle
 
@@ -287,7 +287,10 @@ def test_a_folder_keeps_the_files_that_a_run_read(tmp_path: Path, monkeypatch: p
     (home / "mine.toml").unlink()
     monkeypatch.chdir(tmp_path)
     again = Experiment.load(run / "experiment.toml").with_mode("replay", record=run / "run.rec")
+    read, whole = [], recorded.read_record
+    monkeypatch.setattr(recorded, "read_record", lambda path: read.append(path) or whole(path))
     assert run_experiment(again).counters["replay"]["different"] == 0
+    assert len(read) == 1, "a record may be long"
 
 
 def test_a_gate_that_takes_the_drive_away_ends_the_run_and_keeps_what_was_recorded(tmp_path: Path) -> None:

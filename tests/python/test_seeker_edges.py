@@ -125,6 +125,7 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
         (lambda: EngineBench().find_optimum({"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
         (lambda: EngineBench().find_optimum({"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
         (lambda: EngineBench().find_optimum(cycle=-1), ParameterError, "cycle = -1"),
+        (lambda: EngineBench().steady_map([-6.0], cycle=-1), ParameterError, "cycle = -1"),
         (lambda: EngineBench().steady_map([[1.0, 2.0]]), ShapeError, "2 dimensions"),
         (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
         (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),

@@ -23,16 +23,35 @@ from mgdd.studies.calibrated_guide_cases import (
     VARIANTS,
     WIEBE_45,
     WIEBE_60,
+    Case,
     Refit,
+    Runs,
+    Steps,
+    bars,
     curve_of,
+    findings,
     guided_run,
+    refit_row,
     refits_of,
+    row,
+    step_row,
     step_run,
 )
-from mgdd.studies.calibrated_guide_rows import Case, Runs, Steps, bars, findings, refit_row, row, step_row
-from mgdd.studies.calibration_facts import TRUE_SCALE, WRONG, calibration_facts, fact_bars
 from mgdd.studies.guide_cases import SteadyMap
-from mgdd.studies.online_calibration import CYCLES, ERRORS, NOISES, WAYS, Sensor, Taught, row_of, teach
+from mgdd.studies.online_calibration import (
+    CYCLES,
+    ERRORS,
+    NOISES,
+    TRUE_SCALE,
+    WAYS,
+    WRONG,
+    Sensor,
+    Taught,
+    calibration_facts,
+    fact_bars,
+    row_of,
+    teach,
+)
 
 WAY = {way.name: way for way in WAYS}
 

@@ -102,6 +102,18 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
     assert stop.value.partial is None
 
 
+def test_ctrl_c_in_the_first_part_of_a_later_group_keeps_the_earlier_ones() -> None:
+    def press(text: str) -> None:
+        if text.startswith("component by component"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="7 finished rows") as stop:
+        run_sensor_delay(seeds=1, quick=True, figures=False, progress=press)
+    part = stop.value.partial
+    assert len(part.summary["rows"]) == 7
+    assert part.summary["component_wise"] == []
+
+
 def test_bad_requests_are_named() -> None:
     with pytest.raises(ParameterError, match=r"study 'nothing': must be one of .*sensor-delay"):
         run_study("nothing")

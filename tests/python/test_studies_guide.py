@@ -14,6 +14,7 @@ from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult
+from mgdd.studies.guide_accuracy import HARD, HardCase, run_hard
 from mgdd.studies.guide_cases import (
     GUIDES,
     HIGH,
@@ -23,13 +24,10 @@ from mgdd.studies.guide_cases import (
     SteadyMap,
     curve_seeker,
     drive,
-    first_within,
-    stays_within,
     trimmed,
     verdict_on,
 )
-from mgdd.studies.hard_cases import HARD, HardCase, run_hard
-from mgdd.studies.statistics import median_interval, with_median_interval
+from mgdd.studies.statistics import first_within, median_interval, stays_within, with_median_interval
 
 GUIDE = {guide.name: guide for guide in GUIDES}
 

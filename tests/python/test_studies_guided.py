@@ -13,8 +13,8 @@ from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
 from mgdd.studies import StudyResult, run_study
-from mgdd.studies.guided_limited import LimitedRuns, limited_parts, limited_row
-from mgdd.studies.guided_measured import measured_guide
+from mgdd.studies.guided import LimitedRuns, limited_parts
+from mgdd.studies.measured_engine_cases import measured_guide
 from mgdd.surrogate import fit_surrogate
 
 needs_records = pytest.mark.skipif(
@@ -123,8 +123,8 @@ def test_a_row_under_a_limit_by_hand() -> None:
     estimate = np.array([[8.0, -1.0, -1.0, -2.0], [8.0, 4.0, -1.5, 6.0]])
     rise = np.array([[2.0, 5.1, 5.0, 4.9], [2.0, 3.0, 5.2, 5.3]])
     lost = np.array([[0.4, 0.0, 0.1, 0.0], [0.4, 0.2, 0.0, 0.3]])
-    run = LimitedRuns(case="own", margin_sd=0.0, best_cad=-2.0, limit=5.0, estimate=estimate, lost=lost, rise=rise)
-    row = limited_row(run, 2)
+    run = LimitedRuns(case="own", start_cad=8.0, best_cad=-2.0, limit=5.0, estimate=estimate, lost=lost, rise=rise)
+    row = run.row(2)
     assert row["cycles_to_1_cad"] == 1.5  # cycles 1 and 2
     assert row["cycles_stays_1_5_cad"] is None  # cycle 1, and never
     assert (row["above_share"], row["late_above_share"]) == (3.0 / 8.0, 0.5)

@@ -12,7 +12,7 @@ from mgdd.engine import OperatingPoint, ignition_delay
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult
-from mgdd.studies.guide_cases import PLANT, Guide, SteadyMap, curve_seeker, drive, trimmed
+from mgdd.studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
 from mgdd.studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, told_laws
 from mgdd.studies.ignition_delay import plane_of
 
@@ -66,19 +66,19 @@ def test_a_constant_delay_is_a_shift_of_the_input() -> None:
 
 
 def test_the_trim_of_a_point_cancels_every_error_there() -> None:
-    own = [[SteadyMap.of(EngineBench(point=MEASURED_AT))]]
+    own = SpeedLoadPlane([MEASURED_AT.speed_rpm], [MEASURED_AT.fuel_mg])
     for truth in TRUTHS:
         for law in told_laws(truth):
-            plane = plane_of(truth, law, [[MEASURED_AT]], own)
+            plane = plane_of(truth, law, own)
             assert plane.soi_error_cad[0, 0] == pytest.approx(-plane.trim_cad, abs=1e-12), law.name
             assert plane.lost_trimmed[0, 0] == pytest.approx(0.0, abs=1e-3), law.name
-    bare = plane_of(WATSON, told(WATSON, "no delay"), [[MEASURED_AT]], own)
+    bare = plane_of(WATSON, told(WATSON, "no delay"), own)
     assert bare.trim_cad == pytest.approx(-ignition_delay(PLANT, MEASURED_AT, soi_cad=-10.3).delay_cad, abs=0.05)
 
 
 def test_what_a_cell_loses_is_what_the_bench_loses() -> None:
     bench = EngineBench(point=LATE)
-    plane = plane_of(WATSON, HARDENBERG, [[LATE]], [[SteadyMap.of(bench)]])
+    plane = plane_of(WATSON, HARDENBERG, SpeedLoadPlane([LATE.speed_rpm], [LATE.fuel_mg]))
     said = InjectionGuide(HARDENBERG)(LATE)["soi_cad"]
     burns = ignition_delay(WATSON.cylinder, LATE, soi_cad=said).soc_cad
     best = bench.find_optimum()
@@ -91,9 +91,10 @@ def test_what_a_cell_loses_is_what_the_bench_loses() -> None:
 def test_an_injection_that_does_not_ignite_counts_apart() -> None:
     fast = OperatingPoint(speed_rpm=3000.0, fuel_mg=40.0)
     assert InjectionGuide(WOLFER).timing(fast).clipped  # so early that Hardenberg and Hase have no value there
-    plane = plane_of(HARDENBERG, WOLFER, [[fast]], [[SteadyMap.of(EngineBench(point=fast))]])
+    own = SpeedLoadPlane([3000.0], [40.0])
+    plane = plane_of(HARDENBERG, WOLFER, own)
     assert np.isinf(plane.lost).all()
-    assert plane_of(WOLFER, WOLFER, [[fast]], [[SteadyMap.of(EngineBench(point=fast))]]).lost[0, 0] == 0.0
+    assert plane_of(WOLFER, WOLFER, own).lost[0, 0] == 0.0
 
 
 def test_few_cells(result: StudyResult) -> None:
@@ -121,7 +122,7 @@ def test_few_seeds(result: StudyResult) -> None:
 def test_a_new_curve_is_drawn_after_the_step() -> None:
     bench = EngineBench(schedule=[(0, MEASURED_AT), (30, LATE)], seed=7)
     guide = InjectionGuide(WATSON)
-    run = drive(bench, curve_seeker(guide.curve(MEASURED_AT)), 31, guide=guide, soc_of=WATSON.soc_of)
+    run = drive(bench, curve_seeker(guide.curve(MEASURED_AT)), 31, curve_at=guide.curve, soc_of=WATSON.soc_of)
     move = guide(LATE)["soi_cad"] - guide(MEASURED_AT)["soi_cad"]
     assert run.estimate[30] - run.estimate[29] == pytest.approx(move, abs=0.8)
 

@@ -15,11 +15,10 @@ import pytest
 from mgdd.errors import Interrupted
 from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, from_design_to_map, run_study
-from mgdd.studies import design_to_map_drives as drives
-from mgdd.studies.design_to_map_cases import PROCESS, STAGES, Case, Made, make_map
+from mgdd.studies import design_to_map_engine as drives
 from mgdd.studies.design_to_map_engine import CELLS, ENGINES, MIDDLES, Truth
-from mgdd.studies.design_to_map_rows import Maps, effort_row, loss_parts, part_rows
-from mgdd.studies.design_to_map_steps import SETTLING
+from mgdd.studies.design_to_map_steps import PROCESS, SETTLING, STAGES, Case, Made, make_map
+from mgdd.studies.from_design_to_map import Maps, effort_row, loss_parts, part_rows
 
 OWN = ENGINES["as calibrated"]
 

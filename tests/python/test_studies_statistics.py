@@ -9,7 +9,16 @@ import pytest
 
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Spsa
-from mgdd.studies.statistics import bands, loops, mean_interval, rms, run_with_slope, with_interval
+from mgdd.studies.statistics import (
+    band_variables,
+    estimates,
+    loops,
+    mean_interval,
+    rms,
+    run_with_slope,
+    with_interval,
+    with_quantiles,
+)
 
 
 def test_interval_by_hand() -> None:
@@ -41,7 +50,10 @@ def test_rms_and_bands() -> None:
     def make(seed: int) -> tuple[EngineBench, ExtremumSeeking]:
         return EngineBench(seed=seed), ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
 
-    middle, low, high = bands(make, range(11), 120)
+    found = estimates(make, range(11), 120)
+    variables = band_variables("x_{}_cad", ("run", "cycle"), [found], "°CA", with_quantiles("x"))
+    assert list(variables) == ["x_median_cad", "x_low_cad", "x_high_cad"]
+    (middle,), (low,), (high,) = (values for _, values, *_ in variables.values())
     runs = np.stack([run_seeker(*make(seed), 120).dataset["estimate_cad"].to_numpy() for seed in range(11)])
     np.testing.assert_array_equal(middle, np.median(runs, axis=0))
     np.testing.assert_array_equal(low, np.sort(runs, axis=0)[1])

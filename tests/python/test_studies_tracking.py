@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mgdd.studies import StudyResult
-from mgdd.studies.throttle_baselines import throttle_of
-from mgdd.studies.throttle_tracking_cases import (
+from mgdd.studies.throttle_cases import throttle_of
+from mgdd.studies.throttle_tracking import (
     CASES,
     controllers_of,
     row_of,

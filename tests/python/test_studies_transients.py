@@ -8,12 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mgdd.engine import OperatingPoint
-from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult
-from mgdd.studies.guide_cases import SteadyMap
-from mgdd.studies.guided_plane import Plane, plane_row, run_plane
+from mgdd.studies.guide_cases import SpeedLoadPlane
+from mgdd.studies.guided_transients import Plane, plane_row, run_plane
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +33,10 @@ def test_cells_are_compared_one_by_one() -> None:
 
 
 def test_a_guide_reaches_a_far_cell_at_once_and_the_plain_seeker_does_not() -> None:
-    cell = OperatingPoint(speed_rpm=2700.0, fuel_mg=34.0)
-    maps = [[SteadyMap.of(EngineBench(point=cell))]]
+    cell = SpeedLoadPlane([2700.0], [34.0])
     name = "wall heat -30 %"
     none, heat, curve = (
-        run_plane(form, name, maps, speeds=[2700.0], fuels=[34.0])
-        for form, name in (("none", "none"), ("feed-forward", name), ("curve", name))
+        run_plane(form, name, cell) for form, name in (("none", "none"), ("feed-forward", name), ("curve", name))
     )
     assert none.cycles[0, 0] > 60.0
     assert heat.cycles[0, 0] <= 3.0  # two cycles of the test of the guide

@@ -13,8 +13,8 @@ from mgdd.control import Pid, SlidingMode, SupervisedController, ThrottleSupervi
 from mgdd.errors import ParameterError
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.results.labels import check_labels
-from mgdd.studies.throttle_baselines import baselines, controller_of, supervisor_of, throttle_of
-from mgdd.studies.throttle_fault_cases import CASES, SENSORS, run_case
+from mgdd.studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
+from mgdd.studies.throttle_faults import CASES, SENSORS, run_case
 from mgdd.throttle import SensorFault, SensorPair, Throttle, simulate
 
 NORMAL, HOLDING, LIMITED, LIMP_HOME = range(4)

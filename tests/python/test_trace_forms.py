@@ -16,7 +16,7 @@ from mgdd.engine import analyze
 from mgdd.errors import DataError, ShapeError
 from mgdd.identify import fit_cylinder
 from mgdd.io import pressure_trace, write_pressure
-from mgdd.io.trace_forms import as_trace
+from mgdd.io.pressure import as_trace
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
 TRACE = datasets.load("hd_diesel_128x144")[0]

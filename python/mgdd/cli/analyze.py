@@ -12,7 +12,7 @@ from mgdd.cli.output import check_output, emit, lines
 from mgdd.engine import analyze
 from mgdd.errors import ParameterError
 from mgdd.identify import estimate_tdc
-from mgdd.io.trace_forms import mean_cycle
+from mgdd.io.pressure import mean_cycle
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
 from mgdd.studies.sections import Table

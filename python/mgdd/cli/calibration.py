@@ -15,9 +15,9 @@ from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.identify.engine.tdc import TdcEstimate
-from mgdd.io.trace_forms import mean_cycle
+from mgdd.io.pressure import mean_cycle
 from mgdd.report import write_report
-from mgdd.studies.measured_summary import law_row
+from mgdd.studies.measured_traces import law_row
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,7 +15,7 @@ from mgdd.engine import OperatingPoint
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table
-from mgdd.io.existing_file import existing_file
+from mgdd.io.files import existing_file
 from mgdd.io.parameters import ParameterFile
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from mgdd.design.points import METHODS
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.point_table import read_points
 from mgdd.studies.sections import Table
-from mgdd.surrogate.response_surface import MODELS
+from mgdd.surrogate.polynomial import MODELS
 from mgdd.sweep import sweep
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from mgdd.cli.map_show import add_map_reading
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
-from mgdd.io.whole_file import write_whole_text
+from mgdd.io.files import write_whole_text
 from mgdd.maps import CalibrationMap, read_map, write_dcm, write_map
 
 if TYPE_CHECKING:

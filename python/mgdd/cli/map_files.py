@@ -13,9 +13,9 @@ import numpy as np
 from mgdd.cli.options import as_option
 from mgdd.cli.output import emit, save_figure, wrote
 from mgdd.errors import DataError, arguments_written
-from mgdd.io.netcdf_file import read_netcdf, write_netcdf
-from mgdd.io.plain_csv import write_columns
+from mgdd.io.binary_files import read_netcdf, write_netcdf
 from mgdd.io.point_table import POINT
+from mgdd.io.table import write_columns
 from mgdd.maps import write_map
 from mgdd.maps.files import map_content
 from mgdd.plot import map_cells

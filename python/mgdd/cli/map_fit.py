@@ -15,9 +15,9 @@ from mgdd.cli.map_files import add_csv_options
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.netcdf_file import read_netcdf
+from mgdd.io.binary_files import read_netcdf
+from mgdd.io.files import write_whole_text
 from mgdd.io.point_table import POINT, input_names, read_points
-from mgdd.io.whole_file import write_whole_text
 from mgdd.plot import response_diagnostics
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of

@@ -13,9 +13,9 @@ from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_conditions, read_pressure
-from mgdd.io.conditions import CONDITIONS
-from mgdd.io.pressure_columns import ANGLE_UNITS
-from mgdd.io.pressure_units import PRESSURE_UNITS
+from mgdd.io.point_table import CONDITIONS
+from mgdd.io.pressure_checks import PRESSURE_UNITS
+from mgdd.io.pressure_file import ANGLE_UNITS
 
 if TYPE_CHECKING:
     import xarray as xr

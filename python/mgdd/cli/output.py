@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
-from mgdd.io.traces import write_traces
-from mgdd.io.whole_file import write_whole, write_whole_text
+from mgdd.io.files import write_whole, write_whole_text
+from mgdd.io.table import write_traces
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.studies.sections import Table
 

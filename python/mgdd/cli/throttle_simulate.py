@@ -11,8 +11,7 @@ from mgdd.cli.options import add_command, as_option
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.table import read_table
-from mgdd.io.throttle_checks import Place
+from mgdd.io.table import Place, read_table
 from mgdd.plot.style import drawn
 from mgdd.signals.even_grid import even_step
 from mgdd.throttle import simulate

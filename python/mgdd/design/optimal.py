@@ -40,30 +40,9 @@ def d_optimal(
     """Choose `n` candidates, repeats allowed, that with the fixed rows maximise det X'X.
 
     Fedorov's exchange in the form of Cook and Nachtsheim: each point in turn gives way to the candidate that raises
-    the determinant most, until none does. A local optimum, hence several random starts.
-
-    Parameters
-    ----------
-    candidates : ndarray, shape (c, p)
-        Terms of the model at the points that may be chosen.
-    n : int
-        Points to choose; with the fixed ones at least p.
-    fixed : ndarray, shape (k, p)
-        Terms at points that stay, maybe none.
-    n_starts : int
-        Random starts.
-    generator : numpy.random.Generator
-        Of the starts.
-
-    Returns
-    -------
-    Exchange
-        The best search.
-
-    Raises
-    ------
-    DataError
-        Candidates that do not determine the terms.
+    the determinant most, until none does. A local optimum, hence several random starts. Rows, shape (c, p) and (k, p),
+    hold the p terms of the model at points that may be chosen and that stay; a DataError says that they do not
+    determine the terms.
 
     References
     ----------

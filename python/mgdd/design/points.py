@@ -14,7 +14,7 @@ from mgdd.design.optimal import d_efficiency_percent, d_optimal
 from mgdd.design.region import FeasibleRegion, inside_of
 from mgdd.design.space_filling import best_of, draw_inside, extend_hypercube, far_points, least_distance, sampler_of
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.surrogate.response_surface import MODELS, PolynomialBasis
+from mgdd.surrogate.polynomial import MODELS, PolynomialBasis
 
 if TYPE_CHECKING:
     import xarray as xr

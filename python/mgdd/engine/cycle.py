@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core.engine import Cylinder, NoxProxy, OperatingPoint
+from mgdd._core.engine import NoxProxy, OperatingPoint
+from mgdd.presets.meant import engine_of
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
+
+    from mgdd.presets.meant import CylinderLike, PointLike
 
 __all__ = ["convergence", "sensitivities", "simulate", "timing_sweep"]
 
@@ -31,9 +34,11 @@ TRACES = (
 
 
 def simulate(
-    cylinder: Cylinder,
-    point: OperatingPoint,
+    cylinder: CylinderLike,
+    point: PointLike | None = None,
     *,
+    speed_rpm: float | None = None,
+    fuel_mg: float | None = None,
     soc_cad: float = -6.0,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
@@ -42,10 +47,13 @@ def simulate(
 
     Parameters
     ----------
-    cylinder : Cylinder
-        Its parameters.
-    point : OperatingPoint
-        Speed, fuel and intake state; ``fuel_mg=0`` is a motored cycle.
+    cylinder : Cylinder, Preset, str or path-like
+        The cylinder; or a preset, its name or its file; or a fit of a cylinder.
+    point : OperatingPoint, Preset or mapping of str to float, optional
+        Speed, fuel and intake state; ``fuel_mg=0`` is a motored cycle. Numbers by name replace those of the preset's
+        nominal point, which it is if left out; a cylinder without a preset needs one.
+    speed_rpm, fuel_mg : float, optional
+        Of the point, in place of its own.
     soc_cad : float
         Start of combustion [°CA aTDC], in [-60, 20].
     step_cad : float
@@ -78,7 +86,10 @@ def simulate(
     >>> cycle = simulate(Cylinder(), OperatingPoint(), soc_cad=-6.0)
     >>> round(float(cycle["imep_gross_bar"]), 2), round(float(cycle["p_max_bar"]), 1)
     (9.63, 107.2)
+    >>> simulate("puma_single", speed_rpm=1200.0).attrs["speed_rpm"]
+    1200.0
     """
+    cylinder, point = engine_of(cylinder, point, speed_rpm=speed_rpm, fuel_mg=fuel_mg)
     raw = _core.engine.simulate(cylinder, point, soc_cad, step_cad, integrator)
     motored = _core.engine.simulate(cylinder, point.replace(fuel_mg=0.0), soc_cad, step_cad, integrator)
     scalars = {**raw["indicators"], "soc_cad": soc_cad}
@@ -122,9 +133,11 @@ def _doubts(raw: dict[str, Any], point: OperatingPoint) -> tuple[str, ...]:
 
 
 def timing_sweep(
-    cylinder: Cylinder,
-    point: OperatingPoint,
+    cylinder: CylinderLike,
+    point: PointLike | None = None,
     *,
+    speed_rpm: float | None = None,
+    fuel_mg: float | None = None,
     soc_cad: ArrayLike | None = None,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
@@ -134,7 +147,7 @@ def timing_sweep(
 
     Parameters
     ----------
-    cylinder, point, step_cad, integrator
+    cylinder, point, speed_rpm, fuel_mg, step_cad, integrator
         As in `simulate`.
     soc_cad : array_like, shape (n,), optional
         Starts of combustion [°CA aTDC]; -30 to 10 in steps of 0.5 if left out.
@@ -159,6 +172,7 @@ def timing_sweep(
     >>> sweep["nox_arrhenius_ppm"].values.round(0).tolist()
     [4261.0, 1545.0, 889.0]
     """
+    cylinder, point = engine_of(cylinder, point, speed_rpm=speed_rpm, fuel_mg=fuel_mg)
     timings = np.arange(-30.0, 10.25, 0.5) if soc_cad is None else np.atleast_1d(np.asarray(soc_cad, float))
     columns = _core.engine.scan(cylinder, point, timings, step_cad, integrator)
     proxy = NoxProxy() if nox is None else nox
@@ -171,8 +185,8 @@ def timing_sweep(
 
 
 def sensitivities(
-    cylinder: Cylinder,
-    point: OperatingPoint,
+    cylinder: CylinderLike,
+    point: PointLike | None = None,
     *,
     wrt: Sequence[str] = ("soc_cad", "burn_duration_cad", "fuel_mg", "wall_heat_scale"),
     soc_cad: float = -6.0,
@@ -212,6 +226,7 @@ def sensitivities(
     >>> float(d["d_ca50_cad"].sel(parameter="soc_cad"))
     1.0
     """
+    cylinder, point = engine_of(cylinder, point)
     names = [wrt] if isinstance(wrt, str) else list(wrt)
     raw = _core.engine.sensitivities(cylinder, point, soc_cad, names, step_cad, integrator)
     out = labelled_dataset(
@@ -236,8 +251,8 @@ def sensitivities(
 
 
 def convergence(
-    cylinder: Cylinder,
-    point: OperatingPoint,
+    cylinder: CylinderLike,
+    point: PointLike | None = None,
     *,
     soc_cad: float = -6.0,
     step_cad: float = 1.0,
@@ -273,6 +288,7 @@ def convergence(
     >>> abs(float(c["error"].sel(indicator="efficiency_gross"))) < 2e-4
     True
     """
+    cylinder, point = engine_of(cylinder, point)
     raw = _core.engine.convergence(cylinder, point, soc_cad, step_cad, integrator)
     value, extrapolated, error, order, units = zip(*raw.values(), strict=True)
     own = "unit of the indicator"

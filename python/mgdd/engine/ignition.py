@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mgdd import _core
-from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError
-from mgdd.results.describe import described
+from mgdd.presets.meant import CylinderLike, PointLike, engine_of
+from mgdd.results.result import NumbersResult
 
 __all__ = ["Timing", "ignition_delay"]
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class Timing:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Timing(NumbersResult):
     """An injection and its combustion.
 
     Parameters
@@ -43,17 +42,21 @@ class Timing:
 
 
 def ignition_delay(
-    cylinder: Cylinder, point: OperatingPoint, *, soi_cad: float | None = None, soc_cad: float | None = None
+    cylinder: CylinderLike,
+    point: PointLike | None = None,
+    *,
+    soi_cad: float | None = None,
+    soc_cad: float | None = None,
 ) -> Timing:
     """Find the start of combustion of an injection, or the injection that ignites at a wanted start of combustion.
 
     Parameters
     ----------
-    cylinder : Cylinder
-        ``ignition_model`` chooses the correlation: ``watson`` and ``wolfer`` by the integral over the motored
-        cycle, ``hardenberg_hase`` at the state of SOI, or ``polynomial`` in SOI.
-    point : OperatingPoint
-        Its fuel does not matter.
+    cylinder : Cylinder, Preset, str or path-like
+        As in `simulate`. ``ignition_model`` chooses the correlation: ``watson`` and ``wolfer`` by the integral over
+        the motored cycle, ``hardenberg_hase`` at the state of SOI, or ``polynomial`` in SOI.
+    point : OperatingPoint, Preset or mapping of str to float, optional
+        As in `simulate`; its fuel does not matter.
     soi_cad, soc_cad : float
         Start of injection or wanted start of combustion [°CA aTDC], in [-60, 20]; exactly one of them.
 
@@ -81,6 +84,7 @@ def ignition_delay(
     >>> round(timing.soi_cad, 1), timing.clipped
     (-10.8, False)
     """
+    cylinder, point = engine_of(cylinder, point)
     if soi_cad is not None and soc_cad is None:
         return Timing(**_core.engine.start_of_combustion(cylinder, point, soi_cad))
     if soc_cad is not None and soi_cad is None:

@@ -14,6 +14,7 @@ from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
+from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 
 __all__ = ["find_optimum"]
 
@@ -25,10 +26,12 @@ DEFAULT_CAD = (-30.0, 10.0)
 
 
 def find_optimum(
-    cylinder: Cylinder,
-    point: OperatingPoint,
+    cylinder: CylinderLike,
+    point: PointLike | None = None,
     objective: str = "efficiency_gross",
     *,
+    speed_rpm: float | None = None,
+    fuel_mg: float | None = None,
     limits: Mapping[str, float] | Sequence[Limit] | None = None,
     bounds_cad: tuple[float, float] | None = None,
     step_cad: float = 1.0,
@@ -41,14 +44,16 @@ def find_optimum(
 
     Parameters
     ----------
-    cylinder : Cylinder
-        The model.
-    point : OperatingPoint
-        Must carry fuel.
+    cylinder : Cylinder, Preset, str or path-like
+        The model, as in `simulate`.
+    point : OperatingPoint, Preset or mapping of str to float, optional
+        As in `simulate`; must carry fuel.
     objective : {"efficiency_gross", "imep_gross_bar", "imep_closed_bar"}
         What to maximise.
     limits : mapping of str to float, or sequence of Limit, optional
         Upper limits on indicators, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is kept.
+    speed_rpm, fuel_mg : float, optional
+        Of the point, in place of its own.
     bounds_cad : tuple of float, optional
         Searched range of SOC [°CA aTDC]; -30 to 10, as far as the valves are closed, if left out.
     step_cad, integrator
@@ -75,6 +80,7 @@ def find_optimum(
     (-3.08, ('p_max_bar',))
     """
     require_plain("bounds_cad", bounds_cad)
+    cylinder, point = engine_of(cylinder, point, speed_rpm=speed_rpm, fuel_mg=fuel_mg)
     kept = limits_of(limits)
     caps = {limit.name: limit.upper - limit.margin for limit in kept}
     low, high = bounds_cad or (max(DEFAULT_CAD[0], cylinder.ivc_cad), min(DEFAULT_CAD[1], cylinder.evo_cad - 1.0))

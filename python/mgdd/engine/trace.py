@@ -10,7 +10,8 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace_cycles import is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.trace_forms import as_trace
+from mgdd.io.pressure import as_trace
+from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ _DP_MAX = "slope of the least-squares line over 2 °CA"
 
 def analyze(
     trace: Any,
-    cylinder: Cylinder,
+    cylinder: CylinderLike,
     *,
     point: OperatingPoint | None = None,
     pegging: str = "none",
@@ -64,8 +65,8 @@ def analyze(
         column over crank angle, angle and pressure as a pair, or a file that `mgdd.io.read_pressure` reads without
         options. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k intake_pressure_kpa soi_cad spark_cad
         bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
-    cylinder : Cylinder
-        Geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
+    cylinder : Cylinder, Preset, str or path-like
+        As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, optional
         Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
         ``ivc_temperature_k`` or the intake temperature + 40 K.
@@ -148,6 +149,7 @@ def analyze(
     9.4
     14.9
     """
+    cylinder = cylinder_of(cylinder)
     trace = trace if is_of_cycles(trace) else as_trace(trace)
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:

@@ -51,7 +51,7 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
         Whether a guide that keeps failing is given up for plain extremum seeking.
     maximize : bool
         False to minimise J; the curve is that of -J then.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep; ``tell(J, limits)`` then takes their values.
     limit_curves : sequence of Curve, optional
         The guide's curve of every limited quantity, which gives its shape; level and slope are learnt. Without, their

@@ -11,12 +11,14 @@ from mgdd.errors import DataError
 from mgdd.guide.map_table import read_map_table, write_map_table
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted, wanted
 from mgdd.results.labels import label_of, labelled_dataset
+from mgdd.results.result import Result
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     import os
 
     import xarray as xr
+    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["MapForms"]
@@ -27,7 +29,7 @@ _SETTINGS = {"prior_sd_cad": "°CA", "forgetting": "-"}
 _CORE = dict(zip(_CELLS, ("values_cad", "variance", "support"), strict=True))
 
 
-class MapForms(Parameters):
+class MapForms(Parameters, Result):
     """Axes and cells of a map, as arrays, as a Dataset and as a parameter file."""
 
     _axes: Mapping[str, NDArray[np.float64]]
@@ -53,6 +55,16 @@ class MapForms(Parameters):
     def support(self) -> NDArray[np.float64]:
         """Confirmed optima behind every cell, forgotten ones taken off."""
         return self._table("support")
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The same as `to_dataset` gives."""
+        return self.to_dataset()
+
+    def _draw(self, ax: Axes | None) -> Axes:
+        from mgdd.plot import map_cells
+
+        return map_cells(self, "timing_cad", ax=ax)
 
     def to_dataset(self) -> xr.Dataset:
         """Give the map as data.

@@ -11,6 +11,7 @@ from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance
 from mgdd._core.guide import Curve
 from mgdd.errors import ParameterError
 from mgdd.optimize import Optimum
+from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, core_rows
 
 __all__ = ["ModelOptimum"]
@@ -28,8 +29,8 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
     Parameters
     ----------
-    cylinder : Cylinder
-        The model.
+    cylinder : Cylinder, Preset, str or path-like
+        The model, as in `mgdd.engine.simulate`.
     performance : Performance, optional
         What is maximised, as the plant measures it; gross efficiency in percent if left out.
     nox : NoxModel, optional
@@ -70,7 +71,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
     def __init__(
         self,
-        cylinder: Cylinder,
+        cylinder: CylinderLike,
         *,
         performance: Performance | None = None,
         nox: NoxModel | None = None,
@@ -84,7 +85,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
         integrator: str = "trapezoid",
     ) -> None:
         super().__init__(
-            cylinder,
+            cylinder_of(cylinder),
             performance=performance or Performance(),
             nox=nox or NoxModel(),
             method=method,

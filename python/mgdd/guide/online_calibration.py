@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import _core, presets
+from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide.parameter_verdict import ParameterVerdict
-from mgdd.presets import Preset
+from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
@@ -37,7 +37,7 @@ class OnlineCalibration:
 
     Parameters
     ----------
-    engine : str, Preset or Cylinder
+    engine : Cylinder, Preset, str or path-like
         The guide: a preset, its name, or a cylinder of your own. It is not changed.
     method : {"gauss_newton", "recursive", "extremum_seeking"}
         One exact Gauss-Newton step per update on the last window; the same with earlier windows remembered;
@@ -99,7 +99,7 @@ class OnlineCalibration:
 
     def __init__(
         self,
-        engine: str | Preset | Cylinder,
+        engine: CylinderLike,
         *,
         method: str = "gauss_newton",
         parameters: Sequence[str] = ("wall_heat_scale",),
@@ -116,10 +116,8 @@ class OnlineCalibration:
     ) -> None:
         if isinstance(parameters, str):
             raise ParameterError.of("parameters", parameters, "a sequence of names")
-        if isinstance(engine, str):
-            engine = presets.load(engine, kind="engine")
         self._core = _core.guide.OnlineCalibration(
-            cylinder=engine.cylinder if isinstance(engine, Preset) else engine,
+            cylinder=cylinder_of(engine, "engine"),
             method=method,
             parameters=list(parameters),
             uncertainty=dict(uncertainty or {}),

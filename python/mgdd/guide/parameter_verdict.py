@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mgdd.results.describe import described
+from mgdd.results.result import NumbersResult
 
 __all__ = ["ParameterVerdict"]
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class ParameterVerdict:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ParameterVerdict(NumbersResult):
     """How much one parameter of an online calibration deserves belief.
 
     Attributes

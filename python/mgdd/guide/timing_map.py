@@ -15,7 +15,8 @@ from mgdd.guide.map_forms import MapForms
 from mgdd.guide.map_table import SETTINGS
 from mgdd.guide.settled import settled_estimate
 from mgdd.optimize import Optimum
-from mgdd.results.describe import as_html, rows_of
+from mgdd.results.describe import Row, rows_of
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -265,5 +266,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
         return f"<TimingMap {size}, {np.count_nonzero(self.support > 0.0)} cells with support>"
 
-    def _repr_html_(self) -> str:
-        return as_html("TimingMap", rows_of({**self._axes, "timing_cad": self.timing_cad, **self._settings}))
+    _repr_html_ = Result._repr_html_  # that of the core would come first
+
+    def _rows(self) -> list[Row]:
+        return rows_of({**self._axes, "timing_cad": self.timing_cad, **self._settings})

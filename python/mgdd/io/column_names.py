@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import TYPE_CHECKING, NamedTuple
 
 from mgdd.errors import DataError
@@ -10,29 +11,39 @@ from mgdd.errors import DataError
 if TYPE_CHECKING:
     from mgdd.io.table import TextTable
 
-__all__ = ["Heading", "heading", "headings", "unit_text"]
+__all__ = ["Heading", "check_choice", "heading", "headings", "spelled_unit", "unit_text"]
 
-_UNITS = {
-    "bar": "bar", "bara": "bar", "bar abs": "bar", "kpaa": "kPa", "kpa abs": "kPa", "barg": "bar",
-    "mbar": "mbar", "hpa": "mbar", "kpa": "kPa", "pa": "Pa", "mpa": "MPa",
-    "psi": "psi", "psia": "psi", "psig": "psi", "lbf/in2": "psi", "lbf/in²": "psi",
-    "kgf/cm2": "kgf/cm2", "kgf/cm²": "kgf/cm2", "kp/cm2": "kgf/cm2", "kp/cm²": "kgf/cm2", "kg/cm2": "kgf/cm2",
-    "kg/cm²": "kgf/cm2", "atm": "atm", "torr": "torr", "mmhg": "torr",
-    "n/mm2": "MPa", "n/mm²": "MPa", "kn/m2": "kPa", "kn/m²": "kPa", "n/m2": "Pa", "n/m²": "Pa", "dan/cm2": "bar",
-    "v": "V", "volt": "V", "volts": "V", "mv": "mV",
-    "s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us",
-    "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "°ca": "deg", "°kw": "deg", "cad": "deg", "ca": "deg",
-    "degca": "deg", "deg ca": "deg", "°crk": "deg", "degcrk": "deg", "kw": "deg", "°caatdc": "deg", "°atdc": "deg",
-    "°ca atdc": "deg", "deg atdc": "deg", "atdc": "deg", "cadatdc": "deg", "degatdc": "deg",
-    "rad": "rad", "radian": "rad", "radians": "rad",
-    "nm": "other", "n m": "other", "n·m": "other", "rpm": "other", "1/min": "other", "min-1": "other", "k": "other",
-    "°c": "other", "degc": "other", "a": "other", "ma": "other", "l": "other", "m3": "other", "m³": "other",
-    "cm3": "other", "cm³": "other", "j": "other", "kj": "other", "j/deg": "other", "j/cad": "other", "j/°ca": "other",
-    "mm": "other", "%": "other", "ppm": "other", "g": "other", "mg": "other", "kg": "other", "hz": "other",
-}  # fmt: skip
-_QUANTITIES = dict.fromkeys(("bar", "mbar", "kPa", "Pa", "MPa", "psi", "kgf/cm2", "atm", "torr"), "pressure")
-_QUANTITIES |= {"V": "pressure", "mV": "pressure", "s": "time", "ms": "time", "us": "time"}
-_QUANTITIES |= {"deg": "angle", "rad": "angle", "other": "other"}
+# Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
+_SPELLINGS = {
+    "bar": "bar, bara, bar abs, barg, dan/cm2",
+    "kPa": "kpa, kpaa, kpa abs, kn/m2, kn/m²",
+    "mbar": "mbar, hpa",
+    "Pa": "pa, n/m2, n/m²",
+    "MPa": "mpa, n/mm2, n/mm²",
+    "psi": "psi, psia, psig, lbf/in2, lbf/in²",
+    "kgf/cm2": "kgf/cm2, kgf/cm², kp/cm2, kp/cm², kg/cm2, kg/cm²",
+    "atm": "atm",
+    "torr": "torr, mmhg",
+    "V": "v, volt, volts",
+    "mV": "mv",
+    "s": "s, sec, seconds",
+    "ms": "ms",
+    "us": "us, µs, μs",
+    "deg": "deg, degree, degrees, °",
+    "°CA": "°ca, °kw, cad, ca, degca, deg ca, °crk, degcrk, kw, °caatdc, °atdc, °ca atdc, deg atdc, atdc, cadatdc, "
+    "degatdc",
+    "rad": "rad, radian, radians",
+    "%": "%, percent",
+    "A": "a, amp, ampere",
+    "-": "-, 1",
+    "other": "nm, n m, n·m, rpm, 1/min, min-1, k, °c, degc, ma, l, m3, m³, cm3, cm³, j, kj, j/deg, j/cad, j/°ca, mm, "
+    "ppm, g, mg, kg, hz",
+}
+_UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings.split(", ")}
+# What these are in a table of pressures; the plate of a throttle is not measured in crank angles.
+_AMONG_PRESSURES = {"°CA": "deg", "%": "other", "A": "other", "-": None}
+_QUANTITIES = dict.fromkeys((*list(_SPELLINGS)[:9], "V", "mV"), "pressure")
+_QUANTITIES |= {"s": "time", "ms": "time", "us": "time", "deg": "angle", "rad": "angle", "other": "other"}
 # Words of a name, in English and German; places other than the cylinder count as another quantity.
 _WORDS = {
     "other": "torque drehmoment speed rpm drehzahl temp temperature temperatur volume vol volumen heat rohr hrr lift "
@@ -43,6 +54,7 @@ _WORDS = {
     "angle": "angle crank crankangle cad ca phi theta winkel kurbelwinkel",
     "counter": "sample samples index idx row nr count counter",
 }
+_SQUARE = re.compile(r"\[([^\[\]]*)\]")
 _BRACKETS = re.compile(r"[\[({]([^\[\](){}]*)[\])}]")
 # Round brackets hold a unit or a remark: these, numbers and the words above are remarks.
 _REMARKS = set(
@@ -56,7 +68,8 @@ _CYLINDER = re.compile(r"(?:cyl\w*?|zyl\w*?)[\s_.\-#]*(\d+)")
 class Heading(NamedTuple):
     """What is known of a column, None where nothing is said.
 
-    `strange` is a unit that no list here knows, `unclear` a text that may be one: only who reads the file can tell.
+    `other` is a unit of another quantity, `strange` one that no list here knows, `unclear` a text that may be one: only
+    who reads the file can tell.
     """
 
     name: str
@@ -64,6 +77,7 @@ class Heading(NamedTuple):
     quantity: str | None
     series: str
     cylinder: str | None
+    other: str | None
     strange: str | None
     unclear: str | None
     gauge: bool
@@ -83,6 +97,7 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
     if quantity is None or (quantity == "pressure" and found == "other"):
         quantity = found or quantity
     cylinder = _CYLINDER.search(name.lower())
+    units = [units_row or "", *_SQUARE.findall(name)]
     return Heading(
         name=name,
         unit=None if unit == "other" else unit,
@@ -90,14 +105,15 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
         gauge=bool(_GAUGE.search(f"{name} {units_row}")),
-        strange=_first_strange([units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)]),
+        other=next((text.strip() for text in units if _known(text) == "other"), None),
+        strange=_first_strange(units),
         unclear=_first_strange(_maybe_units(name)),
     )
 
 
 def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool]:
     """Return what stands where a unit stands, None for nothing, and whether it can be nothing else."""
-    for texts, sure in (([units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)], True), (_maybe_units(name), False)):
+    for texts, sure in (([units_row or "", *_SQUARE.findall(name)], True), (_maybe_units(name), False)):
         said = next((text.strip() for text in texts if text.strip()), None)
         if said is not None:
             return said, sure
@@ -134,8 +150,20 @@ def headings(table: TextTable) -> list[Heading]:
     ]
 
 
-def _known(text: str) -> str | None:
+def spelled_unit(text: str) -> str | None:
+    """Return the unit that a text spells, None where it is none that is known."""
     return _UNITS.get(text.strip().lower())
+
+
+def _known(text: str) -> str | None:
+    unit = spelled_unit(text)
+    return _AMONG_PRESSURES.get(unit or "", unit)
+
+
+def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
+    """Refuse a keyword value outside its list, naming both."""
+    if value not in allowed:
+        raise DataError.of(name, value, f"one of {', '.join(map(repr, allowed))}")
 
 
 def _unit_of(name: str) -> str | None:

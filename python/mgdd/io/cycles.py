@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.angles import turned
 from mgdd.io.cycle_phase import CYCLE_DEG, repetition
+from mgdd.io.table import Place
 from mgdd.signals.even_grid import wide_steps
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
 __all__ = ["Cycles", "arranged"]
@@ -40,28 +38,9 @@ def arranged(
     *,
     firing_tdc_deg: float | None,
     before_tdc: bool,
-    place: Callable[[int], str],
-    source: str,
+    place: Place,
 ) -> Cycles:
-    """Turn angles to °CA aTDC and cut what holds several cycles.
-
-    Parameters
-    ----------
-    degrees : ndarray, shape (n,)
-        Angle as in the file [deg].
-    pressure : ndarray, shape (columns, n)
-        Pressure, one row per column of the file.
-    firing_tdc_deg, before_tdc
-        As in `mgdd.io.read_pressure`.
-    place : callable
-        What a message calls sample k.
-    source : str
-        What a message calls the record.
-
-    Returns
-    -------
-    Cycles
-        One row of `pressure` per complete cycle.
+    """Turn angles as in the file [deg] to °CA aTDC and cut pressures, one row per column, into complete cycles.
 
     Raises
     ------
@@ -71,7 +50,7 @@ def arranged(
     """
     rows = np.arange(degrees.size)
     if before_tdc and firing_tdc_deg is not None:
-        turned(degrees, firing_tdc_deg, before_tdc)
+        raise DataError("firing_tdc_deg, before_tdc: angles are in one convention: give one of them")
     if before_tdc:
         degrees = 0.0 - degrees
         if np.all(np.diff(degrees) < 0.0):
@@ -82,15 +61,15 @@ def arranged(
     runs_on = rises and span > 720.0 + _SAME
     if (falls.size or runs_on) and len(pressure) > 1:
         raise DataError(
-            f"{source}: several pressure columns, and several cycles below each other: name one column, "
+            f"{place.source}: several pressure columns, and several cycles below each other: name one column, "
             f"{argument('pressure_column', '')}"
         )
     notes: tuple[str, ...] = ()
     if falls.size:
-        stack = _stacked(degrees, pressure[0], rows, falls, place, source)
+        stack = _stacked(degrees, pressure[0], rows, falls, place)
         degrees, pressure, rows, notes = stack
         if firing_tdc_deg is None or not _splits_a_burn(degrees, firing_tdc_deg) or len(pressure) == 1:
-            return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, source), notes)
+            return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, place), notes)
     if firing_tdc_deg is not None and len(pressure) > 1 and _splits_a_burn(degrees, firing_tdc_deg):
         # The columns follow each other: end of compression in one, its combustion at the head of the next.
         whole = degrees[-1] - degrees[0] >= 720.0 - 1e-3
@@ -99,10 +78,10 @@ def arranged(
         rows = np.tile(rows[keep], len(pressure))
         pressure, runs_on = pressure[:, keep].reshape(1, -1), True
     if runs_on:
-        _check_tdc(degrees, firing_tdc_deg, source)
-        cut = _running(degrees, pressure[0], rows, float(firing_tdc_deg or 0.0), place, source)
+        _check_tdc(degrees, firing_tdc_deg, place)
+        cut = _running(degrees, pressure[0], rows, float(firing_tdc_deg or 0.0), place)
         return cut._replace(notes=notes + cut.notes)
-    return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, source), notes)
+    return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, place), notes)
 
 
 def _turned(
@@ -110,13 +89,23 @@ def _turned(
     pressure: NDArray[np.float64],
     rows: NDArray[np.intp],
     firing_tdc_deg: float | None,
-    source: str,
+    place: Place,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
-    try:
-        order, cad = turned(degrees, firing_tdc_deg, before_tdc=False)
-    except DataError as error:
-        raise error.reworded(f"{source}: {error}") from None
-    return cad, np.ascontiguousarray(pressure[:, order]), rows[order]
+    """Sort one cycle of a 0..720 record by its angles in °CA aTDC."""
+    if firing_tdc_deg is None:
+        return degrees, np.ascontiguousarray(pressure), rows
+    _check_tdc(degrees, firing_tdc_deg, place)
+    step = np.diff(degrees)
+    if not np.all(step > 0.0):
+        k = int(np.argmin(step > 0.0)) + 1
+        raise DataError(f"{place.source}: angle_deg[{k}] = {degrees[k]:g} follows {degrees[k - 1]:g}: angles must rise")
+    span = np.ptp(degrees)
+    if span > 720.0:
+        raise DataError(f"{place.source}: angles span {span:g} degrees: one cycle of at most 720 degrees is needed")
+    shifted = degrees - firing_tdc_deg
+    cad = np.where(shifted > 360.0, shifted - 720.0, np.where(shifted < -360.0, shifted + 720.0, shifted))
+    order = np.argsort(cad, kind="stable")
+    return cad[order], np.ascontiguousarray(pressure[:, order]), rows[order]
 
 
 def _seam(start: float, firing_tdc_deg: float) -> float:
@@ -130,15 +119,16 @@ def _splits_a_burn(degrees: NDArray[np.float64], firing_tdc_deg: float) -> bool:
     return degrees[-1] - degrees[0] + 1.5 * step >= 720.0 and abs(_seam(float(degrees[0]), firing_tdc_deg)) < 180.0
 
 
-def _check_tdc(degrees: NDArray[np.float64], firing_tdc_deg: float | None, source: str) -> None:
+def _check_tdc(degrees: NDArray[np.float64], firing_tdc_deg: float | None, place: Place) -> None:
     if firing_tdc_deg is None:
         span = degrees[-1] - degrees[0]
         raise DataError(
-            f"{source}: crank angles run on from {degrees[0]:g} to {degrees[-1]:g}, {span / 720.0:.3g} cycles: pass "
-            f"{argument('firing_tdc_deg', '')} with the angle of firing TDC in the first of them, 0 to 720"
+            f"{place.source}: crank angles run on from {degrees[0]:g} to {degrees[-1]:g}, {span / 720.0:.3g} cycles: "
+            f"pass {argument('firing_tdc_deg', '')} with the angle of firing TDC in the first of them, 0 to 720"
         )
     if not 0.0 <= firing_tdc_deg <= 720.0:
-        raise DataError.of("firing_tdc_deg", firing_tdc_deg, "in [0, 720]")
+        error = DataError.of("firing_tdc_deg", firing_tdc_deg, "in [0, 720]")
+        raise error.reworded(f"{place.source}: {error}")
 
 
 def _stacked(
@@ -146,8 +136,7 @@ def _stacked(
     pressure: NDArray[np.float64],
     rows: NDArray[np.intp],
     falls: NDArray[np.intp],
-    place: Callable[[int], str],
-    source: str,
+    place: Place,
 ) -> Cycles:
     """Cut where the angle returns to its start."""
     edges = [0, *falls.tolist(), degrees.size]
@@ -157,15 +146,15 @@ def _stacked(
     whole = [degrees[b.start] < low + 0.5 * step and degrees[b.stop - 1] > high - 0.5 * step for b in blocks]
     if not any(whole):
         raise DataError(
-            f"{source}: the angle returns at {place(int(falls[0]))}, and no cycle from {low:g} to {high:g} is complete"
-            ": give at least one"
+            f"{place.source}: the angle returns at {place.row(int(falls[0]))}, and no cycle from {low:g} to {high:g} "
+            "is complete: give at least one"
         )
     dropped = [k + 1 for k, complete in enumerate(whole) if not complete]
     inner = [k for k in dropped if 1 < k < len(blocks)]
     if inner:
         b = blocks[inner[0] - 1]
         raise DataError(
-            f"{place(b.start)}: cycle {inner[0]} of {len(blocks)} runs from {degrees[b.start]:g} to "
+            f"{place.row(b.start)}: cycle {inner[0]} of {len(blocks)} runs from {degrees[b.start]:g} to "
             f"{degrees[b.stop - 1]:g}, the others from {low:g} to {high:g}: repair it or remove its rows"
         )
     kept = [b for b, complete in zip(blocks, whole, strict=True) if complete]
@@ -173,10 +162,11 @@ def _stacked(
     for b in kept:
         if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > _SAME * step:
             raise DataError(
-                f"{place(b.start)}: the cycle that starts here has other crank angles than the one at "
-                f"{place(kept[0].start)}: give all cycles the same angles"
+                f"{place.row(b.start)}: the cycle that starts here has other crank angles than the one at "
+                f"{place.row(kept[0].start)}: give all cycles the same angles"
             )
-    notes = [f"{_numbered(dropped)} of {len(blocks)} left out: incomplete"] if dropped else []
+    which = f"cycle{'s' if len(dropped) > 1 else ''} {' and '.join(map(str, dropped))}"
+    notes = [f"{which} of {len(blocks)} left out: incomplete"] if dropped else []
     return Cycles(grid, np.stack([pressure[b] for b in kept]), rows[kept[0]], tuple(notes))
 
 
@@ -185,23 +175,22 @@ def _running(
     pressure: NDArray[np.float64],
     rows: NDArray[np.intp],
     firing_tdc_deg: float,
-    place: Callable[[int], str],
-    source: str,
+    place: Place,
 ) -> Cycles:
     """Cut angles that run on into cycles of 720 degrees, at the start of the record or at gas-exchange TDC."""
     wide, step = wide_steps(degrees)
     if wide:
         k = wide[0]
         raise DataError(
-            f"{place(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual step "
-            f"is {step:g}; fill it or cut the record there"
+            f"{place.row(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual "
+            f"step is {step:g}; fill it or cut the record there"
         )
     found = repetition(degrees, pressure, firing_tdc_deg)
     if found is not None and found.differs:
         factor = CYCLE_DEG / found.degrees
         raise DataError(
-            f"{source}: the angle runs on and the pressure repeats every {found.degrees:.6g} degrees, not every 720, "
-            f"over {found.cycles} cycles: correct the step of the angle by a factor of {factor:.6g}, "
+            f"{place.source}: the angle runs on and the pressure repeats every {found.degrees:.6g} degrees, not every "
+            f"720, over {found.cycles} cycles: correct the step of the angle by a factor of {factor:.6g}, "
             f"{argument('angle_step_deg', format(step * factor, '.6g'))} for a file without an angle"
         )
     first = float(degrees[0])
@@ -210,7 +199,7 @@ def _running(
     count = int((degrees[-1] + step * (1.0 + _SAME) - first) // 720.0)
     if count < 1:
         raise DataError(
-            f"{source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
+            f"{place.source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
             f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
         )
     starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _SAME * step)
@@ -233,7 +222,3 @@ def _running(
     cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
     order = np.argsort(cad, kind="stable")
     return Cycles(cad[order], np.ascontiguousarray(values[:, order]), rows[starts[0] : starts[1]][order], tuple(notes))
-
-
-def _numbered(cycles: list[int]) -> str:
-    return f"cycle{'s' if len(cycles) > 1 else ''} {' and '.join(map(str, cycles))}"

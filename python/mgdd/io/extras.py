@@ -9,26 +9,7 @@ __all__ = ["import_extra"]
 
 
 def import_extra(module: str, extra: str, purpose: str) -> Any:
-    """Import a package that only an extra of mgdd installs.
-
-    Parameters
-    ----------
-    module : str
-        What to import.
-    extra : str
-        Name of the extra.
-    purpose : str
-        What needs it, for the message.
-
-    Returns
-    -------
-    module
-        As imported.
-
-    Raises
-    ------
-    ImportError
-        It is not installed; the message says how to install it.
+    """Import a module that only an extra of mgdd installs; the ImportError says what needs it and how it is installed.
 
     Examples
     --------

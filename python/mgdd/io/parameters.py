@@ -6,24 +6,119 @@ The one reader and writer of such files. It knows mappings only; presets, models
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Self
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
-from mgdd.io.parameter_entries import FORMS, PARTS, Entry, Wanted, entries, entry_of, fits, key_line, quoted, wanted
-from mgdd.io.toml_text import text_of, toml_of
+from mgdd.io.files import parsed, read_plain_text
+from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     import os
 
-__all__ = ["Entry", "ParameterFile", "Parameters", "Wanted", "entries", "wanted"]
+__all__ = ["FORMS", "Entry", "ModelParameters", "ParameterFile", "Parameters", "Wanted", "entries", "wanted", "written"]
 
 FORMAT = 1
 FIT_NOTES = ("source", "unidentifiable")  # what a fit says beside its model, in a table [fit] too
 _HEAD = ("kind", "format")
+_PARTS = ("value", "unit", "stderr", "source")
+Form = Literal["number", "integer", "flag", "text", "numbers", "texts"]
+FORMS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "flag": "true or false",
+    "text": "text in quotes",
+    "numbers": "a list of numbers",
+    "texts": "a list of texts in quotes",
+}
+
+
+class Wanted(NamedTuple):
+    """What a reader expects of one key; the form ``numbers`` is a list of numbers, or a list of such lists."""
+
+    unit: str = "-"
+    form: Form = "number"
+    required: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One value of a parameter file, with its unit: ``"-"`` if dimensionless, None where the file does not say it.
+
+    Its standard error is in the same unit; the source says where it comes from.
+    """
+
+    value: Any
+    unit: str | None = "-"
+    stderr: float | None = None
+    source: str | None = None
+
+
+def entries(values: Mapping[str, Any], units: Mapping[str, str] = MappingProxyType({})) -> dict[str, Entry]:
+    """Make the entries of a table: units as given, else as the names end."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, np.ndarray | np.generic):
+            return value.tolist()
+        return list(value) if isinstance(value, tuple) else value
+
+    return {name: Entry(value=plain(value), unit=units.get(name, unit_of(name))) for name, value in values.items()}
+
+
+def written(values: Mapping[str, Any], wanted: Mapping[str, Wanted]) -> dict[str, Entry]:
+    """Make the entries of a table that `ParameterFile.values` takes with the same `wanted`."""
+    cast: dict[str, Callable[[Any], Any]] = {"number": float, "integer": int, "flag": bool, "texts": list}
+    cast["numbers"] = lambda rows: np.asarray(rows, dtype=np.float64).tolist()
+    return {name: Entry(value=cast.get(form, str)(values[name]), unit=unit) for name, (unit, form, _) in wanted.items()}
+
+
+def wanted(
+    names: Iterable[str], units: Mapping[str, str] = MappingProxyType({}), form: Form = "number"
+) -> dict[str, Wanted]:
+    """Ask for keys of one form, all required: units as given, else as the names end."""
+    return {name: Wanted(units.get(name, unit_of(name)), form) for name in names}
+
+
+def _entry_of(entry: Any) -> Entry:
+    """Take an entry as it stands; what is not one has no unit, which `ParameterFile.values` refuses."""
+    if not isinstance(entry, dict) or "value" not in entry or not set(entry) <= set(_PARTS):
+        return Entry(value=entry, unit=None)
+    return Entry(**{"unit": None, **entry})
+
+
+def fits(value: Any, form: str) -> bool:
+    """Return whether a value is of a form."""
+    if form == "numbers":
+        rows = value if isinstance(value, list) else [None]
+        return all(fits(row, "numbers" if isinstance(row, list) else "number") for row in rows)
+    if form == "texts":
+        return isinstance(value, list) and all(isinstance(item, str) for item in value)
+    if form in ("number", "integer"):
+        types: tuple[type, ...] = (int, float) if form == "number" else (int,)
+        return isinstance(value, types) and not isinstance(value, bool)
+    return isinstance(value, bool if form == "flag" else str)
+
+
+def _key_line(key: str, value: Any) -> str:
+    """Write ``key = value`` on one line; lists of lists get a line per row."""
+    import tomli_w
+
+    # Strings escape their line breaks, so those left belong to lists.
+    text = re.sub(r",\n\s*\]", "]", tomli_w.dumps({key: value}).rstrip("\n"))
+    text = re.sub(r"\[\n\s*", "[", text)
+    text = re.sub(r",\n\s*", ", ", text)
+    rows = isinstance(value, list) and any(isinstance(row, list) for row in value)
+    return text.replace("], [", "],\n  [") if rows else text
+
+
+def _quoted(name: str) -> str:
+    """Quote a key where TOML needs it."""
+    return _key_line(name, 0).removesuffix(" = 0")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,23 +163,10 @@ class ParameterFile:
         source: str,
         unidentifiable: Collection[str],
     ) -> Self:
-        """Give the same parameters with what a fit says of them.
+        """Give the same parameters with what a fit says of them: standard errors, and figures in a table ``fit``.
 
-        Parameters
-        ----------
-        stderr : mapping of str to float
-            Standard errors by name; both sides of a throttle may share one, without the side.
-        figures : mapping of str to (float, str)
-            Quality of the fit by name, each with its unit.
-        source : str
-            Where the numbers come from.
-        unidentifiable : collection of str
-            Names that the record did not determine.
-
-        Returns
-        -------
-        ParameterFile
-            With a table ``fit``.
+        Both sides of a throttle may share a standard error, named without the side; each figure has its unit;
+        `unidentifiable` are names that the record did not determine.
         """
         parameters = dict(self.tables["parameters"])
         for name, entry in parameters.items():
@@ -100,14 +182,14 @@ class ParameterFile:
 
     def to_toml(self) -> str:
         """Write TOML with one line per value; numbers come back bit for bit."""
-        out = [key_line("kind", self.kind), key_line("format", FORMAT)]
-        out += [key_line(name, value) for name, value in self.notes.items()]
+        out = [_key_line("kind", self.kind), _key_line("format", FORMAT)]
+        out += [_key_line(name, value) for name, value in self.notes.items()]
         for table, values in self.tables.items():
-            out += ["", f"[{quoted(table)}]"]
+            out += ["", f"[{_quoted(table)}]"]
             for key, entry in values.items():
-                said = {part: getattr(entry, part) for part in PARTS}
-                parts = ", ".join(key_line(part, value) for part, value in said.items() if value is not None)
-                out.append(f"{quoted(key)} = {{ {parts} }}")
+                said = {part: getattr(entry, part) for part in _PARTS}
+                parts = ", ".join(_key_line(part, value) for part, value in said.items() if value is not None)
+                out.append(f"{_quoted(key)} = {{ {parts} }}")
         return "\n".join(out) + "\n"
 
     @classmethod
@@ -121,7 +203,7 @@ class ParameterFile:
         ParameterError
             A value that does not stand as ``{ value = ..., unit = "..." }``.
         """
-        data = toml_of(text, origin)
+        data = parsed(text, origin, "TOML")
         kind, version = data.get("kind"), data.get("format")
         if not isinstance(kind, str):
             raise DataError(f'{origin}: kind = {kind!r}: say what the file holds, for example kind = "engine"')
@@ -131,7 +213,7 @@ class ParameterFile:
                 "the file follows the page Formats, or update mgdd"
             )
         tables = {
-            name: {key: entry_of(entry) for key, entry in table.items()}
+            name: {key: _entry_of(entry) for key, entry in table.items()}
             for name, table in data.items()
             if isinstance(table, dict)
         }
@@ -141,27 +223,12 @@ class ParameterFile:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> ParameterFile:
         """Read a file; FileNotFoundError or DataError name it."""
-        text, origin = text_of(path)
-        return cls.from_toml(text, origin=origin)
+        return cls.from_toml(read_plain_text(path, only_utf8=True), origin=str(path))
 
     def expect(self, *, kinds: Collection[str], tables: Collection[str], notes: Collection[str] = ("source",)) -> None:
-        """Refuse another kind, a missing table, and a table or note that the kind does not have.
+        """Refuse another kind or a missing table (DataError), and an unknown table or note (ParameterError).
 
-        Parameters
-        ----------
-        kinds : collection of str
-            Kinds that the caller reads.
-        tables : collection of str
-            Its tables; one that ends in ``?`` may be missing.
-        notes : collection of str
-            Its notes; all of them may be missing.
-
-        Raises
-        ------
-        DataError
-            Another kind, or a table that is missing.
-        ParameterError
-            An unknown table or note.
+        A table that ends in ``?`` may be missing, and so may all notes.
         """
         if self.kind not in kinds:
             raise DataError(f"{self.origin}: kind = {self.kind!r}: must be {' or '.join(map(repr, kinds))}")
@@ -175,14 +242,7 @@ class ParameterFile:
                 raise DataError(f"{self.origin}: no table [{table}]: a file of kind {self.kind!r} has one")
 
     def values(self, table: str, wanted: Mapping[str, Wanted]) -> dict[str, Any]:
-        """Take the values of a table: numbers as float, lists as they stand.
-
-        Parameters
-        ----------
-        table : str
-            Its name; nothing is required of a table that is missing and may be.
-        wanted : mapping of str to Wanted
-            What its keys must be.
+        """Take the values of a table, none of one that may be missing: numbers as float, lists as they stand.
 
         Raises
         ------
@@ -276,7 +336,7 @@ class Parameters:
 
 
 def _example(key: str, unit: str) -> str:
-    return f'{quoted(key)} = {{ value = ..., unit = "{unit}", source = "..." }}'
+    return f'{_quoted(key)} = {{ value = ..., unit = "{unit}", source = "..." }}'
 
 
 def _near(name: str, known: Iterable[str]) -> str:
@@ -287,3 +347,31 @@ def _near(name: str, known: Iterable[str]) -> str:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+class ModelParameters(Parameters):
+    """Base of a model of ``parameters`` by name; what a fit wrote beside them is read over."""
+
+    kind: str
+    parameters: Mapping[str, float]
+    parameter_names: ClassVar[tuple[str, ...]]
+    settings: ClassVar[Mapping[str, Wanted]]
+
+    def _written(self) -> Mapping[str, float]:
+        return self.parameters
+
+    def to_parameters(self) -> ParameterFile:
+        """Give parameters and settings, as `to_toml` writes them."""
+        settings = written({name: getattr(self, name) for name in self.settings}, self.settings)
+        tables = {"parameters": entries(self._written()), "settings": settings}
+        return ParameterFile(kind=self.kind, tables=tables)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> Self:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=(cls.kind,), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        make: Any = cls
+        model: Self = make(
+            parameters=file.values("parameters", wanted(cls.parameter_names)), **file.values("settings", cls.settings)
+        )
+        return model

@@ -1,30 +1,71 @@
-"""Text tables: CSV (comma, semicolon, tab) or blank-separated columns, with optional header and units row."""
+"""Text tables: CSV or blank-separated columns with optional header and units row, and the one writer of plain CSV."""
 
 from __future__ import annotations
 
 import itertools
+import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
-from mgdd.io.plain_text import read_plain_text
+from mgdd.errors import DataError, ShapeError, argument
+from mgdd.io.files import existing_file, read_plain_text, write_whole_text
+from mgdd.results.labels import check_labels
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["TextTable", "parse_number", "read_table"]
+__all__ = [
+    "Place",
+    "TextTable",
+    "parse_number",
+    "read_table",
+    "write_columns",
+    "write_traces",
+]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
+
+
+@dataclass(frozen=True)
+class Place:
+    """How a message calls a sample and a column of a source: by line of a file, or by index."""
+
+    source: str
+    rows: Sequence[int] | None = None
+    columns: Mapping[str, str] | None = None
+
+    def row(self, index: int) -> str:
+        """Return "FILE, line 7" or "log, sample 5"."""
+        return f"{self.source}, " + (f"sample {index}" if self.rows is None else f"line {self.rows[index]}")
+
+    def span(self, first: int, last: int) -> str:
+        """Return "FILE, lines 2 to 1001" or "log, samples 0 to 999"."""
+        if self.rows is None:
+            return f"{self.source}, samples {first} to {last}"
+        return f"{self.source}, lines {self.rows[first]} to {self.rows[last]}"
+
+    def column(self, name: str) -> str:
+        """Return how the source calls a column."""
+        return f"column {(self.columns or {}).get(name, repr(name))}"
+
+    def cell(self, index: int, name: str) -> str:
+        """Return row and column."""
+        return f"{self.row(index)}, {self.column(name)}"
+
+    def only(self, kept: NDArray[np.intp]) -> Place:
+        """Return the place of some of the samples, in this order."""
+        rows = None if self.rows is None else [self.rows[i] for i in kept.tolist()]
+        return Place(self.source, rows, self.columns)
 
 
 @dataclass(frozen=True)
@@ -152,7 +193,7 @@ def read_table(
         raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
-    file = Path(path)
+    file = existing_file(path)
     content = [
         (number, line.strip())
         for number, line in enumerate(read_plain_text(path).splitlines(), start=1)
@@ -225,3 +266,50 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
         return float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:
         return None
+
+
+def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]) -> None:
+    r"""Write columns of one length as CSV that any reader takes without options: a header, then rows.
+
+    Numbers come back bit for bit; texts, which hold no comma, quote or line break, stand as they are.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.io.table import write_columns
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "map.csv"
+    ...     write_columns({"fuel_mg": [6.0, 20.0], "source": ["idle", "model"]}, file)
+    ...     file.read_text()
+    'fuel_mg,source\n6.0,idle\n20.0,model\n'
+    """
+    cells = [
+        column.tolist() if column.dtype.kind == "U" else [repr(value) for value in column.astype(np.float64).tolist()]
+        for column in map(np.asarray, columns.values())
+    ]
+    rows = [",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]
+    write_whole_text(path, "\n".join(rows) + "\n")
+
+
+def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write every variable of a Dataset over its one dimension by `write_columns`; its scalars are left out.
+
+    A variable without units is a DataError, variables over different dimensions are a ShapeError.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
+    >>> from mgdd.io.table import write_traces
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "cycle.csv"
+    ...     write_traces(simulate(Cylinder(), OperatingPoint()), file)
+    ...     file.read_text().splitlines()[0][:28]
+    'crank_angle_cad,pressure_bar'
+    """
+    check_labels(dataset)
+    dims = [dim for dim in dataset.dims if any(v.dims == (dim,) for v in dataset.data_vars.values())]
+    if len(dims) != 1 or any(v.ndim > 1 for v in dataset.variables.values()):
+        raise ShapeError(f"a CSV holds columns over one dimension; this result has {dict(dataset.sizes)}")
+    names = [str(dims[0]), *(str(n) for n, v in dataset.data_vars.items() if v.dims == (dims[0],))]
+    write_columns({name: dataset[name].to_numpy() for name in names}, path)

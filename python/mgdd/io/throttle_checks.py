@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, argument
+from mgdd.errors import DataError, argument
+from mgdd.io.table import Place
 from mgdd.results.labels import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["Place", "check_throttle_log"]
+__all__ = ["check_even", "check_samples", "check_sides", "check_signals", "check_throttle_log"]
 
 MIN_SAMPLES = 50
 _INFINITE = 1e100  # of differences and products something is left below it
@@ -35,58 +35,15 @@ GAP_WINDOW = 20
 SIDE_DEG, SIDE_S = 0.5, 0.1
 
 
-@dataclass(frozen=True)
-class Place:
-    """How a message calls a sample and a column: by line of a file, or by index."""
-
-    source: str
-    rows: Sequence[int] | None = None
-    columns: Mapping[str, str] | None = None
-
-    def row(self, index: int) -> str:
-        """Return "FILE, line 7" or "log, sample 5"."""
-        return f"{self.source}, " + (f"sample {index}" if self.rows is None else f"line {self.rows[index]}")
-
-    def span(self, first: int, last: int) -> str:
-        """Return "FILE, lines 2 to 1001" or "log, samples 0 to 999"."""
-        if self.rows is None:
-            return f"{self.source}, samples {first} to {last}"
-        return f"{self.source}, lines {self.rows[first]} to {self.rows[last]}"
-
-    def column(self, name: str) -> str:
-        """Return how the source calls a column."""
-        return f"column {(self.columns or {}).get(name, repr(name))}"
-
-    def cell(self, index: int, name: str) -> str:
-        """Return row and column."""
-        return f"{self.row(index)}, {self.column(name)}"
-
-
-def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_deg: float | None = None) -> xr.Dataset:
-    """Refuse what no throttle can be identified from.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], as `read_throttle_log` gives it.
-    two_sided : bool
-        Whether both sides of limp-home are to be identified: then the plate must have been on both.
-    limp_home_deg : float, optional
-        Limp-home angle [deg]; `two_sided` needs it.
-
-    Returns
-    -------
-    xarray.Dataset
-        The same log.
+def check_throttle_log(log: xr.Dataset) -> xr.Dataset:
+    """Refuse what no throttle can be identified from: ``duty`` and ``angle_deg`` over ``time_s``; return the same log.
 
     Raises
     ------
     DataError
         NaN, repeated or falling time, gaps, uneven sampling, duty beyond ±1, a duty or an angle that stands still, an
-        angle that cannot be in degrees, exchanged columns, fewer than 50 samples or 0.5 s, or one side only; the
-        message names row, column and remedy.
-    ParameterError
-        `two_sided` without `limp_home_deg`.
+        angle that cannot be in degrees, exchanged columns, fewer than 50 samples or 0.5 s; the message names row,
+        column and remedy.
 
     Examples
     --------
@@ -95,7 +52,7 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     >>> from mgdd.io.throttle_checks import check_throttle_log
     >>> time = np.arange(2000) * 1e-3
     >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> check_throttle_log(log, two_sided=True, limp_home_deg=8.0) is log
+    >>> check_throttle_log(log) is log
     True
     """
     for name in ("time_s", "duty", "angle_deg"):
@@ -105,18 +62,25 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     signals = log[names]
     signals.attrs = {}  # what the user notes beside the log is not ours to judge
     check_labels(signals)
-    place = Place(str(log.attrs.get("file", "log")))
+    place = _place_of(log)
     columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
-    check_finite(columns, place)
-    check_time(columns, place)
+    check_samples(columns, place)
     check_even(columns["time_s"], place)
     check_signals(columns["duty"], columns["angle_deg"], place=place)
-    if two_sided:
-        _check_sides(columns["time_s"], columns["angle_deg"], limp_home_deg, place)
     return log
 
 
-def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+def _place_of(log: xr.Dataset) -> Place:
+    return Place(str(log.attrs.get("file", "log")))
+
+
+def check_samples(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+    """Refuse columns that are not finite, and a time that is none."""
+    _check_finite(columns, place)
+    _check_time(columns, place)
+
+
+def _check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
     """Refuse NaN, infinity, and numbers whose differences and squares would be infinite."""
     for name, values in columns.items():
         bad = np.flatnonzero(~(np.abs(values) < _INFINITE))
@@ -125,11 +89,12 @@ def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> No
             what = "beyond any measurement" if np.isfinite(values[at]) else "not finite"
             more = f" ({bad.size} such cells)" if bad.size > 1 else ""
             raise DataError(
-                f"{place.cell(at, name)}: {values[at]} is {what}{more}: repair it or cut the log; {_window()}"
+                f"{place.cell(at, name)}: {values[at]} is {what}{more}: repair it or cut the log; keep one part with "
+                f"{argument('start_s', '')} or {argument('stop_s', '')}"
             )
 
 
-def check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+def _check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
     """Refuse time that does not rise, leaves gaps, cannot be in seconds, or is too short.
 
     The other columns show whether one of them is the time.
@@ -307,20 +272,14 @@ def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str
         )
 
 
-def _window() -> str:
-    return f"keep one part with {argument('start_s', '')} or {argument('stop_s', '')}"
-
-
 def _exchange() -> str:
     return f"exchange {argument('duty', '')} and {argument('angle', '')}"
 
 
-def _check_sides(
-    time: NDArray[np.float64], angle: NDArray[np.float64], limp_home_deg: float | None, place: Place
-) -> None:
-    if limp_home_deg is None:
-        raise ParameterError(f"{argument('limp_home_deg')} = None: a two-sided check needs the limp-home angle [deg]")
-    step = even_step(time)
+def check_sides(log: xr.Dataset, limp_home_deg: float) -> None:
+    """Refuse a log, checked already, whose plate was not on both sides of limp-home [deg]."""
+    angle, place = log["angle_deg"].to_numpy(), _place_of(log)
+    step = even_step(log["time_s"].to_numpy())
     for side, inside, extreme in (
         ("below", angle < limp_home_deg - SIDE_DEG, int(np.argmin(angle))),
         ("above", angle > limp_home_deg + SIDE_DEG, int(np.argmax(angle))),

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io.mat_file import read_mat
-from mgdd.io.plain_csv import write_columns
-from mgdd.io.table import read_table
-from mgdd.io.throttle_checks import (
-    Place,
-    check_even,
-    check_finite,
-    check_signals,
-    check_throttle_log,
-    check_time,
-)
-from mgdd.io.throttle_units import asked_units, unit_of_column, usual_unit
+from mgdd.errors import DataError, ParameterError, ShapeError, argument
+from mgdd.io.binary_files import read_mat
+from mgdd.io.column_names import check_choice, spelled_unit, unit_text
+from mgdd.io.files import existing_file
+from mgdd.io.table import Place, TextTable, read_table, write_columns
+from mgdd.io.throttle_checks import check_even, check_samples, check_signals, check_throttle_log
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -31,6 +25,11 @@ if TYPE_CHECKING:
 
 __all__ = ["read_throttle_log", "throttle_log", "write_throttle_log"]
 
+# The first unit of each column is taken where nothing is said.
+_UNITS = {
+    "time_s": ("s", "ms"), "duty": ("-", "%"), "angle_deg": ("deg", "rad", "%"), "current_a": ("A",), "supply_v": ("V",)
+}  # fmt: skip
+_ASKED = {"time_s": "time_unit", "duty": "duty_unit", "angle_deg": "angle_unit"}
 _OPTIONAL = ("current_a", "supply_v")
 
 
@@ -83,10 +82,8 @@ def throttle_log(
     >>> log["angle_deg"].attrs["units"], log.sizes["time_s"]
     ('degree', 1000)
     """
-    columns = _columns({"time_s": time_s, "duty": duty, "angle_deg": angle_deg}, name)
-    for key, values in (("current_a", current_a), ("supply_v", supply_v)):
-        if values is not None:
-            columns |= _columns({key: values}, name)
+    given = {"time_s": time_s, "duty": duty, "angle_deg": angle_deg, "current_a": current_a, "supply_v": supply_v}
+    columns = {key: _column(key, values, name) for key, values in given.items() if values is not None}
     return _checked(columns, Place(name), step_s=step_s, name=name)
 
 
@@ -166,7 +163,10 @@ def read_throttle_log(
     >>> float(log["duty"].max())
     0.2
     """
-    given = asked_units(time_unit, duty_unit, angle_unit)
+    given = {"time_s": time_unit, "duty": duty_unit, "angle_deg": angle_unit}
+    for key, unit in given.items():
+        if unit is not None:
+            check_choice(_ASKED[key], unit, _UNITS[key])
     if not 0.0 < travel_deg <= 95.0:
         raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
     wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
@@ -219,31 +219,28 @@ def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
     write_columns({name: log[name].to_numpy() for name in names}, path)
 
 
-def _columns(given: dict[str, ArrayLike], name: str) -> dict[str, NDArray[np.float64]]:
-    out = {}
-    for key, values in given.items():
-        try:
-            column = np.array(values, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise DataError(f"{name}, column {key!r}: must be numbers") from error
-        if column.ndim != 1:
-            raise ShapeError(f"{key} has shape {column.shape}: must have 1 dimension")
-        out[key] = column
-    return out
+def _column(key: str, values: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        column = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"{name}, column {key!r}: must be numbers") from error
+    if column.ndim != 1:
+        raise ShapeError(f"{key} has shape {column.shape}: must have 1 dimension")
+    return column
 
 
 def _read(
     path: str | os.PathLike[str],
     wanted: dict[str, int | str | None],
-    given: dict[str, str | None],
+    given: Mapping[str, str | None],
     *,
     delimiter: str | None,
     decimal: str,
 ) -> tuple[dict[str, NDArray[np.float64]], Place, dict[str, str]]:
     called: dict[str, str] = {}
-    units = {key: given[key] or usual_unit(key) for key in wanted}
+    units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
-    if Path(path).suffix.lower() == ".mat":
+    if existing_file(path).suffix.lower() == ".mat":
         mat = read_mat(path)
         for key, column in wanted.items():
             chosen = key if column is None and mat.has(key) else column
@@ -255,9 +252,26 @@ def _read(
         chosen = key if column is None and key in (table.header or ()) else column
         if chosen is not None:
             index = table.index(chosen)
-            units[key] = unit_of_column(key, given[key], table, index)
+            units[key] = _unit_of_column(key, given.get(key), table, index)
             columns[key], called[key] = table.numbers(index), repr(chosen)
     return columns, Place(table.source, table.lines, called), units
+
+
+def _unit_of_column(key: str, asked: str | None, table: TextTable, index: int) -> str:
+    """Return what the file says, else what is asked for, else the usual unit; the first two must agree."""
+    said, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
+    units = _UNITS[key]
+    if said is None or (said == "-" and "-" not in units):
+        return asked or units[0]
+    unit, where = spelled_unit(said), f"{table.source}: {table.called(index)} is in {said!r} as the file says"
+    if unit not in units:
+        if not sure and asked is not None:
+            return asked  # a remark, as who reads the file knows
+        other = "" if sure or key not in _ASKED else f", or pass {argument(_ASKED[key], '')} if that is a remark"
+        raise DataError(f"{where}: convert it to {' or '.join(units)}, or correct the file{other}")
+    if asked not in (None, unit):
+        raise DataError(f"{where}: leave {argument(_ASKED[key])} out, or correct the file")
+    return unit
 
 
 def _window(
@@ -276,9 +290,7 @@ def _window(
             f"start_s = {low:g}, stop_s = {high:g}: no row of {place.source} lies between; it runs from {time.min():g} "
             f"to {time.max():g} s"
         )
-    rows = range(time.size) if place.rows is None else place.rows
-    kept = {key: values[keep] for key, values in columns.items()}
-    return kept, Place(place.source, None if place.rows is None else [rows[i] for i in keep.tolist()], place.columns)
+    return {key: values[keep] for key, values in columns.items()}, place.only(keep)
 
 
 def _checked(
@@ -297,8 +309,7 @@ def _checked(
             raise ShapeError(
                 f"{place.source}: {key} has {values.size} samples, time {size}: columns must be equally long"
             )
-    check_finite(columns, place)
-    check_time(columns, place)
+    check_samples(columns, place)
     if step_s is None:
         check_even(columns["time_s"], place)
     else:
@@ -326,5 +337,4 @@ def _resampled(
     out = {key: np.interp(even, time, values) for key, values in columns.items()}
     out["duty"] = columns["duty"][held]
     out["time_s"] = even
-    rows = None if place.rows is None else [place.rows[i] for i in held.tolist()]
-    return out, Place(place.source, rows, place.columns)
+    return out, place.only(held)

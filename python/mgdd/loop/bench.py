@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from mgdd import _core, presets
-from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor
+from mgdd import _core
+from mgdd._core.engine import NoxModel, OperatingPoint, Performance, SoftSensor
 from mgdd._core.loop import SensorDynamics
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.loop.steady import find_optimum, steady_map
 from mgdd.optimize import Limit, Optimum
-from mgdd.presets import Preset
+from mgdd.optimize.optimum import limit_names_of
+from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["EngineBench"]
+
+_RANDOM = (
+    "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
+    "wall_heat_drift_per_kcycle",
+)  # fmt: skip
 
 
 class EngineBench(_core.loop.EngineBench):
@@ -34,9 +40,9 @@ class EngineBench(_core.loop.EngineBench):
 
     Parameters
     ----------
-    engine : str, Preset or Cylinder
+    engine : Cylinder, Preset, str or path-like
         A preset, its name, or a cylinder of your own.
-    point : OperatingPoint, optional
+    point : OperatingPoint, Preset or mapping of str to float, optional
         Operating point; that of the preset if left out. It must carry fuel.
     schedule : sequence of (int, OperatingPoint), optional
         First cycle of each operating point, the first being 0, instead of ``point``.
@@ -44,7 +50,7 @@ class EngineBench(_core.loop.EngineBench):
         What is to be maximised; gross efficiency in percent if left out.
     nox_sensor : {"soft", "soft_corrected", "analyser", "fast", "true_value", "none"}
         Which NOx value enters the performance.
-    limits : sequence of str
+    limits : sequence of str, or limits by name or as Limit
         Up to eight indicators to report as limits, or ``"cov_imep_percent"`` (of the last 50 cycles; 0 at the first).
     soc_scatter_cad : float
         Standard deviation of SOC from cycle to cycle [°CA].
@@ -89,13 +95,13 @@ class EngineBench(_core.loop.EngineBench):
 
     def __init__(
         self,
-        engine: str | Preset | Cylinder = "puma_single",
-        point: OperatingPoint | None = None,
+        engine: CylinderLike = "puma_single",
+        point: PointLike | None = None,
         *,
         schedule: Iterable[tuple[int, OperatingPoint]] | None = None,
         performance: Performance | None = None,
         nox_sensor: str = "soft",
-        limits: Sequence[str] = (),
+        limits: Mapping[str, float] | Sequence[Limit | str] = (),
         soc_scatter_cad: float = 0.3,
         efficiency_noise_percent: float = 0.25,
         misfire_probability: float = 0.0,
@@ -116,22 +122,15 @@ class EngineBench(_core.loop.EngineBench):
     ) -> None:
         if schedule is not None and point is not None:
             raise ParameterError("point and schedule were both given: name the operating points in one of them")
-        if isinstance(limits, str):
-            raise ParameterError.of("limits", limits, "a sequence of names")
         if not 0 <= seed < 2**64:
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
-        if isinstance(engine, str):
-            engine = presets.load(engine, kind="engine")
-        if isinstance(engine, Preset):
-            cylinder, nominal = engine.cylinder, engine.point
-        else:
-            cylinder, nominal = engine, OperatingPoint()
+        cylinder, first = engine_of(engine, {} if point is None else point, argument="engine")
         super().__init__(
             cylinder=cylinder,
-            schedule=[(0, point or nominal)] if schedule is None else list(schedule),
+            schedule=[(0, first)] if schedule is None else list(schedule),
             performance=performance,
             nox_sensor=nox_sensor,
-            limits=list(limits),
+            limits=limit_names_of(limits),
             soc_scatter_cad=soc_scatter_cad,
             efficiency_noise_percent=efficiency_noise_percent,
             misfire_probability=misfire_probability,
@@ -291,7 +290,7 @@ class EngineBench(_core.loop.EngineBench):
         >>> EngineBench().steady_map([-10.0, -5.0])["efficiency_gross"].values.round(3)
         array([0.557, 0.562])
         """
-        return steady_map(self, soc_cad, cycle)
+        return steady_map(self._quiet(cycle), soc_cad)
 
     def find_optimum(
         self,
@@ -331,7 +330,18 @@ class EngineBench(_core.loop.EngineBench):
         >>> round(EngineBench().find_optimum()["soc_cad"], 2)
         -5.63
         """
-        return find_optimum(self, limits, bounds_cad, cycle)
+        return find_optimum(self._quiet(cycle), limits, bounds_cad, float(self.settings["soc_scatter_cad"]))
+
+    def _quiet(self, cycle: int) -> EngineBench:
+        """Copy the bench without anything random or slow, at the operating point of one cycle."""
+        if cycle < 0:
+            raise ParameterError.of("cycle", cycle, ">= 0")
+        settings = self.settings
+        cylinder = settings.pop("cylinder")
+        settings.pop("schedule")
+        silent = SensorDynamics(delay_s=0.0, lag_s=0.0, noise_fraction=0.0)
+        settings |= {"analyser": silent, "fast_sensor": silent} | dict.fromkeys(_RANDOM, 0.0)
+        return EngineBench(cylinder, self.point_at(cycle), **settings)
 
     def _repr_html_(self) -> str:
         return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import ParameterError
+from mgdd.presets.meant import throttle_model_of
 
 if TYPE_CHECKING:
     from mgdd.throttle.pseudo_wiener import PseudoWiener
@@ -55,7 +56,7 @@ def groups_of(model: Any) -> Groups:
 
     ParameterError for anything else.
     """
-    model = getattr(model, "model", model)  # of a Fit
+    model = throttle_model_of(model)
     if hasattr(model, "stall_torque_nm"):
         return _of_throttle(model)
     numbers = getattr(model, "parameters", None)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError
+from mgdd.optimize.optimum import limits_of
 
 if TYPE_CHECKING:
     from mgdd.guide import FeedForward, GuidedEngine
@@ -36,7 +38,7 @@ class LoopCriteria:
     exceed_above : mapping of str to float
         Per limit, the value above which a cycle counts for ``exceeded_fraction``, for example the limit and a margin
         for its scatter; the summary repeats it as ``exceed_above_NAME``.
-    limits : mapping of str to float, optional
+    limits : mapping of str to float, or sequence of Limit, optional
         Limits of which the summary tells ``worst_NAME``, ``above_fraction_NAME`` and so on, without any margin; those
         of the seeker if left out.
 
@@ -60,7 +62,7 @@ class LoopCriteria:
     tail_cycles: int = 100
     exceed_from: int | None = None
     exceed_above: Mapping[str, float] = field(default_factory=dict)
-    limits: Mapping[str, float] | None = None
+    limits: Mapping[str, float] | Sequence[Limit] | None = None
 
     def __post_init__(self) -> None:
         number = isinstance(self.optimum, int | float) and math.isfinite(self.optimum)
@@ -72,10 +74,14 @@ class LoopCriteria:
             raise ParameterError.of("tail_cycles", self.tail_cycles, ">= 1")
         if self.exceed_from is not None and self.exceed_from < 0:
             raise ParameterError.of("exceed_from", self.exceed_from, ">= 0")
-        for what, values in (("exceed_above", self.exceed_above), ("limits", self.limits or {})):
+        for what, values in (("exceed_above", self.exceed_above), ("limits", self._uppers())):
             for name, value in values.items():
                 if math.isnan(value):
                     raise ParameterError(f"{what}: {name} = nan: give a number, or leave it out")
+
+    def _uppers(self) -> Mapping[str, float]:
+        own = self.limits or {}
+        return own if isinstance(own, Mapping) else {limit.name: limit.upper for limit in limits_of(own)}
 
     def counted_from(self, cycles: int) -> int:
         """Give the first cycle that counts for ``exceeded_fraction``.
@@ -157,7 +163,7 @@ class LoopCriteria:
             ``limits`` names another quantity.
         """
         if self.limits is not None or seeker is None:
-            return _in_order("limits", self.limits or {}, names)
+            return _in_order("limits", self._uppers(), names)
         return _in_order("limits", {limit.name: limit.upper for limit in seeker.settings["limits"]}, names)
 
     def to_core(self, names: tuple[str, ...]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from mgdd import _core
 from mgdd.control import Pid
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.loop.virtual_throttle import VirtualThrottle
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import DemandChain, SensorPair, Throttle
 
@@ -50,7 +51,7 @@ def simulate_drive(
     speed_rpm: ArrayLike,
     *,
     controller: PositionController | None = None,
-    throttle: Throttle | None = None,
+    throttle: ThrottleLike | None = None,
     engine: DemandChain | None = None,
     measured_pressure: bool = True,
     air_torque: bool = True,
@@ -71,7 +72,7 @@ def simulate_drive(
     controller : PositionController, optional
         ``step(reference_deg, measured_deg)`` gives the duty of a sample; a fresh `mgdd.control.Pid` if left out. It
         must have the sample time of the run.
-    throttle : Throttle, optional
+    throttle : Throttle, Preset, str or path-like, optional
         The throttle; the preset ``P1`` if left out.
     engine : DemandChain, optional
         The engine as it is: throttle flow, manifold and torque; as the controller believes if left out.
@@ -118,7 +119,7 @@ def simulate_drive(
     """
     pedal, speed = _traces(pedal_percent, speed_rpm)
     truth = chain if engine is None else engine
-    body = Throttle() if throttle is None else throttle
+    body = Throttle() if throttle is None else throttle_of(throttle)
     steers = Pid(sample_s=sample_s) if controller is None else controller
     start_kpa, start_deg = _steady(chain, truth, pedal[0], speed[0], body)
     plate = VirtualThrottle(

@@ -14,6 +14,7 @@ from mgdd.loop.track import FIGURES, AngleController, column_of, core_of, plant_
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.parallel.rows import pieces
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import Throttle
 
@@ -27,7 +28,7 @@ __all__ = ["track_many"]
 def track_many(
     controllers: Mapping[str, AngleController],
     references: Sequence[Reference | str],
-    throttles: Sequence[Throttle],
+    throttles: Sequence[ThrottleLike],
     *,
     delay_samples: int = 1,
     airflow_torque_nm: Mapping[str, ArrayLike] | None = None,
@@ -47,7 +48,7 @@ def track_many(
         Controllers of `mgdd.control` by name; each run starts from a copy.
     references : sequence of Reference or str
         As for `track`, all with the same sample time.
-    throttles : sequence of Throttle
+    throttles : sequence of Throttle, Preset, str or path-like
         The plants; the noise of number i has the seed ``first_seed + i`` in every run.
     delay_samples, noise_deg : int, float
         As for `track`.
@@ -99,7 +100,14 @@ def track_many(
     if unknown:
         raise ParameterError.of("airflow_torque_nm", sorted(unknown), "names of references")
     scenarios = [_Scenario(r, column_of("airflow_torque_nm", flows.get(r.name), len(r.angle_deg))) for r in wanted]
-    runs = _Runs(list(throttles), list(controllers.values()), scenarios, delay_samples, noise_deg, first_seed)
+    runs = _Runs(
+        [throttle_of(each) for each in throttles],
+        list(controllers.values()),
+        scenarios,
+        delay_samples,
+        noise_deg,
+        first_seed,
+    )
     stop: Interrupted | WorkerLostError | None
     if executor is None and progress is None:
         threads = threads_of(workers)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,12 +15,13 @@ from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import noise_free_variable
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles
-from mgdd.results.describe import described
 from mgdd.results.finding import Finding
 from mgdd.results.labels import VARIABLES, labelled_dataset
+from mgdd.results.result import Figures, Result
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from mgdd.optimize import Seeker
@@ -43,9 +43,8 @@ class _Row(NamedTuple):
     measured: Measurement
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class LoopRun:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LoopRun(Result):
     """A closed loop, cycle by cycle, and what it came to.
 
     Parameters
@@ -53,10 +52,11 @@ class LoopRun:
     dataset : xarray.Dataset
         Over ``cycle``: ``estimate_cad`` before the cycle and everything that the plant measured of it. A plant whose
         one input is not ``soc_cad`` has ``estimate``, ``asked`` and ``applied`` over ``cycle`` and ``input`` instead.
-    summary : mapping of str to float
-        ``final_cad`` (mean estimate of the last 100 cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to``
-        and ``cycles_stays`` (NaN: never), means of J, efficiency and true NOx over the second half, extremes of the
-        estimate, misfires. Of several inputs, or one that is not an angle, only what does not need the estimate.
+    summary : Figures
+        By name, and as a text where it is called, ``run.summary()``: ``final_cad`` (mean estimate of the last 100
+        cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to`` and ``cycles_stays`` (NaN: never), means of
+        J, efficiency and true NOx over the second half, extremes of the estimate, misfires. Of several inputs, or one
+        that is not an angle, only what does not need the estimate.
         For every limit, as measured and without any margin: ``limit_NAME``, ``worst_NAME`` and ``worst_cycle_NAME``,
         ``above_cycles_NAME`` and ``above_fraction_NAME`` from the first cycle on, ``judged_above_cycles_NAME`` and
         ``judged_above_fraction_NAME`` from cycle ``judged_from`` on. The same with ``noise_free_`` in front, where the
@@ -77,9 +77,14 @@ class LoopRun:
     """
 
     dataset: xr.Dataset
-    summary: Mapping[str, float]
+    summary: Figures = field()
     interrupted: bool = False
     findings: tuple[Finding, ...] = ()
+
+    def _draw(self, ax: Axes | None) -> Axes:
+        from mgdd.plot import seeking
+
+        return seeking(self, ax=ax)
 
 
 def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, criteria: LoopCriteria) -> LoopRun:
@@ -87,7 +92,10 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     if cycles < 1:
         raise ParameterError.of("cycles", cycles, ">= 1")
     if not isinstance(plant, Plant):
-        raise ParameterError(f"plant = {plant!r}: must have input_names, limit_names, apply() and measure()")
+        raise ParameterError(
+            f"plant = {plant!r}: must have input_names, limit_names, apply() and measure(), as "
+            "EngineBench('puma_single') has"
+        )
     if seeker.estimate.size != len(plant.input_names):
         raise ParameterError(
             f"start has {seeker.estimate.size} entries: the plant takes {len(plant.input_names)}, "
@@ -119,7 +127,7 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
         del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
     dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
     dataset.attrs["interrupted"] = int(interrupted)
-    summary = summarize_cycles(dataset, criteria)
+    summary = Figures(summarize_cycles(dataset, criteria))
     run = LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
     if interrupted:
         raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, ShapeError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.files import existing_file
 from mgdd.io.table import read_table
 from mgdd.results.describe import described
 

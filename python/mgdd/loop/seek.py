@@ -13,6 +13,7 @@ from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, steer
+from mgdd.results.result import Figures
 
 if TYPE_CHECKING:
     from mgdd.optimize import Seeker
@@ -84,7 +85,7 @@ def run_seeker(
     known = plant.noise_free_limits(columns["soc_requested_cad"], columns["cycle"])
     dataset = cycles_to_dataset(plant, columns, estimate_cad=raw["estimate_cad"], noise_free_limits=known)
     dataset.attrs["interrupted"] = int(raw["interrupted"])
-    summary = with_a_limit(raw["summary"], names)
+    summary = Figures(with_a_limit(raw["summary"], names))
     summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
     uppers = criteria.limits_of(names, seeker)
     summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)

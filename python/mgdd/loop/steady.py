@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core.loop import SensorDynamics
+from mgdd._core.loop import EngineBench
 from mgdd._core.optimize import Limit
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError
@@ -19,17 +19,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from mgdd.loop.bench import EngineBench
-
 __all__ = ["find_optimum", "steady_map"]
 
 _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
 
 
-def steady_map(bench: EngineBench, soc_cad: ArrayLike, cycle: int) -> xr.Dataset:
-    """Measure a quiet copy of a bench, each sensor settled."""
-    quiet = _quiet(bench, cycle)
+def steady_map(quiet: EngineBench, soc_cad: ArrayLike) -> xr.Dataset:
+    """Measure a bench that shows nothing random or slow, each sensor settled."""
     timings = np.atleast_1d(np.asarray(soc_cad, float))
     if timings.ndim != 1:
         raise ShapeError(f"soc_cad has {timings.ndim} dimensions: must be a column")
@@ -47,20 +44,17 @@ def steady_map(bench: EngineBench, soc_cad: ArrayLike, cycle: int) -> xr.Dataset
 
 
 def find_optimum(
-    bench: EngineBench,
+    quiet: EngineBench,
     limits: Mapping[str, float] | Sequence[Limit] | None,
     bounds_cad: tuple[float, float],
-    cycle: int,
+    scatter_cad: float,
 ) -> Optimum:
-    """Find the best timing of a quiet copy of a bench."""
+    """Find the best timing of such a bench, and what this scatter of SOC would do there."""
     from scipy.optimize import brentq, minimize_scalar
 
     kept_limits = limits_of(limits)
     check_request(OBJECTIVES[0], [limit.name for limit in kept_limits])
     caps = {limit.name: limit.upper - limit.margin for limit in kept_limits}
-    if cycle < 0:
-        raise ParameterError.of("cycle", cycle, ">= 0")
-    quiet = _quiet(bench, cycle)
     low, high = bounds_cad
     window = quiet.window_cad
     if not window[0] <= low < high <= window[1]:
@@ -93,10 +87,9 @@ def find_optimum(
         soc = float(brentq(excess, grid[best], outside, xtol=1e-6)) if excess(outside) > 0.0 else float(grid[best])
     at = _settled(quiet, soc)
     around = [j(free - _SECANT_CAD), j(free), j(free + _SECANT_CAD)]
-    scatter = float(bench.settings["soc_scatter_cad"])
     early, late = _settled(quiet, soc - 0.05), _settled(quiet, soc + 0.05)
     numbers = {name: float(value) for name, value in at.items() if isinstance(value, float) and name != "soc_cad"}
-    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter for name in caps}
+    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter_cad for name in caps}
     return Optimum(
         inputs={"soc_cad": soc},
         objective="j",
@@ -109,22 +102,6 @@ def find_optimum(
         curvature=(around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2,
         free_inputs={"soc_cad": free},
     )
-
-
-def _quiet(bench: EngineBench, cycle: int) -> EngineBench:
-    """Copy a bench without anything random or slow, at the operating point of one cycle."""
-    settings = bench.settings
-    cylinder = settings.pop("cylinder")
-    settings.pop("schedule")
-    silent = {name: SensorDynamics(delay_s=0.0, lag_s=0.0, noise_fraction=0.0) for name in ("analyser", "fast_sensor")}
-    still = dict.fromkeys(
-        (
-            "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
-            "wall_heat_drift_per_kcycle",
-        ),
-        0.0,
-    )  # fmt: skip
-    return type(bench)(cylinder, bench.point_at(cycle), **{**settings, **silent, **still})
 
 
 def _settled(quiet: EngineBench, soc_cad: float) -> dict[str, Any]:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd._core.optimize import Limit
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.optimize.optimum import limit_names_of
 from mgdd.results.describe import described
 from mgdd.surrogate import EngineSurrogate
-from mgdd.surrogate.sensor_lag import decay_of
+from mgdd.surrogate.signal_model import decay_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,7 +36,7 @@ class SurrogatePlant:
         The surfaces.
     objective : str or mapping of str to float
         A signal, or the weight of each signal; every weighted signal is one component of J.
-    limits : sequence of str
+    limits : sequence of str, or limits by name or as Limit
         Signals to report as limits.
     inputs : sequence of str
         Which inputs of the surrogate are steered, ``soi_cad`` first; the others keep the values of `at`.
@@ -77,7 +79,7 @@ class SurrogatePlant:
         surrogate: EngineSurrogate,
         objective: str | Mapping[str, float] = "imep_bar",
         *,
-        limits: Sequence[str] = (),
+        limits: Mapping[str, float] | Sequence[Limit | str] = (),
         inputs: Sequence[str] = ("soi_cad",),
         at: Mapping[str, float] | None = None,
         start_soi_cad: float | None = None,
@@ -93,7 +95,7 @@ class SurrogatePlant:
         self._weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         if not self._weights:
             raise ParameterError("objective = {}: must name at least one signal")
-        for what, names in (("objective", self._weights), ("limits", limits)):
+        for what, names in (("objective", self._weights), ("limits", limit_names_of(limits))):
             for name in names:
                 if name not in surrogate.signals:
                     raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {list(surrogate.signals)}")
@@ -102,7 +104,7 @@ class SurrogatePlant:
             raise ParameterError(
                 f"inputs = {list(inputs)}: must begin with soi_cad and be among {list(known)}, once each"
             )
-        self._limits, self._inputs = tuple(limits), tuple(inputs)
+        self._limits, self._inputs = tuple(limit_names_of(limits)), tuple(inputs)
         self._applied: tuple[float, ...] | None = None
         self.surrogate = surrogate
         self._at = dict(at or {})

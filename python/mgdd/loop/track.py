@@ -11,7 +11,10 @@ from mgdd._arguments import require_plain
 from mgdd.errors import ParameterError
 from mgdd.loop.reference import Reference
 from mgdd.loop.virtual_throttle import VirtualThrottle
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import columns_of, is_timed
 from mgdd.throttle import SensorPair, Throttle
 
 if TYPE_CHECKING:
@@ -66,9 +69,9 @@ def core_of(controller: Any) -> Any:
 
 def track(
     controller: AngleController,
-    reference: Reference | str | ArrayLike,
+    reference: Any,
     *,
-    throttle: Throttle | None = None,
+    throttle: ThrottleLike | None = None,
     delay_samples: int = 1,
     airflow_torque_nm: ArrayLike | None = None,
     supply_v: ArrayLike | None = None,
@@ -84,9 +87,10 @@ def track(
     controller : object
         A controller of `mgdd.control`, or any object with ``step(reference_deg, measurement_deg) -> duty``. It goes on
         from its present state and is left in the state after the run.
-    reference : Reference, str or array_like, shape (n,)
-        What to follow: a `Reference`, what `Reference.parse` reads, or angles [deg] 1 ms apart.
-    throttle : Throttle, optional
+    reference : Reference, str, array_like, shape (n,), or a signal with its time
+        What to follow: a `Reference`, what `Reference.parse` reads, angles [deg] 1 ms apart, or a Dataset, DataFrame,
+        mapping, DataArray or Series with ``reference_deg`` over ``time_s``.
+    throttle : Throttle, Preset, str or path-like, optional
         The plant; the preset ``P1`` if left out.
     delay_samples : int
         Whole samples between the computed duty and its effect, 0 to 20.
@@ -153,7 +157,10 @@ def track(
             band_deg=wanted.band_deg,
         )
     else:
-        raise ParameterError.of("controller", controller, "an object with step(reference_deg, measurement_deg)")
+        raise ParameterError.of(
+            "controller", controller, "an object with step(reference_deg, measurement_deg); "
+            "tuned_controller('guided', model) makes one for a throttle, a preset or a fit"
+        )  # fmt: skip
     variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", np.arange(n) * wanted.sample_s)}
     variables["reference_deg"] = ("time_s", wanted.angle_deg)
     for name, column in run.items():
@@ -176,20 +183,26 @@ def step_times_us(controller: AngleController, run: xr.Dataset) -> tuple[float, 
     return float(np.median(times)), float(np.quantile(times, 0.999))
 
 
-def reference_of(given: Reference | str | ArrayLike) -> Reference:
+def reference_of(given: Any) -> Reference:
     """Read what `track` takes as a reference."""
     if isinstance(given, Reference):
         return given
     if isinstance(given, str):
         return Reference.parse(given)
+    if is_timed(given):
+        time_s, angle_deg = columns_of(given, ("time_s", "reference_deg"), what="reference")
+        return Reference(angle_deg=angle_deg, sample_s=even_step(time_s))
+    if np.ndim(given) == 0:
+        bound = "a Reference, 'step:20:60', 'sine:40:10:1', a CSV file, or one angle per sample"
+        raise ParameterError.of("reference", given, bound)
     return Reference(angle_deg=np.asarray(given, float))
 
 
 def plant_of(
-    throttle: Throttle | None, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
+    throttle: ThrottleLike | None, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
 ) -> VirtualThrottle:
     """Give the plant at rest at the first angle of the reference, inside its travel, if nothing else is said."""
-    body = Throttle() if throttle is None else throttle
+    body = Throttle() if throttle is None else throttle_of(throttle)
     start = float(np.clip(reference.angle_deg[0], body.closed_deg, body.open_deg)) if start_deg is None else start_deg
     return VirtualThrottle(body, sensors=sensors, start_deg=start, sample_s=reference.sample_s, seed=seed)
 

@@ -16,6 +16,8 @@ from mgdd.loop.many_tracks import track_many
 from mgdd.loop.reference import Reference
 from mgdd.loop.tuned import family_of, shipped_numbers
 from mgdd.parallel.pool import MakesExecutor, Pool
+from mgdd.presets.meant import ThrottleLike, throttle_of
+from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,8 +121,8 @@ def tracking_cost(runs: xr.Dataset) -> float:
     return float(total.mean() + 0.5 * np.quantile(total, 0.95))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tuning(NumbersResult):
     """What tuning found: numbers that `tuned_controller` takes, and how the search went."""
 
     kind: str
@@ -133,7 +135,7 @@ class Tuning:
 
 def tune_controller(
     kind: str,
-    throttle: Throttle,
+    throttle: ThrottleLike,
     *,
     n_throttles: int = 20,
     spread: float = 0.2,
@@ -154,7 +156,7 @@ def tune_controller(
     ----------
     kind : str
         ``guided``, ``mgdd1``, ``pid``, ``sliding_mode``, ``linear_mpc`` or ``nmpc``.
-    throttle : Throttle
+    throttle : Throttle, Preset, str or path-like
         The centre of the throttles, and what the controller knows.
     n_throttles, spread : int, float
         How many throttles, and the share by which seven of their numbers vary.
@@ -194,6 +196,7 @@ def tune_controller(
     family = family_of(kind)
     if budget < 30:
         raise ParameterError.of("budget", budget, ">= 30")
+    throttle = throttle_of(throttle)
     groups = groups_of(throttle)
     setup = Setup(delay_samples=delay_samples, noise_deg=noise_deg)
     throttles = draw_throttles(throttle, n_throttles, spread=spread, seed=seed)

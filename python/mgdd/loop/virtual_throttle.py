@@ -8,6 +8,7 @@ from mgdd import _core
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.loop.throttle_faults import ThrottleFault
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.throttle import SensorFault, SensorPair, Throttle
 from mgdd.throttle.sensors import fault_pair
 
@@ -21,7 +22,7 @@ class VirtualThrottle:
 
     Parameters
     ----------
-    throttle : Throttle, optional
+    throttle : Throttle, Preset, str or path-like, optional
         Its parameters; the preset ``P1`` if left out.
     inputs : sequence of str
         Which of ``duty`` [-], ``supply_v`` [V], ``airflow_torque_nm`` [N m] and ``bridge_open`` are applied; the others
@@ -57,7 +58,7 @@ class VirtualThrottle:
 
     def __init__(
         self,
-        throttle: Throttle | None = None,
+        throttle: ThrottleLike | None = None,
         *,
         inputs: Sequence[str] = ("duty",),
         sensors: SensorPair | None = None,
@@ -72,7 +73,7 @@ class VirtualThrottle:
             raise ParameterError.of("inputs", list(inputs), f"some of {', '.join(_INPUTS)}, once each")
         if not 0 <= seed < 2**64:
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
-        self.throttle = Throttle() if throttle is None else throttle
+        self.throttle = Throttle() if throttle is None else throttle_of(throttle)
         self.sample_s = sample_s
         self._inputs = tuple(inputs)
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from mgdd import _core
+from mgdd._arguments import shown
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide.conditions import numbers_of
 from mgdd.maps.cells import MapTask, checked_cells, checked_label, checked_name
 from mgdd.maps.forms import MapForms
-from mgdd.results.describe import as_html, rows_of
+from mgdd.results.describe import Row, rows_of
 from mgdd.results.labels import Label
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["CalibrationMap", "MapPoints"]
+__all__ = ["CalibrationMap", "MapPoints", "map_of"]
 
 _TIMING = "°CA aTDC"
 
@@ -81,6 +82,8 @@ class CalibrationMap(MapForms):
     >>> at = soc.lookup({"speed_rpm": [1200, 4000], "fuel_mg": 13})
     >>> at.values.tolist(), at.held_outside.tolist()
     ([-3.25, -7.0], [False, True])
+    >>> float(soc(speed_rpm=1200, fuel_mg=13))
+    -3.25
     """
 
     def __init__(
@@ -154,13 +157,19 @@ class CalibrationMap(MapForms):
         """Where the map comes from."""
         return MappingProxyType(self._provenance)
 
-    def lookup(self, points: Mapping[str, ArrayLike] | Any) -> MapPoints:
+    def __call__(self, points: Mapping[str, ArrayLike] | Any = None, **coordinates: ArrayLike) -> NDArray[np.float64]:
+        """Read the values alone, as `lookup` does."""
+        return self.lookup(points, **coordinates).values
+
+    def lookup(self, points: Mapping[str, ArrayLike] | Any = None, **coordinates: ArrayLike) -> MapPoints:
         """Read the map at points, in the C++ core.
 
         Parameters
         ----------
         points : mapping of str to array_like, or OperatingPoint
             Coordinates by the names of the axes, broadcast together; other names are ignored.
+        **coordinates
+            The same by keyword, ``speed_rpm=1200.0, fuel_mg=13.0``.
 
         Returns
         -------
@@ -172,6 +181,8 @@ class CalibrationMap(MapForms):
         mgdd.errors.ParameterError
             An axis is missing.
         """
+        if coordinates:
+            points = {**({} if points is None else points), **coordinates}
         return self._read(self._table, points)
 
     def replaced(self, values: ArrayLike | None = None, **changes: Any) -> Self:
@@ -205,7 +216,7 @@ class CalibrationMap(MapForms):
         )
 
     def _read(self, table: Any, points: Any) -> MapPoints:
-        given = points if isinstance(points, Mapping) else numbers_of(points)
+        given = points if isinstance(points, Mapping) else {} if points is None else numbers_of(points)
         lacking = [name for name in self._axes if name not in given]
         if lacking:
             raise ParameterError.of("points", list(given), f"coordinates with {' and '.join(self._axes)}")
@@ -234,8 +245,23 @@ class CalibrationMap(MapForms):
         said = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
         return f"<CalibrationMap {self._name} [{self.unit}], {size}, {said}>"
 
-    def _repr_html_(self) -> str:
-        return as_html(repr(self)[1:-1], rows_of({**self._axes, self._name: self._values, **self._provenance}))
+    def _title(self) -> str:
+        return repr(self)[1:-1]
+
+    def _rows(self) -> list[Row]:
+        return rows_of({**self._axes, self._name: self._values, **self._provenance})
+
+
+def map_of(given: Any, argument: str = "table") -> CalibrationMap:
+    """Return the map that is meant: a CalibrationMap, or the Dataset or DataArray of one."""
+    if isinstance(given, CalibrationMap):
+        return given
+    if hasattr(given, "to_dataset") and hasattr(given, "name"):
+        given = given.to_dataset(name=given.name or "value").assign_attrs(map=str(given.name or "value"))
+    if hasattr(given, "data_vars"):
+        return CalibrationMap.from_dataset(given)
+    bound = "a CalibrationMap, or a Dataset or DataArray over its axes; read_map and optimize_map make one"
+    raise ParameterError(f"{argument} = {shown(given)}: must be {bound}", field=argument, value=given, bound=bound)
 
 
 def _column(name: str, entries: ArrayLike) -> NDArray[np.float64]:

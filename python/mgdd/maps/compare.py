@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.optimum import optimize_map
 from mgdd.maps.sweep_columns import sweep_columns
 from mgdd.maps.windows import between
@@ -20,8 +20,8 @@ __all__ = ["apply_map", "compare_maps"]
 
 
 def compare_maps(
-    first: CalibrationMap,
-    second: CalibrationMap,
+    first: CalibrationMap | xr.Dataset,
+    second: CalibrationMap | xr.Dataset,
     *,
     grid: Literal["union", "first"] = "union",
     tolerance: float | None = None,
@@ -30,7 +30,7 @@ def compare_maps(
 
     Parameters
     ----------
-    first, second : CalibrationMap
+    first, second : CalibrationMap, or the Dataset of one
         Of the same value over the same axes; their breakpoints may differ.
     grid : {"union", "first"}
         Where they are compared: at the breakpoints of both inside of both, or at those of the first.
@@ -60,6 +60,7 @@ def compare_maps(
     >>> found["difference"].values.tolist(), int(found["n_beyond"])
     ([0.0, 0.0, 1.0], 1)
     """
+    first, second = map_of(first, "first"), map_of(second, "second")
     if grid not in ("union", "first"):
         raise ParameterError.of("grid", grid, "'union' or 'first'")
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
@@ -102,12 +103,12 @@ def compare_maps(
     )
 
 
-def apply_map(table: CalibrationMap, sweep: xr.Dataset) -> xr.Dataset:
+def apply_map(table: CalibrationMap | xr.Dataset, sweep: xr.Dataset) -> xr.Dataset:
     """Read what a sweep says at the values of a map: what the map achieves.
 
     Parameters
     ----------
-    table : CalibrationMap
+    table : CalibrationMap, or the Dataset of one
         Whose name is the swept input, on the operating points of the sweep.
     sweep : xarray.Dataset
         As of `optimize_map`.
@@ -138,6 +139,7 @@ def apply_map(table: CalibrationMap, sweep: xr.Dataset) -> xr.Dataset:
     >>> apply_map(best.replaced(best.values + 2), sweep)["loss"].values.round(4).tolist()
     [0.0008, 0.0008]
     """
+    table = map_of(table)
     own = (*table.axes, table.name)
     names = tuple(str(each) for each in sweep.data_vars if set(own) == set(map(str, sweep[each].dims)))
     if not names:

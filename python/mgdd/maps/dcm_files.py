@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, Error, argument
-from mgdd.io.plain_text import read_plain_text
-from mgdd.io.whole_file import write_whole_text
+from mgdd.io.files import read_plain_text, write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import can_be_name, spoken_name
 from mgdd.maps.dcm import DcmBlock, dcm_blocks, dcm_text

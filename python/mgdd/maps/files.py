@@ -9,12 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
-from mgdd.io.existing_file import existing_file
-from mgdd.io.nesting import parsed
-from mgdd.io.netcdf_file import read_netcdf, write_netcdf
-from mgdd.io.plain_text import read_plain_text
-from mgdd.io.whole_file import write_whole_text
-from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.io.binary_files import read_netcdf, write_netcdf
+from mgdd.io.files import existing_file, parsed, read_plain_text, write_whole_text
+from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cells import NUMBERS, MapTask
 from mgdd.maps.dcm_files import read_dcm, write_dcm
 from mgdd.maps.grid_csv import csv_of_map, map_of_csv
@@ -23,18 +20,20 @@ from mgdd.results.labels import to_jsonable
 if TYPE_CHECKING:
     import os
 
+    import xarray as xr
+
 __all__ = ["map_content", "read_map", "write_map"]
 
 _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".nc")
 
 
-def write_map(table: CalibrationMap, path: str | os.PathLike[str]) -> None:
+def write_map(table: CalibrationMap | xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a map in the form that the ending of the file says.
 
     Parameters
     ----------
-    table : CalibrationMap
+    table : CalibrationMap, or the Dataset of one
         The map.
     path : path-like
         ``.csv``: a grid with units that a spreadsheet shows as it is; ``.json`` and ``.nc`` (netCDF): these three hold
@@ -73,6 +72,7 @@ def write_map(table: CalibrationMap, path: str | os.PathLike[str]) -> None:
     end
     True
     """
+    table = map_of(table)
     ending = _ending(path)
     if ending == ".dcm":
         write_dcm([table], path)

@@ -12,9 +12,11 @@ from mgdd.guide import TimingMap
 from mgdd.guide.map_table import SETTINGS
 from mgdd.maps.cells import NUMBERS, SOURCES, TEXTS, WITHOUT_VALUE, MapTask
 from mgdd.results.labels import Label, label_of, labelled_dataset
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
 __all__ = ["MapForms"]
@@ -22,7 +24,7 @@ __all__ = ["MapForms"]
 _TIMING = "°CA aTDC"
 
 
-class MapForms:
+class MapForms(Result):
     """What a calibration map turns into, and out of."""
 
     _name: str
@@ -99,6 +101,16 @@ class MapForms:
         cells = {column: np.where(learnt, entries, self._cells[column]) for column, entries in new.items()}
         made: Self = self.replaced(np.where(learnt, timing.timing_cad, self._values), cells=cells)
         return made
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The same as `to_dataset` gives."""
+        return self.to_dataset()
+
+    def _draw(self, ax: Axes | None) -> Axes:
+        from mgdd.plot import map_cells
+
+        return map_cells(self, ax=ax)
 
     def to_dataset(self) -> xr.Dataset:
         """Give the map as data, which figures and netCDF take.

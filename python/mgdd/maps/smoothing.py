@@ -9,10 +9,11 @@ import numpy as np
 
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument, did_you_mean
 from mgdd.io.extras import import_extra
-from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cells import cell_at
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ _AT_END = 1e-4  # of the median range: a value this near to the end of its range
 
 
 def smooth_map(
-    optimum: CalibrationMap,
+    optimum: CalibrationMap | xr.Dataset,
     *,
     weight: float = 1.0,
     slope_limits: Mapping[str, float] | None = None,
@@ -41,7 +42,7 @@ def smooth_map(
 
     Parameters
     ----------
-    optimum : CalibrationMap
+    optimum : CalibrationMap, or the Dataset of one
         With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`. With
         `fill` a cell that has neither keeps its value and its source.
     weight : float
@@ -82,6 +83,7 @@ def smooth_map(
     >>> smooth_map(best, slope_limits={"fuel_mg": 0.3}).values.round(2).tolist()
     [-5.67, -7.0, -6.67]
     """
+    optimum = map_of(optimum, "optimum")
     slopes = _checked(optimum, weight, slope_limits or {})
     values, low, high = (_flat(optimum, name) for name in ("", "low", "high"))
     known = np.isfinite(values)

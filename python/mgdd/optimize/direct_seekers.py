@@ -57,7 +57,7 @@ class Spsa(Seeker, _core.optimize.Spsa):
         Of the random signs: the same seed gives the same run.
     maximize : bool
         False to minimise J.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep.
     curvature : float, optional
         J'' if known: makes the gain; a first step factor gain abs(J'') above 1 gives a UserWarning.
@@ -113,7 +113,7 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
         Steps within which `converged_at` is looked for; the search goes on all the same.
     maximize : bool
         False to minimise J.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep.
     curvature : float, optional
         J'' if known: makes the step size; one given that cannot converge gives a UserWarning with the bound.
@@ -166,7 +166,7 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
         Width of the bracket at which a noise-free search ends, in the unit of the input, > 0.
     maximize : bool
         False to minimise J.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep. Points on both sides of a limit are tried until the bracket is small, so it is
         broken during the search; behind a delay each point is measured for as long as the limits take to show it.
 

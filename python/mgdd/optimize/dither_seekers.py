@@ -57,7 +57,7 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
         Share of the dither while a limit holds the estimate back [-].
     maximize : bool
         False to minimise J.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep; ``tell(J, limits)`` then takes their values.
     curvature : float, optional
         J'' if known: makes the gain (time constant of four periods), or, where a gain above the bound of averaging is
@@ -136,7 +136,7 @@ class NewtonSeeking(Seeker, _core.optimize.NewtonSeeking):
         Share of the dither while a limit holds the estimate back [-].
     maximize : bool
         False to minimise J; Hessians here are those of the maximised objective.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep.
 
     Raises
@@ -186,7 +186,7 @@ class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
         `ExtremumSeeking`, for an approach in about ten periods.
     maximize : bool
         False to minimise J.
-    limits : sequence of Limit
+    limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep. The oscillation is the search itself: single steps are held back, and while nothing
         is known of a late limit yet, the search goes on where other seekers wait.
     curvature : float, optional

@@ -13,6 +13,7 @@ from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +23,7 @@ __all__ = ["ConvergenceReport", "IterativeLearning"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ConvergenceReport:
+class ConvergenceReport(NumbersResult):
     """What a learning law will do on the model, known before the first trial.
 
     For ``y = G u + d``, with G the lower-triangular Toeplitz matrix of the impulse response from its first

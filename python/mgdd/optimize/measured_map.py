@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.results.describe import described
 from mgdd.results.finding import Finding
+from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,9 +22,8 @@ _SIGNIFICANCE = 0.01  # of the test of lack of fit
 _FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test believes
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class MeasuredMap:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MeasuredMap(NumbersResult):
     """Noise, curvature and optimum of a measured map J(theta), each with its standard error.
 
     Attributes

@@ -11,14 +11,14 @@ from typing import Any
 
 from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError
-from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import to_jsonable
+from mgdd.results.result import NumbersResult
 
-__all__ = ["Optimum", "limits_of"]
+__all__ = ["Optimum", "limit_names_of", "limits_of"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Optimum:
+class Optimum(NumbersResult):
     """A best point of a model, a surrogate or a bench.
 
     Every number is read by its name, inputs first: ``best["soc_cad"]``, ``best["ca50_cad"]``.
@@ -85,9 +85,6 @@ class Optimum:
             own[name] = dict(value) if isinstance(value, Mapping) else value  # a read-only one cannot be pickled
         return partial(type(self), **own), ()
 
-    def _repr_html_(self) -> str:
-        return as_html("Optimum", rows_of({name: getattr(self, name) for name in self.__dataclass_fields__}))
-
     def __repr__(self) -> str:
         at = ", ".join(f"{name} {value:.4g}" for name, value in self.inputs.items())
         held = f", held by {', '.join(self.active_limits)}" if self.active_limits else ""
@@ -141,3 +138,10 @@ def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Lim
     raise ParameterError(
         f"limits = {limits!r}: must map names to numbers, for example {{'p_max_bar': 95.0}}, or be Limit objects"
     )
+
+
+def limit_names_of(limits: Mapping[str, float] | Sequence[Limit | str]) -> list[str]:
+    """Return the names of limited quantities, given as names or as limits in either form."""
+    if isinstance(limits, str):
+        raise ParameterError.of("limits", limits, "a sequence of names")
+    return [limit.name if isinstance(limit, Limit) else limit for limit in limits]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -12,9 +13,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
-from mgdd.io.nesting import parsed
-from mgdd.io.plain_text import read_plain_text
-from mgdd.io.whole_file import write_whole_text
+from mgdd.io.files import parsed, read_plain_text, write_whole_text
+from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
@@ -72,6 +72,11 @@ else:
 class Seeker(SeekerFindings, _CoreSeeker):
     """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
 
+    Parameters
+    ----------
+    *given, **settings
+        As each kind says them; ``limits`` is a sequence of `Limit`, or a mapping of names to upper values.
+
     Examples
     --------
     >>> import tempfile
@@ -85,6 +90,13 @@ class Seeker(SeekerFindings, _CoreSeeker):
     """
 
     kind: ClassVar[str]
+
+    if not TYPE_CHECKING:  # the constructors of the core say what they take
+
+        def __init__(self, *given: Any, **settings: Any) -> None:
+            if isinstance(settings.get("limits"), Mapping):
+                settings["limits"] = list(limits_of(settings["limits"]))
+            super().__init__(*given, **settings)
 
     def run(self, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
         """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd.optimize.direct_seekers import Spsa
 from mgdd.optimize.dither_seekers import ExtremumSeeking
-from mgdd.results.describe import described
+from mgdd.optimize.optimum import limits_of
+from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 __all__ = ["Tuning", "tune"]
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tuning(NumbersResult):
     """Settings of a seeker, what averaging theory predicts for them, and whether that meets the specification.
 
     Attributes
@@ -134,7 +134,7 @@ class Tuning:
         lower: float = -math.inf,
         upper: float = math.inf,
         maximize: bool = True,
-        limits: Sequence[_core.optimize.Limit] = (),
+        limits: Mapping[str, float] | Sequence[_core.optimize.Limit] = (),
         hold_cycles: int | None = None,
         seed: int = 0,
     ) -> ExtremumSeeking | Spsa:
@@ -148,7 +148,7 @@ class Tuning:
             Bounds of the applied input; the start must lie inside by `amplitude`.
         maximize : bool
             False to minimise J.
-        limits : sequence of Limit
+        limits : mapping of str to float, or sequence of Limit
             Measured quantities to keep.
         hold_cycles : int, optional
             Cycles that the estimate is held at the start; one period without. Not for SPSA.
@@ -183,7 +183,7 @@ class Tuning:
                 noise_sd=self.noise_sd,
                 seed=seed,
                 maximize=maximize,
-                limits=list(limits),
+                limits=list(limits_of(limits)),
                 curvature=self.curvature,
             )
         lag = _core.optimize.ComponentLag()
@@ -204,7 +204,7 @@ class Tuning:
             components=[lag],
             hold_cycles=hold_cycles,
             maximize=maximize,
-            limits=list(limits),
+            limits=list(limits_of(limits)),
             curvature=seen,
         )
 

@@ -1,4 +1,4 @@
-"""Figures: a Dataset goes in, matplotlib Axes come out; `ax=` is accepted and nothing is shown or simulated.
+"""Figures: a result or its Dataset goes in, matplotlib Axes come out; nothing is shown or simulated.
 
 Every crank-angle axis reads "crank angle [°CA aTDC]". Lines differ in dash or marker as well as in colour, so that
 a figure survives a black-and-white printer. Legends stand above the axes, where they hide no data: for a

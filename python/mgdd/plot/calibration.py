@@ -27,17 +27,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+    from mgdd.results import Result
+
 __all__ = ["calibration_overlay", "tdc_scan", "wall_heat_profile"]
 
 _EVENTS = {"soi_cad": (":", ORANGE), "soc_cad": ("--", BLUE)}
 
 
-def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def calibration_overlay(overlay: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw measured points under the model's line, and their difference in a panel below.
 
     Parameters
     ----------
-    overlay : xarray.Dataset
+    overlay : xarray.Dataset or Result
         ``measured_bar``, ``model_bar`` and ``residual_bar`` (model minus measured) [bar] over
         ``crank_angle_cad`` [°CA aTDC] of one trace, as `mgdd.identify.fit_cylinder` gives. Start of injection
         and of combustion, RMSE and IMEP error are shown where the Dataset has them.
@@ -73,7 +75,7 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """
     needed = (ANGLE, "measured_bar", "model_bar", "residual_bar")
     optional = (*_EVENTS, "rmse_percent", "imep_closed_error_percent")
-    require(overlay, (*needed, *(name for name in optional if name in overlay)), "mgdd.identify.fit_cylinder")
+    overlay = require("overlay", overlay, needed, "mgdd.identify.fit_cylinder", optional)
     ax = new_axes(ax, height=4.8)
     panel = residual_below(ax, overlay, ANGLE, "residual_bar")
     angle = overlay[ANGLE].to_numpy()
@@ -93,12 +95,12 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def wall_heat_profile(profile: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the best reachable RMSE over the wall-heat scale: a flat curve means the traces do not fix it.
 
     Parameters
     ----------
-    profile : xarray.Dataset
+    profile : xarray.Dataset or Result
         ``rmse_percent`` [% of p_max] over ``wall_heat_scale`` [-], everything else refitted at each scale; a
         second dimension, for example the trace, gives one line each.
     ax : matplotlib.axes.Axes, optional
@@ -125,7 +127,7 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> wall_heat_profile(profile).get_ylabel()
     'pressure RMSE, closed cycle [% of p_max]'
     """
-    require(profile, ("wall_heat_scale", "rmse_percent"), "mgdd.identify.wall_heat_profile")
+    profile = require("profile", profile, ("wall_heat_scale", "rmse_percent"), "mgdd.identify.wall_heat_profile")
     rmse = profile["rmse_percent"]
     if "wall_heat_scale" not in rmse.dims or rmse.ndim > 2:
         raise DataError(f"rmse_percent has dimensions {rmse.dims}: wall_heat_scale and at most one more are needed")
@@ -153,15 +155,15 @@ def _model_name(overlay: xr.Dataset) -> str:
     return f"model, {str(burn).replace('_', ' ').replace('wiebe', 'Wiebe')}" if burn else "model"
 
 
-def tdc_scan(scan: xr.Dataset, possible: tuple[float, float], *, ax: Axes | None = None) -> Axes:
+def tdc_scan(scan: xr.Dataset | Result, possible: tuple[float, float] | None = None, *, ax: Axes | None = None) -> Axes:
     """Draw the least RMSE over the TDC offset, and the range of offsets that are possible.
 
     Parameters
     ----------
-    scan : xarray.Dataset
+    scan : xarray.Dataset or Result
         ``rmse_percent`` [% of p_max] over ``tdc_offset_cad`` [°CA], as `mgdd.identify.estimate_tdc` gives.
-    possible : tuple of float
-        Lowest and highest possible offset [°CA].
+    possible : tuple of float, optional
+        Lowest and highest possible offset [°CA]; ``low_cad`` and ``high_cad`` of `scan` if left out.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -186,7 +188,10 @@ def tdc_scan(scan: xr.Dataset, possible: tuple[float, float], *, ax: Axes | None
     >>> tdc_scan(scan, (-0.1, 0.1)).get_xlabel()
     'angle taken off the trace [°CA]'
     """
-    require(scan, ("tdc_offset_cad", "rmse_percent"), "mgdd.identify.estimate_tdc")
+    scan = require("scan", scan, ("tdc_offset_cad", "rmse_percent"), "mgdd.identify.estimate_tdc")
+    if possible is None:
+        require("scan", scan, ("low_cad", "high_cad"), "mgdd.identify.estimate_tdc")
+        possible = float(scan["low_cad"]), float(scan["high_cad"])
     ax = new_axes(ax, height=4.2)
     lines: list[Line2D] = ax.plot(
         scan["tdc_offset_cad"], scan["rmse_percent"], "o-", color=BLACK, markersize=3, label="calibrated at each offset"

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["convergence"]
 
 _BAND = ("estimate_low_cad", "estimate_high_cad")
@@ -21,12 +23,12 @@ _BAND = ("estimate_low_cad", "estimate_high_cad")
 _STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK))
 
 
-def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def convergence(tracks: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw how estimates approach the optimum: medians as lines, quantiles over seeds as bands.
 
     Parameters
     ----------
-    tracks : xarray.Dataset
+    tracks : xarray.Dataset or Result
         ``estimate_median_cad`` [°CA aTDC] over ``cycle`` and one more dimension, whose coordinate names the lines (at
         most nine). Where the Dataset has them, ``estimate_low_cad`` and ``estimate_high_cad`` are the band and
         ``optimum_cad``, a number, is where the estimates should go.
@@ -61,7 +63,7 @@ def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     'estimate [°CA aTDC]'
     """
     optional = (*_BAND, "optimum_cad")
-    require(tracks, ("cycle", "estimate_median_cad", *(n for n in optional if n in tracks)), "a study of mgdd.studies")
+    tracks = require("tracks", tracks, ("cycle", "estimate_median_cad"), "a study of mgdd.studies", optional)
     median = tracks["estimate_median_cad"]
     others = [str(dim) for dim in median.dims if dim != "cycle"]
     if "cycle" not in median.dims or len(others) != 1:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+    from mgdd.results import Result
+
 __all__ = ["log_pv", "pressure"]
 
 _RATES = {
@@ -27,12 +29,12 @@ _WINDOWS = {"n_compression": (-100.0, -40.0), "n_expansion": (60.0, 120.0)}
 _SLOPE_STYLES = {"n_compression": ("o--", BLUE), "n_expansion": ("s-.", ORANGE)}
 
 
-def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def pressure(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw pressure over crank angle, with what the Dataset knows of heat release and motoring.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
+    dataset : xarray.Dataset or Result
         ``pressure_bar(crank_angle_cad)`` [bar, °CA aTDC] of a measured trace, of `mgdd.engine.simulate` or of
         `mgdd.engine.analyze`. Heat release rates [J/°CA] go to a twin axis,
         ``motored_pressure_bar`` is dashed.
@@ -56,10 +58,9 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_xlabel()
     'crank angle [°CA aTDC]'
     """
-    require(dataset, (ANGLE, "pressure_bar"), "mgdd.io.read_pressure or mgdd.engine.simulate")
+    optional, made_by = ("motored_pressure_bar", *_RATES), "mgdd.io.read_pressure or mgdd.engine.simulate"
+    dataset = require("dataset", dataset, (ANGLE, "pressure_bar"), made_by, optional)
     rates = [name for name in _RATES if name in dataset]
-    optional = [name for name in ("motored_pressure_bar", *rates) if name in dataset]
-    require(dataset, tuple(optional), "mgdd.engine.simulate or mgdd.engine.analyze")
     ax = new_axes(ax)
     angle = dataset[ANGLE].to_numpy()
     lines: list[Line2D] = ax.plot(angle, dataset["pressure_bar"], "-", color=BLACK, label=_name(dataset))
@@ -77,12 +78,12 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     return finished(ax, dataset, ANGLE, "pressure_bar", lines, grid=False)
 
 
-def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def log_pv(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw pressure over volume on logarithmic axes, with the fitted polytropic slopes.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
+    dataset : xarray.Dataset or Result
         ``pressure_bar`` [bar] and ``volume_l`` [L] over ``crank_angle_cad``, as `mgdd.engine.analyze` and
         `mgdd.engine.simulate` give. ``n_compression`` and ``n_expansion`` [-], where present, are drawn as
         lines through the mean of their windows (-100 to -40 and 60 to 120 °CA aTDC).
@@ -106,7 +107,8 @@ def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> plot.log_pv(simulate(Cylinder(), OperatingPoint())).get_xlabel()
     'cylinder volume [L]'
     """
-    require(dataset, (ANGLE, "pressure_bar", "volume_l"), "mgdd.engine.analyze or mgdd.engine.simulate")
+    needed = (ANGLE, "pressure_bar", "volume_l")
+    dataset = require("dataset", dataset, needed, "mgdd.engine.analyze or mgdd.engine.simulate")
     angle = dataset[ANGLE].to_numpy()
     bar = dataset["pressure_bar"].to_numpy()
     litre = dataset["volume_l"].to_numpy()

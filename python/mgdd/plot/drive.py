@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["drive"]
 
 # Panels: label, and the lines, what is wanted first.
@@ -20,12 +22,12 @@ _PANELS = (
 )
 
 
-def drive(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def drive(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw pedal, torque, plate angle and manifold pressure of a drive over time.
 
     Parameters
     ----------
-    run : xarray.Dataset
+    run : xarray.Dataset or Result
         A drive as `mgdd.loop.simulate_drive` gives it.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it gives its lower part to the panels. None makes a figure.
@@ -49,7 +51,7 @@ def drive(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     'pedal [%]'
     """
     names = tuple(name for _, lines in _PANELS for name, _ in lines)
-    require(run, ("time_s", "pedal_percent", *names), "mgdd.loop.simulate_drive")
+    run = require("run", run, ("time_s", "pedal_percent", *names), "mgdd.loop.simulate_drive")
     ax = new_axes(ax, height=6.4)
     time = run["time_s"].to_numpy()
     ax.plot(time, run["pedal_percent"], color=BLACK, linewidth=1.3)

@@ -8,24 +8,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, minus, new_axes
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, minus, new_axes, require
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from mgdd.results import Result
+
 __all__ = ["family_strip", "family_strips"]
 
+_NEEDED = ("free_ca50_cad", "fitted_ca50_cad", "plausible")
 _LABEL = "best CA50, no pressure limit [°CA aTDC]"
 
 
-def family_strip(timing: Any, *, ax: Axes | None = None) -> Axes:
+def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw each member's best CA50 without a pressure limit, one row per member.
 
     Parameters
     ----------
-    timing : BestTiming
-        One load of `mgdd.identify.best_timing`.
+    timing : xarray.Dataset or BestTiming
+        ``free_ca50_cad``, ``fitted_ca50_cad`` [°CA aTDC] and ``plausible`` over ``member`` of one load of
+        `mgdd.identify.best_timing`; attribute ``best`` names the best member.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -50,26 +55,27 @@ def family_strip(timing: Any, *, ax: Axes | None = None) -> Axes:
     >>> family_strip(row).get_xlabel()
     'best CA50, no pressure limit [°CA aTDC]'
     """
-    if not timing.members:
-        raise DataError(f"{timing.file}: no members to draw")
-    ax = new_axes(ax, height=0.24 * len(timing.members) + 1.2)
-    rows = np.arange(len(timing.members))
-    best = np.array([member.free_ca50_cad for member in timing.members])
-    kept = np.array([member.plausible for member in timing.members])
-    if timing.best is not None:
-        low, high = timing.free_ca50_cad
+    timing = require("timing", timing, ("member", *_NEEDED), "mgdd.identify.best_timing")
+    names = [str(name) for name in timing["member"].to_numpy()]
+    if not names:
+        raise DataError(f"{timing.attrs.get('file', 'timing')}: no members to draw")
+    ax = new_axes(ax, height=0.24 * len(names) + 1.2)
+    rows, chosen = np.arange(len(names)), timing.attrs.get("best")
+    best, kept = timing["free_ca50_cad"].to_numpy(), timing["plausible"].to_numpy().astype(bool)
+    if chosen:
+        low, high = float(best[kept].min()), float(best[kept].max())
         ax.axvspan(low, high, color=ORANGE, alpha=0.15, linewidth=0, label=minus(f"plausible: {low:.1f} to {high:.1f}"))
-        measured = timing.best.fitted_ca50_cad
+        at = names.index(chosen)
+        measured = float(timing["fitted_ca50_cad"][at])
         ax.axvline(measured, color=BLUE, linestyle="--", linewidth=1.0, label=minus(f"as measured: {measured:.1f}"))
     ax.plot(best[~kept], rows[~kept], "o", color=GREY, markerfacecolor="none", markersize=4, label="not plausible")
     ax.plot(best[kept], rows[kept], "o", color=BLACK, markersize=4.5)
-    if timing.best is not None:
-        at = timing.members.index(timing.best)
+    if chosen:
         label = minus(f"best member: {best[at]:.1f}")
         ax.plot(
             best[at], at, "o", color=ORANGE, markerfacecolor="none", markersize=10, markeredgewidth=1.8, label=label
         )
-    ax.set_yticks(rows, [member.member.name for member in timing.members], fontsize="x-small")
+    ax.set_yticks(rows, names, fontsize="x-small")
     ax.set_ylim(rows[-1] + 0.7, -0.7)
     ax.set_xlabel(_LABEL)
     ax.grid(axis="x", alpha=0.3)

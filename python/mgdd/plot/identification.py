@@ -15,17 +15,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Rectangle
 
+    from mgdd.results import Result
+
 __all__ = ["correlation_matrix", "error_growth", "residual_correlation"]
 
 _TANGLED = 0.98
 
 
-def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def error_growth(n_step: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw how the error of a prediction grows with its horizon: one line per predictor.
 
     Parameters
     ----------
-    n_step : xarray.Dataset
+    n_step : xarray.Dataset or Result
         ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as in the `n_step` of `validate_throttle`;
         at most five predictors.
     ax : matplotlib.axes.Axes, optional
@@ -55,7 +57,7 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> error_growth(n_step).get_ylabel()
     'RMS error ahead [deg]'
     """
-    require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.validate_throttle")
+    n_step = require("n_step", n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.validate_throttle")
     names = [str(name).replace("_", " ") for name in n_step["predictor"].to_numpy()]
     if len(names) > len(LINE_STYLES):
         raise DataError(f"predictor has {len(names)} entries: at most {len(LINE_STYLES)} lines can be distinguished")
@@ -73,12 +75,12 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def residual_correlation(correlations: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the autocorrelation of a residual and, below, its correlation with earlier input.
 
     Parameters
     ----------
-    correlations : xarray.Dataset
+    correlations : xarray.Dataset or Result
         ``autocorrelation`` and ``cross_correlation`` over ``lag`` and the number ``limit``, as
         `mgdd.signals.residual_tests` gives it in ``correlations``.
     ax : matplotlib.axes.Axes, optional
@@ -108,7 +110,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     'lag [samples]'
     """
     names = ("autocorrelation", "cross_correlation")
-    require(correlations, ("lag", *names, "limit"), "mgdd.signals.residual_tests")
+    correlations = require("correlations", correlations, ("lag", *names, "limit"), "mgdd.signals.residual_tests")
     ax = new_axes(ax, height=4.4)
     panels = divide(ax, (1.0, 1.0))
     lag, limit = correlations["lag"].to_numpy(), float(correlations["limit"])
@@ -131,12 +133,12 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     return ax
 
 
-def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw how the estimates of a fit depend on each other; pairs beyond 0.98 cannot be separated.
 
     Parameters
     ----------
-    correlation : xarray.Dataset
+    correlation : xarray.Dataset or Result
         ``correlation`` [-] over ``parameter`` and ``other``, the names; NaN for a parameter at a bound. As
         `mgdd.results.FitReport.to_dataset` gives it.
     ax : matplotlib.axes.Axes, optional
@@ -160,7 +162,7 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     >>> plot.correlation_matrix(fit.to_dataset()).texts[1].get_text()
     '−0.71'
     """
-    require(correlation, ("parameter", "other", "correlation"), "mgdd.results.FitReport.to_dataset")
+    correlation = require("correlation", correlation, ("parameter", "other", "correlation"), "a fit of mgdd.identify")
     names = [str(name) for name in correlation["parameter"].to_numpy()]
     values = correlation["correlation"].transpose("parameter", "other").to_numpy()
     n = len(names)

@@ -11,17 +11,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+    from mgdd.results import Result
+
 __all__ = ["learning"]
 
 _MARKERS = "osv^D"
 
 
-def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def learning(learned: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw how the error of a repeated task falls from trial to trial, one line per learning law.
 
     Parameters
     ----------
-    learned : xarray.Dataset
+    learned : xarray.Dataset or Result
         ``ca50_error_cad`` [°CA] over ``law`` and ``trial``, as the study seeker-comparison gives.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
@@ -47,7 +49,7 @@ def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> learning(learned).get_ylabel()
     'rms error of CA50 [°CA]'
     """
-    require(learned, ("law", "trial", "ca50_error_cad"), "the study seeker-comparison")
+    learned = require("learned", learned, ("law", "trial", "ca50_error_cad"), "the study seeker-comparison")
     ax = new_axes(ax)
     error = learned["ca50_error_cad"].transpose("law", "trial").to_numpy()
     lines: list[Line2D] = []

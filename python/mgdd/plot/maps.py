@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["map_cells", "map_contour"]
 
+_MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.load"
 _COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
 # Beside a value in its cell; what is not named here needs no mark.
 _MARKS = {
@@ -28,7 +31,7 @@ _MARKS = {
 
 
 def map_contour(
-    data: xr.Dataset,
+    data: xr.Dataset | Result,
     variable: str,
     *,
     levels: int | Sequence[float] = 12,
@@ -39,7 +42,7 @@ def map_contour(
 
     Parameters
     ----------
-    data : xarray.Dataset
+    data : xarray.Dataset or Result
         `variable` over two axes; the first is drawn to the right. NaN is left white.
     variable : str
         What is drawn.
@@ -76,9 +79,10 @@ def map_contour(
     >>> map_contour(data, "bsfc_g_per_kwh").get_xlabel()
     'engine speed [rpm]'
     """
+    data = require("data", data, (), _MADE_BY)
     x, y = _two_axes(data, variable)
     line = full_load if full_load is not None and full_load in data else None
-    require(data, (x, y, variable, *([line] if line else [])), "mgdd.datasets.load or CalibrationMap.to_dataset")
+    require("data", data, (x, y, variable, *([line] if line else [])), _MADE_BY)
     ax = new_axes(ax, height=4.4)
     values = data[variable].transpose(y, x).to_numpy()
     lines: list[Artist] = []
@@ -100,12 +104,12 @@ def map_contour(
     return ax
 
 
-def map_cells(data: xr.Dataset, variable: str | None = None, *, ax: Axes | None = None) -> Axes:
+def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axes | None = None) -> Axes:
     """Draw the cells of a calibration map: value by colour and in print, support as the size of a dot.
 
     Parameters
     ----------
-    data : xarray.Dataset
+    data : xarray.Dataset or Result
         As `mgdd.maps.CalibrationMap.to_dataset` gives it, or any variable over one or two axes; a map over one axis is
         drawn as a line with its standard deviation and range.
     variable : str, optional
@@ -137,11 +141,12 @@ def map_cells(data: xr.Dataset, variable: str | None = None, *, ax: Axes | None 
     >>> map_cells(data, "soc_cad").get_ylabel()
     'fuel [mg]'
     """
+    data = require("data", data, (), _MADE_BY)
     own = str(data.attrs.get("map", "")) if variable is None else variable
     if own in data and data[own].ndim == 1:
         return _curve(data, own, new_axes(ax))
     x, y = _two_axes(data, own)
-    require(data, (x, y, own), "CalibrationMap.to_dataset")
+    require("data", data, (x, y, own), _MADE_BY)
     ax = new_axes(ax, height=4.6)
     values = data[own].transpose(x, y).to_numpy()
     widest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 1.0
@@ -184,7 +189,7 @@ def _two_axes(data: xr.Dataset, variable: str) -> tuple[str, str]:
 def _curve(data: xr.Dataset, variable: str, ax: Axes) -> Axes:
     """Draw a map over one axis."""
     (x,) = map(str, data[variable].dims)
-    require(data, (x, variable), "CalibrationMap.to_dataset")
+    require("data", data, (x, variable), _MADE_BY)
     lines: list[Artist] = []
     values = data[variable].to_numpy()
     if {"low", "high"} <= set(data.data_vars) and np.isfinite(data["low"]).any():

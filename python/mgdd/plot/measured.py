@@ -11,15 +11,17 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["measured_and_model"]
 
 
-def measured_and_model(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def measured_and_model(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw a measured signal and the free run of its model over each other.
 
     Parameters
     ----------
-    run : xarray.Dataset
+    run : xarray.Dataset or Result
         ``measured`` and ``model`` over ``time_s``, as the attribute ``run`` of a `mgdd.results.Fit` has them.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
@@ -47,7 +49,7 @@ def measured_and_model(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> measured_and_model(run, ax=Figure().add_subplot()).get_ylabel()
     'level, measured [V]'
     """
-    require(run, ("time_s", "measured", "model"), "mgdd.results.Fit")
+    run = require("run", run, ("time_s", "measured", "model"), "mgdd.results.Fit")
     ax = new_axes(ax)
     lines: list[Artist] = []
     lines += ax.plot(run["time_s"], run["measured"], color=BLACK, label="measured")

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import SubplotSpec
     from numpy.typing import NDArray
 
+    from mgdd.results import Result
+
 __all__ = ["response_diagnostics"]
 
 _CUTS_IN_A_ROW = 3
@@ -25,12 +27,12 @@ _NEEDED = (
 )  # fmt: skip
 
 
-def response_diagnostics(diagnostics: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw what tells a good response model from a bad one: four panels of residuals, and a cut along each factor.
 
     Parameters
     ----------
-    diagnostics : xarray.Dataset
+    diagnostics : xarray.Dataset or Result
         The ``diagnostics`` of `mgdd.surrogate.fit_response`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it is divided into the panels. None makes a figure.
@@ -55,9 +57,9 @@ def response_diagnostics(diagnostics: xr.Dataset, *, ax: Axes | None = None) -> 
     >>> [panel.get_xlabel() for panel in plot.response_diagnostics(fit.diagnostics).figure.axes][-1]
     'fuel [mg]'
     """
-    require(diagnostics, _NEEDED, "mgdd.surrogate.fit_response")
+    diagnostics = require("diagnostics", diagnostics, _NEEDED, "mgdd.surrogate.fit_response")
     names = [str(name) for name in diagnostics["factor"].to_numpy()]
-    require(diagnostics, tuple(names), "mgdd.surrogate.fit_response")
+    require("diagnostics", diagnostics, tuple(names), "mgdd.surrogate.fit_response")
     rows = -(-len(names) // _CUTS_IN_A_ROW)
     ax = new_axes(ax, height=5.4 + 2.3 * rows)
     panels, cuts = _divided(ax, rows, len(names))

@@ -10,6 +10,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, divide, legend, minus, new_axes, require
 from mgdd.results.labels import label_of
+from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,14 +18,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from mgdd.results import Result
+
 __all__ = ["seeking"]
 
 _NEEDED = ("cycle", "estimate_cad", "soc_requested_cad", "j")
+_MADE_BY = "mgdd.loop.run_seeker"
 _SLOPE = "gradient_per_cad"
 
 
 def seeking(
-    run: xr.Dataset,
+    run: xr.Dataset | Result,
     *,
     optimum_cad: float | None = None,
     limit_values: Mapping[str, float] | None = None,
@@ -39,8 +43,9 @@ def seeking(
 
     Parameters
     ----------
-    run : xarray.Dataset
-        ``estimate_cad``, ``soc_requested_cad`` [°CA aTDC] and ``j`` over ``cycle``, as `mgdd.loop.run_seeker` gives;
+    run : xarray.Dataset or Result
+        ``estimate_cad``, ``soc_requested_cad`` [°CA aTDC] and ``j`` over ``cycle``, as `mgdd.loop.run_seeker` gives; of
+        several inputs ``estimate`` and ``asked`` over ``cycle`` and ``input``, each in a panel of its own;
         optional are ``gradient_per_cad`` [unit of J per °CA], NOx of the sensor that ``attrs["nox_sensor"]`` names, and
         ``limits`` over ``limit``.
     optimum_cad : float, optional
@@ -71,34 +76,39 @@ def seeking(
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
     ['timing [°CA aTDC]', 'J [unit of J]']
     """
+    run = require("run", run, (), _MADE_BY)
     sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")
     third = _SLOPE if _SLOPE in run else sensor if sensor in run else None
     limited = [str(name) for name in run["limit"].to_numpy()] if "limits" in run else []
-    require(run, (*_NEEDED, *([third] if third else []), *(["limits"] if limited else [])), "mgdd.loop.run_seeker")
+    inputs, needed = _inputs(run)
+    require("run", run, (*needed, *([third] if third else []), *(["limits"] if limited else [])), _MADE_BY)
     for name in limit_values or {}:
         if name not in limited:
             raise DataError(f"limit_values: {name!r} was not measured as a limit in this run, which has {limited}")
-    ax = new_axes(ax, height=2.0 + 1.6 * (1 + bool(third) + bool(limited)))
-    panels = divide(ax, [1.4] + [1.0] * (1 + bool(third) + bool(limited)))
+    n, below = len(inputs), 1 + bool(third) + bool(limited)
+    ax = new_axes(ax, height=0.2 + 1.8 * n + 1.6 * below)
+    panels = divide(ax, [1.4] * n + [1.0] * below)
     cycle = run["cycle"].to_numpy()
     handles: list[Artist] = []
-    handles += ax.plot(cycle, run["soc_requested_cad"], color=GREY, linewidth=0.6, label="with dither")
-    handles += ax.plot(cycle, run["estimate_cad"], color=BLACK, linewidth=1.6, label="estimate")
+    for panel, (label, asked, estimate) in zip(panels, inputs, strict=False):
+        panel.set_ylabel(label)
+        lines = panel.plot(cycle, asked, color=GREY, linewidth=0.6, label="with dither")
+        lines += panel.plot(cycle, estimate, color=BLACK, linewidth=1.6, label="estimate")
+        handles = handles or [*lines]
     if optimum_cad is not None:
         label = minus(f"optimum {optimum_cad:.2f}")
         handles.append(ax.axhline(optimum_cad, color=BLUE, linestyle="--", linewidth=1.0, label=label))
-    ax.set_ylabel("timing [°CA aTDC]")
     j = run["j"].to_numpy()
-    panels[1].plot(cycle, j, ".", color=GREY, markersize=1.5)
-    handles += panels[1].plot(
+    panels[n].plot(cycle, j, ".", color=GREY, markersize=1.5)
+    handles += panels[n].plot(
         cycle, _running_mean(j, mean_cycles), "-", color=ORANGE, linewidth=1.4, label=f"mean of {mean_cycles} cycles"
     )
-    panels[1].set_ylabel(f"J [{label_of(run['j']).units}]")
+    panels[n].set_ylabel(f"J [{label_of(run['j']).units}]")
     if third:
-        panels[2].plot(cycle, run[third], color=BLACK, linewidth=0.8)
+        panels[n + 1].plot(cycle, run[third], color=BLACK, linewidth=0.8)
         if third == _SLOPE:
-            panels[2].axhline(0.0, color=GREY, linewidth=0.8)
-        panels[2].set_ylabel(_short(run, third))
+            panels[n + 1].axhline(0.0, color=GREY, linewidth=0.8)
+        panels[n + 1].set_ylabel(_short(run, third))
     for index, name in enumerate(limited):
         dash, color = LINE_STYLES[index % len(LINE_STYLES)]
         panels[-1].plot(cycle, run["limits"].sel(limit=name), linestyle=dash, color=color, linewidth=0.7)
@@ -116,6 +126,16 @@ def seeking(
     ax.figure.align_ylabels(panels)
     legend(ax, handles, columns=3)
     return ax
+
+
+def _inputs(run: xr.Dataset) -> tuple[list[tuple[str, xr.DataArray, xr.DataArray]], tuple[str, ...]]:
+    """Give label, asked value and estimate of every input, and the variables that a run must have."""
+    if "input" not in run.dims:
+        named = [run[name] for name in _NEEDED[1:3]] if set(_NEEDED) <= set(run.variables) else []
+        return ([("timing [°CA aTDC]", named[1], named[0])] if named else []), _NEEDED
+    names = [str(name) for name in run["input"].to_numpy()]
+    made = [(f"{name} [{unit_of(name)}]", run["asked"][:, k], run["estimate"][:, k]) for k, name in enumerate(names)]
+    return made, ("cycle", "asked", "estimate", "j")
 
 
 def _short(run: xr.Dataset, name: str) -> str:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["sensors"]
 
 # Behind each other in this order: the noisy ones first, the true value above them.
@@ -29,12 +31,12 @@ _MARKER_SIZES = {"nox_fast_ppm": 6.0, "nox_soft_corrected_ppm": 7.0, "nox_analys
 _OVER = ("cycle", "soc_cad", "soi_cad", "t_max_k")
 
 
-def sensors(readings: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def sensors(readings: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw what the NOx sensors say beside the true value.
 
     Parameters
     ----------
-    readings : xarray.Dataset
+    readings : xarray.Dataset or Result
         ``nox_true_ppm`` [ppm] over ``cycle`` (as a run of the bench gives), ``soc_cad``, ``soi_cad`` or ``t_max_k``,
         and any of ``nox_analyser_ppm``, ``nox_fast_ppm``, ``nox_soft_ppm``, ``nox_soft_corrected_ppm``,
         ``nox_affine_log_ppm`` and ``nox_arrhenius_ppm``. Steady readings get markers.
@@ -58,13 +60,13 @@ def sensors(readings: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> plot.sensors(EngineBench(seed=1).run([-6.0] * 20)).get_ylabel()
     'NOx [ppm]'
     """
+    readings = require("readings", readings, ("nox_true_ppm",), "mgdd.loop.EngineBench.run", tuple(_SENSORS))
     names = [name for name in _SENSORS if name in readings]
-    require(readings, ("nox_true_ppm", *names), "mgdd.loop.EngineBench.run")
     dims = readings["nox_true_ppm"].dims
     if len(dims) != 1 or dims[0] not in _OVER:
         raise DataError(f"nox_true_ppm has dimensions {dims}: must be one of {', '.join(_OVER)}")
     over = str(dims[0])
-    require(readings, (over,), "mgdd.loop.EngineBench.run")
+    require("readings", readings, (over,), "mgdd.loop.EngineBench.run")
     ax = new_axes(ax)
     lines: list[Artist] = []
     for name in names:

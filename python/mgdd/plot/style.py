@@ -1,10 +1,11 @@
-"""What all figures share: colours, labels, new axes, and the refusal of a Dataset that lacks a variable."""
+"""What all figures share: colours, labels, new axes, and the one gate for what is drawn, a result or its Dataset."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import DataError
+from mgdd._arguments import shown
+from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, label_of
 
 if TYPE_CHECKING:
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from mgdd.results import Result
 
 __all__ = [
     "BLACK",
@@ -53,7 +56,7 @@ def new_axes(ax: Axes | None, *, height: float = 3.8) -> Axes:
     return plt.subplots(figsize=(6.6, height), layout="constrained")[1]
 
 
-def drawn(draw: Callable[..., Axes], data: xr.Dataset, *, size: tuple[float, float], **how: Any) -> Figure:
+def drawn(draw: Callable[..., Axes], data: xr.Dataset | Result, *, size: tuple[float, float], **how: Any) -> Figure:
     """Draw data on the only axes of a new figure of `size` inches, which pyplot does not know."""
     from matplotlib.figure import Figure
 
@@ -91,13 +94,48 @@ def residual_below(ax: Axes, data: xr.Dataset, x: str, residual: str) -> Axes:
     return panel
 
 
-def require(dataset: xr.Dataset, names: tuple[str, ...], made_by: str) -> None:
-    """Refuse a Dataset without these variables (naming the function that makes them) or without labels."""
+def require(
+    argument: str, given: xr.Dataset | Result, names: tuple[str, ...], made_by: str, optional: tuple[str, ...] = ()
+) -> xr.Dataset:
+    """Return the Dataset of what a figure is given, a result or the Dataset itself, with these variables and labels.
+
+    Parameters
+    ----------
+    argument : str
+        Its name, for the error.
+    given : xarray.Dataset or Result
+        What the figure is given.
+    names : tuple of str
+        Variables that it needs.
+    made_by : str
+        The function whose result has them.
+    optional : tuple of str
+        Variables that are drawn where they are there.
+
+    Returns
+    -------
+    xarray.Dataset
+        The data to draw.
+
+    Raises
+    ------
+    ParameterError
+        Neither a result nor a Dataset.
+    DataError
+        A variable is missing or has no unit.
+    """
+    import xarray as xr
+
+    dataset = given if isinstance(given, xr.Dataset) else getattr(given, "dataset", None)
+    if not isinstance(dataset, xr.Dataset):
+        bound = f"a Dataset or a result of mgdd, as {made_by} gives it"
+        raise ParameterError(f"{argument} = {shown(given)}: must be {bound}", field=argument, value=given, bound=bound)
     for name in names:
         if name not in dataset.variables:
             have = ", ".join(map(str, dataset.variables)) or "nothing"
-            raise DataError(f"dataset has no variable {name!r}: {made_by} makes it; this one has {have}")
-    check_labels(dataset[list(names)])
+            raise DataError(f"{argument} has no variable {name!r}: {made_by} makes it; this one has {have}")
+    check_labels(dataset[[*names, *(name for name in optional if name in dataset.variables)]])
+    return dataset
 
 
 def axis_label(dataset: xr.Dataset, name: str) -> str:

@@ -13,17 +13,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+    from mgdd.results import Result
+
 __all__ = ["free_run", "holding_duty"]
 
 _MADE_BY = "mgdd.io.read_throttle_log"
 
 
-def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axes | None = None) -> Axes:
+def holding_duty(log: xr.Dataset | Result, *, limp_home_deg: float | None = None, ax: Axes | None = None) -> Axes:
     """Draw the duty of a slow ramp over the angle: the gap between the branches is twice the friction.
 
     Parameters
     ----------
-    log : xarray.Dataset
+    log : xarray.Dataset or Result
         ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s] of a triangle or staircase; ``model_deg`` [deg], if
         there, is drawn over it.
     limp_home_deg : float, optional
@@ -50,8 +52,8 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
     >>> plot.holding_duty(simulate(Throttle(), ramp["duty"], time_s=ramp["time_s"])).get_xlabel()
     'plate angle [deg]'
     """
+    log = require("log", log, ("time_s", "duty", "angle_deg"), _MADE_BY, ("model_deg",))
     has_model = "model_deg" in log
-    require(log, ("time_s", "duty", "angle_deg", *(("model_deg",) if has_model else ())), _MADE_BY)
     ax = new_axes(ax)
     duty, angle = log["duty"].to_numpy(), log["angle_deg"].to_numpy()
     rising = _rising(duty)
@@ -68,12 +70,12 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
     return finished(ax, log, "angle_deg", "duty", lines)
 
 
-def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def free_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw measured and modelled angle over time, and their difference in a panel below.
 
     Parameters
     ----------
-    run : xarray.Dataset
+    run : xarray.Dataset or Result
         ``angle_deg``, ``model_deg`` and ``residual_deg`` [deg] over ``time_s`` [s], as
         `mgdd.identify.validate_throttle` gives it in ``free_run``.
     ax : matplotlib.axes.Axes, optional
@@ -104,7 +106,7 @@ def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> free_run(run).figure.axes[-1].get_xlabel()
     'time [s]'
     """
-    require(run, ("time_s", "angle_deg", "model_deg", "residual_deg"), "mgdd.identify.validate_throttle")
+    run = require("run", run, ("time_s", "angle_deg", "model_deg", "residual_deg"), "mgdd.identify.validate_throttle")
     ax = new_axes(ax, height=4.4)
     residual_below(ax, run, "time_s", "residual_deg").grid(alpha=0.3)
     time = run["time_s"].to_numpy()

@@ -11,17 +11,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+    from mgdd.results import Result
+
 __all__ = ["air_flow", "rate_dependence"]
 
 _MADE_BY = "the study throttle-characteristics"
 
 
-def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def rate_dependence(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the angle over the duty for every frequency.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
+    dataset : xarray.Dataset or Result
         ``loop_duty`` [-] and ``loop_angle_deg`` [deg] over ``frequency_hz`` [Hz] and ``phase``: one preset of the
         study ``throttle-characteristics``.
     ax : matplotlib.axes.Axes, optional
@@ -45,7 +47,7 @@ def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> rate_dependence(study.dataset.isel(preset=0)).get_xlabel()
     'duty [-]'
     """
-    require(dataset, ("frequency_hz", "phase", "loop_duty", "loop_angle_deg"), _MADE_BY)
+    dataset = require("dataset", dataset, ("frequency_hz", "phase", "loop_duty", "loop_angle_deg"), _MADE_BY)
     ax = new_axes(ax)
     lines: list[Line2D] = []
     for place, frequency in enumerate(dataset["frequency_hz"].to_numpy()):
@@ -59,12 +61,12 @@ def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     return finished(ax, dataset, "loop_duty", "loop_angle_deg", lines, columns=4)
 
 
-def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def air_flow(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the angle over time at constant duty for every torque of the air flow.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
+    dataset : xarray.Dataset or Result
         ``air_angle_deg`` [deg] over ``airflow_torque_nm`` [N m] and ``time_s`` [s]: one preset and one arrival of the
         study ``throttle-characteristics``; attribute ``air_from_s`` marks the onset.
     ax : matplotlib.axes.Axes, optional
@@ -88,7 +90,7 @@ def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> air_flow(study.dataset.isel(preset=0, arrival=0)).get_ylabel()
     'plate angle [deg]'
     """
-    require(dataset, ("time_s", "airflow_torque_nm", "air_angle_deg"), _MADE_BY)
+    dataset = require("dataset", dataset, ("time_s", "airflow_torque_nm", "air_angle_deg"), _MADE_BY)
     ax = new_axes(ax)
     lines: list[Line2D] = []
     for place, torque in enumerate(dataset["airflow_torque_nm"].to_numpy()):

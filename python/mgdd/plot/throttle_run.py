@@ -11,17 +11,19 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["throttle_run"]
 
 _PANELS = (("duty", BLUE), ("current_a", ORANGE))
 
 
-def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def throttle_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the plate angle over time, and duty and current in panels below.
 
     Parameters
     ----------
-    run : xarray.Dataset
+    run : xarray.Dataset or Result
         ``angle_deg`` [deg] and ``duty`` [-] over ``time_s`` [s], and ``current_a`` [A] if there, as
         `mgdd.throttle.simulate` or `mgdd.io.read_throttle_log` gives them. Attribute ``limp_home_deg`` is marked.
     ax : matplotlib.axes.Axes, optional
@@ -44,8 +46,8 @@ def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> throttle_run(simulate(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
     'plate angle [deg]'
     """
-    panels = [(name, color) for name, color in _PANELS if name == "duty" or name in run]
-    require(run, ("time_s", "angle_deg", *(name for name, _ in panels)), "mgdd.throttle.simulate")
+    run = require("run", run, ("time_s", "angle_deg", "duty"), "mgdd.throttle.simulate", ("current_a",))
+    panels = [(name, color) for name, color in _PANELS if name in run]
     ax = new_axes(ax, height=4.8)
     time = run["time_s"].to_numpy()
     lines = ax.plot(time, run["angle_deg"], "-", color=BLACK, linewidth=1.4, label=label_of(run["angle_deg"]).long_name)

@@ -10,15 +10,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["throttle_track"]
 
 
-def throttle_track(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def throttle_track(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw wanted and true angle over time, and the error and the duty in panels below.
 
     Parameters
     ----------
-    run : xarray.Dataset
+    run : xarray.Dataset or Result
         ``reference_deg``, ``angle_deg`` [deg] and ``duty`` [-] over ``time_s`` [s], as `mgdd.loop.track` gives them.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it gives its lower half to the panels. None makes a figure.
@@ -41,7 +43,7 @@ def throttle_track(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> throttle_track(track(Pid(), "step:20:60")).get_ylabel()
     'plate angle [deg]'
     """
-    require(run, ("time_s", "reference_deg", "angle_deg", "duty"), "mgdd.loop.track")
+    run = require("run", run, ("time_s", "reference_deg", "angle_deg", "duty"), "mgdd.loop.track")
     ax = new_axes(ax, height=5.2)
     time, error = run["time_s"].to_numpy(), (run["reference_deg"] - run["angle_deg"]).to_numpy()
     lines = ax.plot(time, run["reference_deg"], "--", color=GREY, linewidth=1.2, label="wanted")

@@ -16,17 +16,19 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
+    from mgdd.results import Result
+
 __all__ = ["timing"]
 
 _NOX = {"nox_affine_log_ppm": ("--", BLUE), "nox_arrhenius_ppm": ("-.", ORANGE)}
 
 
-def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def timing(sweep: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw efficiency and both NOx proxy maps over timing, with the best timing marked.
 
     Parameters
     ----------
-    sweep : xarray.Dataset
+    sweep : xarray.Dataset or Result
         ``efficiency_gross`` [-], ``nox_affine_log_ppm`` and ``nox_arrhenius_ppm`` [ppm] over ``soc_cad``
         [°CA aTDC], as `mgdd.engine.timing_sweep` gives. NOx goes to a twin axis.
     ax : matplotlib.axes.Axes, optional
@@ -50,7 +52,7 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> plot.timing(timing_sweep(Cylinder(), OperatingPoint(), soc_cad=[-10.0, -6.0, 0.0])).get_xlabel()
     'start of combustion [°CA aTDC]'
     """
-    require(sweep, ("soc_cad", "efficiency_gross", *_NOX), "mgdd.engine.timing_sweep")
+    sweep = require("sweep", sweep, ("soc_cad", "efficiency_gross", *_NOX), "mgdd.engine.timing_sweep")
     soc, efficiency = sweep["soc_cad"].to_numpy(), sweep["efficiency_gross"].to_numpy()
     if soc.ndim != 1 or soc.size < 3:
         raise DataError(f"soc_cad has shape {soc.shape}: at least three timings are needed")

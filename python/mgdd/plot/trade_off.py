@@ -15,26 +15,28 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
+    from mgdd.results import Result
+
 __all__ = ["trade_off"]
 
 _MARKERS = "osv^DPX"  # more than there are colours: a sixth line is not the first again
 
 
 def trade_off(
-    sweep: xr.Dataset,
+    sweep: xr.Dataset | Result,
     x: str,
     y: str,
     *,
     over: str = "soc_cad",
     every: int = 4,
-    marked: xr.Dataset | None = None,
+    marked: xr.Dataset | Result | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw two outputs against each other along a swept input, with labels of the input: the price of one in the other.
 
     Parameters
     ----------
-    sweep : xarray.Dataset
+    sweep : xarray.Dataset or Result
         Both variables over `over`, and over one more axis for several lines.
     x, y : str
         To the right and upwards, for example ``nox_affine_log_ppm`` and ``efficiency_gross``.
@@ -69,7 +71,7 @@ def trade_off(
     """
     if every < 1:
         raise ParameterError.of("every", every, ">= 1")
-    require(sweep, (over, x, y), "mgdd.engine.timing_sweep")
+    sweep = require("sweep", sweep, (over, x, y), "mgdd.engine.timing_sweep")
     others = [str(dim) for dim in sweep[y].dims if dim != over]
     if over not in sweep[y].dims or len(others) > 1 or set(sweep[x].dims) != set(sweep[y].dims):
         raise DataError(f"{x} and {y}: must stand over {over} and at most one more axis, the same for both")
@@ -94,7 +96,7 @@ def trade_off(
                     textcoords="offset points", fontsize="x-small", color=color,
                 )  # fmt: skip
     if marked is not None:
-        require(marked, (x, y), "mgdd.maps.apply_map")
+        marked = require("marked", marked, (x, y), "mgdd.maps.apply_map")
         stars = ax.plot(
             marked[x].to_numpy().ravel(), marked[y].to_numpy().ravel(), "*", color=BLUE, markersize=11,
             markeredgecolor=BLACK, linestyle="none", label="chosen",

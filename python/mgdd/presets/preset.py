@@ -258,7 +258,8 @@ def _load(text: str, kind: str | None) -> Preset:
                 error.errno, f"no preset file {text!r}: {hint}; shipped are {', '.join(available(kind))}"
             ) from None
     if text not in available():
-        hint = did_you_mean(text, available(kind)) or "or pass a path that ends in .toml"
+        longer = next((f"did you mean {name!r}?" for name in available(kind) if text and text in name), "")
+        hint = did_you_mean(text, available(kind)) or longer or "or pass a path that ends in .toml"
         raise ParameterError(f"no preset {text!r}: shipped are {', '.join(available(kind))}; {hint}")
     file = resources.files("mgdd.presets").joinpath(f"{text}.toml")
     return Preset.from_toml(file.read_text(encoding="utf-8"), origin=f"preset {text}")

@@ -8,7 +8,7 @@ import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,10 @@ from mgdd import _core
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
 
-__all__ = ["Row", "as_html", "as_text", "core_rows", "described", "rows_of"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Row", "as_figure", "as_html", "as_text", "core_rows", "described", "fields_of", "rows_of", "title_of"]
 
 _WIDTH, _LINES = 100, 15
 _LONG = 60  # of a text in a table
@@ -88,6 +91,36 @@ def as_html(title: str, rows: Iterable[Row]) -> str:
     return f"<div><p><b>{html.escape(title)}</b></p><table><tbody>{body}</tbody></table>{more}</div>"
 
 
+def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
+    """Draw rows as a table.
+
+    Parameters
+    ----------
+    title : str
+        Above the table.
+    rows : iterable of Row
+        One per line.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, without axis lines.
+    """
+    cells = [(row.name, row.value, "" if row.unit == "-" else row.unit) for row in rows] or [("", "", "")]
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        ax = plt.subplots(figsize=(6.6, 0.6 + 0.24 * len(cells)), layout="constrained")[1]
+    ax.set_axis_off()
+    ax.set_title(textwrap.shorten(title, _WIDTH, placeholder=" …"), fontsize="small")
+    table = ax.table(cellText=cells, colWidths=(0.4, 0.4, 0.2), cellLoc="left", edges="open", loc="upper center")
+    table.auto_set_font_size(value=False)
+    table.set_fontsize(8)
+    return ax
+
+
 def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Row]:
     """Make rows of names and values; units as given, else as the results' labels or the names say.
 
@@ -138,10 +171,10 @@ def described(
     type
         The same class.
     """
-    head = _title if title is None else title
+    head = title_of if title is None else title
 
     def known(obj: Any) -> list[Row]:
-        found = _fields(obj) if rows is None else rows(obj)
+        found = fields_of(obj) if rows is None else rows(obj)
         return rows_of(found) if isinstance(found, Mapping) else list(found)
 
     def text(self: Any) -> str:
@@ -156,12 +189,14 @@ def described(
     return cls
 
 
-def _title(obj: Any) -> str:
+def title_of(obj: Any) -> str:
+    """Name an object by its class, name and kind."""
     said = [str(value) for name in ("name", "kind") if isinstance(value := getattr(obj, name, None), str)]
     return " ".join([type(obj).__name__, *said])
 
 
-def _fields(obj: Any) -> dict[str, Any]:
+def fields_of(obj: Any) -> dict[str, Any]:
+    """Give the fields of a dataclass but name and kind."""
     return {item.name: getattr(obj, item.name) for item in dataclasses.fields(obj) if item.name not in ("name", "kind")}
 
 
@@ -197,7 +232,7 @@ def _shown(value: Any) -> str:
     if callable(value):
         return getattr(value, "__qualname__", type(value).__qualname__)
     own = repr(value)
-    return own if len(own) <= _LONG and "\n" not in own and " object at " not in own else _title(value)
+    return own if len(own) <= _LONG and "\n" not in own and " object at " not in own else title_of(value)
 
 
 def core_rows(record: Any) -> list[Row]:

@@ -12,11 +12,12 @@ from mgdd.errors import DataError
 from mgdd.results.finding import Finding, findings_html
 from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import to_jsonable
+from mgdd.results.result import Result, merged
 
 if TYPE_CHECKING:
-    import os
-
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
 __all__ = ["Fit", "FitQuality", "figures_of", "n_best_of"]
 
@@ -66,7 +67,7 @@ class FitQuality:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Fit:
+class Fit(Result):
     """The result of a fit: the model, how well it follows its records, and what the data leave open.
 
     Parameters
@@ -136,6 +137,34 @@ class Fit:
         return own if own is not None else dict(zip(self.report.names, self.report.values.tolist(), strict=True))
 
     @property
+    def residual(self) -> NDArray[np.float64]:
+        """Residual of the report at the estimates."""
+        return self.report.residual
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the free parameters, as in the report."""
+        return self.report.covariance
+
+    @property
+    def success(self) -> bool:
+        """Whether the best search met a tolerance."""
+        return self.report.success
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Estimates, correlation and what was simulated; everything of `to_dict` as attributes."""
+        import xarray as xr
+
+        parts = [own for name in self.__dataclass_fields__ if isinstance(own := getattr(self, name), xr.Dataset)]
+        attrs = {
+            name: json.dumps(value) if isinstance(value, dict | list) else str(value)
+            for name, value in self.to_dict().items()
+            if value is not None
+        }
+        return merged(self.report.dataset, *parts, attrs=attrs)
+
+    @property
     def stderr(self) -> dict[str, float]:
         """Standard errors of the estimated parameters by name."""
         return dict(zip(self.report.names, self.report.stderr.tolist(), strict=True))
@@ -158,24 +187,7 @@ class Fit:
         extra = self._extra()
         return "\n".join([*lines, *(["", "findings:", *(f"  {finding}" for finding in extra)] if extra else [])])
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw the measurement and the free run of the model.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes.
-
-        Raises
-        ------
-        DataError
-            A fit that keeps no run.
-        """
+    def _draw(self, ax: Any) -> Any:
         if self.draw is None:
             raise DataError(f"a fit of {self.kind} keeps no run to draw: simulate its model")
         return self.draw(self, ax)
@@ -205,31 +217,6 @@ class Fit:
             }
         )
         return plain
-
-    def to_netcdf(self, path: str | os.PathLike[str]) -> None:
-        """Write estimates, correlation and what was simulated to a classic netCDF file.
-
-        Parameters
-        ----------
-        path : path-like
-            The file; one that is there is overwritten.
-        """
-        import xarray as xr
-
-        dataset = self.report.to_dataset()
-        for name in self.__dataclass_fields__:
-            if isinstance(own := getattr(self, name), xr.Dataset):
-                dataset = dataset.merge(own, combine_attrs="drop")
-        dataset.attrs = {
-            name: json.dumps(value)
-            if isinstance(value, dict | list)
-            else value
-            if isinstance(value, str)
-            else str(value)
-            for name, value in self.to_dict().items()
-            if value is not None
-        }
-        dataset.to_netcdf(path, engine="scipy")
 
     def to_toml(self) -> str:
         """Write the model as TOML with the standard errors, the quality and the name of the record.

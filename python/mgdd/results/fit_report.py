@@ -10,9 +10,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.results.finding import Finding, findings_html
-from mgdd.results.fit_findings import classified
+from mgdd.results.describe import Row
+from mgdd.results.finding import Finding, classified, findings_html
 from mgdd.results.labels import labelled_dataset, to_jsonable
+from mgdd.results.result import Result
+from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +28,7 @@ _COLUMNS = ("parameter", "value", "stderr", "lower", "upper", "remark")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FitReport:
+class FitReport(Result):
     """Estimates, their uncertainty, what the data leave open, and how the search went.
 
     Attribute names follow `scipy.optimize.OptimizeResult` where it has one. Arrays are read-only.
@@ -238,7 +240,7 @@ class FitReport:
         >>> print(FitReport.from_core(_core.optimize.FitReport()).summary().splitlines()[0])
         not_run: the fit has not been run
         """
-        rows = [_COLUMNS, *self._rows()]
+        rows = [_COLUMNS, *self._lines()]
         widths = [max(len(row[k]) for row in rows) for k in range(len(_COLUMNS))]
         lines = [f"{self.status}: {self.message}", self._numbers(), ""]
         for row in rows:
@@ -266,6 +268,11 @@ class FitReport:
         own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
         plain = {field: to_jsonable(getattr(self, field)) for field in own}
         return plain | {"findings": [finding.to_dict() for finding in self.findings]}
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The same as `to_dataset` gives."""
+        return self.to_dataset()
 
     def to_dataset(self) -> xr.Dataset:
         """Tabulate the estimates and their correlation.
@@ -301,7 +308,7 @@ class FitReport:
         def line(cells: Sequence[str], tag: str) -> str:
             return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
-        body = "".join(line(row, "td") for row in self._rows())
+        body = "".join(line(row, "td") for row in self._lines())
         notes = findings_html("not identifiable from these data", self.findings)
         return (
             f"<div><p><b>{html.escape(self.status)}</b>: {html.escape(self.message)}<br>"
@@ -316,7 +323,14 @@ class FitReport:
             f"{self.nit} iterations, {self.nfev} residual and {self.njev} Jacobian evaluations"
         )
 
-    def _rows(self) -> list[tuple[str, ...]]:
+    def _title(self) -> str:
+        return f"{self.status}: {self.message}"
+
+    def _rows(self) -> list[Row]:
+        found = zip(self.names, self.values, self.stderr, strict=True)
+        return [Row(name, f"{value:.6g} ± {error:.2g}", unit_of(name)) for name, value, error in found]
+
+    def _lines(self) -> list[tuple[str, ...]]:
         remarks = {-1: "at lower bound", 1: "at upper bound"}
         rows = []
         for i, name in enumerate(self.names):

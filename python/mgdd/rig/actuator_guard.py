@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from mgdd.errors import ParameterError, RigError, did_you_mean
 from mgdd.loop import Measurement, Plant
 from mgdd.optimize import Limit
+from mgdd.optimize.optimum import limits_of
 
 __all__ = ["ActuatorGuard", "GuardedAsk"]
 
@@ -70,7 +71,7 @@ class ActuatorGuard:
         Lower and upper bound of every input.
     rates : mapping of str to float
         Largest change per cycle; an input that is left out has none. A step back is not cut.
-    limits : sequence of mgdd.optimize.Limit
+    limits : mapping of str to float, or sequence of mgdd.optimize.Limit
         Measured quantities and their `upper`; `delay_cycles` and `lag_cycles` say which input caused a reading. A
         reading that is missing or NaN counts as exceeded. Their other fields belong to seekers.
     hold_cycles : int
@@ -102,13 +103,13 @@ class ActuatorGuard:
         start: Mapping[str, float],
         bounds: Mapping[str, tuple[float, float]],
         rates: Mapping[str, float] = MappingProxyType({}),
-        limits: Sequence[Limit] = (),
+        limits: Mapping[str, float] | Sequence[Limit] = (),
         hold_cycles: int = 1,
     ) -> None:
-        names = plant.input_names
+        names, kept = plant.input_names, limits_of(limits)
         for argument, given in (("start", start), ("bounds", bounds), ("rates", rates)):
             _require_known(argument, given, names)
-        _require_known("limits", [limit.name for limit in limits], plant.limit_names)
+        _require_known("limits", [limit.name for limit in kept], plant.limit_names)
         for name in names:
             if name not in bounds or name not in start:
                 raise ParameterError(f"{name}: needs a start and bounds")
@@ -126,9 +127,9 @@ class ActuatorGuard:
         self.start = {name: float(start[name]) for name in names}
         self.bounds = {name: (float(bounds[name][0]), float(bounds[name][1])) for name in names}
         self.rates = {name: float(rate) for name, rate in rates.items()}
-        self.limits = tuple(limits)
+        self.limits = kept
         self.hold_cycles = int(hold_cycles)
-        self._delay = max((_delay(limit) for limit in limits), default=0)
+        self._delay = max((_delay(limit) for limit in kept), default=0)
         self._goods = [self.start]
         self._applied: dict[str, float] | None = None
         self._recent: deque[dict[str, float]] = deque(maxlen=self._delay + 1)

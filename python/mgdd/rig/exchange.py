@@ -13,7 +13,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.loop import Measurement, Plant
 from mgdd.rig.base import Rig
-from mgdd.rig.recorded import readable_record
+from mgdd.rig.recorded import RecordedRun, readable_record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -170,14 +170,19 @@ class RigRecord:
         mgdd.errors.DataError
             Not a record, or one without that table.
         """
-        samples = readable_record(path).samples
+        return cls.of_run(readable_record(path), f"{path}", table=table)
+
+    @classmethod
+    def of_run(cls, run: RecordedRun, origin: str, *, table: str = "rig") -> Self:
+        """Take the exchanges of a record that was read."""
+        samples = run.samples
         if table not in samples:
-            raise DataError(f"{path}: has no table {table!r}: it has {', '.join(samples) or 'none'}")
+            raise DataError(f"{origin}: has no table {table!r}: it has {', '.join(samples) or 'none'}")
         columns = samples[table].data_vars
         try:
             return cls.from_columns([str(name) for name in columns], np.column_stack([*columns.values()]))
         except DataError as error:
-            raise error.reworded(f"{path}: table {table!r}: {error}") from error
+            raise error.reworded(f"{origin}: table {table!r}: {error}") from error
 
 
 def flat(exchange: Exchange) -> dict[str, float]:

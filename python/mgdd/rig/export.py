@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import Error, ParameterError, RigError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.binary_files import write_netcdf
 from mgdd.io.extras import import_extra
-from mgdd.io.netcdf_file import write_netcdf
+from mgdd.io.files import existing_file
 from mgdd.results.labels import label_of
 from mgdd.rig.can.logs import LOG_WRITERS, write_log
 from mgdd.rig.recorded import RecordedRun, readable_record, stamped_frames

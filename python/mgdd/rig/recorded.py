@@ -14,9 +14,9 @@ import numpy as np
 
 from mgdd._core import rig as core
 from mgdd.errors import DataError
-from mgdd.io.existing_file import existing_file
-from mgdd.io.nesting import parsed
+from mgdd.io.files import existing_file, parsed
 from mgdd.results.labels import VARIABLES, labelled_dataset
+from mgdd.results.result import Result, merged
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ _FLAGS = {
 }
 
 
-@dataclass(frozen=True)
-class RecordedRun:
+@dataclass(frozen=True, repr=False)
+class RecordedRun(Result):
     """A run as its record holds it.
 
     Attributes
@@ -73,6 +73,18 @@ class RecordedRun:
     unknown: int
     damaged_bytes: int
     ignored_bytes: int
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """All tables beside each other, the name of the table in front of each variable."""
+        tables = {"frame": self.frames, "event": self.events, **self.samples}
+        return merged(
+            *(
+                data.rename({name: f"{table}_{name}" for name in data.variables if name != table})
+                for table, data in tables.items()
+            ),
+            attrs={"run_id": self.run_id, "started": self.started.isoformat()},
+        )
 
     def summary(self) -> str:
         """Return a short text: what the record holds and what could not be read."""

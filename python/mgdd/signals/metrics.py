@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -135,9 +135,8 @@ def rmse(measured: ArrayLike, model: ArrayLike) -> float:
     return float(np.sqrt(mse(measured, model)))
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class ResidualTests:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ResidualTests(Result):
     """Correlations that a residual should not have.
 
     Parameters
@@ -173,6 +172,11 @@ class ResidualTests:
     share_independent: float
     limit: float
     correlations: xr.Dataset = field(repr=False)
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The correlations."""
+        return self.correlations
 
 
 def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> ResidualTests:

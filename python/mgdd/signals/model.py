@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from mgdd._arguments import require_plain
+from mgdd._arguments import require_plain, shown
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results.labels import VARIABLES, Label, labelled_dataset
 from mgdd.signals.even_grid import even_step
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["RunInputs", "SampledModel", "check_horizon", "columns_of"]
+__all__ = ["RunInputs", "SampledModel", "as_signal", "check_horizon", "columns_of", "is_timed", "table_of"]
 
 
 class RunInputs(NamedTuple):
@@ -55,8 +55,9 @@ class SampledModel(ABC):
 
         Parameters
         ----------
-        inputs : xarray.Dataset, DataFrame or mapping of columns
-            ``time_s`` [s], evenly spaced, and the inputs of the model; sample k acts from ``time_s[k]`` to
+        inputs : Dataset, DataFrame, mapping of columns, DataArray, Series, or array_like, shape (n, columns)
+            ``time_s`` [s], evenly spaced, and the inputs of the model; a DataArray or Series over ``time_s`` is the
+            one input, the columns of an array are the time and the inputs in order. Sample k acts from ``time_s[k]`` to
             ``time_s[k + 1]``.
         initial_state : mapping of str to float, or sequence of float, optional
             State at the first sample, by name or in the order of `state_names`; what is left out is that of the model
@@ -85,8 +86,8 @@ class SampledModel(ABC):
 
         Parameters
         ----------
-        record : xarray.Dataset, DataFrame or mapping of columns
-            As `simulate` takes it, and the measured output.
+        record : Dataset, DataFrame, mapping of columns, or array_like, shape (n, columns)
+            As `simulate` takes it, and the measured output as the last column.
         horizon : int
             Samples ahead, at least 1.
 
@@ -144,10 +145,11 @@ class SampledModel(ABC):
 
 def columns_of(table: Any, names: Sequence[str], *, what: str = "inputs", least: int = 2) -> list[NDArray[np.float64]]:
     """Return columns of a Dataset, a DataFrame or a mapping, finite and of one length."""
-    columns = []
+    table, columns = table_of(table, names, what=what), []
     for name in names:
         if name not in table:
-            raise DataError(f"{what} have no {name}: needed are {', '.join(names)}")
+            have = ", ".join(map(str, getattr(table, "columns", table)))
+            raise DataError(f"{what} have no {name}: needed are {', '.join(names)}; given are {have or 'none'}")
         require_plain(name, table[name])
         columns.append(np.asarray(table[name], dtype=np.float64))
     shapes = [column.shape for column in columns]
@@ -157,6 +159,72 @@ def columns_of(table: Any, names: Sequence[str], *, what: str = "inputs", least:
         if not np.isfinite(column).all():
             raise DataError(f"{name}: sample {int(np.argmin(np.isfinite(column)))} is not a finite number")
     return columns
+
+
+def table_of(given: Any, names: Sequence[str], *, what: str) -> Any:
+    """Return something that gives columns by name, of any form of a signal.
+
+    Parameters
+    ----------
+    given : Dataset, Result, DataFrame, mapping, DataArray, Series, or array_like, shape (n, columns)
+        The index of a DataFrame or Series that is named as the first of `names`, or has no name and is not whole
+        numbers, is that column; an array has its columns in the order of `names`. Tables of pandas, polars and others
+        serve alike.
+    names : sequence of str
+        Columns that are wanted, the time first; a DataArray or a Series of another name is the second.
+    what : str
+        What it is, for the error.
+
+    Returns
+    -------
+    mapping
+        Or a table with the same access.
+
+    Raises
+    ------
+    ParameterError
+        Another form, or a signal without its time.
+    """
+    table, time = getattr(given, "dataset", given), names[0]
+    if isinstance(table, Mapping):
+        return table
+    timed = is_timed(table, time)
+    if hasattr(table, "columns"):  # a DataFrame
+        return table if time in table.columns or not timed else table.rename_axis(time).reset_index()
+    own = str(getattr(table, "name", None) or "")
+    own = own if own in names or len(names) < 2 else names[1]
+    if hasattr(table, "coords"):
+        return {**{str(name): table[name] for name in table.coords}, own: table}
+    if timed:
+        return {time: table.index, own: table}
+    if getattr(table, "ndim", 0) == 2 and table.shape[1] == len(names):
+        return dict(zip(names, np.asarray(table).T, strict=True))
+    if isinstance(table, tuple | list) and len(table) == len(names) and all(np.ndim(each) == 1 for each in table):
+        return dict(zip(names, table, strict=True))
+    bound = f"a table with {', '.join(names)}, a DataArray or Series over {time}, or these columns as an array"
+    raise ParameterError(f"{what} = {shown(given)}: must be {bound}", field=what, value=given, bound=bound)
+
+
+def is_timed(given: Any, time: str = "time_s") -> bool:
+    """Say whether a signal carries its time: as a column, a coordinate or an index."""
+    index: Any = getattr(given, "index", None)
+    if hasattr(index, "dtype") and (index.name == time or (index.name is None and index.dtype.kind == "f")):
+        return True
+    names = getattr(given, "columns", getattr(given, "coords", given if isinstance(given, Mapping) else ()))
+    return hasattr(given, "dataset") or time in names
+
+
+def as_signal(given: Any, names: Sequence[str], *, what: str, optional: Sequence[str] = ()) -> xr.Dataset:
+    """Return a Dataset over the first of the names of any form that `table_of` takes; a Dataset as it is."""
+    table = table_of(given, names, what=what)
+    if hasattr(table, "data_vars"):
+        dataset: xr.Dataset = table
+        return dataset
+    columns = dict(zip(names, columns_of(table, names, what=what), strict=True))
+    for name in optional:
+        if name in table:
+            (columns[name],) = columns_of(table, [name], what=what)
+    return labelled_dataset({name: (names[0], own) for name, own in columns.items()})
 
 
 def check_horizon(horizon: int, size: int) -> None:

@@ -12,21 +12,23 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, Pool
-from mgdd.results.describe import described
+from mgdd.results.describe import Row, rows_of
+from mgdd.results.labels import to_jsonable
+from mgdd.results.result import Figures, Result
 from mgdd.studies.sections import Section, standard_sections
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Progress", "StudyResult", "check_seeds", "finish", "parts_on", "run_parts"]
+__all__ = ["Parts", "Progress", "StudyResult", "check_seeds", "parts_on", "silent"]
 
 Progress = Callable[[str], None]
 Part = TypeVar("Part")
 
 
-@dataclass(frozen=True, kw_only=True)
-class StudyResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class StudyResult(Result):
     """Data, figures, summary and sections of a study; `mgdd.report.write_report` makes a page of any of them.
 
     Parameters
@@ -57,7 +59,7 @@ class StudyResult:
     name: str
     dataset: xr.Dataset
     figures: Mapping[str, Figure] = field(default_factory=dict)
-    summary: Mapping[str, Any] = field(default_factory=dict)
+    summary: Figures = field(default_factory=Figures)
     sections: tuple[Section, ...] = ()
     title: str = ""
 
@@ -65,26 +67,27 @@ class StudyResult:
         if not self.sections:
             object.__setattr__(self, "sections", standard_sections(self.summary, self.figures, self.dataset))
 
+    def _title(self) -> str:
+        return f"StudyResult {self.name}" + (f": {self.title}" if self.title else "")
 
-described(
-    StudyResult,
-    title=lambda result: f"StudyResult {result.name}" + (f": {result.title}" if result.title else ""),
-    rows=lambda result: {
-        "seeds": result.summary.get("seeds"),
-        "rows": len(result.summary.get("rows", ())),
-        "sections": tuple(section.title for section in result.sections),
-        "figures": len(result.figures),
-        "dataset": result.dataset,
-        "interrupted": bool(result.summary.get("interrupted", False)),
-    },
-)
+    def _rows(self) -> list[Row]:
+        return rows_of(
+            {
+                "seeds": self.summary.get("seeds"),
+                "rows": len(self.summary.get("rows", ())),
+                "sections": tuple(section.title for section in self.sections),
+                "figures": len(self.figures),
+                "dataset": self.dataset,
+                "interrupted": bool(self.summary.get("interrupted", False)),
+            }
+        )
 
 
-def check_seeds(seeds: int) -> int:
-    """Refuse a number of seeds that is none."""
+def check_seeds(seeds: int, *, quick: bool = False, most: int = 1) -> int:
+    """Refuse a number of seeds that is none; a quick study takes `most` at the most."""
     if seeds < 1:
         raise ParameterError.of("seeds", seeds, ">= 1")
-    return seeds
+    return min(seeds, most) if quick else seeds
 
 
 @dataclass
@@ -98,7 +101,7 @@ _workers: ContextVar[_Workers | None] = ContextVar("workers", default=None)
 
 @contextmanager
 def parts_on(executor: MakesExecutor | None, workers: int | None) -> Iterator[None]:
-    """Let `run_parts` hand the parts to workers; with neither it runs one after the other, each on all cores."""
+    """Let `Parts` hand the parts to workers; with neither it runs one after the other, each on all cores."""
     if executor is None and workers is None:
         yield
         return
@@ -110,48 +113,97 @@ def parts_on(executor: MakesExecutor | None, workers: int | None) -> Iterator[No
             _workers.reset(token)
 
 
-def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progress | None) -> tuple[list[Part], bool]:
-    """Run the parts of a study; Ctrl-C ends them and keeps what is finished, unless nothing is.
-
-    A part must be picklable, as `functools.partial` of a function at the top level is, and so must what it returns.
+class Parts:
+    """Run the parts of a study, group by group; Ctrl-C or a lost worker ends them and keeps what is finished.
 
     Parameters
     ----------
-    parts : iterable of (str, callable)
-        What is going on, and the work.
     progress : callable, optional
-        Called with that text before each part.
+        Called with a short text before each part.
 
-    Returns
-    -------
-    tuple of list and bool
-        What the first parts returned, as many as are finished, and whether Ctrl-C or a lost worker ended them.
+    Attributes
+    ----------
+    progress : callable
+        The same, or one that does nothing.
+    interrupted : bool
+        Whether Ctrl-C or a lost worker ended them; every later group is empty.
     """
-    workers = _workers.get()
-    if workers is not None:
-        return _on_workers(workers, list(parts), progress)
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.interrupted = False
+        self.progress = progress or silent
+        self._any = False
+
+    def __call__(self, parts: Iterable[tuple[str, Callable[[], Part]]]) -> list[Part]:
+        """Return what the first parts of a group returned, as many as are finished.
+
+        Parameters
+        ----------
+        parts : iterable of (str, callable)
+            What is going on, and the work. It must be picklable, as `functools.partial` of a function at the top level
+            is, and so must what it returns. Nothing is read of it where an earlier group was interrupted.
+
+        Raises
+        ------
+        mgdd.errors.Interrupted, mgdd.errors.WorkerLostError
+            Nothing of this group or an earlier one is finished.
+        """
+        if self.interrupted:
+            return []
+        workers = _workers.get()
+        done, stop = _one_by_one(parts, self.progress) if workers is None else _on(workers, list(parts), self.progress)
+        self.interrupted = stop is not None
+        self._any = self._any or bool(done)
+        if stop is not None and not self._any:  # what the part itself may have kept is not a result of the study
+            raise stop
+        return done
+
+    def finish(
+        self,
+        name: str,
+        dataset: xr.Dataset,
+        draw: Callable[[xr.Dataset], Mapping[str, Figure]] | None,
+        **summary: Any,
+    ) -> StudyResult:
+        """Return a whole result; raise one that was cut short as the part of the error that did it.
+
+        `draw` makes the figures of the dataset by caption; the summary has at least ``seeds`` and ``rows``.
+        """
+        figures = {} if draw is None else draw(dataset)
+        plain = to_jsonable({"study": name, **summary, "interrupted": self.interrupted})
+        result = StudyResult(name=name, dataset=dataset, figures=figures, summary=Figures(plain))
+        workers = _workers.get()
+        stop: Interrupted | WorkerLostError | None = None if workers is None else workers.lost
+        if stop is None and self.interrupted:
+            stop = Interrupted(f"interrupted: {len(plain['rows'])} finished rows are in .partial")
+        return hand_over(result, stop)
+
+
+def silent(_: str) -> None:
+    """Take no notice of progress."""
+
+
+def _one_by_one(
+    parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progress
+) -> tuple[list[Part], Interrupted | None]:
     done: list[Part] = []
     try:
         for text, work in parts:
-            if progress is not None:
-                progress(text)
+            progress(text)
             done.append(work())
     except KeyboardInterrupt:
-        if not done:  # what the part itself may have kept is not a result of the study
-            raise Interrupted("interrupted: nothing was finished") from None
-        return done, True
-    return done, False
+        return done, Interrupted("interrupted: nothing was finished")
+    return done, None
 
 
-def _on_workers(
-    workers: _Workers, parts: Sequence[tuple[str, Callable[[], Part]]], progress: Progress | None
-) -> tuple[list[Part], bool]:
+def _on(
+    workers: _Workers, parts: Sequence[tuple[str, Callable[[], Part]]], progress: Progress
+) -> tuple[list[Part], Interrupted | WorkerLostError | None]:
     found: dict[int, Part] = {}
 
     def cut(start: int, _: int) -> tuple[Callable[[], Part]]:
         text, work = parts[start]
-        if progress is not None:
-            progress(text)
+        progress(text)
         return (work,)
 
     def keep(start: int, _: int, part: Part) -> None:
@@ -159,25 +211,9 @@ def _on_workers(
 
     # One part to a chunk; an unbroken row of them is what a study knows how to hand over.
     stop = run_chunks(_call, cut, keep, len(parts), executor=workers.pool, largest=1)
-    done = [found[number] for number in takewhile(found.__contains__, range(len(parts)))]
-    if stop is not None and not done:
-        raise stop
     workers.lost = stop if isinstance(stop, WorkerLostError) else None
-    return done, stop is not None
+    return [found[number] for number in takewhile(found.__contains__, range(len(parts)))], stop
 
 
 def _call(work: Callable[[], Part]) -> Part:
     return work()
-
-
-def finish(
-    dataset: xr.Dataset, summary: Mapping[str, Any], draw: Callable[[xr.Dataset], Mapping[str, Figure]] | None
-) -> StudyResult:
-    """Return a whole result; raise one that was cut short as the part of the error that did it."""
-    figures = {} if draw is None else draw(dataset)
-    result = StudyResult(name=summary["study"], dataset=dataset, figures=figures, summary=summary)
-    workers = _workers.get()
-    stop: Interrupted | WorkerLostError | None = None if workers is None else workers.lost
-    if stop is None and summary["interrupted"]:
-        stop = Interrupted(f"interrupted: {len(summary['rows'])} finished rows are in .partial")
-    return hand_over(result, stop)

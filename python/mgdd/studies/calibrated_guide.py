@@ -7,51 +7,36 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.calibrated_guide_cases import (
-    BURN,
-    HEAT,
-    RECIPES,
-    STEADY,
-    VARIANTS,
-    WIEBE_45,
-    WIEBE_60,
-    Engine,
-    GuidedRun,
-    Recipe,
-    curve_of,
-    guided_run,
-    refits_of,
-    step_run,
-)
-from mgdd.studies.calibrated_guide_figures import draw
-from mgdd.studies.calibrated_guide_rows import (
-    CYCLES,
-    TDC_CAD,
-    Case,
-    Runs,
-    Steps,
-    bars,
-    findings,
-    refit_row,
-    row,
-    setting_row,
-    step_row,
-    uncalibrated,
-)
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies import calibrated_guide_cases as cases
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.calibrated_guide_cases import Case, Engine, GuidedRun, Recipe, Runs, Steps
+from mgdd.studies.figures import band, legend_outside, names_of, new_figure
 from mgdd.studies.guide_cases import SteadyMap
+from mgdd.studies.statistics import band_variables, with_quantiles
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["run_calibrated_guide"]
 
 SHORT_CYCLES, REFIT_CYCLES = 100, 50
 STEP_CYCLE, AFTER = 150, 120
-_ENGINES = (WIEBE_45, WIEBE_60)
+_ENGINES = (cases.WIEBE_45, cases.WIEBE_60)
 _STARTS_CAD = (-20.0, 0.0)
+_MAIN_CASES = [
+    Case(engine=engine, start_cad=start, recipe=recipe, tdc_error_cad=tdc)
+    for tdc in (0.0, cases.TDC_CAD) for engine in _ENGINES for start in _STARTS_CAD
+    for recipe in (cases.RECIPES if tdc == 0.0 else (cases.HEAT, cases.BURN))
+]  # fmt: skip
+_SHORT_CASES = [
+    Case(engine=engine, start_cad=start, recipe=recipe, cycles=SHORT_CYCLES)
+    for engine, start in zip(_ENGINES, _STARTS_CAD, strict=True) for recipe in cases.VARIANTS
+]  # fmt: skip
 
 
 def run_calibrated_guide(
@@ -72,10 +57,8 @@ def run_calibrated_guide(
         Runs of every case.
     quick : bool
         At most two seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -91,11 +74,6 @@ def run_calibrated_guide(
         lost after a load step. ``summary["findings"]``: what calibration gains, in words. ``summary["bars"]``: what was
         demanded.
 
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
-
     References
     ----------
     Tan (2018), chapter 6 (question); the numbers are of this package's own bench.
@@ -107,68 +85,39 @@ def run_calibrated_guide(
     >>> [round(rows[at]["guide_error_end_cad"], 0) for at in (0, 1)]  # Wiebe 45, not calibrated and calibrated
     [7.0, -1.0]
     """
-    seeds = min(check_seeds(seeds), 2) if quick else check_seeds(seeds)
+    seeds = check_seeds(seeds, quick=quick, most=2)
+    work = Parts(progress)
     maps = {engine.name: SteadyMap.of(engine.bench()) for engine in _ENGINES}
-    runs, interrupted = run_parts([(case.name, partial(seek, case, maps, seeds)) for case in _main_cases()], progress)
-    refits: list[dict[str, Any]] = []
-    settings: list[Runs] = []
-    steps: list[Steps] = []
-    if not interrupted:
-        parts = [
-            (f"refits, {engine.name}, {recipe.name}", partial(_refits, engine, recipe, maps, seeds))
-            for engine in _ENGINES for recipe in (HEAT, BURN)
-        ]  # fmt: skip
-        refits, interrupted = run_parts(parts, progress)
-    if not interrupted:
-        cases = [
-            Case(engine=engine, start_cad=start, recipe=recipe, cycles=SHORT_CYCLES)
-            for engine, start in zip(_ENGINES, _STARTS_CAD, strict=True) for recipe in VARIANTS
-        ]  # fmt: skip
-        settings, interrupted = run_parts([(c.name, partial(seek, c, maps, seeds)) for c in cases], progress)
-    if not interrupted:
-        each = [
-            (engine, form, recipe)
-            for engine in _ENGINES
-            for form in ("curve", "feed-forward")
-            for recipe in (*RECIPES, STEADY)
-        ]
-        texts = [f"load step, {form}, {engine.name}, calibrated: {recipe.name}" for engine, form, recipe in each]
-        works = [partial(_step, engine, form, recipe, seeds) for engine, form, recipe in each]
-        steps, interrupted = run_parts(list(zip(texts, works, strict=True)), progress)
-    rows = [row(own, uncalibrated(own, runs)) for own in runs]
-    step_rows = [step_row(own, steps) for own in steps]
-    summary = {
-        "study": "calibrated-guide",
-        "seeds": seeds,
-        "rows": rows,
-        "refits": refits,
-        "settings": [setting_row(own, uncalibrated(own, settings)) for own in settings],
-        "load_step": step_rows,
-        "findings": findings(rows, step_rows),
-        "bars": bars(rows, refits),
-        "guide_cad": curve_of().best,
-        "interrupted": interrupted,
-    }
-    return finish(_dataset(runs, steps), to_jsonable(summary), draw if figures else None)
+    runs = work((case.name, partial(_seek, case, maps, seeds)) for case in _MAIN_CASES)
+    refits = work(
+        (f"refits, {engine.name}, {recipe.name}", partial(_refits, engine, recipe, maps, seeds))
+        for engine in _ENGINES for recipe in (cases.HEAT, cases.BURN)
+    )  # fmt: skip
+    settings = work((case.name, partial(_seek, case, maps, seeds)) for case in _SHORT_CASES)
+    steps = work(
+        (f"load step, {form}, {engine.name}, calibrated: {recipe.name}", partial(_step, engine, form, recipe, seeds))
+        for engine in _ENGINES for form in ("curve", "feed-forward") for recipe in (*cases.RECIPES, cases.STEADY)
+    )  # fmt: skip
+    rows = [cases.row(own, cases.uncalibrated(own, runs)) for own in runs]
+    step_rows = [cases.step_row(own, steps) for own in steps]
+    return work.finish(
+        "calibrated-guide", _dataset(runs, steps), _draw if figures else None,
+        seeds=seeds,
+        rows=rows,
+        refits=refits,
+        settings=[cases.setting_row(own, cases.uncalibrated(own, settings)) for own in settings],
+        load_step=step_rows,
+        findings=cases.findings(rows, step_rows),
+        bars=cases.bars(rows, refits),
+        guide_cad=cases.curve_of().best,
+    )  # fmt: skip
 
 
-def _main_cases() -> list[Case]:
-    return [
-        Case(engine=engine, start_cad=start, recipe=recipe, tdc_error_cad=tdc)
-        for tdc in (0.0, TDC_CAD) for engine in _ENGINES for start in _STARTS_CAD
-        for recipe in (RECIPES if tdc == 0.0 else (HEAT, BURN))
-    ]  # fmt: skip
-
-
-def seek(case: Case, maps: dict[str, SteadyMap], seeds: int) -> Runs:
+def _seek(case: Case, maps: dict[str, SteadyMap], seeds: int) -> Runs:
     """Run one case, once per seed."""
     steady = maps[case.engine.name]
-    found = [
-        guided_run(
-            case.engine.bench(seed, tdc_error_cad=case.tdc_error_cad), case.recipe, case.start_cad, case.cycles
-        )
-        for seed in range(seeds)
-    ]  # fmt: skip
+    benches = [case.engine.bench(seed, tdc_error_cad=case.tdc_error_cad) for seed in range(seeds)]
+    found = [cases.guided_run(bench, case.recipe, case.start_cad, case.cycles) for bench in benches]
     return Runs(case=case, best_cad=steady.best_cad, **_errors(found, steady))
 
 
@@ -181,13 +130,15 @@ def _errors(found: list[GuidedRun], steady: SteadyMap) -> dict[str, NDArray[np.f
 
 
 def _refits(engine: Engine, recipe: Recipe, maps: dict[str, SteadyMap], seeds: int) -> dict[str, Any]:
-    found = [refits_of(engine.bench(seed), recipe, _STARTS_CAD[0], REFIT_CYCLES) for seed in range(seeds)]
-    return refit_row(engine, recipe, found, maps[engine.name].best_cad)
+    found = [cases.refits_of(engine.bench(seed), recipe, _STARTS_CAD[0], REFIT_CYCLES) for seed in range(seeds)]
+    return cases.refit_row(engine, recipe, found, maps[engine.name].best_cad)
 
 
 def _step(engine: Engine, form: str, recipe: Recipe, seeds: int) -> Steps:
     _, after = engine.step_maps()
-    whole = [step_run(engine.stepping(seed, STEP_CYCLE), recipe, form, STEP_CYCLE + AFTER) for seed in range(seeds)]
+    whole = [
+        cases.step_run(engine.stepping(seed, STEP_CYCLE), recipe, form, STEP_CYCLE + AFTER) for seed in range(seeds)
+    ]
     found = _errors([GuidedRun(*(column[STEP_CYCLE:] for column in run)) for run in whole], after)
     return Steps(
         engine=engine, form=form, recipe=recipe, error=found["error"], guide_error=found["guide_error"][:, 0],
@@ -204,22 +155,89 @@ def _dataset(runs: list[Runs], steps: list[Steps]) -> xr.Dataset:
         "start_cad": ("run", [own.case.start_cad for own in runs], cad, "start of the run"),
         "tdc_error_cad": ("run", [own.case.tdc_error_cad for own in runs], "°CA", "error of TDC of the pressure"),
         "best_cad": ("run", [own.best_cad for own in runs], cad, "best timing"),
-        "cycle": ("cycle", np.arange(CYCLES)),
+        "cycle": ("cycle", np.arange(cases.CYCLES)),
         "seed": ("seed", np.arange(runs[0].error.shape[0]), "-", "seed"),
         "late_error_cad": (("run", "seed"), [own.late for own in runs], "°CA", "mean error after 60 cycles"),
     }
-    for at, (name, text) in enumerate((("median", "median"), ("low", "10 % quantile"), ("high", "90 % quantile"))):
-        share = (0.5, 0.1, 0.9)[at]
-        for what, label in (("error", "error of the estimate"), ("guide_error", "error of the guide")):
-            bands = [np.quantile(getattr(own, what), share, axis=0) for own in runs]
-            variables[f"{what}_{name}_cad"] = (("run", "cycle"), bands, "°CA", f"{label}, {text}")
+    for what, label in (("error", "error of the estimate"), ("guide_error", "error of the guide")):
+        said = with_quantiles(label) | {"median": f"{label}, median"}
+        variables |= band_variables(
+            f"{what}_{{}}_cad", ("run", "cycle"), [getattr(own, what) for own in runs], "°CA", said
+        )
     if steps:
         names = [f"{own.engine.name}, {own.form}, {own.recipe.name}" for own in steps]
-        variables["step"] = ("step", names, "-", "engine, form and calibration")
-        variables["after_step"] = ("after_step", np.arange(AFTER), "-", "cycles since the load step")
-        variables["step_lost"] = (("step", "seed"), [own.lost for own in steps], "%", "J lost after the load step")
-        for at, name in enumerate(("median", "low", "high")):
-            bands = [np.quantile(own.error, (0.5, 0.1, 0.9)[at], axis=0) for own in steps]
-            label = "error of the estimate after the load step" + ("", ", 10 % quantile", ", 90 % quantile")[at]
-            variables[f"step_error_{name}_cad"] = (("step", "after_step"), bands, "°CA", label)
+        text = "error of the estimate after the load step"
+        bands = [own.error for own in steps]
+        variables |= {
+            "step": ("step", names, "-", "engine, form and calibration"),
+            "after_step": ("after_step", np.arange(AFTER), "-", "cycles since the load step"),
+            "step_lost": (("step", "seed"), [own.lost for own in steps], "%", "J lost after the load step"),
+            **band_variables("step_error_{}_cad", ("step", "after_step"), bands, "°CA", with_quantiles(text)),
+        }
     return labelled_dataset(variables)
+
+
+_LOOKS = dict(zip((recipe.name for recipe in cases.RECIPES), (("-", BLACK), ("--", BLUE), ("-.", ORANGE)), strict=True))
+_SHOWN, _SHOWN_AFTER = 80, 60
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    out = {
+        "Error of the guide's best timing (above) and of the estimate (below): median of the seeds, and the band that "
+        "holds 80 % of them": _starts(dataset)
+    }
+    if "step" in dataset:
+        out["Error of the estimate after a load step from 12 to 30 mg, by the curve and by feed-forward"] = _steps(
+            dataset
+        )
+    return out
+
+
+def _starts(dataset: xr.Dataset) -> Figure:
+    own = dataset.isel(run=np.flatnonzero(dataset["tdc_error_cad"] == 0.0))
+    columns = list(dict.fromkeys(zip(own["engine"].to_numpy(), own["start_cad"].to_numpy(), strict=True)))
+    figure = new_figure(3.1 * len(columns) + 0.6, 5.4)
+    axes = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
+    for (above, below), (engine, start) in zip(axes.T, columns, strict=True):
+        runs = own.isel(
+            run=np.flatnonzero((own["engine"] == engine) & (own["start_cad"] == start)), cycle=slice(_SHOWN)
+        )
+        for at, name in enumerate(map(str, runs["calibrated"].to_numpy())):
+            one = runs.isel(run=at)
+            _band(above, one["cycle"], one, "guide_error", name)
+            _band(below, one["cycle"], one, "error", name)
+        above.set_title(f"{engine},\nfrom {start:g} °CA aTDC".replace("-", "−"), loc="left", fontsize="small")
+        below.set_ylim(-4.0, 4.0)
+        below.axhspan(-1.5, 1.5, color=GREY, alpha=0.15, linewidth=0.0)
+    axes[0, 0].set_ylabel("error of the guide's\nbest timing [°CA]")
+    axes[1, 0].set_ylabel("error of the estimate [°CA]")
+    figure.supxlabel("engine cycle [-]", fontsize="medium")
+    legend_outside(figure, axes[0, 0], 3)
+    return figure
+
+
+def _steps(dataset: xr.Dataset) -> Figure:
+    parts = [name.rsplit(", ", 2) for name in names_of(dataset, "step")]
+    columns = list(dict.fromkeys((engine, form) for engine, form, _ in parts))
+    figure = new_figure(3.1 * len(columns) + 0.6, 3.8)
+    axes = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
+    cycle = dataset["after_step"].to_numpy()[:_SHOWN_AFTER]
+    for ax, case in zip(axes, columns, strict=True):
+        for at, (engine, form, name) in enumerate(parts):
+            if (engine, form) == case and name in _LOOKS:
+                _band(ax, cycle, dataset.isel(step=at, after_step=slice(_SHOWN_AFTER)), "step_error", name)
+        ax.axhspan(-1.5, 1.5, color=GREY, alpha=0.15, linewidth=0.0)
+        ax.set_title(f"{case[0]},\n{case[1]}", loc="left", fontsize="small")
+    axes[0].set_ylabel("error of the estimate [°CA]")
+    figure.supxlabel("cycles since the load step [-]", fontsize="medium")
+    legend_outside(figure, axes[0], 3)
+    return figure
+
+
+def _band(ax: Axes, cycle: xr.DataArray | np.ndarray, one: xr.Dataset, what: str, name: str) -> None:
+    dash, color = _LOOKS[name]
+    ends = [one[f"{what}_{end}_cad"] for end in ("low", "median", "high")]
+    label = "not calibrated" if name == "none" else f"calibrated: {name}"
+    band(ax, cycle, *ends, dash=dash, color=color, alpha=0.13, linewidth=1.3, label=label)
+    ax.axhline(0.0, color=GREY, linewidth=0.7)
+    ax.grid(alpha=0.3)

@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import GuidedEngine, ModelOptimum, OnlineCalibration
 from mgdd.loop import EngineBench, run_seeker
 from mgdd.optimize import ExtremumSeeking
-from mgdd.studies.calibration_facts import WRONG
-from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT, SteadyMap, curve_seeker, seeker_without_clip
+from mgdd.studies.guide_cases import (
+    BOUNDS_CAD,
+    PLANT,
+    WRONG,
+    SteadyMap,
+    curve_seeker,
+    seeker_without_clip,
+    verdict_on,
+    verdicts,
+)
+from mgdd.studies.statistics import first_within, quantile_of, stays_within, with_interval, with_median_interval
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from mgdd.guide import Curve, CurveSeeking
 
 __all__ = [
-    "BURN",
-    "HEAT",
-    "NOISE_BAR",
-    "NONE",
-    "RECIPES",
-    "STEADY",
-    "VARIANTS",
-    "WIEBE_45",
-    "WIEBE_60",
-    "Engine",
-    "GuidedRun",
-    "Recipe",
-    "Refit",
-    "curve_of",
-    "guided_run",
-    "refits_of",
-    "step_run",
-]
+    "BURN", "CYCLES", "HEAT", "RECIPES", "STEADY", "TDC_CAD", "VARIANTS", "WIEBE_45", "Case", "Engine", "GuidedRun",
+    "Recipe", "Runs", "Steps", "bars", "curve_of", "findings", "guided_run", "refit_row", "refits_of", "row",
+    "setting_row", "step_row", "step_run", "uncalibrated",
+]  # fmt: skip
 
 NOISE_BAR = 0.2
 _LOW, _HIGH = OperatingPoint(fuel_mg=12.0), OperatingPoint(fuel_mg=30.0)  # burn durations by the law of the cylinder
@@ -184,3 +181,179 @@ def refits_of(bench: EngineBench, recipe: Recipe, start_cad: float, cycles: int)
             found.append((k, float(twin.estimate[0]), float(engine.estimate[0])))
     said = engine.history["guide_cad"].to_numpy()  # before each cycle
     return [Refit(k, without, with_it, float(said[k + 1])) for k, without, with_it in found]
+
+
+CYCLES, LATE = 200, 60
+TDC_CAD = 0.3
+_STAY_CAD, _BACK_CAD, _NEAR_AFTER = 1.5, 1.0, 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """An engine, where seeking starts on it, how the guide is calibrated, and how late TDC is read."""
+
+    engine: Engine
+    start_cad: float
+    recipe: Recipe
+    tdc_error_cad: float = 0.0
+    cycles: int = CYCLES
+
+    @property
+    def name(self) -> str:
+        """For a progress line."""
+        tdc = f", TDC {self.tdc_error_cad:g} CAD late" if self.tdc_error_cad else ""
+        return f"{self.engine.name} from {self.start_cad:g}, calibrated: {self.recipe.name}{tdc}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runs:
+    """Of one case, one row per seed: errors of estimate and guide [°CA], J lost by what was applied [points]."""
+
+    case: Case
+    error: NDArray[np.float64]
+    guide_error: NDArray[np.float64]
+    lost: NDArray[np.float64]
+    best_cad: float
+
+    @property
+    def late(self) -> NDArray[np.float64]:
+        """Mean absolute error of the estimate after the first sixty cycles, by seed."""
+        return np.asarray(np.abs(self.error[:, LATE:]).mean(axis=1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steps:
+    """Load steps of one engine, form and recipe, one row per seed; errors from the load step on."""
+
+    engine: Engine
+    form: str
+    recipe: Recipe
+    error: NDArray[np.float64]
+    guide_error: NDArray[np.float64]  # of the first cycle of the new point
+    lost: NDArray[np.float64]
+
+
+def uncalibrated(own: Runs, runs: list[Runs]) -> Runs:
+    """Find the runs without calibration on the same noise; pressure has no part in those."""
+    same = (own.case.engine.name, own.case.start_cad)
+    return next(r for r in runs if r.case.recipe == NONE and (r.case.engine.name, r.case.start_cad) == same)
+
+
+def setting_row(own: Runs, plain: Runs) -> dict[str, Any]:
+    """Put one case into figures, beside the same runs without calibration."""
+    stays = [stays_within(error, 0.0, _STAY_CAD) for error in own.error]
+    return {
+        "engine": own.case.engine.name,
+        "start_cad": own.case.start_cad,
+        "calibrated": own.case.recipe.name,
+        **with_median_interval("median_stays", stays),
+        "stays_90_percent": quantile_of(stays, 0.9),
+        **with_interval("late_error_cad", own.late),
+        **with_interval("late_error_less_cad", plain.late - own.late),
+        **with_interval("late_lost_percent", own.lost[:, LATE:].mean(axis=1)),
+        "guide_error_end_cad": float(np.median(own.guide_error[:, -1])),
+    }
+
+
+def row(own: Runs, plain: Runs) -> dict[str, Any]:
+    """Put one case into figures, with the error of the guide over cycles."""
+    said = setting_row(own, plain)
+    end = said.pop("guide_error_end_cad")
+    at = {"guide_error_cad": 0, "guide_error_10_cad": 10, "guide_error_60_cad": 60}
+    return {
+        **{name: said.pop(name) for name in ("engine", "start_cad", "calibrated")},
+        "tdc_error_cad": own.case.tdc_error_cad,
+        **said,
+        **{name: float(np.median(own.guide_error[:, k])) for name, k in at.items()},
+        "guide_error_end_cad": end,
+    }
+
+
+def refit_row(engine: Engine, recipe: Recipe, found: list[list[Refit]], best: float) -> dict[str, Any]:
+    """Say what calibrations did to the estimate, run by run."""
+    early = [_change(refit, best) for refits in found for refit in refits if refit.cycle < _NEAR_AFTER]
+    late = [[refit for refit in refits if refit.cycle >= _NEAR_AFTER] for refits in found]
+    changes = [_change(refit, best) for refits in late for refit in refits]
+    thrown = [abs(refit.without - best) <= _STAY_CAD < abs(refit.with_it - best) for refits in late for refit in refits]
+    return {
+        "engine": engine.name,
+        "calibrated": recipe.name,
+        "refits_per_run": sum(map(len, found)) / len(found),
+        "early_change_cad": float(np.mean(early)) if early else math.nan,
+        **with_interval("late_change_cad", [np.mean([_change(r, best) for r in own]) for own in late if own]),
+        "late_worst_cad": max(changes, default=math.nan),
+        "thrown_back": sum(thrown),
+        "late_refits": len(thrown),
+    }
+
+
+def _change(refit: Refit, best: float) -> float:
+    """Give by how much the calibration made the estimate worse."""
+    return abs(refit.with_it - best) - abs(refit.without - best)
+
+
+def step_row(own: Steps, steps: list[Steps]) -> dict[str, Any]:
+    """Put the load steps of one form and recipe into figures, beside the same without calibration."""
+    plain = next(s for s in steps if (s.engine, s.form) == (own.engine, own.form) and s.recipe == NONE)
+    back = [first_within(error, 0.0, _BACK_CAD) for error in own.error]
+    return {
+        "engine": own.engine.name,
+        "form": own.form,
+        "calibrated": own.recipe.name,
+        "guide_error_cad": float(np.median(own.guide_error)),
+        **with_median_interval("median_back", back),
+        "back_90_percent": quantile_of(back, 0.9),
+        **with_interval("lost", own.lost),
+        **with_interval("lost_less", plain.lost - own.lost),
+    }
+
+
+def findings(rows: list[dict[str, Any]], steps: list[dict[str, Any]]) -> list[str]:
+    """Say in words what calibration gains over the same guide without it."""
+    said = []
+    for name in (HEAT.name, BURN.name):
+        own = [row for row in rows if row["calibrated"] == name and row["tdc_error_cad"] == 0.0]
+        if own:
+            text = f"One operating point, {name}: the mean error after {LATE} cycles is"
+            said.append(f"{text} {_gain(own, 'late_error_less_cad', 2, '°CA')}")
+    for form in ("curve", "feed-forward"):
+        for name in (HEAT.name, BURN.name):
+            own = [row for row in steps if (row["form"], row["calibrated"]) == (form, name)]
+            if own:
+                text = f"After a load step, {form}, {name}: the loss is"
+                said.append(f"{text} {_gain(own, 'lost_less', 1, 'points x cycles')}")
+    return said
+
+
+def _gain(rows: list[dict[str, Any]], name: str, digits: int, unit: str) -> str:
+    gains = [row[name] for row in rows]
+    better = sum(row[f"{name}_low"] > 0.0 for row in rows)
+    worse = sum(row[f"{name}_high"] < 0.0 for row in rows)
+    span = f"{min(gains):.{digits}f} to {max(gains):.{digits}f} {unit}"
+    beyond = f"beyond the 95 % interval better in {better} of {len(rows)} cases, worse in {worse}"
+    return f"{span} less than without calibration, {beyond}."
+
+
+def bars(rows: list[dict[str, Any]], refits: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Compare with what was demanded of a guide that learns."""
+    said = []
+    for recipe in (HEAT, BURN):
+        for tdc in (0.0, TDC_CAD):
+            own = [row for row in rows if row["calibrated"] == recipe.name and row["tdc_error_cad"] == tdc]
+            if not own:
+                continue
+            text = recipe.name + (f", TDC {tdc:g} CAD late" if tdc else "")
+            said += verdicts([
+                (f"{text}: stays within 1.5 CAD, median [cycles]", [row["median_stays"] for row in own], 8.0),
+                (f"{text}: mean error after 60 cycles [CAD]", [row["late_error_cad"] for row in own], 0.5),
+            ])  # fmt: skip
+            if not tdc:
+                better = [row["late_error_less_cad_low"] for row in own]
+                text += ": less error after 60 cycles than without calibration, low end of the interval [CAD]"
+                said.append(verdict_on(text, better, "at least 0", low=0.0))
+    for name in (HEAT.name, BURN.name):
+        found = [row for row in refits if row["calibrated"] == name]
+        if found:
+            thrown = [100.0 * row["thrown_back"] / max(row["late_refits"], 1) for row in found]
+            said.append(verdict_on(f"{name}: refits that throw the estimate back [%]", thrown, "none", high=0.0))
+    return said

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.engine import Cylinder, OperatingPoint
+from mgdd.guide import FeedForward, ModelOptimum
+from mgdd.loop import EngineBench
 from mgdd.maps import optimize_map
+from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.guide_cases import PLANT
 from mgdd.sweep import sweep
@@ -18,23 +21,15 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from mgdd.guide import TimingMap
+    from mgdd.maps import CalibrationMap
+
     Array = NDArray[np.float64]
 
 __all__ = [
-    "AXES",
-    "CELLS",
-    "ENGINES",
-    "LIMITS",
-    "MIDDLES",
-    "OBJECTIVE",
-    "ROUGH",
-    "TIMINGS",
-    "Truth",
-    "as_sweep",
-    "grid_of",
-    "intake_kpa",
-    "point_of",
-]
+    "AXES", "CELLS", "DWELL", "EARLY", "ENGINES", "LIMITS", "MIDDLES", "OBJECTIVE", "ROUGH", "TIMINGS", "Drive",
+    "Truth", "as_sweep", "drive", "drive_by_map", "intake_kpa", "point_of", "rough_model", "timing_map",
+]  # fmt: skip
 
 OBJECTIVE = "efficiency_percent"
 LIMITS: Mapping[str, float] = {"p_max_bar": 130.0, "dp_max_bar_per_cad": 4.2}
@@ -44,7 +39,6 @@ AXES: Mapping[str, Array] = {
 }
 TIMINGS = np.linspace(-24.0, 10.0, 69)
 _FINE = np.linspace(-30.0, 14.0, 441)  # of the truth [°CA aTDC]
-_RESPONSES = (OBJECTIVE, *LIMITS)
 
 
 def _changed(*, heat: float = 1.0, burn: float = 1.0, compression: float = 0.0) -> Cylinder:
@@ -109,20 +103,13 @@ def as_sweep(columns: Mapping[str, Array], timings: Array, axes: Mapping[str, Ar
 class Truth:
     """An engine without noise at some operating points: efficiency [points] and what is limited, over the timing.
 
-    Parameters
-    ----------
-    columns : mapping of str to ndarray, shape (places, timings)
-        Every response over 441 timings from -30 to 14 °CA aTDC.
-    best_cad, best : ndarray, shape (places,)
-        Best timing under the limits, and the efficiency there.
-    free_cad, free : ndarray, shape (places,)
-        The same without limits.
+    Shapes (places, timings) of the columns, over 441 timings from -30 to 14 °CA aTDC, and (places,) of all else.
     """
 
     columns: Mapping[str, Array]
-    best_cad: Array
+    best_cad: Array  # under the limits
     best: Array
-    free_cad: Array
+    free_cad: Array  # without limits
     free: Array
 
     @classmethod
@@ -157,3 +144,82 @@ class Truth:
     def excess(self, timing_cad: ArrayLike) -> Array:
         """How far beyond its worst limit each place runs, as a share of that limit; negative inside."""
         return np.asarray(np.max([self.at(timing_cad, name) / upper - 1.0 for name, upper in LIMITS.items()], axis=0))
+
+
+PLACES, DWELL, EARLY = 16, 200, 50  # operating points of a drive, cycles at each, and those that count as early
+PRIOR_SD_CAD = 2.0  # how far a cell of the map may lie from the best timing
+_START_CAD, _BOUNDS_CAD = 0.0, (-30.0, 14.0)
+_GAIN = 0.98  # time constant 40 cycles at a curvature of -0.051 points per CAD**2
+_CONFIRMED = 100  # last cycles at a point that make a confirmed optimum
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """J lost [points] and share beyond the worst limit, shape (cycles of a point, points but the first)."""
+
+    lost: Array
+    excess: Array
+    learnt: int = 0
+
+    @property
+    def above_percent(self) -> float:
+        """Cycles beyond a limit, without scatter and noise [%]."""
+        return 100.0 * float((self.excess > 0.0).mean())
+
+
+def route(seed: int) -> tuple[Array, Array]:
+    """Draw the speeds and loads of a drive inside the axes of the map."""
+    draw = np.random.default_rng([seed, 2026]).random((len(AXES), PLACES))
+    speed, fuel = (entries[0] + part * np.ptp(entries) for entries, part in zip(AXES.values(), draw, strict=True))
+    return speed, fuel
+
+
+def timing_map(table: CalibrationMap) -> TimingMap:
+    """Make the table of the guide of a map; it forgets nothing, since its engine stays as it is."""
+    return table.to_timing_map(prior_sd_cad=PRIOR_SD_CAD, forgetting=1.0)
+
+
+def drive(cylinder: Cylinder, guide: Any, seed: int, *, learns: bool = False) -> Drive:
+    """Drive a route by extremum seeking under the limits, led by a map, a model or nothing as feed-forward.
+
+    A map that `learns` takes the settled estimate of each point before the next one; route and noise are those of the
+    seed.
+    """
+    places = route(seed)
+    points = [point_of(*place) for place in zip(*places, strict=True)]
+    schedule = [(k * DWELL, point) for k, point in enumerate(points)]
+    bench = EngineBench(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed)
+    plain = ExtremumSeeking(
+        start=_START_CAD, lower=_BOUNDS_CAD[0], upper=_BOUNDS_CAD[1], form="moving_average", gain=_GAIN,
+        limits=[Limit(name, upper) for name, upper in LIMITS.items()],
+    )  # fmt: skip
+    seeker = FeedForward(plain, guide)
+    applied, learnt = np.empty((PLACES, DWELL)), 0
+    for k, point in enumerate(points):
+        seeker.at(point)  # once: it stands still until the next
+        for cycle in range(DWELL):
+            asked = float(seeker.ask()[0])
+            measured = bench.step(asked)
+            applied[k, cycle] = measured["soc_applied_cad"]
+            seeker.tell(measured["j"], measured["limits"])
+        if learns:
+            learnt += guide.learn_from(seeker, point, cycles=_CONFIRMED)
+    return _judged(cylinder, places, applied, learnt)
+
+
+def drive_by_map(cylinder: Cylinder, table: Callable[[Any], float | None], seed: int) -> Drive:
+    """Drive the same route at the timings of a table, without a seeker."""
+    places = route(seed)
+    timings = [table(point_of(*place)) for place in zip(*places, strict=True)]
+    return _judged(cylinder, places, np.repeat(np.array(timings, np.float64)[:, None], DWELL, axis=1), 0)
+
+
+def rough_model() -> ModelOptimum:
+    """Make the model that was there before anything was measured."""
+    return ModelOptimum(ROUGH, bounds_cad=_BOUNDS_CAD)
+
+
+def _judged(cylinder: Cylinder, places: tuple[Array, Array], applied: Array, learnt: int) -> Drive:
+    """Judge all but the first point, where a seeker without a guide stands wherever it was put."""
+    truth, moved = Truth.of(cylinder, (places[0][1:], places[1][1:])), applied[1:].T
+    return Drive(lost=truth.lost(moved), excess=truth.excess(moved), learnt=learnt)

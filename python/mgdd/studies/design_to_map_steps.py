@@ -16,8 +16,11 @@ from mgdd.maps import CalibrationMap, optimize_map, smooth_map
 from mgdd.optimize import Limit
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.design_to_map_engine import (
+    AXES,
     CELLS,
+    ENGINES,
     LIMITS,
+    MIDDLES,
     OBJECTIVE,
     ROUGH,
     TIMINGS,
@@ -36,25 +39,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = [
-    "CYCLES",
-    "FACTORS",
-    "PRICES",
-    "SETTLING",
-    "SLOPES",
-    "Checked",
-    "Measured",
-    "check_map",
-    "design",
-    "design_of_cells",
-    "margins_of",
-    "measure",
-    "optimum_of",
-    "predict",
-    "responses",
-    "screen",
-    "smooth",
-]
+__all__ = ["CASES", "POLYNOMIAL", "PROCESS", "QUICK_CASES", "SETTLING", "SLOPES", "STAGES", "Case", "Made", "make_map"]
 
 FACTORS = {"speed_rpm": (800.0, 3200.0), "fuel_mg": (5.0, 35.0), "soc_cad": (-24.0, 8.0)}
 SETTLING, CYCLES = 20, 50  # cycles of a point that do not count, and that are averaged
@@ -143,19 +128,8 @@ def smooth(
 ) -> tuple[CalibrationMap, float]:
     """Step 5: smooth the map at the least of `PRICES` that the slope limits allow; give both.
 
-    Parameters
-    ----------
-    predicted : xarray.Dataset
-        As `predict` gives it.
-    margins : mapping of str to float, optional
-        Kept free below the limits.
-    not_before : ndarray, shape (cells,), optional
-        Earliest timings that a check of the map left [°CA aTDC].
-
-    Raises
-    ------
-    mgdd.errors.ConvergenceError
-        The slope limits cannot be kept at any of these prices.
+    Margins are kept free below the limits; `not_before` are timings that a check of the map left, shape (cells,)
+    [°CA aTDC]. ConvergenceError where no price allows the slopes.
     """
     refused: ConvergenceError | None = None
     for price in PRICES:
@@ -226,3 +200,137 @@ def _later(predicted: xr.Dataset, measured: xr.Dataset, timing: Array, name: str
     steep = np.fmin(slope[np.arange(at.size), at], -_LEAST_SLOPE * LIMITS[name])  # also where it was not measured
     excess = measured[name].to_numpy() - LIMITS[name]
     return np.where(excess > 0.0, _BEYOND_CAD - excess / steep, 0.0)
+
+
+STAGES = ("response model", "noise", "margin", "smoothing", "check")
+_SWEEP = np.arange(-24.0, 8.1, 4.0)  # timings of a sweep in every cell [°CA aTDC]
+_ENGINE = ENGINES["as calibrated"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A way to calibrate: what is fitted to how many points of how many averaged cycles.
+
+    The kind is ``polynomial`` or ``gaussian_process`` over all factors, or ``sweep``: one of timings in every cell,
+    as many as the rough model permits, and no model.
+    """
+
+    kind: str
+    points: int = 0
+    degree: int = 3
+    cycles: int = CYCLES
+
+    @property
+    def name(self) -> str:
+        """Name of what is done, without its size."""
+        said = {"sweep": "sweep in every cell", "gaussian_process": "Gaussian process"}
+        return said.get(self.kind, f"polynomial of degree {self.degree}")
+
+    @property
+    def label(self) -> str:
+        """Name with its size, each once in `CASES`."""
+        return f"{self.name}, {self.points or 'all'} x {self.cycles}"
+
+
+POLYNOMIAL, PROCESS = Case(kind="polynomial", points=64), Case(kind="gaussian_process", points=64)
+CASES = (
+    Case(kind="sweep"),
+    Case(kind="polynomial", points=64, degree=2),
+    Case(kind="polynomial", points=32),
+    POLYNOMIAL,
+    Case(kind="polynomial", points=64, cycles=5),
+    Case(kind="polynomial", points=128),
+    Case(kind="gaussian_process", points=32),
+    PROCESS,
+    Case(kind="gaussian_process", points=128),
+)
+QUICK_CASES = (Case(kind="sweep"), POLYNOMIAL, PROCESS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """One calibration of one seed."""
+
+    table: CalibrationMap  # as it goes into the controller
+    timings: Mapping[str, Array]  # of the cells after each of `STAGES`, the first only where it was asked for
+    between: Array  # four cells
+    points: int
+    cycles: int
+    check_cycles: int
+    broken: int  # measured points beyond a limit
+    found: int  # cells that the check found beyond a limit
+    price: float  # what smoothness was allowed to cost by the model [points]
+    by_model: float  # largest loss of a cell by the model that the map was made of, before the check [points]
+
+
+def make_map(case: Case, seed: int, *, noise_free: bool = False) -> Made:
+    """Calibrate once: choose points, run them, fit, optimise, smooth, check.
+
+    With `noise_free` the same points are fitted without noise as well: what the form of the response model loses alone.
+    """
+    stages: dict[str, Array] = {}
+    if case.kind == "sweep":
+        measured = measure(_ENGINE, _sweep_points(), seed=_stream(seed, 0), cycles=case.cycles)
+        predicted, margins = _as_measured(measured.points), {}
+    else:
+        plan = design(case.points, seed)
+        measured = measure(_ENGINE, plan, seed=_stream(seed, 0), cycles=case.cycles)
+        models = responses(measured.points, case.kind, degree=case.degree)
+        predicted, margins = predict(models), margins_of(models)
+        if noise_free:
+            clean = measure(_ENGINE, plan, seed=0, cycles=1, noise=False).points
+            stages["response model"] = _flat(optimum_of(predict(responses(clean, case.kind, degree=case.degree))))
+    stages["noise"] = _flat(optimum_of(predicted))
+    held = optimum_of(predicted, margins=margins)
+    stages["margin"] = _flat(held)
+    smoothed, price = smooth(predicted, margins=margins)
+    stages["smoothing"] = _flat(smoothed)
+    checked = check_map(_ENGINE, smoothed, price, predicted, margins, _stream(seed, 1))
+    stages["check"] = _flat(checked.table)
+    above = np.any([measured.points[name] > upper for name, upper in LIMITS.items()], axis=0)
+    return Made(
+        table=checked.table, timings=stages, between=checked.table.lookup(dict(zip(AXES, MIDDLES, strict=True))).values,
+        points=measured.points.sizes["point"], cycles=measured.cycles, check_cycles=checked.cycles,
+        broken=int(above.sum()), found=checked.found, price=checked.price,
+        by_model=float(np.nanmax(held.cells["objective"].ravel() - _read(predicted, stages["smoothing"]))),
+    )  # fmt: skip
+
+
+def _flat(table: CalibrationMap) -> Array:
+    return np.array(table.values, np.float64).ravel()
+
+
+def _stream(seed: int, part: int) -> int:
+    """Give the design's measurement and each check noise of their own."""
+    return 1000 * seed + 100 * part
+
+
+def _read(predicted: xr.Dataset, timing: Array) -> Array:
+    """Read the objective of a sweep at one timing per cell, linear between its points."""
+    over = predicted["soc_cad"].to_numpy()
+    table = predicted[OBJECTIVE].to_numpy().reshape(-1, over.size)
+    rows = []
+    for at, row in zip(timing, table, strict=True):
+        known = np.isfinite(row)
+        rows.append(np.interp(at, over[known], row[known]))
+    return np.array(rows)
+
+
+def _sweep_points() -> xr.Dataset:
+    """Give the timings of every cell that the rough model permits."""
+    timing = np.tile(_SWEEP, CELLS[0].size)
+    every = design_of_cells(timing, tuple(np.repeat(column, _SWEEP.size) for column in CELLS))
+    allowed = np.flatnonzero(screen().contains(every))
+    return every.isel(point=allowed).assign_coords(point=("point", np.arange(allowed.size), every["point"].attrs))
+
+
+def _as_measured(points: xr.Dataset) -> xr.Dataset:
+    """Arrange measured timings by cell; what was not run is NaN."""
+    cell = {place: k for k, place in enumerate(zip(*CELLS, strict=True))}
+    rows = [cell[place] for place in zip(points["speed_rpm"].to_numpy(), points["fuel_mg"].to_numpy(), strict=True)]
+    columns = np.searchsorted(_SWEEP, points["soc_cad"].to_numpy())
+    table = {}
+    for name in (OBJECTIVE, *LIMITS):
+        table[name] = np.full((CELLS[0].size, _SWEEP.size), np.nan)
+        table[name][rows, columns] = points[name].to_numpy()
+    return as_sweep(table, _SWEEP)

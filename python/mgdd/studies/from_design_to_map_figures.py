@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, minus
-from mgdd.studies.design_to_map_cases import PROCESS
+from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, minus
+from mgdd.studies.design_to_map_steps import PROCESS
+from mgdd.studies.figures import legend_outside, names_of, new_figure
 from mgdd.studies.statistics import mean_interval
 
 if TYPE_CHECKING:
@@ -18,11 +19,10 @@ if TYPE_CHECKING:
 __all__ = ["draw"]
 
 _MARKS = {"sweep in every cell": ("s", GREY), "Gaussian process": ("o", BLUE), "polynomial of degree 3": ("^", ORANGE)}
-_PART_COLOURS = (GREY, ORANGE, BLUE, GREEN, BLACK)
 
 
 def draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    """Draw loss over cost, its parts, the map of the first seed, other engines and drives, by caption."""
+    """Draw the figures of the study by caption."""
     out = {
         "Engine cycles of a calibration, and what its map loses: mean and worst of 30 cells, 95 % intervals": _effort(
             dataset
@@ -38,12 +38,6 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
     return out
 
 
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def _bar(values: Any) -> tuple[float, list[list[float]]]:
     """Give a mean and the two arms of its interval; without arms where there is one seed."""
     mean, low, high = mean_interval(values)
@@ -51,9 +45,9 @@ def _bar(values: Any) -> tuple[float, list[list[float]]]:
 
 
 def _effort(dataset: xr.Dataset) -> Figure:
-    figure = _figure(9.0, 4.0)
+    figure = new_figure(9.0, 4.0)
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    ways = [str(way) for way in dataset["way"].to_numpy()]
+    ways = names_of(dataset, "way")
     panels_of = zip(panels, ("lost_percent", "worst_lost_percent"), ("mean of the cells", "worst cell"), strict=True)
     for ax, name, said in panels_of:
         seen = set()
@@ -76,16 +70,14 @@ def _effort(dataset: xr.Dataset) -> Figure:
         ax.minorticks_off()
         ax.grid(alpha=0.3)
     panels[0].set_ylabel("efficiency lost [points]")
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize="small"
-    )
+    legend_outside(figure, panels[0], 3, at="lower")
     return figure
 
 
 def _parts(dataset: xr.Dataset) -> Figure:
-    figure = _figure(6.6, 3.4)
+    figure = new_figure(6.6, 3.4)
     ax = figure.subplots()
-    stages = [str(part) for part in dataset["part"].to_numpy()]
+    stages = names_of(dataset, "part")
     for at, way in enumerate(dataset["parted_way"].to_numpy()):
         _, color = _MARKS[str(way)]
         place = np.arange(len(stages)) + 0.16 * (2 * at - 1)
@@ -101,8 +93,8 @@ def _parts(dataset: xr.Dataset) -> Figure:
 
 
 def _map(dataset: xr.Dataset) -> Figure:
-    figure = _figure(10.0, 4.2)
-    ways = [str(way) for way in dataset["way"].to_numpy()]
+    figure = new_figure(10.0, 4.2)
+    ways = names_of(dataset, "way")
     at = ways.index(PROCESS.label) if PROCESS.label in ways else 0
     left, right = figure.subplots(1, 2, sharey=True)
     shown = ((left, dataset["map_cad"][at], "start of combustion [°CA aTDC]", ".1f"),
@@ -125,8 +117,8 @@ def _map(dataset: xr.Dataset) -> Figure:
 
 
 def _drives(dataset: xr.Dataset) -> Figure:
-    engines = [str(engine) for engine in dataset["driven"].to_numpy()]
-    figure = _figure(3.4 * len(engines) + 0.4, 3.8)
+    engines = names_of(dataset, "driven")
+    figure = new_figure(3.4 * len(engines) + 0.4, 3.8)
     panels = figure.subplots(1, len(engines), sharex=True, sharey=True, squeeze=False)[0]
     cycle = dataset["cycle"].to_numpy()
     for at, (ax, engine) in enumerate(zip(panels, engines, strict=True)):
@@ -141,20 +133,18 @@ def _drives(dataset: xr.Dataset) -> Figure:
         ax.minorticks_off()
         ax.grid(alpha=0.3)
     panels[0].set_ylabel("efficiency lost,\nmean of ten cycles [points]")
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize="small"
-    )
+    legend_outside(figure, panels[0], 4, at="lower")
     return figure
 
 
 def _other(dataset: xr.Dataset) -> Figure:
-    figure = _figure(8.0, 3.6)
+    figure = new_figure(8.0, 3.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
-    names = [str(name) for name in dataset["engine"].to_numpy()]
+    names = names_of(dataset, "engine")
     _rows(left, names, [[dataset["other_lost_percent"][k] for k in range(len(names))]], ((BLUE, None),))
     left.set_xlabel("efficiency lost in the cells [points]")
     if "driven" in dataset:
-        driven = [str(name) for name in dataset["driven"].to_numpy()]
+        driven = names_of(dataset, "driven")
         both = [[dataset[f"lost_{when}_percent"][k] for k in range(len(driven))] for when in ("before", "after")]
         _rows(right, driven, both, ((GREY, "before"), (BLUE, "after learning")))
         right.set_xlabel("lost on another route,\nmap alone [points]")

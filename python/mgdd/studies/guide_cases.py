@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,32 +16,20 @@ from mgdd.loop import EngineBench
 from mgdd.optimize import ExtremumSeeking, Optimum
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
 __all__ = [
-    "BOUNDS_CAD",
-    "GUIDES",
-    "HIGH",
-    "LOW",
-    "PLANT",
-    "DrawsCurve",
-    "Guide",
-    "Run",
-    "SteadyMap",
-    "curve_seeker",
-    "drive",
-    "first_within",
-    "guided_by",
-    "seeker_without_clip",
-    "stays_within",
-    "trimmed",
-    "verdict_on",
-]
+    "BOUNDS_CAD", "GUIDES", "HIGH", "LOW", "PLANT", "WRONG", "Guide", "SpeedLoadPlane", "SteadyMap", "curve_seeker",
+    "drive", "guided_by", "no_model", "seeker_without_clip", "trimmed", "verdict_on", "verdicts",
+]  # fmt: skip
 
 BOUNDS_CAD = (-30.0, 10.0)
 PLANT: Cylinder = presets.load("puma_single", kind="engine").cylinder
+WRONG: Cylinder = PLANT.replace(wall_heat_scale=1.0)  # twice the wall heat of the engine
+SPEEDS_RPM = tuple(np.linspace(900.0, 3000.0, 8).tolist())
+FUELS_MG = tuple(np.round(np.linspace(6.0, 40.0, 8), 1).tolist())
 LOW = OperatingPoint(speed_rpm=1500.0, fuel_mg=12.0, burn_duration_cad=24.0)
 HIGH = OperatingPoint(speed_rpm=1500.0, fuel_mg=30.0, burn_duration_cad=44.0)
 _UNGUIDED_START_CAD, _WIDE_CAD = -20.0, (-50.0, 18.0)
@@ -51,24 +39,12 @@ _GRID_STEP_CAD = 0.05
 
 @dataclass(frozen=True)
 class Guide:
-    """A cycle model that is wrong in what it is told of the engine.
-
-    Parameters
-    ----------
-    name : str
-        What is wrong with it.
-    cylinder : Cylinder
-        The model.
-    burn_duration : float
-        Scale of the burn duration it is told [-].
-    backwards : bool
-        From the point `LOW` on its optimum moves as far as the model's, the other way.
-    """
+    """A cycle model that is wrong in what it is told of the engine."""
 
     name: str
     cylinder: Cylinder
-    burn_duration: float = 1.0
-    backwards: bool = False
+    burn_duration: float = 1.0  # scale of the burn duration that it is told [-]
+    backwards: bool = False  # from the point `LOW` on its optimum moves as far as the model's, the other way
 
     @cached_property
     def model(self) -> ModelOptimum:
@@ -116,18 +92,14 @@ def _heat(scale: float) -> Cylinder:
     return PLANT.replace(wall_heat_scale=scale)
 
 
-def _squeezed(change: float) -> Cylinder:
-    return PLANT.replace(compression_ratio=PLANT.compression_ratio + change)
-
-
 GUIDES: tuple[Guide, ...] = (
     Guide("exact", PLANT),
     Guide("wall heat -30 %", _heat(0.35)),
     Guide("wall heat +30 %", _heat(0.65)),
     Guide("duration -15 %", PLANT, burn_duration=0.85),
     Guide("duration +15 %", PLANT, burn_duration=1.15),
-    Guide("compression ratio -1", _squeezed(-1.0)),
-    Guide("compression ratio +1", _squeezed(1.0)),
+    Guide("compression ratio -1", PLANT.replace(compression_ratio=PLANT.compression_ratio - 1.0)),
+    Guide("compression ratio +1", PLANT.replace(compression_ratio=PLANT.compression_ratio + 1.0)),
     Guide("adiabatic", _heat(0.0)),
     Guide("wrong sign", PLANT, backwards=True),
 )
@@ -139,6 +111,11 @@ def seeker_without_clip() -> ExtremumSeeking:
         start=_UNGUIDED_START_CAD, lower=_WIDE_CAD[0], upper=_WIDE_CAD[1], form="moving_average", gain=_GAIN,
         rate=math.inf,
     )  # fmt: skip
+
+
+def no_model() -> Curve:
+    """Draw a parabola in the middle of the bounds, as bent as J of an engine is [points/CAD**2]."""
+    return Curve.parabola(curvature=-0.05, best=-10.0, reach=60.0)
 
 
 def trimmed(guide: Callable[[OperatingPoint], Optimum] | None) -> FeedForward:
@@ -187,12 +164,21 @@ class SteadyMap:
         return np.asarray(self.j.max() - np.interp(applied_cad, self.soc_cad, self.j))
 
 
-class DrawsCurve(Protocol):
-    """A guide that draws J over its input at an operating point."""
+class SpeedLoadPlane:
+    """Cells over speed [rpm] and fuel [mg] on the default intake, each with its operating point and J of the engine.
 
-    def curve(self, point: OperatingPoint) -> Curve:
-        """Draw it."""
-        ...
+    Without arguments 8 x 8 cells.
+    """
+
+    def __init__(self, speeds: Sequence[float] = SPEEDS_RPM, fuels: Sequence[float] = FUELS_MG) -> None:
+        self.speeds, self.fuels = speeds, fuels
+        self.points = [[OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)) for m in fuels] for n in speeds]
+        self.maps = [[SteadyMap.of(EngineBench(point=point)) for point in row] for row in self.points]
+
+    @classmethod
+    def of(cls, *, quick: bool) -> SpeedLoadPlane:
+        """Give the whole plane, or 3 x 3 of its cells."""
+        return cls(SPEEDS_RPM[::3], FUELS_MG[::3]) if quick else cls()
 
 
 @dataclass(frozen=True)
@@ -209,34 +195,25 @@ def drive(
     seeker: FeedForward | CurveSeeking | GuidedEngine,
     cycles: int,
     *,
-    guide: DrawsCurve | None = None,
+    curve_at: Callable[[OperatingPoint], Curve] | None = None,
     late_by_cad: Callable[[int], float] | None = None,
     soc_of: Callable[[OperatingPoint, float], float] | None = None,
     beyond: Callable[[float], float] | None = None,
 ) -> Run:
-    """Let a guided seeker steer a bench.
+    """Let a guided seeker steer a bench; both advance.
 
     Parameters
     ----------
-    bench : EngineBench
-        It advances.
-    seeker : FeedForward, CurveSeeking or GuidedEngine
-        It advances; all but a bare curve are told every operating point.
-    cycles : int
-        How many.
-    guide : DrawsCurve, optional
-        Draws the curve of a new operating point.
+    bench, seeker, cycles
+        All seekers but a bare curve are told every operating point.
+    curve_at : callable, optional
+        Draws the curve of a new operating point, for a bare curve.
     late_by_cad : callable, optional
         By how much combustion starts later than asked for, by cycle [°CA]; nobody tells the seeker.
     soc_of : callable, optional
         Start of combustion of an injection at an operating point: the seeker then steers the injection.
     beyond : callable, optional
         What J gains at an input beside what the bench measures [points].
-
-    Returns
-    -------
-    Run
-        Of these cycles.
     """
     estimate, sd, applied = np.empty(cycles), np.full(cycles, np.nan), np.empty(cycles)
     point = bench.point
@@ -244,8 +221,8 @@ def drive(
         now = bench.point
         if isinstance(seeker, FeedForward | GuidedEngine):
             seeker.at(now)
-        elif guide is not None and now != point:
-            seeker.guide(guide.curve(now))
+        elif curve_at is not None and now != point:
+            seeker.guide(curve_at(now))
         point = now
         asked = float(seeker.ask()[0])
         estimate[k] = seeker.estimate[0]
@@ -258,22 +235,11 @@ def drive(
     return Run(estimate, sd, applied)
 
 
-def first_within(estimate: NDArray[np.float64], best: float, distance: float) -> float:
-    """Give the first cycle whose estimate lies within the distance; infinite where none does."""
-    near = np.abs(estimate - best) <= distance
-    return float(np.argmax(near)) if near.any() else math.inf
-
-
-def stays_within(estimate: NDArray[np.float64], best: float, distance: float) -> float:
-    """Give the cycle from which no estimate lies beyond the distance; infinite where the last one does."""
-    beyond = np.flatnonzero(np.abs(estimate - best) > distance)
-    last = int(beyond[-1]) + 1 if beyond.size else 0
-    return float(last) if last < estimate.size else math.inf
-
-
-def verdict_on(bar: str, values: Sequence[float], limit: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
+def verdict_on(
+    bar: str, values: Sequence[float | None], limit: str, *, low: float = -math.inf, high: float = math.inf
+) -> dict[str, Any]:
     """Say of one bar what the worst case came to, and whether all of them are within it; a missing one is not."""
-    known = [value if math.isfinite(value) else math.inf for value in values]
+    known = [math.inf if value is None or not math.isfinite(value) else value for value in values]
     outside = [max(low - value, value - high) for value in known]
     worst = known[int(np.argmax(outside))]
     return {
@@ -284,3 +250,8 @@ def verdict_on(bar: str, values: Sequence[float], limit: str, *, low: float = -m
         "cases_met": sum(excess <= 0.0 for excess in outside),
         "met": all(excess <= 0.0 for excess in outside),
     }
+
+
+def verdicts(wanted: Iterable[tuple[str, Sequence[float | None], float]]) -> list[dict[str, Any]]:
+    """Say of each bar that has cases whether they are at most that: text, cases and limit."""
+    return [verdict_on(text, values, f"at most {most:g}", high=most) for text, values, most in wanted if values]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -12,29 +11,50 @@ import numpy as np
 
 from mgdd.guide import Curve, CurveSeeking, ModelOptimum
 from mgdd.loop import EngineBench, SurrogatePlant, run_seeker
-from mgdd.optimize import ExtremumSeeking
+from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.optimize.by_curvature import approach_gain
+from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies import measured_engine_cases as measured
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.guided_figures import draw
-from mgdd.studies.guided_limited import LimitedRuns, limited_parts, limited_row, limited_variables
-from mgdd.studies.guided_measured import drawn_curve, measured_guide
-from mgdd.studies.statistics import with_interval, with_median_interval
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import band, legend_outside, names_of, new_figure
+from mgdd.studies.statistics import (
+    OF_SEEDS,
+    band_variables,
+    first_within,
+    sd_of,
+    stays_within,
+    with_interval,
+    with_median_interval,
+)
 from mgdd.surrogate import EngineSurrogate, fit_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["run_guided"]
 
+_LABELS = {
+    "unguided": "extremum seeking, unguided",
+    "feed_forward": "extremum seeking from the guide's timing",
+    "curve": "guided by the curve",
+    "parabola": "guided by a parabola",
+}
 _NAME = "guided"
 _CYCLES, _EARLY_CYCLES, _QUICK_SEEDS = 400, 100, 20
-_GRID_CAD, _REACH_CAD = 0.1, 60.0
+_GRID_CAD, _FINE_CAD, _REACH_CAD = 0.1, 0.05, 60.0
 _BEND = -0.05  # of a parabola, points of efficiency per (°CA)**2: what cycle models have, -0.037 to -0.054
 _WRONG_WALL_HEAT = 1.0  # of the guide of the bench, which has 0.5
+_OBJECTIVE = measured.OBJECTIVES[0]  # of the cases with a limit
 _AMPLITUDE_CAD, _PERIOD, _TIME_CONSTANT = 1.0, 10, 40.0  # of the seeker on the bench, as `mgdd engine seek` has them
+_CASES = ("unguided", "feed_forward", "curve", "parabola")
+_LIMITED_CASES = tuple(
+    (f"{form}, margin {margin:g} sd", form, margin)
+    for margin in (0.0, 1.0)
+    for form in ("unguided", "curve", "curve, slope of the limit learnt")
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +71,13 @@ class _Engine:
     curve: Curve
     bend: float  # of the parabola
     plant: Callable[[int, float], Any]
-    plain: Callable[[float], ExtremumSeeking]
+    plain: Callable[..., ExtremumSeeking]
 
     def seeker(self, case: str) -> Any:
         """Make the seeker of a case."""
         led_cad = min(max(self.curve.best, self.bounds_cad[0]), self.bounds_cad[1])
         if case in ("unguided", "feed_forward"):
-            return self.plain(self.start_cad if case == "unguided" else led_cad)
+            return self.plain(start=self.start_cad if case == "unguided" else led_cad)
         shape = self.curve
         if case == "parabola":
             shape = Curve.parabola(curvature=self.bend, best=led_cad, reach=_REACH_CAD)
@@ -65,16 +85,53 @@ class _Engine:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Runs:
-    """Of one case, one row per seed."""
+class Runs:
+    """Of one case: estimate [°CA aTDC] and J lost, by seed and cycle."""
 
     case: str
     start_cad: float
+    best_cad: float
     estimate: NDArray[np.float64]
     lost: NDArray[np.float64]
 
+    def row(self, early: int = _EARLY_CYCLES) -> dict[str, Any]:
+        """Give the row of the case."""
+        final = self.estimate[:, -early:].mean(axis=1)
+        arrivals = [first_within(own, self.best_cad, 1.0) for own in self.estimate]
+        stays = [stays_within(own, self.best_cad, 1.5) for own in self.estimate]
+        return {
+            "case": self.case,
+            "start_cad": self.start_cad,
+            **with_median_interval("cycles_to_1_cad", arrivals),
+            **with_median_interval("cycles_stays_1_5_cad", stays),
+            **with_interval("lost_j_cycles", self.lost[:, :early].sum(axis=1)),
+            **with_interval("late_loss", self.lost[:, self.lost.shape[1] // 2 :].mean(axis=1)),
+            **with_interval("final_cad", final),
+            "final_sd_cad": sd_of(final),
+        }
 
-_CASES = ("unguided", "feed_forward", "curve", "parabola")
+
+@dataclass(frozen=True, kw_only=True)
+class LimitedRuns(Runs):
+    """Of one case with a limit also the pressure rise without noise [bar/°CA]."""
+
+    limit: float
+    rise: NDArray[np.float64]
+
+    @property
+    def above(self) -> NDArray[np.bool_]:
+        """Whether the pressure rise without noise is above the limit."""
+        return self.rise > self.limit
+
+    def row(self, early: int = _EARLY_CYCLES) -> dict[str, Any]:
+        """Give the row of the case, beside those without a limit."""
+        return {
+            **super().row(early),
+            "limited_optimum_cad": self.best_cad,
+            **with_interval("above_share", self.above.mean(axis=1)),
+            **with_interval("late_above_share", self.above[:, self.lost.shape[1] // 2 :].mean(axis=1)),
+            "worst_pressure_rise": float(self.rise.max()),
+        }
 
 
 def run_guided(
@@ -96,12 +153,10 @@ def run_guided(
         Runs per case.
     quick : bool
         At most twenty seeds.
-    figures : bool
-        Whether to draw.
     real : bool
         Whether the plant is the surrogate of the measured hydrogen-diesel engine, J its IMEP, input its injection.
-    progress : callable, optional
-        Called with a few words before each case.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -116,8 +171,6 @@ def run_guided(
     ------
     mgdd.errors.DataError
         The records are not at hand.
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     Examples
     --------
@@ -126,27 +179,22 @@ def run_guided(
     >>> [row["case"] for row in rows], 5 * rows[2]["cycles_to_1_cad"] < rows[0]["cycles_to_1_cad"]
     (['unguided', 'feed_forward', 'curve', 'parabola'], True)
     """
-    seeds = min(check_seeds(seeds), _QUICK_SEEDS if quick else seeds)
-    if progress is not None:
-        progress("drawing the guide")
+    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    work = Parts(progress)
+    work.progress("drawing the guide")
     engine = _measured_engine() if real else _bench_engine()
-    parts = [(case, partial(_run, engine, case, seeds)) for case in _CASES]
-    runs, interrupted = run_parts(parts, progress)
-    limited: list[LimitedRuns] = []
-    if real and not interrupted:
-        limited, interrupted = run_parts(limited_parts(measured.measured_records(_NAME), seeds, _CYCLES), progress)
-    summary: dict[str, Any] = {
-        "study": _NAME,
-        "plant": "surrogate of the measured engine" if real else "virtual bench",
-        "seeds": seeds,
-        "cycles": _CYCLES,
-        "unit_of_j": engine.unit,
-        "optimum_cad": engine.best_cad,
-        "guide_cad": engine.curve.best,
-        "interrupted": interrupted,
-        "rows": [_row(engine, run) for run in runs] + [limited_row(run, _EARLY_CYCLES) for run in limited],
-    }
-    return finish(_dataset(engine, runs, limited), summary, draw if figures else None)
+    runs = work((case, partial(_run, engine, case, seeds)) for case in _CASES)
+    limited = work(limited_parts(measured.measured_records(_NAME), seeds, _CYCLES)) if real else []
+    return work.finish(
+        _NAME, _dataset(engine, runs, limited), _draw if figures else None,
+        plant="surrogate of the measured engine" if real else "virtual bench",
+        seeds=seeds,
+        cycles=_CYCLES,
+        unit_of_j=engine.unit,
+        optimum_cad=engine.best_cad,
+        guide_cad=engine.curve.best,
+        rows=[run.row() for run in [*runs, *limited]],
+    )  # fmt: skip
 
 
 def _bench_engine() -> _Engine:
@@ -163,21 +211,17 @@ def _bench_engine() -> _Engine:
         best_j=best.value,
         grid_cad=grid,
         steady_j=bench.steady_map(grid)["j"].to_numpy(),
-        curve=drawn_curve(model, bench.point),
+        curve=measured.drawn_curve(model, bench.point),
         bend=_BEND,
         plant=_bench_plant,
         plain=partial(
-            _seeker_from, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
+            ExtremumSeeking, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
         ),
     )
 
 
 def _bench_plant(seed: int, _: float) -> EngineBench:
     return EngineBench(seed=seed)
-
-
-def _seeker_from(start: float, **settings: Any) -> ExtremumSeeking:
-    return ExtremumSeeking(**{**settings, "start": start})
 
 
 def _measured_engine() -> _Engine:
@@ -187,28 +231,21 @@ def _measured_engine() -> _Engine:
     case = measured.tuned_case(surrogate, objective, "batch", measured.held_objective(surrogate, objective))
     bounds = (measured.LOWER_CAD, measured.UPPER_CAD)
     grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
-    guide = measured_guide(records)
+    guide = measured.measured_guide(records)
     settings = {name: value for name, value in measured.seeker_of(case, 0).settings.items() if name != "start"}
     return _Engine(
-        unit="bar",
-        start_cad=measured.START_CAD,
-        bounds_cad=bounds,
-        best_cad=case.best["soi_cad"],
-        best_j=case.best.value,
-        grid_cad=grid,
-        steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
-        curve=guide.curve,
-        bend=_BEND * guide.bar_per_point,
-        plant=partial(_measured_plant, surrogate),
-        plain=partial(_seeker_from, **settings),
-    )
+        unit="bar", start_cad=measured.START_CAD, bounds_cad=bounds, best_cad=case.best["soi_cad"],
+        best_j=case.best.value, grid_cad=grid, steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
+        curve=guide.curve, bend=_BEND * guide.bar_per_point, plant=partial(_measured_plant, surrogate),
+        plain=partial(ExtremumSeeking, **settings),
+    )  # fmt: skip
 
 
 def _measured_plant(surrogate: EngineSurrogate, seed: int, start_cad: float) -> SurrogatePlant:
     return SurrogatePlant(surrogate, "imep_bar", start_soi_cad=start_cad, seed=seed)
 
 
-def _run(engine: _Engine, case: str, seeds: int) -> _Runs:
+def _run(engine: _Engine, case: str, seeds: int) -> Runs:
     estimate, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
     start = float(engine.seeker(case).estimate[0])
     for seed in range(seeds):
@@ -218,50 +255,150 @@ def _run(engine: _Engine, case: str, seeds: int) -> _Runs:
         else:
             estimate[seed], applied = cycles["estimate"][:, 0], cycles["applied"][:, 0].to_numpy()
         lost[seed] = engine.best_j - np.interp(applied, engine.grid_cad, engine.steady_j)
-    return _Runs(case=case, start_cad=start, estimate=estimate, lost=lost)
+    return Runs(case=case, start_cad=start, best_cad=engine.best_cad, estimate=estimate, lost=lost)
 
 
-def _arrivals(engine: _Engine, run: _Runs) -> NDArray[np.float64]:
-    near = np.abs(run.estimate - engine.best_cad) <= 1.0
-    return np.where(near.any(axis=1), near.argmax(axis=1), math.inf)
+def limited_parts(records: xr.Dataset, seeds: int, cycles: int) -> Iterator[tuple[str, Callable[[], LimitedRuns]]]:
+    """Give each case with a limit as a part of the study."""
+    surrogate, guide = fit_surrogate(records), measured.measured_guide(records)
+    case = measured.tuned_case(surrogate, _OBJECTIVE, "batch", measured.held_objective(surrogate, _OBJECTIVE))
+    for name, form, margin in _LIMITED_CASES:
+        limits = [Limit(limited, upper, margin_sd=margin) for limited, upper in _OBJECTIVE.limits.items()]
+        if form == "unguided":
+            make: Callable[[], Any] = partial(
+                ExtremumSeeking, **measured.seeker_of(case, 0).settings | {"limits": limits}
+            )
+        else:
+            make = partial(
+                CurveSeeking, start=measured.START_CAD, lower=measured.LOWER_CAD, upper=measured.UPPER_CAD,
+                curve=guide.curve, limits=limits, limit_curves=[guide.pressure_rise] if form == "curve" else None,
+            )  # fmt: skip
+        yield f"limited: {name}", partial(_run_limited, surrogate, case, name, make, seeds, cycles)
 
 
-def _stays(engine: _Engine, run: _Runs) -> NDArray[np.float64]:
-    outside = np.abs(run.estimate - engine.best_cad) > 1.5
-    after = _CYCLES - np.argmax(outside[:, ::-1], axis=1)
-    stays = np.where(outside.any(axis=1), after, 0).astype(np.float64)
-    return np.where(outside[:, -1], math.inf, stays)
+def _run_limited(
+    surrogate: EngineSurrogate, case: measured.Case, name: str, make: Callable[[], Any], seeds: int, cycles: int
+) -> LimitedRuns:
+    grid = np.arange(measured.LOWER_CAD, measured.UPPER_CAD + 0.5 * _FINE_CAD, _FINE_CAD)
+    (limited, upper), *_ = _OBJECTIVE.limits.items()
+    surface = surrogate.predict(grid)
+    estimate, lost, rise = (np.empty((seeds, cycles)) for _ in range(3))
+    for seed in range(seeds):
+        plant = SurrogatePlant(
+            surrogate, _OBJECTIVE.weights, limits=[limited], start_soi_cad=measured.START_CAD, seed=seed
+        )
+        run = run_seeker(plant, make(), cycles).dataset
+        estimate[seed], applied = run["estimate"][:, 0], run["applied"][:, 0].to_numpy()
+        lost[seed] = np.maximum(case.best.value - np.interp(applied, grid, surface["imep_bar"].to_numpy()), 0.0)
+        rise[seed] = np.interp(applied, grid, surface[limited].to_numpy())
+    return LimitedRuns(
+        case=name, start_cad=measured.START_CAD, best_cad=case.best["soi_cad"], limit=upper, estimate=estimate,
+        lost=lost, rise=rise,
+    )  # fmt: skip
 
 
-def _row(engine: _Engine, run: _Runs) -> dict[str, Any]:
-    final = run.estimate[:, -_EARLY_CYCLES:].mean(axis=1)
-    return {
-        "case": run.case,
-        "start_cad": run.start_cad,
-        **with_median_interval("cycles_to_1_cad", _arrivals(engine, run)),
-        **with_median_interval("cycles_stays_1_5_cad", _stays(engine, run)),
-        **with_interval("lost_j_cycles", run.lost[:, :_EARLY_CYCLES].sum(axis=1)),
-        **with_interval("late_loss", run.lost[:, _CYCLES // 2 :].mean(axis=1)),
-        **with_interval("final_cad", final),
-        "final_sd_cad": float(final.std(ddof=1)) if final.size > 1 else math.nan,
-    }
-
-
-def _dataset(engine: _Engine, runs: list[_Runs], limited: list[LimitedRuns]) -> xr.Dataset:
-    cad, unit = "°CA aTDC", engine.unit
-    low, median, high = np.quantile(np.stack([run.estimate for run in runs]), [0.1, 0.5, 0.9], axis=1)
-    lost = np.stack([np.cumsum(run.lost, axis=1).mean(axis=0) for run in runs])
-    over = ("case", "cycle")
+def _dataset(engine: _Engine, runs: list[Runs], limited: list[LimitedRuns]) -> xr.Dataset:
+    cad, over = "°CA aTDC", ("case", "cycle")
     variables: dict[str, tuple[Any, ...]] = {
         "case": ("case", [run.case for run in runs], "-", "what guides"),
         "cycle": ("cycle", np.arange(_CYCLES)),
         "timing_cad": ("timing_cad", engine.grid_cad, cad, "timing"),
-        "steady_j": ("timing_cad", engine.steady_j, unit, "J without noise"),
-        "guide_j": ("timing_cad", np.asarray(engine.curve(engine.grid_cad)), unit, "J by the guide"),
+        "steady_j": ("timing_cad", engine.steady_j, engine.unit, "J without noise"),
+        "guide_j": ("timing_cad", np.asarray(engine.curve(engine.grid_cad)), engine.unit, "J by the guide"),
         "optimum_cad": ((), engine.best_cad, cad, "best timing"),
-        "estimate_low_cad": (over, low, cad, "estimate, 10 % of the seeds below"),
-        "estimate_median_cad": (over, median, cad, "estimate, median of the seeds"),
-        "estimate_high_cad": (over, high, cad, "estimate, 10 % of the seeds above"),
-        "lost_j_cycles": (over, lost, unit, "J lost so far, summed over cycles, mean of the seeds"),
+        **band_variables("estimate_{}_cad", over, [run.estimate for run in runs], cad, OF_SEEDS),
+        "lost_j_cycles": (
+            over, [np.cumsum(run.lost, axis=1).mean(axis=0) for run in runs], engine.unit,
+            "J lost so far, summed over cycles, mean of the seeds",
+        ),
+    }  # fmt: skip
+    if limited:
+        variables |= {
+            "limited_case": (
+                "limited_case",
+                [run.case for run in limited],
+                "-",
+                "what guides, and margin of the limit",
+            ),
+            "limited_optimum_cad": ((), limited[0].best_cad, cad, "best timing within the limit"),
+            "pressure_rise_limit": ((), limited[0].limit, "bar/°CA", "limit of the pressure rise"),
+        }
+        for key, unit, text in (
+            ("estimate", cad, "estimate under the limit"),
+            ("rise", "bar/°CA", "pressure rise without noise"),
+        ):
+            said = {end: f"{text}, {end} of the seeds" for end in OF_SEEDS}
+            each = [getattr(run, key) for run in limited]
+            variables |= band_variables(f"limited_{key}_{{}}", ("limited_case", "cycle"), each, unit, said)
+    return labelled_dataset(variables)
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    out = {
+        "Estimates and J lost since the start, median and mean of the seeds; the bands hold 80 %": _starts(dataset),
+        "J of the engine and of its guide over timing, each from its own maximum": _curves(dataset),
     }
-    return labelled_dataset(variables | limited_variables(limited))
+    if "limited_case" in dataset:
+        out["Under a limit of the pressure rise: estimate and true pressure rise, medians; the bands hold 80 %"] = (
+            _limited(dataset)
+        )
+    return out
+
+
+def _starts(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(8.0, 6.4)
+    above, below = figure.subplots(2, 1, sharex=True)
+    lines = []
+    for at, case in enumerate(names_of(dataset, "case")):
+        one = dataset.isel(case=at)
+        dash, color = LINE_STYLES[at % len(LINE_STYLES)]
+        look: dict[str, Any] = {"linestyle": dash, "color": color, "label": _LABELS[case]}
+        lines += above.plot(one["cycle"], one["estimate_median_cad"], **look)
+        if case in ("unguided", "curve"):
+            low, high = one["estimate_low_cad"], one["estimate_high_cad"]
+            above.fill_between(one["cycle"], low, high, color=color, alpha=0.15, linewidth=0.0)
+        below.plot(one["cycle"], one["lost_j_cycles"], **look)
+    best = float(dataset["optimum_cad"])
+    lines.append(above.axhline(best, color=GREY, linewidth=1.0, label=minus(f"best timing: {best:.1f} °CA aTDC")))
+    above.set_ylabel("timing [°CA aTDC]")
+    below.set_ylabel(f"J lost since the start [{dataset['steady_j'].attrs['units']} × cycles]".replace("percent", "%"))
+    below.set_yscale("log")
+    below.set_xlabel("cycle")
+    legend(above, lines)
+    return figure
+
+
+def _curves(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(7.0, 4.0)
+    ax = figure.subplots()
+    own, guide = dataset["steady_j"], dataset["guide_j"]
+    lines = ax.plot(dataset["timing_cad"], own - own.max(), color=BLACK, label="engine")
+    lines += ax.plot(dataset["timing_cad"], guide - guide.max(), color=LINE_STYLES[1][1], linestyle="--", label="guide")
+    ax.set_xlabel("timing [°CA aTDC]")
+    ax.set_ylabel(f"J less its maximum [{own.attrs['units']}]".replace("percent", "%"))
+    legend(ax, lines)
+    return figure
+
+
+def _limited(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(9.0, 5.6)
+    axes = figure.subplots(2, 2, sharex=True, sharey="row")
+    cases = names_of(dataset, "limited_case")
+    margins = list(dict.fromkeys(name.rpartition(", ")[2] for name in cases))
+    for column, margin in enumerate(margins[:2]):
+        above, below = axes[0, column], axes[1, column]
+        for at, case in enumerate(name for name in cases if name.endswith(margin)):
+            own = dataset.isel(limited_case=cases.index(case))
+            dash, color = LINE_STYLES[at % len(LINE_STYLES)]
+            for ax, key in ((above, "estimate"), (below, "rise")):
+                ends = [own[f"limited_{key}_{end}"] for end in OF_SEEDS]
+                label = case.rpartition(", ")[0]
+                band(ax, own["cycle"], *ends, dash=dash, color=color, alpha=0.12, label=label)
+        above.axhline(float(dataset["limited_optimum_cad"]), color=GREY, linewidth=1.0, label="best within the limit")
+        below.axhline(float(dataset["pressure_rise_limit"]), color=GREY, linewidth=1.0)
+        above.set_title(margin, loc="left", fontsize="small")
+        below.set_xlabel("cycle")
+    axes[0, 0].set_ylabel("timing [°CA aTDC]")
+    axes[1, 0].set_ylabel("pressure rise\nwithout noise [bar/°CA]")
+    legend_outside(figure, axes[0, 0], 4)
+    return figure

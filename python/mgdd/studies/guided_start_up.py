@@ -9,37 +9,47 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd import plot
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve
 from mgdd.loop import EngineBench
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.plot.style import drawn
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import convergence_panels, names_of
 from mgdd.studies.guide_cases import (
     GUIDES,
     LOW,
     PLANT,
+    WRONG,
     Guide,
     SteadyMap,
     curve_seeker,
     drive,
-    first_within,
-    stays_within,
+    no_model,
     trimmed,
     verdict_on,
 )
-from mgdd.studies.guided_start_up_figures import draw
-from mgdd.studies.statistics import rms, with_interval, with_median_interval
+from mgdd.studies.statistics import (
+    OVER_SEEDS,
+    band_variables,
+    first_within,
+    quantile_of,
+    rms,
+    stays_within,
+    with_interval,
+    with_median_interval,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["run_guided_start_up"]
 
 TRIM_CYCLES, CURVE_CYCLES, LATE, SHOWN = 500, 400, 200, 200
 ARRIVAL_CAD, STAY_CAD, EARLY_CAD = 1.0, 1.5, -20.0
-_BEND = -0.05  # curvature of the parabola that stands for no model [points/CAD**2]
-_MIDDLE_CAD, _REACH_CAD = -10.0, 60.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +69,7 @@ class _Case:
 
     def curve(self) -> Curve:
         if self.guide is None:
-            return Curve.parabola(curvature=_BEND, best=_MIDDLE_CAD, reach=_REACH_CAD)
+            return no_model()
         return self.guide.curve(OperatingPoint(burn_duration_cad=self.told_burn_cad))
 
 
@@ -67,7 +77,7 @@ def _wiebe(scale: float) -> Cylinder:
     return PLANT.replace(burn_shape="wiebe", wall_heat_scale=scale)
 
 
-_TWICE = Guide("triangle 30, wall heat 1.0", PLANT.replace(wall_heat_scale=1.0))
+_TWICE = Guide("triangle 30, wall heat 1.0", WRONG)
 _TRIM = tuple(guide for guide in GUIDES if not guide.backwards)  # the wrong sign is exact until the load changes
 _CASES = (
     *(_Case(name=guide.name, guide=guide) for guide in _TRIM),
@@ -105,10 +115,8 @@ def run_guided_start_up(
         Runs of every case.
     quick : bool
         At most eight seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -118,11 +126,6 @@ def run_guided_start_up(
         cycle from which the estimate stays within 1.5 °CA, the 95th percentile of the first within 1 °CA, loss and rms
         error of cycles 200 to 400, and how often the estimate and 1.96 of its standard deviations hold the optimum.
         ``summary["bars"]``: what was demanded, the worst case, and whether all cases met it.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -136,33 +139,28 @@ def run_guided_start_up(
     >>> rows["wall heat +30 %"]["cycles_to_1_cad"] < 0.5 * rows["none"]["cycles_to_1_cad"]
     True
     """
-    seeds = min(check_seeds(seeds), 8) if quick else check_seeds(seeds)
+    seeds = check_seeds(seeds, quick=quick, most=8)
+    work = Parts(progress)
     steady = SteadyMap.of(EngineBench(point=LOW))
-    trims = [("feed-forward, none", partial(_trim, None, steady, seeds))]
-    trims += [(f"feed-forward, {guide.name}", partial(_trim, guide, steady, seeds)) for guide in _TRIM]
-    done, interrupted = run_parts(trims, progress)
-    curves: list[_Outcome] = []
-    if not interrupted:
-        each = [
-            (f"curve, {case.name}, start at {'the guide' if near else case.far_start_cad}",
-             partial(_seek, case, near, seeds))
-            for case in _CASES for near in (True, False)
-        ]  # fmt: skip
-        curves, interrupted = run_parts(each, progress)
+    trims = [("none", None), *((guide.name, guide) for guide in _TRIM)]
+    done = work((f"feed-forward, {name}", partial(_trim, guide, steady, seeds)) for name, guide in trims)
+    curves = work(
+        (f"curve, {case.name}, start at {'the guide' if near else case.far_start_cad}",
+         partial(_seek, case, near, seeds))
+        for case in _CASES for near in (True, False)
+    )  # fmt: skip
     for outcome in done:
         cycles = outcome.row["cycles_to_1_cad"]
         outcome.row["times_fewer"] = done[0].row["cycles_to_1_cad"] / cycles if cycles >= 1.0 else None
-    summary = {
-        "study": "guided-start-up",
-        "seeds": seeds,
-        "rows": [outcome.row for outcome in done],
-        "curve": [outcome.row for outcome in curves],
-        "bars": _bars([outcome.row for outcome in done], [outcome.row for outcome in curves]),
-        "optimum_cad": steady.best_cad,
-        "start_cad": EARLY_CAD,
-        "interrupted": interrupted,
-    }
-    return finish(_dataset(done, curves, steady), to_jsonable(summary), draw if figures else None)
+    return work.finish(
+        "guided-start-up", _dataset(done, curves, steady), _draw if figures else None,
+        seeds=seeds,
+        rows=[outcome.row for outcome in done],
+        curve=[outcome.row for outcome in curves],
+        bars=_bars([outcome.row for outcome in done], [outcome.row for outcome in curves]),
+        optimum_cad=steady.best_cad,
+        start_cad=EARLY_CAD,
+    )  # fmt: skip
 
 
 def _trim(guide: Guide | None, steady: SteadyMap, seeds: int) -> _Outcome:
@@ -205,7 +203,7 @@ def _seek(case: _Case, near: bool, seeds: int) -> _Outcome:
         "start_cad": start,
         "guide_error_cad": curve.best - best,
         **with_median_interval("median_stays", stays),
-        "first_95_percent": _none(np.quantile(first, 0.95, method="inverted_cdf")),
+        "first_95_percent": quantile_of(first, 0.95),
         **with_interval("late_loss_percent", lost),
         "late_rms_cad": rms(errors),
         "late_mean_error_cad": float(errors.mean()),
@@ -215,35 +213,24 @@ def _seek(case: _Case, near: bool, seeds: int) -> _Outcome:
     return _Outcome(row=row, estimates=np.stack(runs), cycles=stays)
 
 
-def _none(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _number(value: float | None) -> float:
-    return math.inf if value is None else value
-
-
 def _bars(trims: list[dict[str, Any]], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
     bars = []
-    heat = [_number(row["times_fewer"]) for row in trims if row["guide"].startswith("wall heat")]
+    heat = [row["times_fewer"] for row in trims if row["guide"].startswith("wall heat")]
     if heat:
         text = "feed-forward, wall heat ±30 %: times fewer cycles to 1 CAD"
         bars.append(verdict_on(text, heat, "at least 4", low=4.0))
     if curves:
-        stays = [_number(row["median_stays"]) for row in curves]
-        first = [_number(row["first_95_percent"]) for row in curves]
+        stays, first, loss, covered = (
+            [row[name] for row in curves]
+            for name in ("median_stays", "first_95_percent", "late_loss_percent", "covered_percent")
+        )
+        held = "curve: 95 % interval holds the optimum [%]"
         bars += [
             verdict_on("curve: stays within 1.5 CAD, median [cycles]", stays, "at most 8", high=8.0),
             verdict_on("curve: first within 1 CAD, 95th percentile [cycles]", first, "at most 40", high=40.0),
-            verdict_on(
-                "curve: loss of cycles 200 to 400 [points]", [row["late_loss_percent"] for row in curves],
-                "at most 0.025", high=0.025,
-            ),
-            verdict_on(
-                "curve: 95 % interval holds the optimum [%]", [row["covered_percent"] for row in curves],
-                "90 to 99", low=90.0, high=99.0,
-            ),
-        ]  # fmt: skip
+            verdict_on("curve: loss of cycles 200 to 400 [points]", loss, "at most 0.025", high=0.025),
+            verdict_on(held, covered, "90 to 99", low=90.0, high=99.0),
+        ]
     return bars
 
 
@@ -256,21 +243,40 @@ def _dataset(done: list[_Outcome], curves: list[_Outcome], steady: SteadyMap) ->
         "cycles_to": (("guide", "seed"), [o.cycles for o in done], "-", "first cycle within 1 °CA of the optimum"),
         "optimum_cad": ((), steady.best_cad, cad, "optimum"),
     }
-    groups = [("", "guide", done)]
+    bands = [o.estimates[:, :SHOWN] for o in done]
+    variables |= band_variables("estimate_{}_cad", ("guide", "cycle"), bands, cad, OVER_SEEDS)
     if curves:
         names = [f"{o.row['case']}, from {o.row['start_cad']:.0f}" for o in curves]
-        best = [_best(o) for o in curves]
-        variables["case"] = ("case", names, "-", "case and start")
-        variables["cycles_stays"] = (("case", "seed"), [o.cycles for o in curves], "-", "estimate stays from here on")
-        variables["case_optimum_cad"] = ("case", best, cad, "optimum of the plant")
-        groups.append(("curve_", "case", curves))
-    for front, dim, outcomes in groups:
-        bands = [np.quantile(o.estimates[:, :SHOWN], [0.5, 0.1, 0.9], axis=0) for o in outcomes]
-        for at, (name, text) in enumerate((("median", "median"), ("low", "10 % quantile"), ("high", "90 % quantile"))):
-            label = f"{text} of the estimate over seeds" if at else "estimate of the best timing"
-            variables[f"{front}estimate_{name}_cad"] = ((dim, "cycle"), [band[at] for band in bands], cad, label)
+        best = [float(o.estimates[:, LATE:].mean() - o.row["late_mean_error_cad"]) for o in curves]
+        bands = [o.estimates[:, :SHOWN] for o in curves]
+        variables |= {
+            "case": ("case", names, "-", "case and start"),
+            "cycles_stays": (("case", "seed"), [o.cycles for o in curves], "-", "estimate stays from here on"),
+            "case_optimum_cad": ("case", best, cad, "optimum of the plant"),
+            **band_variables("curve_estimate_{}_cad", ("case", "cycle"), bands, cad, OVER_SEEDS),
+        }
     return labelled_dataset(variables)
 
 
-def _best(outcome: _Outcome) -> float:
-    return float(outcome.estimates[:, LATE:].mean() - outcome.row["late_mean_error_cad"])
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    names = {f"estimate_{end}_cad" for end in ("median", "low", "high")}
+    kept = [name for name in ("none", "wall heat +30 %", "duration -15 %", "adiabatic") if name in dataset["guide"]]
+    own = dataset[[*sorted(names), "optimum_cad"]].sel(guide=kept)
+    out = {
+        "Feed-forward: median of the estimate over the seeds, and the band that holds 80 % of them": drawn(
+            plot.convergence, own, size=(7.4, 4.2)
+        )
+    }
+    if "case" not in dataset:
+        return out
+    cases = names_of(dataset, "case")
+    shown = [at for at, name in enumerate(cases) if any(part in name for part in ("+30 %", "adiabatic", "60", "no mo"))]
+    curve = dataset[[f"curve_{name}" for name in sorted(names)]].rename({f"curve_{n}": n for n in sorted(names)})
+    panels = []
+    for at in shown[:8]:
+        panel = curve.isel(case=[at], cycle=slice(60)).assign(optimum_cad=dataset["case_optimum_cad"].isel(case=at))
+        panels.append((cases[at], panel.drop_vars("case_optimum_cad", errors="ignore")))
+    out[
+        "The curve: median of the estimate and the band of 80 % of the seeds, from the guide's optimum and from afar"
+    ] = convergence_panels(panels, height=5.0)
+    return out

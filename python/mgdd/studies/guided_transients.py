@@ -10,19 +10,25 @@ import numpy as np
 
 from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.guide_cases import GUIDES, Guide, SteadyMap, drive, guided_by, verdict_on
-from mgdd.studies.guided_plane import FUELS_MG, PLANE_GUIDES, PLANE_RUNS, SPEEDS_RPM, Plane, plane_row, run_plane
-from mgdd.studies.guided_transients_figures import draw
-from mgdd.studies.statistics import mean_interval, with_interval
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import band, names_of, new_figure, numbered_plane
+from mgdd.studies.guide_cases import GUIDES, Guide, SpeedLoadPlane, SteadyMap, drive, guided_by, verdict_on, verdicts
+from mgdd.studies.statistics import first_within, mean_interval, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-__all__ = ["run_guided_transients"]
+__all__ = ["PLANE_RUNS", "plane_row", "run_guided_transients", "run_plane"]
 
+LEARNT_AT = OperatingPoint(speed_rpm=1500.0, fuel_mg=20.0)
+PLANE_GUIDES = ("wall heat -30 %", "wall heat +30 %", "duration -15 %", "adiabatic")
+PLANE_RUNS = (("none", "none"), *((form, name) for form in ("feed-forward", "curve") for name in PLANE_GUIDES))
+_SETTLED, _JUDGED = 400, 200
+_BY_NAME: dict[str, Guide] = {guide.name: guide for guide in GUIDES}
 # Speed [rpm] and fuel [mg] of 250 cycles each: pulling away, cruising, overtaking, coasting down.
 SEQUENCE = (
     (900.0, 8.0), (1500.0, 12.0), (1500.0, 30.0), (2000.0, 24.0), (2500.0, 34.0), (1800.0, 10.0),
@@ -30,6 +36,48 @@ SEQUENCE = (
 )  # fmt: skip
 _DWELL, _BIN = 250, 50
 _GUIDES = ("wall heat +30 %", "duration -15 %", "adiabatic")
+_SAME = 0.01  # share of loss within which two cells count as equal: two cycles of dither
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane:
+    """Cycles to 1 CAD and J lost in 200 cycles [points x cycles] after the step, by speed and fuel."""
+
+    form: str
+    name: str
+    cycles: NDArray[np.float64]
+    lost: NDArray[np.float64]
+
+
+def run_plane(form: str, name: str, plane: SpeedLoadPlane) -> Plane:
+    """Step from 1500 rpm and 20 mg to each cell, with that guide as feed-forward or curve, or without (``none``)."""
+    shape = (len(plane.speeds), len(plane.fuels))
+    cycles, lost = np.empty(shape), np.empty(shape)
+    for at in np.ndindex(*shape):
+        cell, after = plane.points[at[0]][at[1]], plane.maps[at[0]][at[1]]
+        schedule = [(0, LEARNT_AT), (_SETTLED, cell)]
+        bench = EngineBench(schedule=schedule, soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+        run = drive(bench, guided_by(form, _BY_NAME.get(name), LEARNT_AT), _SETTLED + _JUDGED)
+        cycles[at] = first_within(run.estimate[_SETTLED:], after.best_cad, 1.0)
+        lost[at] = after.lost(run.applied[_SETTLED:]).sum()
+    return Plane(form=form, name=name, cycles=cycles, lost=lost)
+
+
+def plane_row(plane: Plane, none: Plane) -> dict[str, Any]:
+    """Compare with the plain seeker: cells that take more cycles to 1 CAD or lose over 1 % more, and means."""
+    ratio = plane.lost / none.lost
+    return {
+        "form": plane.form,
+        "guide": plane.name,
+        "cells": plane.lost.size,
+        "cells_slower": int(np.sum(plane.cycles > none.cycles)),
+        "cells_costlier": int(np.sum(ratio > 1.0 + _SAME)),
+        "worst_cost_over_unguided": float(ratio.max()),
+        "mean_cycles": float(plane.cycles.mean()),
+        "mean_cycles_saved": float(np.mean(none.cycles - plane.cycles)),
+        "mean_lost": float(plane.lost.mean()),
+        "lost_over_unguided": float(plane.lost.sum() / none.lost.sum()),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,10 +106,8 @@ def run_guided_transients(
         Runs of the sequence.
     quick : bool
         At most two seeds, and a plane of 3 x 3 cells.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -70,11 +116,6 @@ def run_guided_transients(
         cycles [points x cycles] against the noise-free optimum, of the whole sequence and from the second point on.
         ``summary["plane"]``: cells that take more cycles than unguided, or lose more, cycles and loss saved.
         ``summary["bars"]``: what was demanded of the plane.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -87,46 +128,32 @@ def run_guided_transients(
     >>> all(row["lost_over_unguided"] < 0.7 for row in result.summary["rows"][1:])
     True
     """
-    seeds = min(check_seeds(seeds), 2) if quick else check_seeds(seeds)
+    seeds = check_seeds(seeds, quick=quick, most=2)
+    work = Parts(progress)
     points = [OperatingPoint(speed_rpm=speed, fuel_mg=fuel) for speed, fuel in SEQUENCE]
     maps = [SteadyMap.of(EngineBench(point=point)) for point in points]
+    plane = SpeedLoadPlane.of(quick=quick)
     wanted = [("none", "none"), *((form, name) for form in ("feed-forward", "curve") for name in _GUIDES)]
-    parts = [
+    done = work(
         (f"sequence, {form}, {name}", partial(_sequence, form, name, points, maps, seeds)) for form, name in wanted
-    ]
-    done, interrupted = run_parts(parts, progress)
-    planes: list[Plane] = []
-    speeds, fuels = (SPEEDS_RPM[::3], FUELS_MG[::3]) if quick else (SPEEDS_RPM, FUELS_MG)
-    if not interrupted:
-        cells = [
-            [SteadyMap.of(EngineBench(point=OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)))) for m in fuels]
-            for n in speeds
-        ]
-        each = [
-            (f"plane, {form}, {name}", partial(run_plane, form, name, cells, speeds=speeds, fuels=fuels))
-            for form, name in PLANE_RUNS
-        ]
-        planes, interrupted = run_parts(each, progress)
+    )
+    planes = work((f"plane, {form}, {name}", partial(run_plane, form, name, plane)) for form, name in PLANE_RUNS)
     table = [plane_row(plane, planes[0]) for plane in planes]
-    summary = {
-        "study": "guided-transients",
-        "seeds": seeds,
-        "rows": [_row(own, done[0]) for own in done],
-        "plane": table,
-        "bars": _bars(table),
-        "interrupted": interrupted,
-    }
-    data = _dataset(done, planes, maps, speeds, fuels)
-    return finish(data, to_jsonable(summary), draw if figures else None)
+    return work.finish(
+        "guided-transients", _dataset(done, planes, maps, plane), _draw if figures else None,
+        seeds=seeds,
+        rows=[_row(own, done[0]) for own in done],
+        plane=table,
+        bars=_bars(table),
+    )  # fmt: skip
 
 
 def _sequence(form: str, name: str, points: list[OperatingPoint], maps: list[SteadyMap], seeds: int) -> _Drive:
-    guides: dict[str, Guide] = {guide.name: guide for guide in GUIDES}
     schedule = [(_DWELL * at, point) for at, point in enumerate(points)]
     lost, estimates = [], []
     for seed in range(seeds):
         bench = EngineBench(schedule=schedule, seed=seed)
-        run = drive(bench, guided_by(form, guides.get(name), points[0]), _DWELL * len(points))
+        run = drive(bench, guided_by(form, _BY_NAME.get(name), points[0]), _DWELL * len(points))
         parts = run.applied.reshape(len(points), _DWELL)
         lost.append(np.concatenate([own.lost(part) for own, part in zip(maps, parts, strict=True)]))
         estimates.append(run.estimate)
@@ -156,26 +183,26 @@ def _bars(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
             if good:
                 said = f"plane, {form}, wall heat ±30 % and duration -15 %: cells with {text} than unguided"
                 bars.append(verdict_on(said, [float(row[key]) for row in good], "none", high=0.0))
-        if "adiabatic" in known:
-            worst = [known["adiabatic"]["worst_cost_over_unguided"]]
-            said = f"plane, {form}, adiabatic: worst cost over unguided [-]"
-            bars.append(verdict_on(said, worst, "at most 1.2", high=1.2))
+        worst = [known["adiabatic"]["worst_cost_over_unguided"]] if "adiabatic" in known else []
+        bars += verdicts([(f"plane, {form}, adiabatic: worst cost over unguided [-]", worst, 1.2)])
     return bars
 
 
-def _dataset(done: list[_Drive], planes: list[Plane], maps: list[SteadyMap], speeds: Any, fuels: Any) -> xr.Dataset:
+def _named(form: str, guide: str) -> str:
+    return "unguided" if form == "none" else f"{form}, {guide}"
+
+
+def _dataset(done: list[_Drive], planes: list[Plane], maps: list[SteadyMap], plane: SpeedLoadPlane) -> xr.Dataset:
     cad = "°CA aTDC"
-    names = ["unguided" if own.form == "none" else f"{own.form}, {own.guide}" for own in done]
-    bins = [100.0 * own.lost.reshape(own.lost.shape[0], -1, _BIN).mean(axis=(0, 2)) for own in done]
     cycles = done[0].lost.shape[1]
+    means = [own.lost.reshape(own.lost.shape[0], -1, _BIN).mean(axis=2) for own in done]
+    bins = [100.0 * own.lost.reshape(own.lost.shape[0], -1, _BIN).mean(axis=(0, 2)) for own in done]
     lows, highs = (
-        [np.array([mean_interval(c)[end] for c in own.lost.reshape(own.lost.shape[0], -1, _BIN).mean(axis=2).T]) * 100.0
-         for own in done]
-        for end in (1, 2)
-    )  # fmt: skip
+        [np.array([mean_interval(column)[end] for column in mean.T]) * 100.0 for mean in means] for end in (1, 2)
+    )
     run = ("run", "middle_cycle")
     variables: dict[str, tuple[Any, ...]] = {
-        "run": ("run", names, "-", "form and guide"),
+        "run": ("run", [_named(own.form, own.guide) for own in done], "-", "form and guide"),
         "cycle": ("cycle", np.arange(cycles)),
         "middle_cycle": ("middle_cycle", np.arange(_BIN / 2, cycles, _BIN), "-", "engine cycle"),
         "lost_per_100": (run, bins, "%", "J lost per 100 cycles"),
@@ -188,12 +215,69 @@ def _dataset(done: list[_Drive], planes: list[Plane], maps: list[SteadyMap], spe
     }
     if planes:
         dims = ("plane_run", "plane_speed_rpm", "plane_fuel_mg")
-        named = ["unguided" if plane.form == "none" else f"{plane.form}, {plane.name}" for plane in planes]
         variables |= {
-            "plane_run": ("plane_run", named, "-", "form and guide"),
-            "plane_speed_rpm": ("plane_speed_rpm", speeds, "rpm", "engine speed"),
-            "plane_fuel_mg": ("plane_fuel_mg", fuels, "mg", "fuel per cycle"),
-            "plane_cycles": (dims, [plane.cycles for plane in planes], "-", "cycles to 1 °CA after the step"),
-            "plane_lost": (dims, [plane.lost for plane in planes], "%", "J lost over 200 cycles after the step"),
+            "plane_run": ("plane_run", [_named(own.form, own.name) for own in planes], "-", "form and guide"),
+            "plane_speed_rpm": ("plane_speed_rpm", plane.speeds, "rpm", "engine speed"),
+            "plane_fuel_mg": ("plane_fuel_mg", plane.fuels, "mg", "fuel per cycle"),
+            "plane_cycles": (dims, [own.cycles for own in planes], "-", "cycles to 1 °CA after the step"),
+            "plane_lost": (dims, [own.lost for own in planes], "%", "J lost over 200 cycles after the step"),
         }
     return labelled_dataset(variables)
+
+
+_SHOWN = (
+    ("unguided", "-", BLACK), ("feed-forward, wall heat +30 %", "--", BLUE), ("curve, wall heat +30 %", "-", ORANGE),
+)  # fmt: skip
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    figure = new_figure(9.0, 7.0)
+    timing, loss, point = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.6, 1.0))
+    cycle = dataset["cycle"].to_numpy()
+    runs = names_of(dataset, "run")
+    for name, dash, color in _SHOWN:
+        if name in runs:
+            own = dataset.sel(run=name)
+            timing.plot(cycle, own["estimate_cad"], dash, color=color, linewidth=1.1, label=name)
+            ends = [own[f"lost_per_100{end}"] for end in ("_low", "", "_high")]
+            band(loss, own["middle_cycle"].to_numpy(), *ends, dash=dash, color=color, alpha=0.2, linewidth=1.1)
+    timing.plot(cycle, dataset["optimum_cad"], ":", color=GREY, linewidth=1.4, label="optimum")
+    timing.set(ylabel="estimate of the best\ntiming [°CA aTDC]", ylim=(-20.5, 2.0))
+    timing.legend(ncols=2, fontsize="small", loc="lower right")
+    loss.set(ylabel="J lost per 100 cycles\n[points × cycles]", yscale="log")
+    point.plot(cycle, dataset["speed_rpm"], "-", color=BLACK)
+    point.set(ylabel="speed [rpm]", xlabel="engine cycle [-]", xlim=(0, cycle.size))
+    fuel = point.twinx()
+    fuel.plot(cycle, dataset["fuel_mg"], "--", color=BLUE)
+    fuel.set_ylabel("fuel [mg], dashed")
+    for ax in (timing, loss, point):
+        ax.grid(alpha=0.3)
+    out = {"A sequence of twelve operating points: medians of the estimate, loss with its 95 % interval": figure}
+    if "plane_run" in dataset:
+        out["Loss in the 200 cycles after a step from 1500 rpm and 20 mg, over that of the unguided seeker"] = (
+            _draw_plane(dataset)
+        )
+    return out
+
+
+def _draw_plane(dataset: xr.Dataset) -> Figure:
+    names = names_of(dataset, "plane_run")[1:]
+    lost = dataset["plane_lost"].to_numpy()
+    speeds, fuels = dataset["plane_speed_rpm"].to_numpy(), dataset["plane_fuel_mg"].to_numpy()
+    rows = 2 if len(names) > 1 else 1
+    columns = max(-(-len(names) // rows), 1)
+    figure = new_figure(3.1 * columns, 3.4 * rows)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for ax, name, own in zip(grid.flat, names, lost[1:], strict=False):
+        shares = own / lost[0]
+        mesh = numbered_plane(
+            ax, speeds, fuels, shares, numbers=shares, white=shares > 0.6, cmap="cividis_r", span=(0.0, 1.4)
+        )
+        ax.set_title(name, loc="left", fontsize="small")
+    for ax in grid[-1]:
+        ax.set_xlabel("speed [rpm]")
+    for ax in grid[:, 0]:
+        ax.set_ylabel("fuel [mg]")
+    if names:
+        figure.colorbar(mesh, ax=list(grid.flat), label="loss over unguided [-]")
+    return figure

@@ -17,7 +17,7 @@ from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["MEASURED_AT", "MEASURED_SOI_CAD", "SOI_CAD", "TRUTHS", "DelayLaw", "InjectionGuide", "told_laws"]
+__all__ = ["MEASURED_AT", "SOI_CAD", "TRUTHS", "DelayLaw", "InjectionGuide", "told_laws"]
 
 SOI_CAD = np.linspace(-60.0, 20.0, 321)  # what `ignition_delay` takes
 MEASURED_AT = OperatingPoint(speed_rpm=1500.0, fuel_mg=20.0)
@@ -26,15 +26,7 @@ MEASURED_SOI_CAD = np.arange(-25.0, 5.1, 5.0)
 
 @dataclass(frozen=True)
 class DelayLaw:
-    """A correlation of the ignition delay on the motored cycle of the plant.
-
-    Parameters
-    ----------
-    name : str
-        Of the correlation.
-    cylinder : Cylinder
-        The plant with this correlation.
-    """
+    """A correlation of the ignition delay on the motored cycle of the plant, and the plant with this correlation."""
 
     name: str
     cylinder: Cylinder
@@ -94,13 +86,7 @@ def _best_soc(cylinder: Cylinder, point: OperatingPoint) -> Optimum:
 
 @dataclass(frozen=True)
 class InjectionGuide:
-    """The plant's own cycle model, right in all but the ignition delay: best SOC, turned into SOI.
-
-    Parameters
-    ----------
-    told : DelayLaw
-        The correlation that it is told.
-    """
+    """The plant's own cycle model, right in all but the ignition delay that it is told: best SOC, turned into SOI."""
 
     told: DelayLaw
 

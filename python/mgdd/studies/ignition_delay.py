@@ -11,16 +11,17 @@ import numpy as np
 from mgdd.engine import OperatingPoint
 from mgdd.guide import CurveSeeking
 from mgdd.loop import EngineBench
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.guide_cases import SteadyMap, drive, first_within, trimmed
-from mgdd.studies.guided_plane import FUELS_MG, SPEEDS_RPM
+from mgdd.plot.style import GREY, LINE_STYLES, axis_label, legend
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import legend_outside, names_of, new_figure, numbered_plane
+from mgdd.studies.guide_cases import SpeedLoadPlane, SteadyMap, drive, trimmed
 from mgdd.studies.ignition_cases import MEASURED_AT, SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, told_laws
-from mgdd.studies.ignition_delay_figures import draw
-from mgdd.studies.statistics import with_interval, with_median_interval
+from mgdd.studies.statistics import OF_SEEDS, band_variables, first_within, with_interval, with_median_interval
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["Plane", "plane_of", "plane_row", "run_ignition_delay", "slope_row"]
@@ -76,10 +77,8 @@ def run_ignition_delay(
         Runs per form and correlation.
     quick : bool
         At most four seeds, and a plane of 3 x 3 cells.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -87,11 +86,6 @@ def run_ignition_delay(
         Rows ``truth told ...``: errors of the told injection [°CA], of what the trim of one point leaves, and J lost
         [points]. ``summary["slopes"]``: delay and dSOC/dSOI at the right injection. ``summary["intake"]``: the same
         when the intake is not as told. ``summary["runs"]``: J lost [points x cycles] and cycles to 1 °CA.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -104,41 +98,37 @@ def run_ignition_delay(
     >>> [row["lost_mean"] for row in rows if row["truth"] == row["told"]]
     [0.0, 0.0, 0.0]
     """
-    seeds = min(check_seeds(seeds), _QUICK_SEEDS) if quick else check_seeds(seeds)
-    speeds, fuels = (SPEEDS_RPM[::3], FUELS_MG[::3]) if quick else (SPEEDS_RPM, FUELS_MG)
-    if progress is not None:
-        progress("maps of the plane")
-    cells = [[OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)) for m in fuels] for n in speeds]
-    maps = [[SteadyMap.of(EngineBench(point=point)) for point in row] for row in cells]
-    wanted = [(truth, told) for truth in TRUTHS for told in told_laws(truth)]
-    parts = [(f"{a.name}, told {b.name}", partial(plane_of, a, b, cells, maps)) for a, b in wanted]
-    planes, interrupted = run_parts(parts, progress)
-    runs: list[_Runs] = []
-    if not interrupted:
-        told_runs = [(form, told) for form in ("feed-forward", "curve") for told in told_laws(TRUTHS[0])]
-        each = [(f"{form}, told {told.name}", partial(_runs, form, told, seeds)) for form, told in told_runs]
-        runs, interrupted = run_parts(each, progress)
-    summary = {
-        "study": "ignition-delay",
-        "seeds": seeds,
-        "rows": [plane_row(plane) for plane in planes],
-        "slopes": [slope_row(plane) for plane in planes if plane.truth == plane.told],
-        "intake": [_intake_row(law) for law in TRUTHS],
-        "runs": [_run_row(run) for run in runs],
-        "interrupted": interrupted,
-    }
-    return finish(_dataset(planes, runs, speeds, fuels), to_jsonable(summary), draw if figures else None)
+    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    work = Parts(progress)
+    work.progress("maps of the plane")
+    plane = SpeedLoadPlane.of(quick=quick)
+    planes = work(
+        (f"{truth.name}, told {told.name}", partial(plane_of, truth, told, plane))
+        for truth in TRUTHS for told in told_laws(truth)
+    )  # fmt: skip
+    runs = work(
+        (f"{form}, told {told.name}", partial(_runs, form, told, seeds))
+        for form in ("feed-forward", "curve") for told in told_laws(TRUTHS[0])
+    )  # fmt: skip
+    return work.finish(
+        "ignition-delay", _dataset(planes, runs, plane), _draw if figures else None,
+        seeds=seeds,
+        rows=[plane_row(plane) for plane in planes],
+        slopes=[slope_row(plane) for plane in planes if plane.truth == plane.told],
+        intake=[_intake_row(law) for law in TRUTHS],
+        runs=[_run_row(run) for run in runs],
+    )  # fmt: skip
 
 
-def plane_of(truth: DelayLaw, told: DelayLaw, cells: Any, maps: Any) -> Plane:
+def plane_of(truth: DelayLaw, told: DelayLaw, plane: SpeedLoadPlane) -> Plane:
     """Compare told with right injection in every cell."""
     right, guide = InjectionGuide(truth), InjectionGuide(told)
     trim = right.timing(MEASURED_AT).soi_cad - guide.timing(MEASURED_AT).soi_cad
-    shape = (len(cells), len(cells[0]))
+    shape = (len(plane.speeds), len(plane.fuels))
     error, lost, trimmed_lost, delay, slope = (np.empty(shape) for _ in range(5))
     clipped = np.empty(shape, bool)
     for at in np.ndindex(*shape):
-        point, own = cells[at[0]][at[1]], maps[at[0]][at[1]]
+        point, own = plane.points[at[0]][at[1]], plane.maps[at[0]][at[1]]
         best, said = right.timing(point), guide.timing(point)
         error[at], clipped[at] = said.soi_cad - best.soi_cad, best.clipped
         delay[at], slope[at] = best.delay_cad, truth.slope(point, best.soi_cad)
@@ -160,21 +150,25 @@ def _lost(truth: DelayLaw, own: SteadyMap, point: OperatingPoint, soi_cad: float
 def plane_row(plane: Plane) -> dict[str, Any]:
     """Give size of the error and J lost, before and after the trim."""
     left = plane.soi_error_cad + plane.trim_cad
-    fired, fired_trimmed = (np.isfinite(lost) for lost in (plane.lost, plane.lost_trimmed))
+
+    def losses(lost: NDArray[np.float64], end: str = "") -> dict[str, Any]:
+        fired = lost[np.isfinite(lost)]
+        return {
+            f"lost{end}_mean": float(fired.mean()),
+            f"lost{end}_p95": float(np.quantile(fired, 0.95)),
+            f"cells_without_ignition{end}": lost.size - fired.size,
+        }
+
     return {
         "truth": plane.truth,
         "told": plane.told,
         "cells": plane.lost.size,
         "soi_error_median_cad": float(np.median(np.abs(plane.soi_error_cad))),
         "soi_error_largest_cad": float(np.abs(plane.soi_error_cad).max()),
-        "lost_mean": float(plane.lost[fired].mean()),
-        "lost_p95": float(np.quantile(plane.lost[fired], 0.95)),
-        "cells_without_ignition": int(np.sum(~fired)),
+        **losses(plane.lost),
         "trim_cad": plane.trim_cad,
         "left_median_cad": float(np.median(np.abs(left))),
-        "lost_trimmed_mean": float(plane.lost_trimmed[fired_trimmed].mean()),
-        "lost_trimmed_p95": float(np.quantile(plane.lost_trimmed[fired_trimmed], 0.95)),
-        "cells_without_ignition_trimmed": int(np.sum(~fired_trimmed)),
+        **losses(plane.lost_trimmed, "_trimmed"),
     }
 
 
@@ -218,7 +212,7 @@ def _runs(form: str, told: DelayLaw, seeds: int) -> _Runs:
             seeker: Any = CurveSeeking(start=curve.best, lower=low, upper=high, curve=curve)
         else:
             seeker = trimmed(guide)
-        run = drive(bench, seeker, _CYCLES, guide=guide, soc_of=truth.soc_of)
+        run = drive(bench, seeker, _CYCLES, curve_at=guide.curve, soc_of=truth.soc_of)
         estimates[seed] = run.estimate
         lost[seed] = np.concatenate(
             [own.lost(part) for own, part in zip(maps, np.split(run.applied, [_STEP_AT]), strict=True)]
@@ -245,36 +239,108 @@ def _run_row(run: _Runs) -> dict[str, Any]:
     }
 
 
-def _dataset(planes: list[Plane], runs: list[_Runs], speeds: Any, fuels: Any) -> xr.Dataset:
+def _dataset(planes: list[Plane], runs: list[_Runs], plane: SpeedLoadPlane) -> xr.Dataset:
     cad, dims = "°CA aTDC", ("pair", "speed_rpm", "fuel_mg")
     laws = [law.soc(MEASURED_AT) - SOI_CAD for law in TRUTHS]
     variables: dict[str, tuple[Any, ...]] = {
-        "pair": ("pair", [f"{plane.truth}, told {plane.told}" for plane in planes], "-", "truth and told correlation"),
-        "speed_rpm": ("speed_rpm", speeds, "rpm", "engine speed"),
-        "fuel_mg": ("fuel_mg", fuels, "mg", "fuel per cycle"),
-        "soi_error_cad": (dims, [plane.soi_error_cad for plane in planes], "°CA", "told less right start of injection"),
+        "pair": ("pair", [f"{own.truth}, told {own.told}" for own in planes], "-", "truth and told correlation"),
+        "speed_rpm": ("speed_rpm", plane.speeds, "rpm", "engine speed"),
+        "fuel_mg": ("fuel_mg", plane.fuels, "mg", "fuel per cycle"),
+        "soi_error_cad": (dims, [own.soi_error_cad for own in planes], "°CA", "told less right start of injection"),
         "left_error_cad": (
-            dims, [plane.soi_error_cad + plane.trim_cad for plane in planes], "°CA", "error that the trim leaves",
+            dims, [own.soi_error_cad + own.trim_cad for own in planes], "°CA", "error that the trim leaves",
         ),
-        "lost": (dims, [plane.lost for plane in planes], "%", "J lost by the told injection"),
-        "lost_trimmed": (dims, [plane.lost_trimmed for plane in planes], "%", "J lost with the trim of one point"),
+        "lost": (dims, [own.lost for own in planes], "%", "J lost by the told injection"),
+        "lost_trimmed": (dims, [own.lost_trimmed for own in planes], "%", "J lost with the trim of one point"),
         "law": ("law", [law.name for law in TRUTHS], "-", "correlation"),
         "soi_cad": ("soi_cad", SOI_CAD),
         "delay_cad": (("law", "soi_cad"), laws, "°CA", "ignition delay"),
         "cycle": ("cycle", np.arange(_CYCLES)),
     }  # fmt: skip
     if runs:
-        over = ("run", "cycle")
-        low, median, high = np.quantile(np.stack([run.estimate for run in runs]), [0.1, 0.5, 0.9], axis=1)
         best = np.repeat([_best_soi(MEASURED_AT), _best_soi(AFTER)], [_STEP_AT, _CYCLES - _STEP_AT])
         lost = [run.lost.mean(axis=0).reshape(-1, _BIN).mean(axis=1) for run in runs]
         variables |= {
             "run": ("run", [f"{run.form}, {run.told}" for run in runs], "-", "form and told correlation"),
-            "estimate_low_cad": (over, low, cad, "estimate, 10 % of the seeds below"),
-            "estimate_median_cad": (over, median, cad, "estimate, median of the seeds"),
-            "estimate_high_cad": (over, high, cad, "estimate, 10 % of the seeds above"),
+            **band_variables("estimate_{}_cad", ("run", "cycle"), [run.estimate for run in runs], cad, OF_SEEDS),
             "middle_cycle": ("middle_cycle", np.arange(_BIN / 2, _CYCLES, _BIN), "-", "engine cycle"),
             "mean_lost": (("run", "middle_cycle"), lost, "%", "J lost per cycle, mean of the seeds and of 20 cycles"),
             "optimum_cad": ("cycle", best, cad, "right start of injection"),
         }
     return labelled_dataset(variables)
+
+
+_LATEST_CAD, _EARLIEST_CAD = 12.0, -40.0
+_MAPPED = ("Wolfer", "Hardenberg-Hase", "polynomial of 1500 rpm", "constant of 1500 rpm")
+_SHOWN = ("Watson", "Hardenberg-Hase", "polynomial of 1500 rpm", "no delay")
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    out = {
+        "Ignition delay over the start of injection at 1500 rpm, three correlations": _delays(dataset),
+        "Error of the told injection where Watson's correlation is true; the numbers are J lost [points] with the trim "
+        "of 1500 rpm and 20 mg": _draw_plane(dataset),
+    }
+    if "run" in dataset:
+        out["Start and step by wrong correlations: median of the estimate, and J lost per cycle"] = _draw_runs(dataset)
+    return out
+
+
+def _delays(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(6.6, 3.9)
+    ax = figure.subplots()
+    own = dataset.sel(soi_cad=slice(_EARLIEST_CAD, _LATEST_CAD))
+    lines = []
+    for at, law in enumerate(map(str, own["law"].to_numpy())):
+        dash, color = LINE_STYLES[at]
+        lines += ax.plot(own["soi_cad"], own["delay_cad"][at], linestyle=dash, color=color, label=law)
+    ax.set(xlabel=axis_label(dataset, "soi_cad"), ylabel=axis_label(dataset, "delay_cad"), ylim=(0.0, 25.0))
+    ax.grid(alpha=0.3)
+    legend(ax, lines, columns=3)
+    return figure
+
+
+def _draw_plane(dataset: xr.Dataset) -> Figure:
+    pairs = names_of(dataset, "pair")
+    wanted = [f"Watson, told {name}" for name in _MAPPED]
+    shown = [pairs.index(name) for name in wanted if name in pairs]
+    figure = new_figure(12.5, 3.8)
+    axes = figure.subplots(1, max(len(shown), 1), sharey=True, squeeze=False)[0]
+    speeds, fuels = dataset["speed_rpm"].to_numpy(), dataset["fuel_mg"].to_numpy()
+    for ax, at in zip(axes, shown, strict=False):
+        error = dataset["soi_error_cad"][at].to_numpy()
+        left = dataset["lost_trimmed"][at].to_numpy()
+        mesh = numbered_plane(
+            ax, speeds, fuels, error, numbers=left, white=abs(error) > 9.0, cmap="RdBu_r", span=(-15.0, 15.0)
+        )
+        ax.set_title(pairs[at].partition("told ")[2], loc="left", fontsize="small")
+        ax.set_xlabel("speed [rpm]")
+    axes[0].set_ylabel("fuel [mg]")
+    if shown:
+        figure.colorbar(mesh, ax=list(axes), extend="both", label="told less right SOI [°CA]")
+    return figure
+
+
+def _draw_runs(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(9.0, 5.6)
+    axes = figure.subplots(2, 2, sharex=True, sharey="row")
+    runs = names_of(dataset, "run")
+    cycle = dataset["cycle"].to_numpy()
+    for column, form in enumerate(("feed-forward", "curve")):
+        above, below = axes[0, column], axes[1, column]
+        for at, name in enumerate(_SHOWN):
+            if f"{form}, {name}" not in runs:
+                continue
+            own = dataset.isel(run=runs.index(f"{form}, {name}"))
+            dash, color = LINE_STYLES[at]
+            above.plot(cycle, own["estimate_median_cad"], linestyle=dash, color=color, label=f"told {name}")
+            below.plot(own["middle_cycle"], own["mean_lost"], linestyle=dash, color=color)
+        above.plot(cycle, dataset["optimum_cad"], color=GREY, linewidth=1.0, label="right SOI")
+        above.set_title(form, loc="left", fontsize="small")
+        below.set(xlabel="engine cycle [-]", yscale="log")
+    axes[0, 0].set_ylabel("estimate of the best SOI\n[°CA aTDC]")
+    axes[1, 0].set_ylabel("J lost per cycle [points]")
+    for ax in axes.flat:
+        ax.grid(alpha=0.3)
+    legend_outside(figure, axes[0, 0], 5)
+    return figure

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.loop import SurrogatePlant, run_seeker
+from mgdd.plot.style import BLACK, GREY, LINE_STYLES, axis_label, legend, minus
 from mgdd.results.labels import labelled_dataset
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import new_figure
 from mgdd.studies.measured_engine_cases import (
     ARRIVAL_CAD,
     LOWER_CAD,
@@ -26,12 +28,20 @@ from mgdd.studies.measured_engine_cases import (
     seeker_of,
     tuned_case,
 )
-from mgdd.studies.measured_engine_figures import draw
-from mgdd.studies.statistics import mean_interval, with_interval
+from mgdd.studies.statistics import (
+    OF_SEEDS,
+    band_variables,
+    first_within,
+    mean_interval,
+    sd_of,
+    with_interval,
+    with_median_interval,
+)
 from mgdd.surrogate import EngineSurrogate, fit_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["run_measured_engine_seek"]
@@ -45,9 +55,18 @@ _TAIL = 100
 class _Runs:
     """Trajectories of one case, one row per seed."""
 
+    case: Case
     estimate: NDArray[np.float64]
     outside: NDArray[np.float64]
     signals: Mapping[str, NDArray[np.float64]]
+
+    @property
+    def final(self) -> NDArray[np.float64]:
+        return np.asarray(self.estimate[:, -_TAIL:].mean(axis=1), dtype=np.float64)
+
+    @property
+    def arrivals(self) -> NDArray[np.float64]:
+        return np.array([first_within(own, self.case.best["soi_cad"], ARRIVAL_CAD) for own in self.estimate])
 
 
 def run_measured_engine_seek(
@@ -67,10 +86,8 @@ def run_measured_engine_seek(
         Runs per seeker and objective.
     quick : bool
         At most three seeds and 600 instead of 1500 cycles.
-    figures : bool
-        Whether to draw.
-    progress : callable, optional
-        Called with a few words before each seeker.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -84,8 +101,6 @@ def run_measured_engine_seek(
     ------
     mgdd.errors.DataError
         The records are not at hand.
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -99,35 +114,32 @@ def run_measured_engine_seek(
     ...     result = run_measured_engine_seek(seeds=1, quick=True, figures=False)
     ...     assert len(result.summary["rows"]) == 12
     """
-    seeds = min(check_seeds(seeds), _QUICK_SEEDS if quick else seeds)
+    seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
+    work = Parts(progress)
     cycles = _QUICK_CYCLES if quick else _CYCLES
-    if progress is not None:
-        progress("fitting the surrogate")
+    work.progress("fitting the surrogate")
     surrogate = _surrogate()
     cases = []
     for objective in OBJECTIVES:
         held = held_objective(surrogate, objective)
         cases += [tuned_case(surrogate, objective, name, held) for name in objective.seekers]
-    parts = [(f"{case.objective.name}: {case.seeker}", partial(_run, surrogate, case, seeds, cycles)) for case in cases]
-    runs, interrupted = run_parts(parts, progress)
-    cases = cases[: len(runs)]
-    dataset = _dataset(cases, runs, surrogate)
+    runs = work(
+        (f"{case.objective.name}: {case.seeker}", partial(_run, surrogate, case, seeds, cycles)) for case in cases
+    )
     sensor = surrogate.signals["nox_ppm"].sensor
     lag = lag_of(surrogate, "nox_ppm")
-    summary: dict[str, Any] = {
-        "study": _NAME,
-        "seeds": seeds,
-        "cycles": cycles,
-        "start_soi_cad": START_CAD,
-        "bounds_soi_cad": [LOWER_CAD, UPPER_CAD],
-        "nox_delay_cycles": lag.delay_cycles,
-        "nox_lag_cycles": lag.lag_cycles,
-        "nox_lag_stderr_cycles": sensor.tau_stderr_cycles if sensor is not None else math.nan,
-        "records": dict(surrogate.source),
-        "interrupted": interrupted,
-        "rows": [_row(case, run) for case, run in zip(cases, runs, strict=True)],
-    }
-    return finish(dataset, summary, draw if figures else None)
+    return work.finish(
+        _NAME, _dataset(runs, surrogate), _draw if figures else None,
+        seeds=seeds,
+        cycles=cycles,
+        start_soi_cad=START_CAD,
+        bounds_soi_cad=[LOWER_CAD, UPPER_CAD],
+        nox_delay_cycles=lag.delay_cycles,
+        nox_lag_cycles=lag.lag_cycles,
+        nox_lag_stderr_cycles=sensor.tau_stderr_cycles if sensor is not None else math.nan,
+        records=dict(surrogate.source),
+        rows=[_row(run) for run in runs],
+    )  # fmt: skip
 
 
 def _surrogate() -> EngineSurrogate:
@@ -146,32 +158,21 @@ def _run(surrogate: EngineSurrogate, case: Case, seeds: int, cycles: int) -> _Ru
         outside[seed] = 1.0 - run["supported"]
         for name, column in signals.items():
             column[seed] = run[name]
-    return _Runs(estimate=estimate, outside=outside, signals=signals)
+    return _Runs(case=case, estimate=estimate, outside=outside, signals=signals)
 
 
-def _final(run: _Runs) -> NDArray[np.float64]:
-    return np.asarray(run.estimate[:, -_TAIL:].mean(axis=1), dtype=np.float64)
-
-
-def _arrivals(case: Case, run: _Runs) -> NDArray[np.float64]:
-    near = np.abs(run.estimate - case.best["soi_cad"]) <= ARRIVAL_CAD
-    return np.where(near.any(axis=1), near.argmax(axis=1), np.nan)
-
-
-def _row(case: Case, run: _Runs) -> dict[str, Any]:
-    final, arrivals = _final(run), _arrivals(case, run)
-    later = run.estimate.shape[1] // 2
-    reached = np.where(np.isnan(arrivals), np.inf, arrivals)
-    median = float(np.median(reached))
+def _row(run: _Runs) -> dict[str, Any]:
+    case, final, later = run.case, run.final, run.estimate.shape[1] // 2
+    away = final - case.best["soi_cad"]
     return {
         "objective": case.objective.name,
         "seeker": case.seeker,
         **with_interval("final_soi_cad", final),
-        "final_soi_sd_cad": float(final.std(ddof=1)) if final.size > 1 else math.nan,
+        "final_soi_sd_cad": sd_of(final),
         "optimum_soi_cad": case.best["soi_cad"],
         "error_cad": float(final.mean() - case.best["soi_cad"]),
-        "cycles_to_1_cad": median if math.isfinite(median) else None,
-        "ends_within_1_cad_share": float(np.mean(np.abs(final - case.best["soi_cad"]) <= ARRIVAL_CAD)),
+        "cycles_to_1_cad": with_median_interval("median", run.arrivals)["median"],
+        "ends_within_1_cad_share": float(np.mean(np.abs(away) <= ARRIVAL_CAD)),
         "outside_share": float(run.outside.mean()),
         "mean_imep_bar": float(run.signals["imep_bar"][:, later:].mean()),
         "mean_pressure_rise": float(run.signals["mprr"][:, later:].mean()),
@@ -183,42 +184,101 @@ def _row(case: Case, run: _Runs) -> dict[str, Any]:
     }
 
 
-def _half_interval(values: NDArray[np.float64]) -> float:
-    mean, _, high = mean_interval(values)
-    return high - mean
-
-
-def _dataset(cases: list[Case], runs: list[_Runs], surrogate: EngineSurrogate) -> xr.Dataset:
-    cad, finals = "°CA aTDC", [_final(run) for run in runs]
-    estimates = np.stack([run.estimate for run in runs])
-    low, median, high = np.quantile(estimates, [0.1, 0.5, 0.9], axis=1)
-    every = ("case", "seed")
+def _dataset(runs: list[_Runs], surrogate: EngineSurrogate) -> xr.Dataset:
+    cad, every, cases = "°CA aTDC", ("case", "seed"), [run.case for run in runs]
     ranges = [case.best.bounds["soi_cad"] for case in cases]
+    half = [high - mean for mean, _, high in (mean_interval(run.final) for run in runs)]
+    arrivals = [np.where(np.isfinite(run.arrivals), run.arrivals, np.nan) for run in runs]
     variables: dict[str, tuple[Any, ...]] = {
         "case": ("case", np.arange(len(cases)), "-", "seeker on objective"),
-        "seed": ("seed", np.arange(estimates.shape[1]), "-", "seed"),
-        "cycle": ("cycle", np.arange(estimates.shape[2])),
+        "seed": ("seed", np.arange(runs[0].estimate.shape[0]), "-", "seed"),
+        "cycle": ("cycle", np.arange(runs[0].estimate.shape[1])),
         "objective": ("case", [case.objective.name for case in cases], "-", "objective"),
         "seeker": ("case", [case.seeker for case in cases], "-", "seeker"),
         "optimum_soi_cad": ("case", [case.best["soi_cad"] for case in cases], cad, "optimum of the surrogate"),
         "supported_low_cad": ("case", [low for low, _ in ranges], cad, "earliest supported SOI"),
         "supported_high_cad": ("case", [high for _, high in ranges], cad, "latest supported SOI"),
-        "final_soi_cad": (every, finals, cad, "mean estimate of the last 100 cycles"),
-        "final_soi_interval_cad": (
-            "case",
-            [_half_interval(f) for f in finals],
-            "°CA",
-            "half 95 % interval of its mean",
-        ),
-        "cycles_to_1_cad": (
-            every,
-            [_arrivals(case, run) for case, run in zip(cases, runs, strict=True)],
-            "cycle",
-            "first cycle within 1 °CA of the optimum",
-        ),
+        "final_soi_cad": (every, [run.final for run in runs], cad, "mean estimate of the last 100 cycles"),
+        "final_soi_interval_cad": ("case", half, "°CA", "half 95 % interval of its mean"),
+        "cycles_to_1_cad": (every, arrivals, "cycle", "first cycle within 1 °CA of the optimum"),
         "outside_share": (every, [r.outside.mean(axis=1) for r in runs], "-", "share of cycles outside the records"),
-        "estimate_low_cad": (("case", "cycle"), low, cad, "estimate, 10 % of the seeds below"),
-        "estimate_median_cad": (("case", "cycle"), median, cad, "estimate, median of the seeds"),
-        "estimate_high_cad": (("case", "cycle"), high, cad, "estimate, 10 % of the seeds above"),
+        **band_variables("estimate_{}_cad", ("case", "cycle"), [run.estimate for run in runs], cad, OF_SEEDS),
     }
     return labelled_dataset(variables, attrs=dict(surrogate.source))
+
+
+_MARKS = "osD^v"
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    return {
+        "Estimates, median of the seeds; the band holds 80 % of the batch seeker's, dotted: end of the records": (
+            _trajectories(dataset)
+        ),
+        "Where the seekers end: mean with its 95 % interval, below it each seed; dashed: optimum of the surrogate, "
+        "dotted: end of the records": _ends(dataset),
+    }
+
+
+def _groups(dataset: xr.Dataset) -> dict[str, list[int]]:
+    groups: dict[str, list[int]] = {}
+    for at, name in enumerate(dataset["objective"].to_numpy()):
+        groups.setdefault(str(name), []).append(at)
+    return groups
+
+
+def _styles(dataset: xr.Dataset) -> dict[str, int]:
+    return {name: at for at, name in enumerate(dict.fromkeys(map(str, dataset["seeker"].to_numpy())))}
+
+
+def _trajectories(dataset: xr.Dataset) -> Figure:
+    groups, styles = _groups(dataset), _styles(dataset)
+    figure = new_figure(8.0, 3.4 * len(groups))
+    panels = figure.subplots(len(groups), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    cycle = dataset["cycle"]
+    for ax, (objective, cases) in zip(panels, groups.items(), strict=True):
+        lines = []
+        for at in cases:
+            one = dataset.isel(case=at)
+            seeker = str(one["seeker"].item())
+            dash, color = LINE_STYLES[styles[seeker] % len(LINE_STYLES)]
+            lines += ax.plot(cycle, one["estimate_median_cad"], linestyle=dash, color=color, label=seeker)
+            if at == cases[0]:
+                low, high = one["estimate_low_cad"], one["estimate_high_cad"]
+                ax.fill_between(cycle, low, high, color=color, alpha=0.15, linewidth=0.0)
+        best = float(dataset["optimum_soi_cad"][cases[0]])
+        line = ax.axhline(best, color=GREY, linewidth=1.0, label=minus(f"optimum of the surrogate: {best:.1f}"))
+        for edge in ("supported_low_cad", "supported_high_cad"):
+            ax.axhline(float(dataset[edge][cases[0]]), color=GREY, linewidth=0.8, linestyle=":")
+        ax.annotate(minus(objective), (0.99, 0.95), xycoords="axes fraction", ha="right", va="top")
+        ax.set_ylabel("start of injection [°CA aTDC]")
+        legend(ax, [*lines, line], columns=6)
+    panels[-1].set_xlabel(axis_label(dataset, "cycle"))
+    return figure
+
+
+def _ends(dataset: xr.Dataset) -> Figure:
+    groups, styles = _groups(dataset), _styles(dataset)
+    figure = new_figure(8.0, 0.42 * dataset.sizes["case"] + 1.2)
+    ax = figure.add_subplot()
+    rows: list[str] = []
+    for objective, cases in groups.items():
+        best = float(dataset["optimum_soi_cad"][cases[0]])
+        top = len(rows) - 0.4
+        for at in cases:
+            one = dataset.isel(case=at)
+            seeker, place = str(one["seeker"].item()), len(rows)
+            color = LINE_STYLES[styles[seeker] % len(LINE_STYLES)][1]
+            each = one["final_soi_cad"].to_numpy()
+            ax.plot(each, np.full(each.size, place + 0.28), ".", color=color, markersize=3)
+            half = float(np.nan_to_num(one["final_soi_interval_cad"]))
+            mark = _MARKS[styles[seeker] % len(_MARKS)]
+            ax.errorbar(each.mean(), place, xerr=half, fmt=mark, color=color, capsize=4, markersize=6)
+            rows.append(minus(f"{objective}: {seeker}"))
+        ax.vlines(best, top, len(rows) - 0.6, color=BLACK, linestyle="--", linewidth=1.0)
+    for edge in ("supported_low_cad", "supported_high_cad"):
+        ax.axvline(float(dataset[edge][0]), color=GREY, linewidth=0.8, linestyle=":")
+    ax.set_yticks(range(len(rows)), rows)
+    ax.invert_yaxis()
+    ax.set_xlabel("final start of injection [°CA aTDC]")
+    return figure

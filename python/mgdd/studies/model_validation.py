@@ -12,17 +12,31 @@ import numpy as np
 from mgdd import datasets, presets
 from mgdd.identify import best_timing
 from mgdd.identify.engine.records import CylinderFit
-from mgdd.results.labels import ANGLE, labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.model_validation_figures import draw
-from mgdd.studies.statistics import with_interval
-from mgdd.studies.validation_fits import LAWS, STAGES, Burn, Draw, Law, Meeting, best_slopes, burns_of, meet, redraw
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, axis_label
+from mgdd.results.labels import ANGLE, labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import names_of, new_figure
+from mgdd.studies.statistics import sd_of, with_interval
+from mgdd.studies.validation_fits import (
+    LAWS,
+    STAGES,
+    Burn,
+    Draw,
+    Law,
+    Meeting,
+    best_slopes,
+    burns_of,
+    meet,
+    redraw,
+    stated_sd,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-__all__ = ["Validated", "run_model_validation", "stage_rows", "validate_law"]
+__all__ = ["run_model_validation", "stage_rows", "validate_law"]
 
 BLOCK_CAD = 30.0  # the residuals of every law have lost their correlation over this angle
 SHOWN = "Wiebe, linear gamma"  # of the figure of pressures
@@ -70,10 +84,8 @@ def run_model_validation(
         Draws per law and kind of error.
     quick : bool
         At most eight draws, and no family.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -81,11 +93,6 @@ def run_model_validation(
         Rows per law, stage and trace: pressure RMSE [% of p_max], closed IMEP error [%], best CA50 [°CA aTDC],
         curvature over J [%/°CA²] and what the best timing loses [% of J]. ``summary["spread"]``: scatter of best
         timing and curvature. ``summary["coverage"]``: of the stated intervals.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -99,23 +106,19 @@ def run_model_validation(
     >>> [round(row["rmse_percent"], 1) for row in own if row["stage"] == "calibrated"]
     [0.1, 0.1, 0.1, 0.2]
     """
-    draws = min(check_seeds(seeds), _QUICK_DRAWS) if quick else check_seeds(seeds)
+    draws = check_seeds(seeds, quick=quick, most=_QUICK_DRAWS)
+    work = Parts(progress)
     traces, cylinder = datasets.load(_ENGINE), presets.load(_ENGINE).cylinder
-    parts = [(law.name, partial(validate_law, law, traces, cylinder, draws)) for law in LAWS]
-    done, interrupted = run_parts(parts, progress)
-    family: list[tuple[float, float]] = []
-    if not quick and not interrupted:
-        families, interrupted = run_parts([("family of models", partial(best_timing, traces, cylinder))], progress)
-        family = [row.free_ca50_cad for row in families[0]] if families else []
-    summary = {
-        "study": "model-validation",
-        "seeds": draws,
-        "rows": [row for own in done for row in stage_rows(own, done[0])],
-        "spread": [row for own in done for row in _spread(own, family)],
-        "coverage": [_coverage(own) for own in done],
-        "interrupted": interrupted,
-    }
-    return finish(_dataset(done, family), to_jsonable(summary), draw if figures else None)
+    done = work((law.name, partial(validate_law, law, traces, cylinder, draws)) for law in LAWS)
+    families = [] if quick else work([("family of models", partial(best_timing, traces, cylinder))])
+    family = [row.free_ca50_cad for rows in families for row in rows]
+    return work.finish(
+        "model-validation", _dataset(done, family), _draw if figures else None,
+        seeds=draws,
+        rows=[row for own in done for row in stage_rows(own, done[0])],
+        spread=[row for own in done for row in _spread(own, family)],
+        coverage=[_coverage(own) for own in done],
+    )  # fmt: skip
 
 
 def validate_law(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) -> Validated:
@@ -141,56 +144,48 @@ def validate_law(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) 
 
 def stage_rows(own: Validated, reference: Validated) -> list[dict[str, Any]]:
     """Give a row per stage and trace; the reference says what a best timing loses."""
-    out = []
-    for stage in STAGES:
-        for at, (burn, met) in enumerate(zip(own.burns[stage], own.met[stage], strict=True)):
-            best, bend = burn.best
-            truth = reference.burns["calibrated"][at]
-            out.append(
-                {
-                    "law": own.law.name,
-                    "stage": stage,
-                    "file": own.fit.loads[at].file,
-                    "rmse_percent": met.rmse_percent,
-                    "imep_closed_error_percent": met.imep_closed_error_percent,
-                    "largest_error_bar": met.largest_error_bar,
-                    "best_ca50_cad": best,
-                    "best_ca50_error_cad": best - truth.best[0],
-                    "lost_percent": truth.lost_percent(best),
-                    "curvature_percent_per_cad2": bend,
-                    "curvature_ratio": bend / truth.best[1],
-                }
-            )
-    return out
+    return [
+        {
+            "law": own.law.name,
+            "stage": stage,
+            "file": load.file,
+            "rmse_percent": met.rmse_percent,
+            "imep_closed_error_percent": met.imep_closed_error_percent,
+            "largest_error_bar": met.largest_error_bar,
+            "best_ca50_cad": burn.best[0],
+            "best_ca50_error_cad": burn.best[0] - truth.best[0],
+            "lost_percent": truth.lost_percent(burn.best[0]),
+            "curvature_percent_per_cad2": burn.best[1],
+            "curvature_ratio": burn.best[1] / truth.best[1],
+        }
+        for stage in STAGES
+        for burn, met, truth, load in zip(
+            own.burns[stage], own.met[stage], reference.burns["calibrated"], own.fit.loads, strict=True
+        )
+    ]
 
 
 def _spread(own: Validated, family: list[tuple[float, float]]) -> list[dict[str, Any]]:
     best = np.array([drawn.best_ca50_cad for drawn in own.block])
     bend = np.array([drawn.curvature_percent for drawn in own.block])
-    slopes = best_slopes(own.fit)
-    stated = np.sqrt(np.einsum("ij,jk,ik->i", slopes, np.nan_to_num(own.fit.report.covariance), slopes))
-    out = []
-    for at, load in enumerate(own.fit.loads):
-        away = best[:, at] - own.best[at]
-        lost = -0.5 * own.curvature[at] * away**2
-        out.append(
-            {
-                "law": own.law.name,
-                "file": load.file,
-                "best_ca50_cad": own.best[at],
-                "stated_sd_cad": float(stated[at]),
-                **_sd_interval("redrawn_sd_cad", best[:, at]),
-                **with_interval("redrawn_bias_cad", away),
-                "family_low_cad": family[at][0] if family else None,
-                "family_high_cad": family[at][1] if family else None,
-                "lost_p95_percent": float(np.quantile(lost, 0.95)),
-                "curvature_percent_per_cad2": own.curvature[at],
-                "curvature_relative_sd_percent": 100.0 * float(bend[:, at].std(ddof=1) / abs(own.curvature[at]))
-                if len(bend) > 1
-                else None,
-            }
-        )
-    return out
+    away, stated = best - own.best, stated_sd(own.fit, best_slopes(own.fit))
+    lost = -0.5 * own.curvature * away**2
+    return [
+        {
+            "law": own.law.name,
+            "file": load.file,
+            "best_ca50_cad": own.best[at],
+            "stated_sd_cad": float(stated[at]),
+            **_sd_interval("redrawn_sd_cad", best[:, at]),
+            **with_interval("redrawn_bias_cad", away[:, at]),
+            "family_low_cad": family[at][0] if family else None,
+            "family_high_cad": family[at][1] if family else None,
+            "lost_p95_percent": float(np.quantile(lost[:, at], 0.95)),
+            "curvature_percent_per_cad2": own.curvature[at],
+            "curvature_relative_sd_percent": 100.0 * (sd_of(bend[:, at]) / abs(own.curvature[at])),
+        }
+        for at, load in enumerate(own.fit.loads)
+    ]
 
 
 def _sd_interval(name: str, values: NDArray[np.float64]) -> dict[str, float | None]:
@@ -257,3 +252,69 @@ def _dataset(done: list[Validated], family: list[tuple[float, float]]) -> xr.Dat
         ),
     }  # fmt: skip
     return labelled_dataset(variables, attrs={"shown": shown.law.name})
+
+
+_LOOKS = {"other loads": ("--", BLUE), "heat release": (":", GREEN), "calibrated": ("-", ORANGE)}
+_MARKERS = "osD^"
+_COLORS = (BLACK, BLUE, ORANGE, GREEN)
+_SPAN_CAD = (-40.0, 80.0)
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    law = str(dataset.attrs["shown"])
+    return {
+        f"Measured pressure and the model ({law}) before and after its calibration": _pressures(dataset),
+        "Best CA50 of each calibrated model: 95 % of calibrations to redrawn residuals, the stated 95 % interval "
+        "(short bars), and the range over a family of plausible models (grey)": _draw_best(dataset),
+    }
+
+
+def _pressures(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(9.0, 6.6)
+    files = names_of(dataset, "file")
+    angle = dataset[ANGLE].to_numpy()
+    axes = figure.subplots(4, 2, sharex=True, height_ratios=(3.0, 1.2, 3.0, 1.2))
+    for at, file in enumerate(files[:4]):
+        ax, below = axes[2 * (at // 2), at % 2], axes[2 * (at // 2) + 1, at % 2]
+        measured = dataset["measured_bar"][at].to_numpy()
+        ax.plot(angle, measured, ".", color=BLACK, markersize=2.5, label="measured")
+        for stage, (dash, color) in _LOOKS.items():
+            model = dataset["stage_bar"].sel(stage=stage)[at].to_numpy()
+            ax.plot(angle, model, dash, color=color, linewidth=1.1, label=stage)
+            below.plot(angle, model - measured, dash, color=color, linewidth=1.0)
+        below.axhline(0.0, color=GREY, linewidth=0.8)
+        ax.set_title(file, loc="left", fontsize="small")
+        ax.set_xlim(*_SPAN_CAD)
+        for panel in (ax, below):
+            panel.grid(alpha=0.3)
+        if at % 2 == 0:
+            ax.set_ylabel("pressure [bar]")
+            below.set_ylabel("model −\nmeasured\n[bar]")
+    axes[0, 0].legend(fontsize="small")
+    for ax in axes[-1]:
+        ax.set_xlabel(axis_label(dataset, ANGLE))
+    return figure
+
+
+def _draw_best(dataset: xr.Dataset) -> Figure:
+    figure = new_figure(7.4, 4.2)
+    ax = figure.subplots()
+    files, laws = names_of(dataset, "file"), names_of(dataset, "law")
+    best = dataset["best_ca50_cad"].sel(stage="calibrated").to_numpy()
+    redrawn, stated = dataset["redrawn_ca50_cad"].to_numpy(), dataset["stated_sd_cad"].to_numpy()
+    for at in range(len(files)):
+        low, high = float(dataset["family_low_cad"][at]), float(dataset["family_high_cad"][at])
+        ax.fill_between([at - 0.42, at + 0.42], low, high, color=GREY, alpha=0.2, linewidth=0.0)
+        for k, law in enumerate(laws):
+            x = at + 0.18 * (k - 0.5 * (len(laws) - 1))
+            color, marker = _COLORS[k % len(_COLORS)], _MARKERS[k % len(_MARKERS)]
+            ends = np.quantile(redrawn[k, at], [0.025, 0.975])
+            ax.plot([x, x], ends, color=color, linewidth=1.2)
+            half = 1.96 * float(np.median(stated[k, at]))
+            ax.plot([x + 0.05] * 2, [best[k, at] - half, best[k, at] + half], color=color, linewidth=3.0, alpha=0.6)
+            ax.plot(x, best[k, at], marker, color=color, markersize=5, label=law if at == 0 else None)
+    ax.set_xticks(range(len(files)), files, fontsize="small")
+    ax.set_ylabel("best CA50 [°CA aTDC]")
+    ax.grid(alpha=0.3, axis="y")
+    ax.legend(fontsize="small", frameon=False, ncols=2)
+    return figure

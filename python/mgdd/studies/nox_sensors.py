@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import presets
+from mgdd import plot, presets
 from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, ignition_delay
 from mgdd.loop import EngineBench, SensorDynamics
-from mgdd.results.labels import VARIABLES, labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.nox_sensors_figures import draw
+from mgdd.results.labels import VARIABLES, labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import grey_band, new_figure
 from mgdd.studies.statistics import with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["run_nox_sensors"]
@@ -68,10 +69,8 @@ def run_nox_sensors(
         Repetitions of the sweep and of the start of the correction.
     quick : bool
         At most three seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -80,11 +79,6 @@ def run_nox_sensors(
         load_step_t90_cycles load_step_t90_s``: rms and largest error of the steady means over the sweep, scatter about
         the true value from cycle to cycle, and the time to 90 % of a sensor's own answer to a step without noise.
         ``summary`` holds the sweep, the two fits and the course of the correction.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -97,27 +91,20 @@ def run_nox_sensors(
     >>> {row["sensor"]: row["timing_step_t90_cycles"] for row in rows}["soft sensor, fitted proxy"]
     0
     """
-    seeds = min(check_seeds(seeds), 3) if quick else check_seeds(seeds)
-    (sweep,), interrupted = run_parts([("sweep of injection timing", partial(_sweep, seeds))], progress)
+    seeds = check_seeds(seeds, quick=quick, most=3)
+    work = Parts(progress)
+    (sweep,) = work([("sweep of injection timing", partial(_sweep, seeds))])
     proxy = sweep.proxies["affine_log"]
-    moves: list[Any] = []
-    if not interrupted:
-        moves, interrupted = run_parts([(name, partial(_step, name, proxy)) for name in _STEPS], progress)
-    course: list[NDArray[np.float64]] = []
-    if not interrupted:
-        course, interrupted = run_parts([("correction of a wrong proxy", partial(_correction, seeds))], progress)
-    rows = [_row(sensor, sweep, [quiet for quiet, _ in moves]) for sensor in _NAMES]
-    dataset = _dataset(sweep, [noisy for _, noisy in moves], course)
-    summary = {
-        "study": "nox-sensors",
-        "seeds": seeds,
-        "rows": rows,
-        "sweep": _sweep_rows(sweep),
-        "fits": sweep.fits,
-        "correction": [_course_row(own) for own in course],
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), draw if figures else None)
+    moves = work((name, partial(_step, name, proxy)) for name in _STEPS)
+    course = work([("correction of a wrong proxy", partial(_correction, seeds))])
+    return work.finish(
+        "nox-sensors", _dataset(sweep, [noisy for _, noisy in moves], course), _draw if figures else None,
+        seeds=seeds,
+        rows=[_row(sensor, sweep, [quiet for quiet, _ in moves]) for sensor in _NAMES],
+        sweep=_sweep_rows(sweep),
+        fits=sweep.fits,
+        correction=[_course_row(own) for own in course],
+    )  # fmt: skip
 
 
 def _sweep(seeds: int) -> _Sweep:
@@ -141,13 +128,10 @@ def _sweep(seeds: int) -> _Sweep:
     means["soft_fitted"] = fits["affine_log"].proxy.affine_log_ppm(temperature.ravel()).reshape(temperature.shape)
     scatter = {name: 100.0 * float(np.mean(values)) for name, values in deviation.items()}
     return _Sweep(
-        soc_cad=soc,
-        t_max_k=t_max,
-        nox_ppm=means,
-        scatter=scatter,
+        soc_cad=soc, t_max_k=t_max, nox_ppm=means, scatter=scatter,
         fits=[_fit_row(name, fit) for name, fit in fits.items()],
         proxies={name: fit.proxy for name, fit in fits.items()},
-    )
+    )  # fmt: skip
 
 
 def _step(name: str, fitted: NoxProxy) -> tuple[dict[str, NDArray[np.float64]], xr.Dataset]:
@@ -167,13 +151,6 @@ def _step(name: str, fitted: NoxProxy) -> tuple[dict[str, NDArray[np.float64]], 
     quiet = {sensor: still[f"nox_{sensor}_ppm"].to_numpy() for sensor in _SENSORS}
     quiet["soft_fitted"] = fitted.affine_log_ppm(still["t_max_k"].to_numpy())
     return quiet, noisy
-
-
-def _answer_cycles(column: NDArray[np.float64]) -> int:
-    """Count the cycles from the step until 90 % of the way from a sensor's own old to its own new value."""
-    old, new = column[STEP_AT - 1], column[-1]
-    share = (column[STEP_AT:] - old) / (new - old)
-    return int(np.flatnonzero(share >= 0.9)[0])
 
 
 def _correction(seeds: int) -> NDArray[np.float64]:
@@ -199,7 +176,8 @@ def _row(sensor: str, sweep: _Sweep, moves: list[dict[str, NDArray[np.float64]]]
     if sensor == "soft_fitted":  # one map of the same temperature: it scatters as the uncorrected one does
         row["scatter_percent"] = sweep.scatter["soft"]
     for name, move in zip(_STEPS, moves, strict=False):
-        cycles = _answer_cycles(move[sensor])
+        old, new = move[sensor][STEP_AT - 1], move[sensor][-1]
+        cycles = int(np.argmax((move[sensor][STEP_AT:] - old) / (new - old) >= 0.9))
         key = name.replace(" ", "_")
         row |= {f"{key}_t90_cycles": cycles, f"{key}_t90_s": cycles * 120.0 / OperatingPoint().speed_rpm}
     return row
@@ -266,3 +244,31 @@ def _dataset(sweep: _Sweep, moves: list[xr.Dataset], course: list[NDArray[np.flo
             ("seed", "correction_cycle"), course[0], "%", "error of the corrected soft sensor, mean of 10 cycles",
         )  # fmt: skip
     return labelled_dataset(variables)
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    figure = new_figure(11.0, 4.2)
+    left, right = figure.subplots(1, 2)
+    names = {f"steady_{name}_ppm": f"nox_{name}_ppm" for name in ("true", *_SENSORS)}
+    steady = dataset[[*names, "soi_cad"]].rename(names)
+    map_names = {"steady_true_ppm": "nox_true_ppm", "steady_analyser_ppm": "nox_analyser_ppm"}
+    map_names |= {f"fitted_{name}_ppm": f"nox_{name}_ppm" for name in ("affine_log", "arrhenius")}
+    mapped = dataset[[*map_names, "t_max_k"]].rename(map_names).swap_dims(soi_cad="t_max_k").drop_vars("soi_cad")
+    plot.sensors(mapped, ax=left)
+    plot.sensors(steady, ax=right)
+    out = {"Map of the soft sensor over the maximum gas temperature, and every sensor over injection timing": figure}
+    if "step" in dataset:
+        figure = new_figure(11.0, 4.2)
+        steps = dataset[[*names.values()]]
+        for ax, step in zip(figure.subplots(1, steps.sizes["step"], squeeze=False).flat, dataset["step"], strict=True):
+            plot.sensors(steps.sel(step=step).drop_vars("step"), ax=ax)
+            ax.annotate(str(step.item()), (0.98, 0.04), xycoords="axes fraction", ha="right")
+        out["Answers of the sensors to a step of timing and of load at cycle 0"] = figure
+    if "correction_cycle" in dataset:
+        figure = new_figure(6.6, 3.8)
+        ax = figure.add_subplot()
+        ends = np.quantile(dataset["correction_error_percent"], [0.1, 0.5, 0.9], axis=0)
+        grey_band(ax, dataset["correction_cycle"].to_numpy(), *ends)
+        ax.set(xlabel="cycle since the wrong start [-]", ylabel="error of the corrected soft sensor [%]")
+        out["A wrong proxy held to the analyser: median of the seeds and the band that holds 80 % of them"] = figure
+    return out

@@ -11,18 +11,92 @@ import numpy as np
 from mgdd.guide import OnlineCalibration
 from mgdd.loop import EngineBench
 from mgdd.optimize import ExtremumSeeking
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.calibration_facts import ENGINE_KNOWN, EXACT, TRUE_SCALE, WRONG, calibration_facts, fact_bars
-from mgdd.studies.guide_cases import BOUNDS_CAD, first_within, stays_within, verdict_on
-from mgdd.studies.online_calibration_figures import draw
-from mgdd.studies.statistics import with_interval, with_median_interval
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, minus
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import band, legend_outside, names_of, new_figure
+from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT, WRONG, verdict_on, verdicts
+from mgdd.studies.statistics import (
+    band_variables,
+    first_within,
+    mean_interval,
+    sd_of,
+    stays_within,
+    with_interval,
+    with_median_interval,
+    with_quantiles,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
 __all__ = ["run_online_calibration"]
+
+TRUE_SCALE = float(PLANT.wall_heat_scale)
+# Everything but the wall heat taken as known exactly.
+EXACT = {name: 0.0 for name in OnlineCalibration("puma_single").parameters if name != "wall_heat_scale"}
+# The engine itself, as its virtual compression ratio and temperatures are: what is asked then is what a sensor does.
+ENGINE_KNOWN = dict.fromkeys(
+    ["compression_ratio_offset", "charge_temperature_offset_k", "wall_temperature_offset_k"], 0.0
+)
+_FACT_CAD, _TRIALS, _STEADY_CYCLES = -6.0, 200, 40
+# Shift of the wall heat by a timing told 0.5 CAD late, at these timings, found by an independent program.
+_SHIFTS = {-10.0: 0.053, -6.0: 0.075, 0.0: 0.114}
+_SHIFT_MARGIN = 0.02
+
+
+def calibration_facts() -> list[dict[str, Any]]:
+    """Give rows ``fact value expected margin``: trials of extremum seeking, and the shift by a wrong timing."""
+    trials, final = _seeking()
+    found = [
+        ("extremum seeking: trials until it stays within 2 %", trials, 137.0, 13.0),
+        ("extremum seeking: wall heat in the end", final, TRUE_SCALE, 0.01),
+    ]
+    for soc, shift in _SHIFTS.items():
+        early, late = (_told(soc, late) for late in (-0.5, 0.5))
+        text = f"shift of the wall heat by 0.5 CAD of told timing, at {soc:g} CAD"
+        found.append((text, 0.5 * abs(late - early), shift, _SHIFT_MARGIN))
+    return [dict(zip(("fact", "value", "expected", "margin"), row, strict=True)) for row in found]
+
+
+def fact_bars(facts: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Compare each fact with what was expected."""
+    return [
+        verdict_on(
+            fact["fact"], [fact["value"]], f"{fact['expected']:g} ± {fact['margin']:g}",
+            low=fact["expected"] - fact["margin"], high=fact["expected"] + fact["margin"],
+        )
+        for fact in facts
+    ]  # fmt: skip
+
+
+def _seeking() -> tuple[float, float]:
+    """Count trials until the wall heat stays within 2 % of the truth, one trial per update; and where it ends."""
+    bench = EngineBench(soc_scatter_cad=0.0)
+    calibration = OnlineCalibration(
+        WRONG, method="extremum_seeking", uncertainty=EXACT, window_cycles=2, soc_scatter_cad=0.0, trials_per_update=1
+    )
+    scale: list[float] = []
+    while len(scale) < _TRIALS:
+        bench.step(_FACT_CAD)
+        calibration.offer(bench.pressure()[1], bench.point, _FACT_CAD)
+        if calibration.update() == "updated":
+            scale.append(calibration.parameters["wall_heat_scale"])
+    return 1.0 + stays_within(np.array(scale), TRUE_SCALE, 0.02 * TRUE_SCALE), scale[-1]
+
+
+def _told(soc_cad: float, late_cad: float) -> float:
+    """Fit the wall heat alone where the timing is told wrong."""
+    bench = EngineBench(soc_scatter_cad=0.0)
+    calibration = OnlineCalibration(WRONG, uncertainty=EXACT, soc_scatter_cad=0.0)
+    for _ in range(_STEADY_CYCLES):
+        bench.step(soc_cad)
+        calibration.offer(bench.pressure()[1], bench.point, soc_cad + late_cad)
+        calibration.update()
+    return calibration.parameters["wall_heat_scale"]
+
 
 CYCLES, SETTLED = 150, 40
 _START_CAD, _NEAR_PERCENT, _WRONG_PERCENT, _NOISE_BAR, _SCATTER_CAD = -12.0, 3.0, 5.0, 0.1, 0.3
@@ -120,10 +194,8 @@ def run_online_calibration(
         Runs of every case.
     quick : bool
         At most four seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -134,11 +206,6 @@ def run_online_calibration(
         error; shares of runs whose 95 % interval holds the truth, that call the wall heat determined at the end, and
         that do so while it is more than 5 % off. ``summary["facts"]``: extremum seeking on a steady engine without
         noise, and what a wrong timing does. ``summary["bars"]``: what was demanded.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -152,28 +219,24 @@ def run_online_calibration(
     >>> row["way"], row["sensor"], abs(row["error_percent"]) < 3.0
     ('Gauss-Newton', 'clean', True)
     """
-    seeds = min(check_seeds(seeds), 4) if quick else check_seeds(seeds)
-    parts = [
+    seeds = check_seeds(seeds, quick=quick, most=4)
+    work = Parts(progress)
+    done = work(
         (f"{way.name}, {sensor.name}", partial(teach, way, sensor, seeds))
         for sensor in (*NOISES, *ERRORS)
         for way in WAYS
-    ]
-    done, interrupted = run_parts(parts, progress)
-    facts: list[dict[str, Any]] = []
-    if not interrupted:
-        found, interrupted = run_parts([("facts of a steady engine", calibration_facts)], progress)
-        facts = [row for rows in found for row in rows]
+    )
+    found = work([("facts of a steady engine", calibration_facts)])
+    facts = [row for rows in found for row in rows]
     rows = [row_of(taught) for taught in done]
-    summary = {
-        "study": "online-calibration",
-        "seeds": seeds,
-        "rows": rows,
-        "facts": facts,
-        "bars": _bars(rows) + fact_bars(facts),
-        "true_wall_heat_scale": TRUE_SCALE,
-        "interrupted": interrupted,
-    }
-    return finish(_dataset(done), to_jsonable(summary), draw if figures else None)
+    return work.finish(
+        "online-calibration", _dataset(done), _draw if figures else None,
+        seeds=seeds,
+        rows=rows,
+        facts=facts,
+        bars=_bars(rows) + fact_bars(facts),
+        true_wall_heat_scale=TRUE_SCALE,
+    )  # fmt: skip
 
 
 def teach(way: Way, sensor: Sensor, seeds: int) -> Taught:
@@ -210,7 +273,7 @@ def row_of(taught: Taught) -> dict[str, Any]:
         **with_median_interval("median_stays", stays),
         "late_within_3_percent": 100.0 * float(np.mean(np.abs(error[:, SETTLED:]) <= near)),
         **with_interval("error_percent", final),
-        "error_sd_percent": float(final.std(ddof=1)) if final.size > 1 else np.nan,
+        "error_sd_percent": sd_of(final),
         "stated_percent": 100.0 * float(taught.stated.mean()) / TRUE_SCALE,
         "covered_percent": 100.0 * float(np.mean(off <= 1.96 * taught.stated)),
         "determined_percent": 100.0 * float(sure.mean()),
@@ -223,25 +286,18 @@ def _bars(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     own = [row for row in rows if "exact" not in row["way"]]
     clean = [abs(row["error_percent"]) for row in own if row["sensor"] == "clean"]
     faulty = [row for row in own if row["sensor"] in names]
-    bars = []
-    if clean:
-        bars.append(verdict_on("clean sensor: mean error of the wall heat [%]", clean, "at most 3", high=3.0))
-    if faulty:
-        # Where the data determine the wall heat, the error counts; where the verdict says that they do not, it is said.
-        said = [abs(row["error_percent"]) if row["determined_percent"] >= 50.0 else 0.0 for row in faulty]
-        wrong = [row["sure_and_wrong_percent"] for row in faulty]
-        bars += [
-            verdict_on("error of the sensor: mean error of a determined wall heat [%]", said, "at most 5", high=5.0),
-            verdict_on(
-                "error of the sensor: determined and more than 5 % off [% of runs]", wrong, "at most 5", high=5.0
-            ),
-        ]
-    return bars
+    # Where the data determine the wall heat, the error counts; where the verdict says that they do not, it is said.
+    said = [abs(row["error_percent"]) if row["determined_percent"] >= 50.0 else 0.0 for row in faulty]
+    wrong = [row["sure_and_wrong_percent"] for row in faulty]
+    return verdicts([
+        ("clean sensor: mean error of the wall heat [%]", clean, 3.0),
+        ("error of the sensor: mean error of a determined wall heat [%]", said, 5.0),
+        ("error of the sensor: determined and more than 5 % off [% of runs]", wrong, 5.0),
+    ])  # fmt: skip
 
 
 def _dataset(done: list[Taught]) -> xr.Dataset:
-    over = ("run", "cycle")
-    bands = [np.quantile(taught.scale, [0.5, 0.1, 0.9], axis=0) for taught in done]
+    said = with_quantiles("wall heat over the textbook law")
     at_end = {
         "final_scale": ([taught.scale[:, -1] for taught in done], "wall heat at the end over the textbook law"),
         "final_error": ([taught.stated for taught in done], "its stated standard error"),
@@ -257,8 +313,78 @@ def _dataset(done: list[Taught]) -> xr.Dataset:
         "cycle": ("cycle", np.arange(1, CYCLES + 1)),
         "true_scale": ((), TRUE_SCALE, "-", "wall heat of the engine over the textbook law"),
         **{name: (("run", "seed"), values, "-", text) for name, (values, text) in at_end.items()},
+        **band_variables("scale_{}", ("run", "cycle"), [taught.scale for taught in done], "-", said),
     }
-    for at, name in enumerate(("median", "low", "high")):
-        text = "wall heat over the textbook law" + ("", ", 10 % quantile", ", 90 % quantile")[at]
-        variables[f"scale_{name}"] = (over, [band[at] for band in bands], "-", text)
     return labelled_dataset(variables)
+
+
+_LOOKS = (("-", BLACK, "o"), ("--", BLUE, "s"), ("-.", ORANGE, "^"), (":", ORANGE, "v"), ("-", GREEN, "D"))
+_SURE_PERCENT, _SHOWN = 50.0, 80
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    sensors = list(dict.fromkeys(names_of(dataset, "sensor")))
+    noises = [name for name in sensors if "noise" in name or name == "clean"]
+    errors = [name for name in sensors if name not in noises]
+    out = {
+        "Wall heat of the guide over cycles: median of the seeds, and the band that holds 80 % of them": _approach(
+            dataset, noises
+        )
+    }
+    if errors:
+        out[
+            "Error of the wall heat after 150 cycles: mean, and the range that holds 95 % of the seeds; filled where "
+            "the verdict is determined in most runs"
+        ] = _draw_errors(dataset, errors)
+    return out
+
+
+def _approach(dataset: xr.Dataset, sensors: list[str]) -> Figure:
+    figure = new_figure(4.0 * len(sensors), 4.4)
+    true = float(dataset["true_scale"])
+    cycle = dataset["cycle"].to_numpy()
+    axes = figure.subplots(1, len(sensors), sharey=True, squeeze=False)[0]
+    for ax, sensor in zip(axes, sensors, strict=True):
+        for way, (dash, color, _) in zip(dict.fromkeys(names_of(dataset, "way")), _LOOKS, strict=True):
+            found = np.flatnonzero((dataset["sensor"] == sensor) & (dataset["way"] == way))
+            if found.size:
+                own = dataset.isel(run=int(found[0]))
+                ends = [own[f"scale_{end}"] for end in ("low", "median", "high")]
+                band(ax, cycle, *ends, dash=dash, color=color, linewidth=1.3, label=way)
+        near = 0.01 * _NEAR_PERCENT * true
+        ax.axhspan(true - near, true + near, color=GREY, alpha=0.25, linewidth=0.0, label="truth ± 3 %")
+        ax.set_title(sensor, loc="left", fontsize="small")
+        ax.set(xlim=(1, _SHOWN), ylim=(0.35, 1.05))
+        ax.grid(alpha=0.3)
+    figure.supxlabel("cycles since the start [-]", fontsize="medium")
+    axes[0].set_ylabel("wall heat over the textbook law [-]")
+    legend_outside(figure, axes[0], 3)
+    return figure
+
+
+def _draw_errors(dataset: xr.Dataset, sensors: list[str]) -> Figure:
+    figure = new_figure(8.4, 4.8)
+    ax = figure.subplots()
+    true, ways = float(dataset["true_scale"]), dict.fromkeys(names_of(dataset, "way"))
+    rows = np.arange(len(sensors))[::-1]
+    for at, (way, (_, color, marker)) in enumerate(zip(ways, _LOOKS, strict=True)):
+        for row, sensor in zip(rows, sensors, strict=True):
+            found = np.flatnonzero((dataset["sensor"] == sensor) & (dataset["way"] == way))
+            if not found.size:
+                continue
+            own = dataset.isel(run=int(found[0]))
+            error = 100.0 * (own["final_scale"].to_numpy() / true - 1.0)
+            sure = 100.0 * float(own["final_determined"].mean()) >= _SURE_PERCENT
+            height = row + 0.3 - 0.15 * at
+            ax.plot(np.quantile(error, [0.025, 0.975]), [height, height], "-", color=color, linewidth=1.2)
+            ax.plot(
+                mean_interval(error)[0], height, marker, color=color, markersize=5.0,
+                markerfacecolor=color if sure else "white", label=way if row == rows[0] else None,
+            )  # fmt: skip
+    ax.axvspan(-5.0, 5.0, color=GREY, alpha=0.18, linewidth=0.0, label=minus("within 5 %"))
+    ax.axvline(0.0, color=GREY, linewidth=0.8)
+    ax.set_yticks(rows, [name.replace("CAD", "°CA") for name in sensors])
+    ax.set_xlabel("error of the wall heat [%]")
+    ax.grid(alpha=0.3, axis="x")
+    legend_outside(figure, ax, 2)
+    return figure

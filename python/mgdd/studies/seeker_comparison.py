@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
     GoldenSection,
     GradientDescent,
+    IterativeLearning,
     NewtonSeeking,
     Optimum,
     Spsa,
@@ -23,10 +26,10 @@ from mgdd.optimize import (
 )
 from mgdd.optimize.tuning import Tuning
 from mgdd.plot.style import drawn
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.load_step_learning import LAWS, Learned, learn
-from mgdd.studies.statistics import bands, loops, rms, with_interval
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.figures import convergence_panels, names_of
+from mgdd.studies.statistics import OVER_SEEDS, band_variables, estimates, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,12 +38,64 @@ if TYPE_CHECKING:
 
 __all__ = ["run_seeker_comparison"]
 
+_STEP_CYCLES, STEP_AT, LOW_MG, HIGH_MG = 40, 15, 12.0, 28.0
+TARGET_CA50_CAD, FIRST_SOC_CAD = 9.0, -4.0
+_LAG = 0.6 * 0.4 ** np.arange(_STEP_CYCLES)  # impulse response of the timing actuator, first order
+LAWS: dict[str, dict[str, Any]] = {
+    "p": {"law": "p"},
+    "q_filter": {"law": "q_filter", "cutoff": 0.5},
+    "norm_optimal": {"law": "norm_optimal"},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Learned:
+    """Error of CA50 by seed and trial [°CA], as rms over the cycles of a trial, and what the law promises."""
+
+    law: str
+    rms_cad: NDArray[np.float64]
+    sigma_max: float
+
+    def row(self) -> dict[str, Any]:
+        """Give the row of this law."""
+        over_seeds = [rms(column) for column in self.rms_cad.T]
+        first = next((n for n, value in enumerate(over_seeds) if value <= 0.1 * over_seeds[0]), None)
+        return {
+            "law": self.law,
+            "trials": len(over_seeds),
+            "sigma_max": self.sigma_max,
+            "first_rms_cad": over_seeds[0],
+            "third_rms_cad": over_seeds[min(3, len(over_seeds) - 1)],
+            "last_rms_cad": over_seeds[-1],
+            "trials_to_a_tenth": first,
+        }
+
+
+def learn(law: str, seeds: int, *, trials: int = 12, scatter_cad: float = 0.3) -> Learned:
+    """Learn the commanded timing of the load step trial by trial; the scatter of combustion differs in every trial."""
+    points = [(0, OperatingPoint(fuel_mg=LOW_MG)), (STEP_AT, OperatingPoint(fuel_mg=HIGH_MG))]
+    bench = EngineBench(schedule=points, soc_scatter_cad=scatter_cad, efficiency_noise_percent=0.0)
+    errors = np.empty((seeds, trials))
+    sigma_max = math.nan
+    for seed in range(seeds):
+        learner = IterativeLearning(
+            np.full(_STEP_CYCLES, FIRST_SOC_CAD), impulse_response=_LAG, lower=-25.0, upper=8.0, **LAWS[law]
+        )
+        sigma_max = learner.convergence().sigma_max
+        for trial in range(trials):
+            bench.reset(seed * trials + trial)
+            soc = FIRST_SOC_CAD + np.convolve(_LAG, learner.ask() - FIRST_SOC_CAD)[:_STEP_CYCLES]
+            error = TARGET_CA50_CAD - bench.run(soc)["ca50_cad"].to_numpy()
+            errors[seed, trial] = rms(error)
+            learner.tell(error)
+    return Learned(law=law, rms_cad=errors, sigma_max=sigma_max)
+
+
 START_CAD, BOUNDS_CAD, CYCLES, ARRIVAL_CAD, NOISE_PERCENT = -20.0, (-30.0, 10.0), 2000, 1.0, 0.25
 _SHOWN, _BAND_SEEDS = 600, 50
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Contender:
+class _Contender(NamedTuple):
     name: str
     settings: str
     seeker: Any
@@ -49,7 +104,7 @@ class _Contender:
 @dataclass(frozen=True, kw_only=True)
 class _Outcome:
     row: dict[str, Any]
-    bands: NDArray[np.float64]
+    runs: NDArray[np.float64]
     table: xr.Dataset
 
 
@@ -69,10 +124,8 @@ def run_seeker_comparison(
         Runs of each seeker.
     quick : bool
         At most six seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -81,11 +134,6 @@ def run_seeker_comparison(
         mean: first cycle within 1 CAD of the optimum and the share of seeds that get there, rms error over cycles 1000
         to 2000, mean estimate of the last 100, mean loss of J against the optimum over cycles 1000 to 2000 (dither,
         jitter, and 0.002 points by the scatter of combustion). ``summary["iterative_learning"]`` has one row per law.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -98,29 +146,22 @@ def run_seeker_comparison(
     >>> min(row["share_arrived"] for row in result.summary["rows"])
     1.0
     """
-    seeds = min(check_seeds(seeds), 6) if quick else check_seeds(seeds)
+    seeds = check_seeds(seeds, quick=quick, most=6)
+    work = Parts(progress)
     best = EngineBench().find_optimum()
-    contenders = _contenders(best)
-    parts = [(c.name, partial(_run, c, best, seeds)) for c in contenders]
-    done, interrupted = run_parts(parts, progress)
-    learned: list[Learned] = []
-    if not interrupted:
-        laws = [(f"iterative learning, {law}", partial(learn, law, min(seeds, 20))) for law in LAWS]
-        learned, interrupted = run_parts(laws, progress)
-    dataset = _dataset(done, learned, best)
-    summary = {
-        "study": "seeker-comparison",
-        "seeds": seeds,
-        "rows": [outcome.row for outcome in done],
-        "iterative_learning": [own.row() for own in learned],
-        "iterative_learning_seeds": min(seeds, 20),
-        "optimum_cad": best["soc_cad"],
-        "curvature_percent_per_cad2": best.curvature,
-        "start_cad": START_CAD,
-        "cycles": CYCLES,
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), _draw if figures else None)
+    done = work((c.name, partial(_run, c, best, seeds)) for c in _contenders(best))
+    learned = work((f"iterative learning, {law}", partial(learn, law, min(seeds, 20))) for law in LAWS)
+    return work.finish(
+        "seeker-comparison", _dataset(done, learned, best), _draw if figures else None,
+        seeds=seeds,
+        rows=[outcome.row for outcome in done],
+        iterative_learning=[own.row() for own in learned],
+        iterative_learning_seeds=min(seeds, 20),
+        optimum_cad=best["soc_cad"],
+        curvature_percent_per_cad2=best.curvature,
+        start_cad=START_CAD,
+        cycles=CYCLES,
+    )  # fmt: skip
 
 
 def _contenders(best: Optimum) -> list[_Contender]:
@@ -129,54 +170,27 @@ def _contenders(best: Optimum) -> list[_Contender]:
     batch = tune(NOISE_PERCENT, best.curvature, method="batch", **wish)
     spsa = tune(NOISE_PERCENT, best.curvature, method="spsa", **wish)
     dither = "amplitude 1, period 10, gain 0.98"
+    bend: dict[str, Any] = {"initial_hessian": -0.051}
+    vanishing = ExtremumSeeking(**box, gain=0.98, amplitude_floor=0.3, full_gradient=0.2)
+    newton = NewtonSeeking(**box, **bend, initial_inverse=-20.0, largest_inverse=100.0)
     return [
-        _Contender(name="extremum seeking, batch", settings=dither, seeker=ExtremumSeeking(**box, gain=0.98)),
-        _Contender(name="extremum seeking, batch, tuned", settings=_short(batch), seeker=batch.seeker(**box)),
+        _Contender("extremum seeking, batch", dither, ExtremumSeeking(**box, gain=0.98)),
+        _Contender("extremum seeking, batch, tuned", _short(batch), batch.seeker(**box)),
+        _Contender("extremum seeking, vanishing dither", f"{dither}, floor 0.3 below slope 0.2", vanishing),
         _Contender(
-            name="extremum seeking, vanishing dither",
-            settings=f"{dither}, floor 0.3 below slope 0.2",
-            seeker=ExtremumSeeking(**box, gain=0.98, amplitude_floor=0.3, full_gradient=0.2),
+            "extremum seeking, moving average", dither, ExtremumSeeking(**box, gain=0.98, form="moving_average")
         ),
         _Contender(
-            name="extremum seeking, moving average",
-            settings=dither,
-            seeker=ExtremumSeeking(**box, gain=0.98, form="moving_average"),
+            "extremum seeking, washout", f"{dither}, pole 0.9", ExtremumSeeking(**box, gain=0.98, form="washout")
         ),
-        _Contender(
-            name="extremum seeking, washout",
-            settings=f"{dither}, pole 0.9",
-            seeker=ExtremumSeeking(**box, gain=0.98, form="washout"),
-        ),
-        _Contender(
-            name="Newton extremum seeking",
-            settings="amplitude 2, period 10, time constant 40, held 300",
-            seeker=NewtonSeeking(**box, initial_hessian=-0.051, initial_inverse=-20.0, largest_inverse=100.0),
-        ),
-        _Contender(
-            name="bounded extremum seeking",
-            settings="amplitude 1, period 10, kappa 1",
-            seeker=BoundedSeeking(**box, kappa=1.0),
-        ),
-        _Contender(name="SPSA, first order", settings="a 20, c 1.5, decreasing", seeker=Spsa(**box, gain=20.0)),
-        _Contender(name="SPSA, tuned", settings=_short(spsa), seeker=spsa.seeker(**box)),
-        _Contender(
-            name="SPSA, second order",
-            settings="a 3, c 1.5, decreasing",
-            seeker=Spsa(**box, form="second_order", initial_hessian=-0.051),
-        ),
-        _Contender(
-            name="SPSA, one measurement",
-            settings="a 20, c 1.5, decreasing",
-            seeker=Spsa(**box, form="one_measurement", gain=20.0),
-        ),
-        _Contender(
-            name="two-sided differences", settings="step size 15, c 1", seeker=GradientDescent(**box, step_size=15.0)
-        ),
-        _Contender(
-            name="golden section",
-            settings=f"noise {NOISE_PERCENT:g}",
-            seeker=GoldenSection(**box, noise_sd=NOISE_PERCENT),
-        ),
+        _Contender("Newton extremum seeking", "amplitude 2, period 10, time constant 40, held 300", newton),
+        _Contender("bounded extremum seeking", "amplitude 1, period 10, kappa 1", BoundedSeeking(**box, kappa=1.0)),
+        _Contender("SPSA, first order", "a 20, c 1.5, decreasing", Spsa(**box, gain=20.0)),
+        _Contender("SPSA, tuned", _short(spsa), spsa.seeker(**box)),
+        _Contender("SPSA, second order", "a 3, c 1.5, decreasing", Spsa(**box, **bend, form="second_order")),
+        _Contender("SPSA, one measurement", "a 20, c 1.5, decreasing", Spsa(**box, form="one_measurement", gain=20.0)),
+        _Contender("two-sided differences", "step size 15, c 1", GradientDescent(**box, step_size=15.0)),
+        _Contender("golden section", f"noise {NOISE_PERCENT:g}", GoldenSection(**box, noise_sd=NOISE_PERCENT)),
     ]
 
 
@@ -189,12 +203,9 @@ def _short(tuning: Tuning) -> str:
 def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
     seeker = contender.seeker
     table = loops(
-        EngineBench(),
-        seeker,
-        range(seeds),
-        cycles=CYCLES,
+        EngineBench(), seeker, range(seeds), cycles=CYCLES,
         criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD),
-    )
+    )  # fmt: skip
 
     def make(seed: int) -> tuple[EngineBench, Any]:
         fresh = Spsa(**{**seeker.settings, "seed": seed}) if isinstance(seeker, Spsa) else copy.deepcopy(seeker)
@@ -209,12 +220,11 @@ def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
         **with_interval("final_cad", table["final_cad"]),
         **with_interval("j_lost", best.value - table["mean_j"]),
     }
-    return _Outcome(row=row, bands=bands(make, range(min(seeds, _BAND_SEEDS)), _SHOWN), table=table)
+    return _Outcome(row=row, runs=estimates(make, range(min(seeds, _BAND_SEEDS)), _SHOWN), table=table)
 
 
 def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum) -> xr.Dataset:
-    cad, dims = "°CA aTDC", ("seeker", "cycle")
-    tracks = np.stack([outcome.bands for outcome in done])
+    cad = "°CA aTDC"
 
     def by_seed(name: str) -> list[NDArray[np.float64]]:
         return [outcome.table[name].to_numpy() for outcome in done]
@@ -225,9 +235,7 @@ def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum
         "seeker": ("seeker", [outcome.row["seeker"] for outcome in done], "-", "seeker"),
         "seed": ("seed", seeds, "-", "seed"),
         "cycle": ("cycle", np.arange(_SHOWN)),
-        "estimate_median_cad": (dims, tracks[:, 0], cad, "estimate of the best timing"),
-        "estimate_low_cad": (dims, tracks[:, 1], cad, "10 % quantile of the estimate over seeds"),
-        "estimate_high_cad": (dims, tracks[:, 2], cad, "90 % quantile of the estimate over seeds"),
+        **band_variables("estimate_{}_cad", ("seeker", "cycle"), [outcome.runs for outcome in done], cad, OVER_SEEDS),
         "cycles_to": (own, by_seed("cycles_to"), "-", "first cycle within 1 °CA of the optimum"),
         "rms_cad": (own, by_seed("rms_cad"), "°CA", "rms error of the estimate, second half"),
         "final_cad": (own, by_seed("final_cad"), cad, "mean estimate of the last 100 cycles"),
@@ -244,28 +252,12 @@ def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
-    from mgdd import plot
     from mgdd.plot.learning import learning as learning_curves
 
-    names = dataset["seeker"].to_numpy()
-    columns = 4
-    rows = -(-len(names) // columns)
-    figure = Figure(figsize=(11.0, 2.0 * rows + 0.4), layout="constrained")
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     tracks = dataset[["estimate_median_cad", "estimate_low_cad", "estimate_high_cad", "optimum_cad"]]
-    for index, ax in enumerate(axes.flat):
-        if index < len(names):
-            plot.convergence(tracks.isel(seeker=[index]), ax=ax)
-            ax.get_legend().remove()
-            ax.set_title(str(names[index]), loc="left", fontsize="small")
-            ax.set(xlabel="", ylabel="")
-            ax.tick_params(labelbottom=index + columns >= len(names))
-        else:
-            ax.remove()
-    figure.supylabel("estimate of the best timing [°CA aTDC]", fontsize="medium")
-    figure.supxlabel("engine cycle [-]", fontsize="medium")
+    names = names_of(dataset, "seeker")
+    panels = [(name, tracks.isel(seeker=[at])) for at, name in enumerate(names)]
+    figure = convergence_panels(panels, height=2.0 * -(-len(names) // 4) + 0.4)
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
         out["Iterative learning of a repeated load step"] = drawn(learning_curves, dataset, size=(6.6, 3.8))

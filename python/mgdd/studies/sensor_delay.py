@@ -14,10 +14,10 @@ from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
 from mgdd.optimize.by_curvature import approach_gain
 from mgdd.plot.style import drawn
-from mgdd.results.labels import labelled_dataset, to_jsonable
+from mgdd.results.labels import labelled_dataset
 from mgdd.results.units import unit_attributes
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.statistics import bands, loops, rms, with_interval
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd.studies.statistics import OVER_SEEDS, band_variables, estimates, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,21 +70,14 @@ def run_sensor_delay(
         Runs behind each rms of the component-wise seekers.
     quick : bool
         At most four seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
     StudyResult
         Rows ``case period_cycles phase_deg step_sign cycles_stays final_cad``; ``cycles_stays`` (within 1.5 CAD of the
         optimum, for good) is None where the estimate never stays. The dataset holds every trajectory.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -97,37 +90,28 @@ def run_sensor_delay(
     >>> rows[0]["cycles_stays"], rows[1]["cycles_stays"]
     (72, None)
     """
-    seeds = min(check_seeds(seeds), 4) if quick else check_seeds(seeds)
+    seeds = check_seeds(seeds, quick=quick, most=4)
+    work = Parts(progress)
     performance = Performance.efficiency_and_nox()
     best = EngineBench(**_QUIET, performance=performance, nox_sensor="true_value").find_optimum()
-    parts = [(f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES]
-    done, interrupted = run_parts(parts, progress)
-    rows = [row for row, _, _ in done]
-    own: list[dict[str, Any]] = []
-    tracks: list[NDArray[np.float64]] = []
-    if not interrupted:
-        wise = [
-            (f"component by component, period {period}", partial(_component_wise, period, time, best, seeds))
-            for period, time in ((10, 40.0), (60, 240.0))
-        ]
-        found, interrupted = run_parts(wise, progress)
-        own, tracks = [row for row, _ in found], [track for _, track in found]
-    dataset = _dataset(done, own, tracks, best)
-    summary = {
-        "study": "sensor-delay",
-        "seeds": seeds,
-        "rows": rows,
-        "component_wise": own,
-        "frozen_slope_percent_per_cad": [slope for _, slope, _ in done],
-        "optimum_cad": best["soc_cad"],
-        "curvature_percent_per_cad2": best.curvature,
-        "start_cad": best["soc_cad"] - EARLY_CAD,
-        "arrival_cad": ARRIVAL_CAD,
-        "cycles": CYCLES,
-        "slow_dither_rule_cycles": 6.0 * (_ANALYSER.delay_cycles + _ANALYSER.lag_cycles),
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), _draw if figures else None)
+    done = work((f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES)
+    found = work(
+        (f"component by component, period {period}", partial(_component_wise, period, time, best, seeds))
+        for period, time in ((10, 40.0), (60, 240.0))
+    )
+    return work.finish(
+        "sensor-delay", _dataset(done, found, best), _draw if figures else None,
+        seeds=seeds,
+        rows=[row for row, _, _ in done],
+        component_wise=[row for row, _ in found],
+        frozen_slope_percent_per_cad=[slope for _, slope, _ in done],
+        optimum_cad=best["soc_cad"],
+        curvature_percent_per_cad2=best.curvature,
+        start_cad=best["soc_cad"] - EARLY_CAD,
+        arrival_cad=ARRIVAL_CAD,
+        cycles=CYCLES,
+        slow_dither_rule_cycles=6.0 * (_ANALYSER.delay_cycles + _ANALYSER.lag_cycles),
+    )  # fmt: skip
 
 
 def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArray[np.float64]]:
@@ -145,16 +129,9 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
         )
 
     def seeker(hold_cycles: int | None) -> ExtremumSeeking:
-        return ExtremumSeeking(
-            start=best["soc_cad"] - EARLY_CAD,
-            lower=BOUNDS_CAD[0],
-            upper=BOUNDS_CAD[1],
-            form="moving_average",
-            period=case.period,
-            gain=approach_gain(best.curvature, case.time_constant),
-            rate=math.inf,
-            components=[case.lag] if case.compensated else None,
-            hold_cycles=hold_cycles,
+        lags = [case.lag] if case.compensated else None
+        return _seeker(
+            best, case.period, case.time_constant, early_cad=EARLY_CAD, components=lags, hold_cycles=hold_cycles
         )
 
     run = run_seeker(bench(), seeker(None), CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD))
@@ -172,6 +149,17 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
     return row, slope, run.dataset["estimate_cad"].to_numpy()
 
 
+def _seeker(
+    best: Optimum, period: int, time_constant: float, *, components: list[ComponentLag] | None, early_cad: float = 0.0,
+    hold_cycles: int | None = None,
+) -> ExtremumSeeking:  # fmt: skip
+    return ExtremumSeeking(
+        start=best["soc_cad"] - early_cad, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], form="moving_average",
+        period=period, gain=approach_gain(best.curvature, time_constant), rate=math.inf, components=components,
+        hold_cycles=hold_cycles,
+    )  # fmt: skip
+
+
 def _frozen_slope(bench: EngineBench, seeker: ExtremumSeeking, settle: int, period: int) -> float:
     """Average the demodulated slope of J over one period, once the sensor has settled, with the estimate held."""
     slopes = []
@@ -185,7 +173,7 @@ def _frozen_slope(bench: EngineBench, seeker: ExtremumSeeking, settle: int, peri
 def _component_wise(
     period: int, time_constant: float, best: Optimum, seeds: int
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
-    """Give the row of a seeker that demodulates efficiency at once and NOx with the analyser's phase, and its bands."""
+    """Give the row of a seeker that demodulates efficiency at once and NOx with the analyser's phase, and its runs."""
     sensor = SensorDynamics(
         delay_cycles=int(_ANALYSER.delay_cycles), lag_cycles=_ANALYSER.lag_cycles, noise_fraction=0.01
     )
@@ -194,16 +182,7 @@ def _component_wise(
         bench = EngineBench(
             performance=Performance.efficiency_and_nox(), nox_sensor="analyser", analyser=sensor, seed=seed
         )
-        return bench, ExtremumSeeking(
-            start=best["soc_cad"],
-            lower=BOUNDS_CAD[0],
-            upper=BOUNDS_CAD[1],
-            form="moving_average",
-            period=period,
-            gain=approach_gain(best.curvature, time_constant),
-            rate=math.inf,
-            components=[ComponentLag(), _ANALYSER],
-        )
+        return bench, _seeker(best, period, time_constant, components=[ComponentLag(), _ANALYSER])
 
     table = loops(*make(0), range(seeds), cycles=CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"]))
     row = {
@@ -214,13 +193,12 @@ def _component_wise(
         "rms_cad": rms(table["rms_cad"]),
         **with_interval("final_cad", table["mean_cad"]),
     }
-    return row, bands(make, range(min(seeds, 20)), CYCLES)
+    return row, estimates(make, range(min(seeds, 20)), CYCLES)
 
 
 def _dataset(
     done: list[tuple[dict[str, Any], float, NDArray[np.float64]]],
-    own: list[dict[str, Any]],
-    tracks: list[NDArray[np.float64]],
+    found: list[tuple[dict[str, Any], NDArray[np.float64]]],
     best: Optimum,
 ) -> xr.Dataset:
     cad = "°CA aTDC"
@@ -237,20 +215,14 @@ def _dataset(
         "final_cad": ("case", [row["final_cad"] for row, _, _ in done], cad, "mean estimate of the last cycles"),
         "optimum_cad": ((), best["soc_cad"], cad, "optimum"),
     }
-    if own:
-        both = np.stack(tracks)
-        variables["component_period"] = (
-            "component_period",
-            [row["period_cycles"] for row in own],
-            "-",
-            "dither period",
-        )
-        for index, (name, text) in enumerate(
-            (("median", "median"), ("low", "10 % quantile"), ("high", "90 % quantile"))
-        ):
-            dims = ("component_period", "cycle")
-            variables[f"component_{name}_cad"] = (dims, both[:, index], cad, f"{text} of the estimate over seeds")
-        variables["component_rms_cad"] = ("component_period", [row["rms_cad"] for row in own], "°CA", "rms error")
+    if found:
+        own, runs = [row for row, _ in found], [run for _, run in found]
+        over, said = ("component_period", "cycle"), OVER_SEEDS | {"median": "median of the estimate over seeds"}
+        variables |= {
+            "component_period": ("component_period", [row["period_cycles"] for row in own], "-", "dither period"),
+            **band_variables("component_{}_cad", over, runs, cad, said),
+            "component_rms_cad": ("component_period", [row["rms_cad"] for row in own], "°CA", "rms error"),
+        }
     return labelled_dataset(variables)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,17 +19,18 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "bands",
-    "loops",
-    "mean_interval",
-    "median_interval",
-    "rms",
-    "run_with_slope",
-    "with_interval",
-    "with_median_interval",
-]
+    "OF_SEEDS", "OVER_SEEDS", "band_variables", "estimates", "first_within", "loops", "mean_interval",
+    "median_interval", "quantile_of", "quantiles_of", "rms", "run_with_slope", "sd_of", "stays_within", "with_interval",
+    "with_median_interval", "with_quantiles",
+]  # fmt: skip
 
 _CONFIDENCE = 0.95
+_SHARES = {"low": 0.1, "median": 0.5, "high": 0.9}
+OF_SEEDS = {
+    "low": "estimate, 10 % of the seeds below",
+    "median": "estimate, median of the seeds",
+    "high": "estimate, 10 % of the seeds above",
+}
 
 
 def mean_interval(values: ArrayLike) -> tuple[float, float, float]:
@@ -93,7 +94,16 @@ def median_interval(values: ArrayLike) -> tuple[float, float, float]:
 def with_median_interval(name: str, values: ArrayLike) -> dict[str, float | None]:
     """Name a median and the ends of its interval as a row does; None for what is not finite."""
     said = zip((name, f"{name}_low", f"{name}_high"), median_interval(values), strict=True)
-    return {key: value if math.isfinite(value) else None for key, value in said}
+    return {key: _finite(value) for key, value in said}
+
+
+def quantile_of(values: ArrayLike, share: float) -> float | None:
+    """Give the least of the values below which a share of them lies; None where it is not finite."""
+    return _finite(float(np.quantile(np.asarray(values, float), share, method="inverted_cdf")))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def with_interval(name: str, values: ArrayLike) -> dict[str, float]:
@@ -106,15 +116,70 @@ def rms(values: ArrayLike) -> float:
     return float(np.sqrt(np.nanmean(np.square(np.asarray(values, float)))))
 
 
+def sd_of(values: NDArray[np.float64]) -> float:
+    """Give the standard deviation over seeds; NaN of one."""
+    return float(values.std(ddof=1)) if values.size > 1 else math.nan
+
+
+def first_within(estimate: NDArray[np.float64], best: float, distance: float) -> float:
+    """Give the first cycle whose estimate lies within the distance; infinite where none does."""
+    near = np.abs(estimate - best) <= distance
+    return float(np.argmax(near)) if near.any() else math.inf
+
+
+def stays_within(estimate: NDArray[np.float64], best: float, distance: float) -> float:
+    """Give the cycle from which no estimate lies beyond the distance; infinite where the last one does."""
+    beyond = np.flatnonzero(np.abs(estimate - best) > distance)
+    last = int(beyond[-1]) + 1 if beyond.size else 0
+    return float(last) if last < estimate.size else math.inf
+
+
+def band_variables(
+    name: str, over: tuple[str, str], runs: Iterable[ArrayLike], units: str, said: Mapping[str, str]
+) -> dict[str, tuple[Any, ...]]:
+    """Give median and band of 80 % of the seeds of some runs, as variables of a Dataset.
+
+    Parameters
+    ----------
+    name : str
+        Of the variables, with ``{}`` for ``low``, ``median`` or ``high``.
+    over : tuple of str
+        Dimensions of runs and cycles.
+    runs : iterable of array_like, shape (seeds, cycles)
+        Each run.
+    units : str
+        Of the variables.
+    said : mapping of str to str
+        Long names by end, in the order of the variables.
+    """
+    each = [np.asarray(run, float) for run in runs]
+    return {
+        name.format(end): (over, [np.quantile(run, _SHARES[end], axis=0) for run in each], units, text)
+        for end, text in said.items()
+    }
+
+
+def quantiles_of(what: str, median: str) -> dict[str, str]:
+    """Name median and ends of a band for `band_variables`: the ends as quantiles of something."""
+    return {"median": median, "low": f"10 % quantile of the {what}", "high": f"90 % quantile of the {what}"}
+
+
+def with_quantiles(text: str) -> dict[str, str]:
+    """Name median and ends of a band for `band_variables`: the median by the text alone."""
+    return {"median": text, "low": f"{text}, 10 % quantile", "high": f"{text}, 90 % quantile"}
+
+
 def loops(bench: EngineBench, seeker: Any, seeds: Iterable[int], **how: Any) -> xr.Dataset:
     """Run `monte_carlo` of one bench and one seeker, over ``seed`` alone."""
     return monte_carlo(bench, seeker, seeds, **how).isel(bench=0, seeker=0, drop=True)
 
 
-def bands(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], cycles: int) -> NDArray[np.float64]:
-    """Give median, 10 % and 90 % quantile of the estimate over seeds, cycle by cycle, shape (3, cycles) [°CA aTDC]."""
-    runs = [run_seeker(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds]
-    return np.asarray(np.quantile(np.stack(runs), [0.5, 0.1, 0.9], axis=0))
+OVER_SEEDS = quantiles_of("estimate over seeds", "estimate of the best timing")
+
+
+def estimates(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], cycles: int) -> NDArray[np.float64]:
+    """Run a seeker on a bench for each seed, and give its estimates, shape (seeds, cycles) [°CA aTDC]."""
+    return np.stack([run_seeker(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds])
 
 
 def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:

@@ -10,8 +10,8 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.plot.style import drawn
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, finish, run_parts
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult
 from mgdd.throttle import Throttle, characteristics, holding_duty, simulate
 
 if TYPE_CHECKING:
@@ -44,20 +44,13 @@ def run_throttle_characteristics(
     ----------
     quick : bool
         Preset P1 only.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
     StudyResult
         Rows ``effect preset condition value unit closed_form``; ``closed_form`` is None where there is none.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        None: nothing can be chosen wrongly.
 
     References
     ----------
@@ -72,20 +65,18 @@ def run_throttle_characteristics(
     [82.2, 82.3, 62.0, 33.0, 16.2, 5.8, 2.4]
     """
     names = presets.available("throttle")[: 1 if quick else None]
-    parts = [(f"throttle {name}", partial(_one, name)) for name in names]
-    done, interrupted = run_parts(parts, progress)
+    work = Parts(progress)
+    done = work((f"throttle {name}", partial(_one, name)) for name in names)
     dataset = _dataset([one for _, one in done], [str(name) for name in names[: len(done)]])
-    summary = {
-        "study": "throttle-characteristics",
-        "seeds": 0,
-        "rows": [row for rows, _ in done for row in rows],
-        "ramp_per_s": RAMP_PER_S,
-        "offset": OFFSET,
-        "amplitude": AMPLITUDE,
-        "air_angle_deg": AIR_ANGLE_DEG,
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), _draw if figures else None)
+    return work.finish(
+        "throttle-characteristics", dataset, _draw if figures else None,
+        seeds=0,
+        rows=[row for rows, _ in done for row in rows],
+        ramp_per_s=RAMP_PER_S,
+        offset=OFFSET,
+        amplitude=AMPLITUDE,
+        air_angle_deg=AIR_ANGLE_DEG,
+    )  # fmt: skip
 
 
 def _one(name: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
@@ -111,14 +102,8 @@ def _one(name: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
 def _row(
     effect: str, preset: str, condition: str, value: float, unit: str, closed_form: float | None = None
 ) -> dict[str, Any]:
-    return {
-        "effect": effect,
-        "preset": preset,
-        "condition": condition,
-        "value": value,
-        "unit": unit,
-        "closed_form": closed_form,
-    }
+    names = ("effect", "preset", "condition", "value", "unit", "closed_form")
+    return dict(zip(names, (effect, preset, condition, value, unit, closed_form), strict=True))
 
 
 def _ramp(throttle: Throttle) -> tuple[xr.Dataset, float]:
@@ -179,26 +164,21 @@ def _dataset(done: list[dict[str, Any]], names: list[str]) -> xr.Dataset:
             "phase": ("phase", np.linspace(0.0, 1.0, _PHASES + 1), "-", "part of the last period"),
             "loop_duty": (("frequency_hz", "phase"), done[0]["loops"][:, 0], "-", "duty"),
             "loop_angle_deg": (
-                ("preset", "frequency_hz", "phase"),
-                [one["loops"][:, 1] for one in done],
-                "deg",
-                "plate angle",
+                ("preset", "frequency_hz", "phase"), [one["loops"][:, 1] for one in done], "deg", "plate angle",
             ),
             "arrival": ("arrival", list(_ARRIVALS), "-", "how the plate came to rest"),
             "airflow_torque_nm": ("airflow_torque_nm", list(AIR_NM)),
             "time_s": ("time_s", time),
             "air_angle_deg": (
                 ("preset", "arrival", "airflow_torque_nm", "time_s"),
-                [one["air"] for one in done],
-                "deg",
-                "plate angle",
+                [one["air"] for one in done], "deg", "plate angle",
             ),
             "ramp_time_s": ("ramp_time_s", ramp["time_s"].to_numpy(), "s", "time of the slow ramp"),
             "ramp_duty": ("ramp_time_s", ramp["duty"].to_numpy(), "-", f"duty of the slow ramp, {names[0]}"),
             "ramp_angle_deg": ("ramp_time_s", ramp["angle_deg"].to_numpy(), "deg", f"plate angle, {names[0]}"),
         },
         attrs={"air_from_s": AIR_FROM_S},
-    )
+    )  # fmt: skip
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:

@@ -11,10 +11,10 @@ from mgdd import presets
 from mgdd.identify import fit_first_principle
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.statistics import with_interval
-from mgdd.studies.throttle_records import LSB_DEG, NOISE_DEG, judged_run, noisy_records
+from mgdd.studies.throttle_cases import LSB_DEG, NOISE_DEG, judged_run, noisy_records
 from mgdd.throttle import Throttle, characteristics
 
 if TYPE_CHECKING:
@@ -48,21 +48,14 @@ def run_throttle_first_principle(
         Noise records behind each figure.
     quick : bool
         Two seeds at most.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
     StudyResult
         Rows ``case group unit true error_percent``, the mean error over seeds with its interval; ``summary["fits"]``
         has the free-run fit of the training record and of both test records in percent, without their first 50 ms.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -75,20 +68,17 @@ def run_throttle_first_principle(
     >>> all(fit["random_steps_percent"] > 90.0 for fit in fits)
     True
     """
-    seeds = min(check_seeds(seeds), 2) if quick else check_seeds(seeds)
-    parts = [(name, partial(_case, name, throttle, seeds)) for name, throttle in _cases().items()]
-    done, interrupted = run_parts(parts, progress)
-    dataset = _dataset([run for _, _, run in done], [fit["case"] for _, fit, _ in done])
-    summary = {
-        "study": "throttle-first-principle",
-        "seeds": seeds,
-        "rows": [row for rows, _, _ in done for row in rows],
-        "fits": [fit for _, fit, _ in done],
-        "noise_deg": NOISE_DEG,
-        "resolution_deg": LSB_DEG,
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), _draw if figures else None)
+    seeds = check_seeds(seeds, quick=quick, most=2)
+    work = Parts(progress)
+    done = work((name, partial(_case, name, throttle, seeds)) for name, throttle in _cases().items())
+    return work.finish(
+        "throttle-first-principle", _dataset(done), _draw if figures else None,
+        seeds=seeds,
+        rows=[row for rows, _, _ in done for row in rows],
+        fits=[fit for _, fit, _ in done],
+        noise_deg=NOISE_DEG,
+        resolution_deg=LSB_DEG,
+    )  # fmt: skip
 
 
 def _cases() -> dict[str, Throttle]:
@@ -114,27 +104,23 @@ def _case(name: str, throttle: Throttle, seeds: int) -> tuple[list[dict[str, Any
             run, percent = judged_run(fit.model, log)
             quality[record].append(percent)
     rows = [
-        {
-            "case": name,
-            "group": fitted,
-            "unit": unit,
-            "true": float(truth[own]),
-            **with_interval("error_percent", np.array(errors[fitted])),
-        }
+        {"case": name, "group": fitted, "unit": unit, "true": float(truth[own]),
+         **with_interval("error_percent", errors[fitted])}
         for own, fitted, unit in _GROUPS
-    ]
+    ]  # fmt: skip
     fits: dict[str, Any] = {"case": name}
     for record, values in quality.items():
         fits |= with_interval(_FITS[record], np.array(values))
     return rows, fits, run
 
 
-def _dataset(runs: list[xr.Dataset], names: list[str]) -> xr.Dataset:
+def _dataset(done: list[tuple[list[dict[str, Any]], dict[str, Any], xr.Dataset]]) -> xr.Dataset:
+    runs = [run for _, _, run in done]
     stacked = {key: np.array([run[key].to_numpy() for run in runs]) for key in ("angle_deg", "model_deg")}
     both = ("case", "time_s")
     return labelled_dataset(
         {
-            "case": ("case", names, "-", "case"),
+            "case": ("case", [fit["case"] for _, fit, _ in done], "-", "case"),
             "time_s": ("time_s", runs[0]["time_s"].to_numpy()),
             "angle_deg": (both, stacked["angle_deg"]),
             "model_deg": (both, stacked["model_deg"]),

@@ -11,9 +11,11 @@ from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.identify import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, finish, run_parts
-from mgdd.studies.throttle_records import DURATION_S, NOISE_DEG, RECORDS, SAMPLE_S, judged_run, noisy_records
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult
+from mgdd.studies.figures import names_of, new_figure
+from mgdd.studies.throttle_cases import DURATION_S, NOISE_DEG, RECORDS, SAMPLE_S, judged_run, noisy_records
 from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
@@ -23,8 +25,9 @@ if TYPE_CHECKING:
 
 __all__ = ["run_throttle_pseudo_wiener"]
 
-KINDS = {"pw_r": "PW-R, friction inside", "pw_w": "PW-W, strict Wiener", "pw_p": "PW-P, Wiener with play"}
+KINDS = ("pw_r", "pw_w", "pw_p")  # friction inside, strict Wiener, Wiener with play
 HORIZONS = (5, 20, 50)
+_STYLES = {"pw_r": (BLUE, "-"), "pw_w": (ORANGE, "--"), "pw_p": (GREY, "-.")}
 GROWTH = (1, 2, 5, 10, 20, 35, 50, 75, 100)
 # A higher level of friction at rest than in the models, and the inductance: neither is in a pseudo-Wiener model.
 _STICTION_NM = {"P1": 0.30, "P2": 0.11}
@@ -42,10 +45,8 @@ def run_throttle_pseudo_wiener(
         rule of the lags is kept.
     quick : bool
         At most six starts.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -56,11 +57,6 @@ def run_throttle_pseudo_wiener(
         ``hits`` counts the searches that ended at the best fit. Every record starts at limp-home without duty, so
         ``lag_start`` is *rest* in the first rows; *best* also lets the lags start from the first angle. The row
         *persistence* predicts that nothing moves.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one start.
 
     References
     ----------
@@ -77,38 +73,26 @@ def run_throttle_pseudo_wiener(
         raise ParameterError.of("starts", starts, ">= 1")
     count = min(starts, 6) if quick else starts
     cases = [(kind, "rest") for kind in KINDS] + [("pw_w", "best"), ("pw_p", "best")]
-    parts = [
+    work = Parts(progress)
+    done = work(
         (f"{kind} on {plant}, lags from {rule}", partial(_judge, plant, kind, rule, count))
         for plant in ("P1", "P2")
         for kind, rule in cases
-    ]
-    done, interrupted = run_parts(parts, progress)
+    )
     rows = [row for row, _ in done]
     done = [(row, extra) for row, extra in done if row["lag_start"] == "rest"]
-    plants = list(dict.fromkeys(row["plant"] for row in rows))
-    for plant in plants:
-        still = _ahead(_records(plant)["chirp"], None, HORIZONS)
-        rows.append(
-            {
-                "plant": plant,
-                "model": "persistence",
-                "lag_start": None,
-                **_columns(None, still),
-                "starts": None,
-                "hits": None,
-            }
-        )
-    dataset = _dataset(done)
-    summary = {
-        "study": "throttle-pseudo-wiener",
-        "seeds": 0,
-        "rows": rows,
-        "parameters": [{"plant": row["plant"], "model": row["model"], **extra["parameters"]} for row, extra in done],
-        "duration_s": DURATION_S,
-        "noise_deg": NOISE_DEG,
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), _draw if figures else None)
+    for plant in dict.fromkeys(row["plant"] for row in rows):
+        named = {"plant": plant, "model": "persistence", "lag_start": None}
+        still = _columns(None, _ahead(_records(plant)["chirp"], None, HORIZONS))
+        rows.append({**named, **still, "starts": None, "hits": None})
+    return work.finish(
+        "throttle-pseudo-wiener", _dataset(done), _draw if figures else None,
+        seeds=0,
+        rows=rows,
+        parameters=[{"plant": row["plant"], "model": row["model"], **extra["parameters"]} for row, extra in done],
+        duration_s=DURATION_S,
+        noise_deg=NOISE_DEG,
+    )  # fmt: skip
 
 
 def study_throttle(plant: str) -> Throttle:
@@ -180,39 +164,34 @@ def _dataset(done: list[tuple[dict[str, Any], dict[str, Any]]]) -> xr.Dataset:
             "RMS error of persistence",
         ),
     }
-    for name in ("fit_train_percent", "fit_chirp_percent", "fit_steps_percent"):
-        variables[name] = ("case", [row[name] for row, _ in done], "%", f"free-run fit, {name.split('_')[1]}")
+    for name in RECORDS:
+        column = f"fit_{name}_percent"
+        variables[column] = ("case", [row[column] for row, _ in done], "%", f"free-run fit, {name}")
     return labelled_dataset(variables)
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
-    from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
-
-    styles = {"pw_r": (BLUE, "-"), "pw_w": (ORANGE, "--"), "pw_p": (GREY, "-.")}
-    cases = [str(case) for case in dataset["case"].to_numpy()]
+    cases = names_of(dataset, "case")
+    horizon_ms = 1e3 * dataset["horizon_s"].to_numpy()
+    window = dataset.sel(time_s=slice(0.0, 4.0))
     out: dict[str, Figure] = {}
     for plant in dict.fromkeys(case.split()[0] for case in cases):
         own = [case for case in cases if case.startswith(plant)]
-        figure = Figure(figsize=(7.4, 3.8), layout="constrained")
-        ax = figure.add_subplot()
-        window = dataset.sel(time_s=slice(0.0, 4.0))
-        ax.plot(window["time_s"], window["angle_deg"].sel(case=own[0]), color=BLACK, label="measured")
+        runs = new_figure(7.4, 3.8)
+        left = runs.add_subplot()
+        left.plot(window["time_s"], window["angle_deg"].sel(case=own[0]), color=BLACK, label="measured")
+        ahead = new_figure(7.4, 3.8)
+        right = ahead.add_subplot()
+        right.plot(horizon_ms, dataset["persistence_deg"].sel(case=own[0]), ":", color=BLACK, label="persistence")
         for case in own:
-            color, line = styles[case.split()[1]]
-            ax.plot(window["time_s"], window["model_deg"].sel(case=case), line, color=color, label=case.split()[1])
-        ax.set(xlabel="time [s]", ylabel="angle [deg]")
-        ax.legend(ncols=4)
-        out[f"{plant}: free run on random steps"] = figure
-        figure = Figure(figsize=(7.4, 3.8), layout="constrained")
-        ax = figure.add_subplot()
-        horizon_ms = 1e3 * dataset["horizon_s"].to_numpy()
-        ax.plot(horizon_ms, dataset["persistence_deg"].sel(case=own[0]), ":", color=BLACK, label="persistence")
-        for case in own:
-            color, line = styles[case.split()[1]]
-            ax.plot(horizon_ms, dataset["n_step_rms_deg"].sel(case=case), line, color=color, label=case.split()[1])
-        ax.set(xlabel="horizon [ms]", ylabel="RMS prediction error [deg]", xscale="log", yscale="log")
-        ax.legend()
-        out[f"{plant}: error ahead of the last measurement, validation chirp"] = figure
+            kind = case.split()[1]
+            color, line = _STYLES[kind]
+            left.plot(window["time_s"], window["model_deg"].sel(case=case), line, color=color, label=kind)
+            right.plot(horizon_ms, dataset["n_step_rms_deg"].sel(case=case), line, color=color, label=kind)
+        left.set(xlabel="time [s]", ylabel="angle [deg]")
+        left.legend(ncols=4)
+        right.set(xlabel="horizon [ms]", ylabel="RMS prediction error [deg]", xscale="log", yscale="log")
+        right.legend()
+        out[f"{plant}: free run on random steps"] = runs
+        out[f"{plant}: error ahead of the last measurement, validation chirp"] = ahead
     return out

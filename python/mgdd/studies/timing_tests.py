@@ -14,8 +14,8 @@ from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
 from mgdd.optimize.by_curvature import approach_gain
 from mgdd.plot.style import drawn
-from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.statistics import loops, rms, run_with_slope, with_interval
 
 if TYPE_CHECKING:
@@ -51,15 +51,11 @@ class _Test:
     def seeker(self, best: Optimum, *, limited: bool = False) -> ExtremumSeeking:
         late = self.nox_sensor == "analyser"
         return ExtremumSeeking(
-            start=self.start_cad,
-            lower=BOUNDS_CAD[0],
-            upper=BOUNDS_CAD[1],
-            period=self.period,
-            gain=approach_gain(best.curvature, self.time_constant),
-            rate=_LATE_RATE if late else None,
+            start=self.start_cad, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], period=self.period,
+            gain=approach_gain(best.curvature, self.time_constant), rate=_LATE_RATE if late else None,
             components=[ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25)] if late else None,
             limits=[Limit("p_max_bar", P_MAX_BAR)] if limited else [],
-        )
+        )  # fmt: skip
 
 
 TESTS = (
@@ -95,10 +91,8 @@ def run_timing_tests(
         Runs of each test, of 3000 cycles.
     quick : bool
         At most ten seeds.
-    figures : bool
-        Draw figures.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -108,11 +102,6 @@ def run_timing_tests(
         of cycles 1500 to 3000, dither included), and the gain in J by true NOx. The limited row adds the worst
         pressure, the share of all cycles and of those from ``judged_from`` on above the limit, and of the latter also
         above ``exceed_above_bar``, the limit and three standard deviations of its scatter.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one seed.
 
     References
     ----------
@@ -125,24 +114,19 @@ def run_timing_tests(
     >>> [row["gain_percent_points"] > 0.0 for row in rows]
     [True, True, True, True]
     """
-    seeds = min(check_seeds(seeds), 10) if quick else check_seeds(seeds)
-    done, interrupted = run_parts([(f"test {t.name}", partial(_run, t, seeds)) for t in TESTS], progress)
-    limited: list[_Outcome] = []
-    if not interrupted:
-        parts = [("test 1 under a pressure limit", partial(_run, TESTS[0], seeds, limited=True))]
-        limited, interrupted = run_parts(parts, progress)
-    dataset = _dataset(done)
-    summary = {
-        "study": "timing-tests",
-        "seeds": seeds,
-        "rows": [outcome.row for outcome in done],
-        "limited": [outcome.row for outcome in limited],
-        "nox_weight_percent_per_ppm": NOX_WEIGHT,
-        "p_max_limit_bar": P_MAX_BAR,
-        "cycles": CYCLES,
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), (lambda _: _draw(done, limited)) if figures else None)
+    seeds = check_seeds(seeds, quick=quick, most=10)
+    work = Parts(progress)
+    done = work((f"test {t.name}", partial(_run, t, seeds)) for t in TESTS)
+    limited = work([("test 1 under a pressure limit", partial(_run, TESTS[0], seeds, limited=True))])
+    return work.finish(
+        "timing-tests", _dataset(done), (lambda _: _draw(done, limited)) if figures else None,
+        seeds=seeds,
+        rows=[outcome.row for outcome in done],
+        limited=[outcome.row for outcome in limited],
+        nox_weight_percent_per_ppm=NOX_WEIGHT,
+        p_max_limit_bar=P_MAX_BAR,
+        cycles=CYCLES,
+    )  # fmt: skip
 
 
 def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
@@ -152,12 +136,9 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
     seeker = test.seeker(best, limited=limited)
     above = {name: cap + 3.0 * best[f"scatter_{name}"] for name, cap in caps.items()}
     table = loops(
-        bench,
-        seeker,
-        range(seeds),
-        cycles=CYCLES,
+        bench, seeker, range(seeds), cycles=CYCLES,
         criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD, tail_cycles=TAIL, exceed_above=above),
-    )
+    )  # fmt: skip
     before = bench.steady_map([test.start_cad])
     efficiency = 100.0 * float(before["efficiency_gross"][0])
     nox = float(before["nox_true_ppm"][0])

@@ -10,8 +10,9 @@ import numpy as np
 from mgdd.control import SlidingMode
 from mgdd.loop import simulate_drive
 from mgdd.plot.style import drawn
-from mgdd.results.labels import label_of, labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, finish, run_parts
+from mgdd.results.labels import label_of, labelled_dataset
+from mgdd.studies.base import Parts, Progress, StudyResult
+from mgdd.studies.statistics import rms
 from mgdd.throttle import DemandChain, SensorPair
 
 if TYPE_CHECKING:
@@ -53,10 +54,8 @@ def run_torque_demand(*, quick: bool = False, figures: bool = True, progress: Pr
     ----------
     quick : bool
         The first three cases only.
-    figures : bool
-        Draw the figure.
-    progress : callable, optional
-        Called with a short text before each part.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -65,11 +64,6 @@ def run_torque_demand(*, quick: bool = False, figures: bool = True, progress: Pr
         torque against the one that the pedal wants at once, pressure against the wanted one behind its lag, time after
         the tip-in to 90 % of the torque's step and what it overshoots by, mean torque error over the last 0.2 s of the
         tip-in and of the run, and the plate against its reference.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        None: nothing can be chosen wrongly.
 
     References
     ----------
@@ -83,17 +77,14 @@ def run_torque_demand(*, quick: bool = False, figures: bool = True, progress: Pr
     [0.17, 0.34, 0.17]
     """
     names = list(_CASES)[: 3 if quick else None]
-    parts = [(f"case {name}", partial(_run, name)) for name in names]
-    runs, interrupted = run_parts(parts, progress)
-    dataset = _dataset(runs, names[: len(runs)])
-    summary = {
-        "study": "torque-demand",
-        "seeds": 0,
-        "rows": [_row(name, run) for name, run in zip(names, runs, strict=False)],
-        "sample_s": SAMPLE_S,
-        "interrupted": interrupted,
-    }
-    return finish(dataset, to_jsonable(summary), _draw if figures else None)
+    work = Parts(progress)
+    runs = work((f"case {name}", partial(_run, name)) for name in names)
+    return work.finish(
+        "torque-demand", _dataset(runs, names[: len(runs)]), _draw if figures else None,
+        seeds=0,
+        rows=[_row(name, run) for name, run in zip(names, runs, strict=False)],
+        sample_s=SAMPLE_S,
+    )  # fmt: skip
 
 
 def _run(name: str) -> xr.Dataset:
@@ -128,18 +119,14 @@ def _row(name: str, run: xr.Dataset) -> dict[str, Any]:
     error = torque - wanted
     return {
         "case": name,
-        "torque_rms_nm": _rms(error),
-        "pressure_rms_kpa": _rms(run["pressure_kpa"].to_numpy() - run["wanted_pressure_kpa"].to_numpy()),
+        "torque_rms_nm": rms(error),
+        "pressure_rms_kpa": rms(run["pressure_kpa"].to_numpy() - run["wanted_pressure_kpa"].to_numpy()),
         "tip_in_t90_s": float(time[held][np.argmax(passed)] - TIP_IN_S) if passed.any() else None,
         "overshoot_nm": float(torque[held].max() - high),
         "hold_error_nm": float(error[held & (time >= TIP_OUT_S - HOLD_S)].mean()),
         "end_error_nm": float(error[time >= time[-1] - HOLD_S].mean()),
-        "plate_rms_deg": _rms(run["angle_deg"].to_numpy() - run["reference_deg"].to_numpy()),
+        "plate_rms_deg": rms(run["angle_deg"].to_numpy() - run["reference_deg"].to_numpy()),
     }
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _dataset(runs: list[xr.Dataset], names: list[str]) -> xr.Dataset:

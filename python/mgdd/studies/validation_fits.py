@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["LAWS", "STAGES", "Burn", "Draw", "Law", "Meeting", "best_slopes", "burns_of", "meet", "redraw"]
+__all__ = ["LAWS", "STAGES", "Burn", "Draw", "Law", "Meeting", "best_slopes", "burns_of", "meet", "redraw", "stated_sd"]
 
 STAGES = ("other loads", "heat release", "calibrated")
 OBJECTIVE = "imep_closed_bar"  # a closed-valve trace carries no more
@@ -32,17 +32,7 @@ _WHITE_SHARE = 0.1  # of the residual's rms: white noise as large as that would 
 
 @dataclass(frozen=True)
 class Law:
-    """A cycle model that is calibrated: what is changed of the cylinder, and what all traces share and is fitted.
-
-    Parameters
-    ----------
-    name : str
-        Of the model.
-    changes : mapping
-        Fields of the cylinder.
-    common : tuple of str
-        Parameters fitted for all traces together.
-    """
+    """A cycle model that is calibrated: what is changed of the cylinder, and what all traces share and is fitted."""
 
     name: str
     changes: Mapping[str, Any]
@@ -195,22 +185,8 @@ def redraw(
 ) -> Draw:
     """Calibrate again to the model's pressure plus its residual times random factors that hold for about a block.
 
-    Parameters
-    ----------
-    fit : CylinderFit
-        Its model is the truth of the draw.
-    rng : numpy.random.Generator
-        Where the factors come from.
-    block_cad : float or None
-        Angle over which they are correlated [°CA]; None draws white noise of a tenth of the
-        residual's rms instead.
-    slopes : ndarray, optional
-        `best_slopes` of the fit, from which the stated standard deviation of the best CA50 follows.
-
-    Returns
-    -------
-    Draw
-        Estimates, stated standard errors, and best timing and curvature of every load.
+    The model of the fit is the truth of the draw. Without `block_cad` [°CA] the error is white noise of a tenth of the
+    residual's rms; with `slopes`, those of `best_slopes`, the draw has the stated standard deviation of the best CA50.
 
     References
     ----------
@@ -224,14 +200,11 @@ def redraw(
     best = np.array([Burn.of(load).best for load in again.loads])
     stated = np.full(len(again.loads), np.nan)
     if slopes is not None:
-        stated = np.sqrt(np.einsum("ij,jk,ik->i", slopes, np.nan_to_num(again.report.covariance), slopes))
+        stated = stated_sd(again, slopes)
     return Draw(
-        values=np.array(again.report.values),
-        stderr=np.array(again.report.stderr),
-        best_ca50_cad=best[:, 0],
-        curvature_percent=best[:, 1],
-        stated_sd_cad=stated,
-    )
+        values=np.array(again.report.values), stderr=np.array(again.report.stderr), best_ca50_cad=best[:, 0],
+        curvature_percent=best[:, 1], stated_sd_cad=stated,
+    )  # fmt: skip
 
 
 def _disturbed(trace: xr.Dataset, load: Load, rng: np.random.Generator, block_cad: float | None) -> xr.Dataset:
@@ -262,3 +235,8 @@ def best_slopes(fit: CylinderFit) -> NDArray[np.float64]:
             ends = [burn.moved(own, sign * step).best[0] for sign in (-1.0, 1.0)]
             out[at, k] = (ends[1] - ends[0]) / (2.0 * step)
     return out
+
+
+def stated_sd(fit: CylinderFit, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the standard deviation of each load's best CA50 that the fit states, by the slopes of `best_slopes`."""
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", slopes, np.nan_to_num(fit.report.covariance), slopes)))

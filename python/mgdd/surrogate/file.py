@@ -1,171 +1,224 @@
-"""A surrogate as a parameter file: surfaces, support, sensor lags and residuals."""
+"""Surrogates and response models as parameter files: one list of keys writes each table and reads it back."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted
+from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted, written
 from mgdd.results.labels import Label
-from mgdd.surrogate.response_surface import PolynomialBasis, Support
-from mgdd.surrogate.sensor_lag import SensorLag
-from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.polynomial import PolynomialBasis, PolynomialSurface, Support
+from mgdd.surrogate.process import ProcessSurface
+from mgdd.surrogate.signal_model import SensorLag, SignalModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mgdd.surrogate.surrogate import EngineSurrogate
+__all__ = ["read_response", "read_surrogate", "response_file", "surrogate_file"]
 
-__all__ = ["array_of", "labels_of", "numbers_entry", "read_surrogate", "surrogate_file", "whole_of"]
-
-_LABELS = ("name", "units", "long_name")
-_SIGNAL = "signal_"
-_OWN = ("r2", "r2_held_out", "residual_sd", "cyclic_sd")
-_SENSOR = ("tau_cycles", "tau_stderr_cycles", "total_cycles", "total_stderr_cycles")
-_PER_INPUT = "unit of the input"
 _LARGEST_COUNT = 1_000_000
+_SIGNAL = "signal_"
+_LABELS = wanted(("name", "units", "long_name"), form="texts")
+_NUMBERS = Wanted(form="numbers")
+_PER_INPUT, _PER_FACTOR = Wanted("unit of the input", "numbers"), Wanted("unit of the factor", "numbers")
+_INPUTS = {**_LABELS, "median": _PER_INPUT}
+_RECORDS = {"nonnegative": Wanted(form="texts"), "residuals": Wanted("unit of the signal", "numbers")}
+_SUPPORT = {
+    **dict.fromkeys(("lower", "upper", "centre", "scale"), _PER_INPUT), "root": _NUMBERS, "leverage_limit": Wanted()
+}  # fmt: skip
+_SENSOR = {
+    **dict.fromkeys(("tau_cycles", "tau_stderr_cycles", "total_cycles", "total_stderr_cycles"), Wanted("cycles")),
+    "delay_cycles": Wanted("cycles", "integer"),
+    "delays": Wanted("cycles", "numbers"),
+    "delay_share": _NUMBERS,
+    "at_bound": Wanted(form="flag"),
+}
 
 
-def surrogate_file(surrogate: EngineSurrogate) -> ParameterFile:
-    """Give everything that a surrogate holds."""
-    support, names = surrogate.support, list(surrogate.inputs)
-    own = {name: numbers_entry(getattr(support, name), _PER_INPUT) for name in ("lower", "upper")}
-    own |= {name: numbers_entry(getattr(support.basis, name), _PER_INPUT) for name in ("centre", "scale")}
-    own |= {"root": numbers_entry(support.root), "leverage_limit": Entry(value=float(support.leverage_limit))}
+def _signal_keys(label: Label) -> dict[str, Wanted]:
+    return {
+        "coefficients": Wanted(label.units, "numbers"),
+        "lag_cycles": Wanted("cycles", "integer"),
+        "lags": Wanted("cycles", "numbers"),
+        "lag_scores": _NUMBERS,
+        "lag_at_bound": Wanted(form="flag"),
+        **wanted(("r2", "r2_held_out")),
+        **dict.fromkeys(("residual_sd", "cyclic_sd"), Wanted(label.units)),
+    }
+
+
+def _surface_keys(kind: str, label: Label) -> dict[str, Wanted]:
+    if kind == "polynomial":
+        keys = {**dict.fromkeys(("centre", "scale"), _PER_FACTOR), **dict.fromkeys(("monomials", "root"), _NUMBERS)}
+        keys |= {"leverage_limit": Wanted(), "coefficients": Wanted(label.units, "numbers")}
+    else:
+        keys = {"length_scales": _PER_FACTOR, **dict.fromkeys(("offset", "signal_sd"), Wanted(label.units))}
+    return {**keys, "noise_sd": Wanted(label.units)}
+
+
+def surrogate_file(surrogate: Mapping[str, Any]) -> ParameterFile:
+    """Give everything that the fields of a surrogate hold."""
+    support, signals = surrogate["support"], surrogate["signals"]
+    inputs = {name: surrogate["input_labels"][name] for name in support.inputs}
+    medians = [surrogate["medians"][name] for name in support.inputs]
     tables = {
-        "inputs": {
-            **_labels(names, [surrogate.input_labels[name] for name in names]),
-            "median": numbers_entry([surrogate.medians[name] for name in names], _PER_INPUT),
-        },
-        "support": own,
-        "signals": _labels(list(surrogate.signals), [signal.label for signal in surrogate.signals.values()]),
-        **{_SIGNAL + name: _signal(signal) for name, signal in surrogate.signals.items()},
-        "records": {
-            "nonnegative": Entry(value=list(surrogate.nonnegative)),
-            "residuals": numbers_entry(surrogate.residuals, "unit of the signal"),
-        },
-        "source": {name: Entry(value=_said(value)) for name, value in surrogate.source.items()},
+        "inputs": written({**_columns(inputs), "median": medians}, _INPUTS),
+        "support": written(vars(support.basis) | vars(support), _SUPPORT),
+        "signals": written(_columns({name: signal.label for name, signal in signals.items()}), _LABELS),
+        **{_SIGNAL + name: _signal(signal) for name, signal in signals.items()},
+        "records": written(surrogate, _RECORDS),
+        "source": {name: Entry(value=_said(value)) for name, value in surrogate["source"].items()},
     }
     return ParameterFile(kind="surrogate", tables=tables)
 
 
+def _signal(signal: SignalModel) -> dict[str, Entry]:
+    scores = {"lags": list(signal.lag_scores), "lag_scores": list(signal.lag_scores.values())}
+    own = written(vars(signal) | scores, _signal_keys(signal.label))
+    if signal.sensor is None:
+        return own
+    share = signal.sensor.delay_share
+    return own | written(vars(signal.sensor) | {"delays": list(share), "delay_share": list(share.values())}, _SENSOR)
+
+
 def read_surrogate(file: ParameterFile) -> dict[str, Any]:
-    """Give what such a file holds, by the fields of the surrogate."""
+    """Give the fields of the surrogate of such a file."""
     per_signal = [table for table in file.tables if table.startswith(_SIGNAL)]
     file.expect(kinds=("surrogate",), tables=("inputs", "support", "signals", "records", "source", *per_signal))
-    inputs = file.values("inputs", {**wanted(_LABELS, form="texts"), "median": Wanted(_PER_INPUT, "numbers")})
-    signals = file.values("signals", wanted(_LABELS, form="texts"))
-    vectors = {name: Wanted(_PER_INPUT, "numbers") for name in ("lower", "upper", "centre", "scale")}
-    own = file.values("support", {**vectors, "root": Wanted(form="numbers"), "leverage_limit": Wanted()})
-    records = file.values(
-        "records", {"nonnegative": Wanted(form="texts"), "residuals": Wanted("unit of the signal", "numbers")}
-    )
-    labels = labels_of(file, "signals", signals)
+    given = file.values("inputs", _INPUTS)
+    inputs = _labels(file, "inputs", given)
+    names, n, terms = tuple(inputs), len(inputs), (len(inputs) + 1) * (len(inputs) + 2) // 2
+    median = _array(file, "[inputs] median", given["median"], (n,))
+    labels = _labels(file, "signals", file.values("signals", _LABELS))
     if [_SIGNAL + name for name in labels] != per_signal:
         raise DataError(f"{file.origin}: [signals] names {', '.join(labels)}: each needs its table [signal_...]")
-    n, terms = len(inputs["name"]), (len(inputs["name"]) + 1) * (len(inputs["name"]) + 2) // 2
-    lower, upper, centre, scale = (array_of(file, f"[support] {name}", own[name], (n,)) for name in vectors)
-    support = Support(
-        inputs=tuple(inputs["name"]),
-        lower=lower,
-        upper=upper,
-        leverage_limit=own["leverage_limit"],
-        basis=PolynomialBasis.of("quadratic", centre=centre, scale=scale),
-        root=array_of(file, "[support] root", own["root"], (terms, terms)),
-    )
-    return dict(  # noqa: C408 one line per field
-        signals={name: _signal_of(file, name, label, terms) for name, label in labels.items()},
-        support=support,
-        medians={
-            name: float(value)
-            for name, value in zip(
-                inputs["name"], array_of(file, "[inputs] median", inputs["median"], (n,)), strict=True
-            )
-        },
-        input_labels=labels_of(file, "inputs", inputs),
-        nonnegative=tuple(records["nonnegative"]),
-        residuals=array_of(file, "[records] residuals", records["residuals"], (len(records["residuals"]), len(labels))),
-        source={
+    shapes = {**dict.fromkeys(("lower", "upper", "centre", "scale"), (n,)), "root": (terms, terms)}
+    own = _shaped(file, "support", file.values("support", _SUPPORT), shapes)
+    basis = PolynomialBasis.of("quadratic", centre=own.pop("centre"), scale=own.pop("scale"))
+    records = file.values("records", _RECORDS)
+    rows = records["residuals"]
+    return {
+        "signals": {name: _signal_of(file, name, label, terms) for name, label in labels.items()},
+        "support": Support(inputs=names, basis=basis, **own),
+        "medians": dict(zip(names, median.tolist(), strict=True)),
+        "input_labels": inputs,
+        "nonnegative": tuple(records["nonnegative"]),
+        "residuals": _array(file, "[records] residuals", rows, (len(rows), len(labels))),
+        "source": {
             name: tuple(entry.value) if isinstance(entry.value, list) else entry.value
             for name, entry in file.tables["source"].items()
         },
-    )
-
-
-def _signal(signal: SignalModel) -> dict[str, Entry]:
-    unit = signal.label.units
-    own = {
-        "coefficients": numbers_entry(signal.coefficients, unit),
-        "lag_cycles": Entry(value=int(signal.lag_cycles), unit="cycles"),
-        "lags": numbers_entry(list(signal.lag_scores), "cycles"),
-        "lag_scores": numbers_entry(list(signal.lag_scores.values())),
-        "lag_at_bound": Entry(value=bool(signal.lag_at_bound)),
-        **{name: Entry(value=float(getattr(signal, name)), unit=_unit(name, unit)) for name in _OWN},
     }
-    sensor = signal.sensor
-    if sensor is not None:
-        own |= {name: Entry(value=float(getattr(sensor, name)), unit="cycles") for name in _SENSOR}
-        own |= {
-            "delay_cycles": Entry(value=int(sensor.delay_cycles), unit="cycles"),
-            "delays": numbers_entry(list(sensor.delay_share), "cycles"),
-            "delay_share": numbers_entry(list(sensor.delay_share.values())),
-            "at_bound": Entry(value=bool(sensor.at_bound)),
-        }
-    return own
 
 
 def _signal_of(file: ParameterFile, name: str, label: Label, terms: int) -> SignalModel:
-    table = _SIGNAL + name
-    expected = {
-        "coefficients": Wanted(label.units, "numbers"),
-        "lag_cycles": Wanted("cycles", "integer"),
-        "lags": Wanted("cycles", "numbers"),
-        "lag_scores": Wanted(form="numbers"),
-        "lag_at_bound": Wanted(form="flag"),
-        **{own: Wanted(_unit(own, label.units)) for own in _OWN},
-    }
-    slow = {
-        **{own: Wanted("cycles") for own in _SENSOR},
-        "delay_cycles": Wanted("cycles", "integer"),
-        "delays": Wanted("cycles", "numbers"),
-        "delay_share": Wanted(form="numbers"),
-        "at_bound": Wanted(form="flag"),
-    }
-    has_sensor = not slow.keys().isdisjoint(file.tables[table])
-    values = file.values(table, expected | (slow if has_sensor else {}))
+    table, keys = _SIGNAL + name, _signal_keys(label)
+    slow = not _SENSOR.keys().isdisjoint(file.tables[table])
+    values = file.values(table, keys | (_SENSOR if slow else {}))
+    values = _shaped(file, table, values, {"coefficients": (terms,)})
+    values["lag_scores"] = _by_count(file, table, values, "lags", "lag_scores")
     sensor = None
-    if has_sensor:
-        sensor = SensorLag(
-            delay_share=_scores(file, table, values, "delays", "delay_share"),
-            **{own: values.pop(own) for own in (*_SENSOR, "delay_cycles", "at_bound")},
-        )
-    scores = _scores(file, table, values, "lags", "lag_scores")
-    coefficients = array_of(file, f"[{table}] coefficients", values.pop("coefficients"), (terms,))
-    return SignalModel(name=name, label=label, coefficients=coefficients, lag_scores=scores, sensor=sensor, **values)
+    if slow:
+        values["delay_share"] = _by_count(file, table, values, "delays", "delay_share")
+        sensor = SensorLag(**{key: values.pop(key) for key in _SENSOR if key != "delays"})
+    return SignalModel(name=name, label=label, sensor=sensor, **values)
 
 
-def _labels(names: Sequence[str], labels: Sequence[Label]) -> dict[str, Entry]:
-    return {
-        "name": Entry(value=list(names)),
-        "units": Entry(value=[label.units for label in labels]),
-        "long_name": Entry(value=[label.long_name for label in labels]),
+def response_file(model: Mapping[str, Any]) -> ParameterFile:
+    """Give everything that the fields of a response model hold."""
+    label, factors, surface = model["label"], model["factors"], model["surface"]
+    kind = "polynomial" if isinstance(surface, PolynomialSurface) else "gaussian_process"
+    own = vars(surface)
+    if isinstance(surface, PolynomialSurface):
+        own = vars(surface.support.basis) | vars(surface.support) | own
+    units = {name: Wanted(factor.units, "numbers") for name, factor in factors.items()}
+    response = dict(zip(_LABELS, (model["name"], *label), strict=True))
+    tables = {
+        "factors": written(_columns(factors), _LABELS),
+        "response": {part: Entry(value=value) for part, value in response.items()},
+        kind: written(own, _surface_keys(kind, label)),
+        "points": written(dict(zip(factors, surface.points.T, strict=True)), units),
+        "values": written({model["name"]: surface.values}, {model["name"]: Wanted(label.units, "numbers")}),
     }
+    return ParameterFile(kind="response", tables=tables)
 
 
-def _unit(name: str, own: str) -> str:
-    return "-" if name.startswith("r2") else own
+def read_response(file: ParameterFile) -> dict[str, Any]:
+    """Give the fields of the response model of such a file."""
+    known = ("polynomial", "gaussian_process")
+    kinds = [kind for kind in known if kind in file.tables]
+    if file.kind == "response" and len(kinds) != 1:
+        raise DataError(
+            f"{file.origin}: holds {' and '.join(kinds) or 'neither'}: must hold one of [{'], ['.join(known)}]"
+        )
+    file.expect(kinds=("response",), tables=("factors", "response", "points", "values", *kinds))
+    factors = _labels(file, "factors", file.values("factors", _LABELS))
+    name, *said = file.values("response", wanted(_LABELS, form="text")).values()
+    label = Label(*said)
+    columns = file.values("points", {factor: Wanted(each.units, "numbers") for factor, each in factors.items()})
+    values = _array(file, "values", file.values("values", {name: Wanted(label.units, "numbers")})[name])
+    points = np.column_stack([_array(file, factor, columns[factor], values.shape) for factor in factors])
+    own = {"points": points, "values": values}
+    (kind,) = kinds
+    read = _polynomial if kind == "polynomial" else _process
+    surface = read(file, _surface_keys(kind, label), tuple(factors), own)
+    return {"name": name, "label": label, "factors": factors, "surface": surface}
 
 
-def numbers_entry(values: Any, unit: str = "-") -> Entry:
-    """Return numbers as an entry of a file."""
-    return Entry(value=np.asarray(values, dtype=np.float64).tolist(), unit=unit)
+def _polynomial(
+    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], own: dict[str, Any]
+) -> PolynomialSurface:
+    given = file.values("polynomial", keys)
+    m, p = len(names), len(given["coefficients"])
+    given = _shaped(file, "polynomial", given, {"centre": (m,), "scale": (m,), "root": (p, p), "coefficients": (p,)})
+    monomials = _whole(file, "[polynomial] monomials", given["monomials"])
+    if monomials.ndim != 2 or len(monomials) != p or monomials.min() < 0 or monomials.max() > m:
+        raise DataError(
+            f"{file.origin}: [polynomial] monomials: must be {p} rows of factors, numbered 1 to {m}, 0 for none"
+        )
+    support = Support(
+        inputs=names,
+        lower=own["points"].min(axis=0),
+        upper=own["points"].max(axis=0),
+        leverage_limit=given["leverage_limit"],
+        basis=PolynomialBasis(centre=given["centre"], scale=given["scale"], monomials=monomials),
+        root=given["root"],
+    )
+    return PolynomialSurface(support=support, coefficients=given["coefficients"], noise_sd=given["noise_sd"], **own)
 
 
-def array_of(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
-    """Return what a file holds as an array, and refuse another shape."""
+def _process(
+    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], own: dict[str, Any]
+) -> ProcessSurface:
+    given = file.values("gaussian_process", keys)
+    given = _shaped(file, "gaussian_process", given, {"length_scales": (len(names),)})
+    if not (given["length_scales"] > 0.0).all() or not given["signal_sd"] > 0.0 or not given["noise_sd"] >= 0.0:
+        raise DataError(f"{file.origin}: [gaussian_process]: length scales and signal_sd must be > 0, noise_sd >= 0")
+    return ProcessSurface(**given, **own)
+
+
+def _columns(labels: Mapping[str, Label]) -> dict[str, list[str]]:
+    rows = [(name, *label) for name, label in labels.items()]
+    return {part: [row[k] for row in rows] for k, part in enumerate(_LABELS)}
+
+
+def _labels(file: ParameterFile, table: str, columns: Mapping[str, Any]) -> dict[str, Label]:
+    if len({len(columns[part]) for part in _LABELS}) > 1:
+        raise DataError(f"{file.origin}: [{table}]: {', '.join(_LABELS)} must be equally long")
+    return {name: Label(*label) for name, *label in zip(*(columns[part] for part in _LABELS), strict=True)}
+
+
+def _shaped(
+    file: ParameterFile, table: str, values: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]
+) -> dict[str, Any]:
+    """Turn the values of known shape into arrays."""
+    return values | {key: _array(file, f"[{table}] {key}", values[key], shape) for key, shape in shapes.items()}
+
+
+def _array(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
     try:
         array = np.array(values, dtype=np.float64)
     except ValueError as error:
@@ -175,25 +228,17 @@ def array_of(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...]
     return array
 
 
-def whole_of(file: ParameterFile, what: str, values: Any) -> NDArray[np.intp]:
-    """Return numbers that a file counts with, and refuse fractions."""
-    array = array_of(file, what, values)
+def _whole(file: ParameterFile, what: str, values: Any) -> NDArray[np.intp]:
+    array = _array(file, what, values)
     if not (np.abs(array) < _LARGEST_COUNT).all() or (array != np.rint(array)).any():
         raise DataError(f"{file.origin}: {what}: must be whole numbers below {_LARGEST_COUNT}")
     return array.astype(np.intp)
 
 
-def labels_of(file: ParameterFile, table: str, columns: Mapping[str, Any]) -> dict[str, Label]:
-    """Return the labels of a table of names, units and long names."""
-    if len({len(columns[part]) for part in _LABELS}) > 1:
-        raise DataError(f"{file.origin}: [{table}]: {', '.join(_LABELS)} must be equally long")
-    return {name: Label(*label) for name, *label in zip(*(columns[part] for part in _LABELS), strict=True)}
-
-
-def _scores(file: ParameterFile, table: str, values: dict[str, Any], keys: str, own: str) -> dict[int, float]:
+def _by_count(file: ParameterFile, table: str, values: dict[str, Any], keys: str, own: str) -> dict[int, float]:
     """Take counts of cycles and what belongs to each."""
-    counts = whole_of(file, f"[{table}] {keys}", values.pop(keys))
-    numbers = array_of(file, f"[{table}] {own}", values.pop(own), counts.shape)
+    counts = _whole(file, f"[{table}] {keys}", values.pop(keys))
+    numbers = _array(file, f"[{table}] {own}", values.pop(own), counts.shape)
     return dict(zip(counts.tolist(), numbers.tolist(), strict=True))
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import Label, label_of
 from mgdd.signals.even_grid import check_count
-from mgdd.surrogate.response_surface import PolynomialBasis, least_squares_of, r_squared, support_of
-from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
-from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.polynomial import PolynomialBasis, least_squares_of, r_squared, support_of
+from mgdd.surrogate.signal_model import SensorLag, SignalModel, find_sensor_lag, lagged
 from mgdd.surrogate.surrogate import STEERED, EngineSurrogate
 
 if TYPE_CHECKING:
@@ -135,7 +134,8 @@ def _fit_signal(
     lag = max(scores, key=lambda trial: scores[trial])
     sensor: SensorLag | None = None
     if slow:
-        use = _settled(log.excited) & np.isfinite(values)
+        last = np.maximum.accumulate(np.where(log.excited, -1, rows))  # row that was not excited
+        use = log.excited & (rows - last > _SETTLE) & np.isfinite(values)
         sensor = find_sensor_lag(log.terms, values, use & early, max_delay=_MAX_DELAY, seed=seed)
         lag = sensor.delay_cycles
         terms = lagged(log.terms, delay_cycles=lag, tau_cycles=sensor.tau_cycles)
@@ -178,13 +178,6 @@ def _usable(log: _Log, values: NDArray[np.float64], lag: int) -> NDArray[np.bool
     """Return the rows with a value whose command, `lag` rows before, was excited as well."""
     source = np.arange(values.size) - lag
     return np.isfinite(values) & log.excited & (source >= 0) & log.excited[np.maximum(source, 0)]
-
-
-def _settled(excited: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the rows with enough excited rows behind them."""
-    rows = np.arange(excited.size)
-    last = np.maximum.accumulate(np.where(excited, -1, rows))
-    return np.asarray(excited & (rows - last > _SETTLE), dtype=np.bool_)
 
 
 def _cyclic(residual: NDArray[np.float64], log: _Log, lag: int) -> float:

@@ -11,11 +11,10 @@ from numpy.polynomial import Polynomial
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError
 from mgdd.optimize import Optimum
+from mgdd.surrogate.polynomial import Support
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from mgdd.surrogate.surrogate import EngineSurrogate
 
 __all__ = ["best_along"]
 
@@ -23,29 +22,33 @@ _TINY = 1e-9  # relative slack of a limit at its own crossing
 
 
 def best_along(
-    surrogate: EngineSurrogate,
+    support: Support,
+    surfaces: Mapping[str, NDArray[np.float64]],
+    at: NDArray[np.float64],
+    *,
     weights: Mapping[str, float],
     kept: tuple[Limit, ...],
-    at: Mapping[str, float] | None,
+    nonnegative: tuple[str, ...],
 ) -> Optimum:
-    """Maximise the weighted sum of signals over SOI where supported and within the limits."""
-    support, limits = surrogate.support, {limit.name: limit.upper - limit.margin for limit in kept}
+    """Maximise the weighted sum of signals over SOI where supported and within the limits, the rest of a point held."""
+    limits = {limit.name: limit.upper - limit.margin for limit in kept}
     column = support.inputs.index("soi_cad")
     low, high = float(support.lower[column]), float(support.upper[column])
     nodes = np.linspace(low, high, 5)
-    points = surrogate.points(nodes, at)
+    points = np.tile(at, (nodes.size, 1))
+    points[:, column] = nodes
     terms = support.basis(points)
 
     def along(values: NDArray[np.float64], degree: int) -> Polynomial:
         return Polynomial.fit(nodes, values, degree)
 
-    curves = {name: along(terms @ signal.coefficients, 2) for name, signal in surrogate.signals.items()}
+    curves = {name: along(terms @ coefficients, 2) for name, coefficients in surfaces.items()}
     leverage = along(support.leverage(points), 4) - support.leverage_limit
     goal = Polynomial([0.0], (low, high), (-1.0, 1.0))
     for name, weight in weights.items():
         goal = goal + weight * curves[name]
     held = {name: curves[name] - limit for name, limit in limits.items()}
-    rules = [leverage, *(-curves[name] for name in surrogate.nonnegative)]
+    rules = [leverage, *(-curves[name] for name in nonnegative)]
     edges = _inner_roots(rules, low, high)
     others = np.delete(np.arange(len(support.inputs)), column)
     inside = np.all((points[0, others] >= support.lower[others]) & (points[0, others] <= support.upper[others]))

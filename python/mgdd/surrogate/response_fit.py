@@ -16,14 +16,10 @@ from mgdd.results.fit import FitQuality
 from mgdd.results.labels import Label, label_of
 from mgdd.signals import nrmse_fit_percent, rmse
 from mgdd.surrogate.points import column_label, column_names, points_of
-from mgdd.surrogate.polynomial import PolynomialSurface
-from mgdd.surrogate.process import ProcessSurface
-from mgdd.surrogate.process_fit import fit_process
-from mgdd.surrogate.response_diagnostics import diagnostics_of
-from mgdd.surrogate.response_findings import response_findings
+from mgdd.surrogate.polynomial import PolynomialBasis, PolynomialSurface, choose_terms, support_of
+from mgdd.surrogate.process import ProcessSurface, fit_process
+from mgdd.surrogate.response_diagnostics import diagnostics_of, response_findings
 from mgdd.surrogate.response_model import RESERVED, ResponseModel
-from mgdd.surrogate.response_surface import PolynomialBasis, support_of
-from mgdd.surrogate.stepwise import choose_terms
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,10 +13,10 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
+from mgdd.surrogate.file import read_response, response_file
 from mgdd.surrogate.points import EDGE, PointHull, hull_of, points_of
 from mgdd.surrogate.polynomial import PolynomialSurface
 from mgdd.surrogate.process import ProcessSurface
-from mgdd.surrogate.response_file import read_response, response_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -179,7 +179,7 @@ class ResponseModel(Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give everything, the points included, as `to_toml` writes it."""
-        return response_file(self)
+        return response_file(vars(self))
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> ResponseModel:

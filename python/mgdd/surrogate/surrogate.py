@@ -18,7 +18,7 @@ from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
 from mgdd.surrogate.file import read_surrogate, surrogate_file
 from mgdd.surrogate.optimum import best_along
-from mgdd.surrogate.response_surface import PolynomialBasis, Support
+from mgdd.surrogate.polynomial import PolynomialBasis, Support
 from mgdd.surrogate.signal_model import SignalModel
 
 if TYPE_CHECKING:
@@ -183,7 +183,14 @@ class EngineSurrogate(Parameters):
                     raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {', '.join(self.signals)}")
                 if not np.isfinite(value):
                     raise ParameterError(f"{what}: {name} = {value:g}: must be finite")
-        return best_along(self, weights, kept, at)
+        return best_along(
+            self.support,
+            {name: signal.coefficients for name, signal in self.signals.items()},
+            self.points(np.zeros(1), at)[0],
+            weights=weights,
+            kept=kept,
+            nonnegative=self.nonnegative,
+        )
 
     def quality(self) -> xr.Dataset:
         """Tabulate how well each surface does.
@@ -209,7 +216,7 @@ class EngineSurrogate(Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give everything, residuals included, as `to_toml` writes it."""
-        return surrogate_file(self)
+        return surrogate_file(vars(self))
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> EngineSurrogate:

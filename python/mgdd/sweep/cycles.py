@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core.engine import Cylinder, NoxProxy, OperatingPoint
+from mgdd._core.engine import NoxProxy
 from mgdd.engine.cycle import TRACES
 from mgdd.errors import ParameterError, argument, did_you_mean, hand_over
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor
+from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results import Finding
 from mgdd.results.labels import ANGLE, labelled_dataset
 from mgdd.sweep.batch import NOX, VOID, Request, angles_of, said, simulate_cases
@@ -35,9 +36,9 @@ _GRID_MOVES = ("ivc_cad", "evo_cad")  # a cycle of other valve timings has other
 
 
 def sweep(
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    over: Mapping[str, ArrayLike] | xr.Dataset,
+    cylinder: CylinderLike,
+    point: PointLike | Mapping[str, ArrayLike] | xr.Dataset | None = None,
+    over: Mapping[str, ArrayLike] | xr.Dataset | None = None,
     *,
     points: bool = False,
     soc_cad: float = -6.0,
@@ -59,7 +60,7 @@ def sweep(
     Parameters
     ----------
     cylinder, point, step_cad, integrator
-        As in `mgdd.engine.simulate`; what is not swept.
+        As in `mgdd.engine.simulate`; what is not swept. The point may be left out, ``sweep("puma_single", over)``.
     over : mapping of str to array_like, or Dataset
         Values by input: ``soc_cad``, ``burn_duration_cad``, ``trapped_mass_g``, and every field of cylinder and point
         that is a number. Each is one dimension of a grid, in the order given. A Dataset over ``point``, as
@@ -106,6 +107,9 @@ def sweep(
     >>> table["efficiency_gross"].idxmax("soc_cad").values.tolist()
     [-3.0, -9.0]
     """
+    if over is None:
+        point, over = None, point
+    cylinder, point = engine_of(cylinder, point)
     cases = cases_of(over, points=points)
     request = Request(
         cylinder=cylinder,

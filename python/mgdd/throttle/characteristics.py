@@ -10,6 +10,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -22,12 +23,12 @@ _DEG = math.radians(1.0)
 AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
 
 
-def characteristics(throttle: Throttle) -> xr.Dataset:
+def characteristics(throttle: ThrottleLike) -> xr.Dataset:
     """Give the groups of parameters that duty and angle identify, and the linear part on each side of limp-home.
 
     Parameters
     ----------
-    throttle : Throttle
+    throttle : Throttle, Preset, str or path-like
         Its parameters.
 
     Returns
@@ -53,6 +54,7 @@ def characteristics(throttle: Throttle) -> xr.Dataset:
     >>> c["pole_real_per_s"].sel(side="above").values.round(3).tolist()
     [-0.83, -49.929]
     """
+    throttle = throttle_of(throttle)
     stall, damping, inertia = throttle.stall_torque_nm, throttle.damping_nms_per_rad, throttle.inertia_kgm2
     tau = inertia / damping if damping > 0.0 else math.inf
     scalars = {
@@ -87,12 +89,12 @@ def characteristics(throttle: Throttle) -> xr.Dataset:
     )
 
 
-def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.Dataset:
+def holding_duty(throttle: ThrottleLike, angle_deg: ArrayLike | None = None) -> xr.Dataset:
     """Give the duty that holds the plate at an angle, with the band that friction leaves free.
 
     Parameters
     ----------
-    throttle : Throttle
+    throttle : Throttle, Preset, str or path-like
         Its parameters; the modelled air flow (``pressure_drop_kpa``) counts.
     angle_deg : array_like, shape (n,), optional
         Angles [deg] within the travel; the travel in steps of about 0.25 deg if left out.
@@ -121,6 +123,7 @@ def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.D
     >>> round(float(curve["duty_rising"][0] - curve["duty_falling"][0]), 4)
     0.1854
     """
+    throttle = throttle_of(throttle)
     t = throttle
     angle = _angles(t, angle_deg)
     x = (angle - t.limp_home_deg) * _DEG
@@ -146,12 +149,12 @@ def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.D
     )
 
 
-def airflow_torque_nm(throttle: Throttle, angle_deg: ArrayLike) -> NDArray[np.float64]:
+def airflow_torque_nm(throttle: ThrottleLike, angle_deg: ArrayLike) -> NDArray[np.float64]:
     """Give the torque of the modelled air flow, -D³ dp C_T(angle): it closes.
 
     Parameters
     ----------
-    throttle : Throttle
+    throttle : Throttle, Preset, str or path-like
         Its ``bore_mm`` D and ``pressure_drop_kpa`` dp.
     angle_deg : array_like
         Plate angles [deg].
@@ -174,6 +177,7 @@ def airflow_torque_nm(throttle: Throttle, angle_deg: ArrayLike) -> NDArray[np.fl
     >>> airflow_torque_nm(Throttle(pressure_drop_kpa=10.0), [0.0, 55.0, 90.0]).round(3).tolist()
     [-0.0, -0.108, -0.0]
     """
+    throttle = throttle_of(throttle)
     angle = np.asarray(angle_deg, dtype=np.float64)
     if not np.isfinite(angle).all():
         raise ParameterError("angle_deg holds a value that is not finite")

@@ -9,6 +9,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
+from mgdd.presets.meant import ThrottleLike, throttle_model_of
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _ANGLE = _STATES.index("plate_angle_deg")
 
 
 def to_iosystem(
-    model: Throttle | PseudoWiener,
+    model: ThrottleLike | PseudoWiener,
     *,
     sample_s: float = 1e-3,
     step_s: float = 1e-4,
@@ -36,7 +37,7 @@ def to_iosystem(
 
     Parameters
     ----------
-    model : Throttle or PseudoWiener
+    model : Throttle, Preset, str or path-like, or PseudoWiener
         The plant, or a pseudo-Wiener model of it.
     sample_s : float
         Time between samples, the time base of the system [s]; the duty holds in between.
@@ -76,17 +77,18 @@ def to_iosystem(
     ...     assert system.dt == 0.001
     ...     assert rest.round(6).tolist() == [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
     """
+    own: Throttle | PseudoWiener = throttle_model_of(model)
     try:
         import control
     except ImportError as error:
         raise ImportError("to_iosystem needs python-control: pip install 'mgdd[control]'") from error
-    rest = _at_rest(model, start_deg)
+    rest = _at_rest(own, start_deg)
     stepper: Any
-    if isinstance(model, PseudoWiener):
-        stepper = _stepper(model.at_sample(sample_s))
+    if isinstance(own, PseudoWiener):
+        stepper = _stepper(own.at_sample(sample_s))
         states = [f"state_{i}" for i in range(rest.size)]
     else:
-        stepper = _core.throttle.Stepper(model, sample_s=sample_s, step_s=step_s)
+        stepper = _core.throttle.Stepper(own, sample_s=sample_s, step_s=step_s)
         states = list(_STATES)
 
     def update(_time: float, state: Any, inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
@@ -94,7 +96,7 @@ def to_iosystem(
 
     def output(_time: float, state: Any, _inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
         column = np.asarray(state, dtype=np.float64)
-        return np.asarray([stepper.output(column) if isinstance(model, PseudoWiener) else column[_ANGLE]])
+        return np.asarray([stepper.output(column) if isinstance(own, PseudoWiener) else column[_ANGLE]])
 
     system = control.nlsys(
         update, output, inputs=["duty"], outputs=["angle_deg"], states=states, dt=sample_s, name=name

@@ -11,6 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.describe import described, rows_of
 from mgdd.signals.even_grid import even_step, is_same_step
 from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from mgdd._core.throttle import Throttle
 
 __all__ = ["PseudoWiener"]
 
@@ -87,12 +87,12 @@ class PseudoWiener(SampledModel, Parameters):
         self._options = {"switching": switching, "friction": friction}
 
     @classmethod
-    def of_throttle(cls, throttle: Throttle) -> PseudoWiener:
+    def of_throttle(cls, throttle: ThrottleLike) -> PseudoWiener:
         """Give PW-R with the groups of a first-principle throttle.
 
         Parameters
         ----------
-        throttle : Throttle
+        throttle : Throttle, Preset, str or path-like
             tau = J/b, G = g/J, preload, spring and Coulomb torque over the stall torque g.
 
         Returns
@@ -100,7 +100,7 @@ class PseudoWiener(SampledModel, Parameters):
         PseudoWiener
             Without inductance, stiction and the softness of the stops, which PW-R does not have.
         """
-        return cls("pw_r", _core.throttle.pseudo_wiener_of(throttle).parameters)
+        return cls("pw_r", _core.throttle.pseudo_wiener_of(throttle_of(throttle)).parameters)
 
     @property
     def kind(self) -> str:

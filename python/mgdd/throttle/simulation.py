@@ -11,8 +11,10 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import columns_of, is_timed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,8 +28,8 @@ _MOVED_DEG = 0.01
 
 
 def simulate(
-    throttle: Throttle | Sequence[Throttle],
-    duty: ArrayLike,
+    throttle: ThrottleLike | Sequence[ThrottleLike],
+    duty: Any,
     *,
     time_s: ArrayLike | None = None,
     sample_s: float = 1e-3,
@@ -42,10 +44,12 @@ def simulate(
 
     Parameters
     ----------
-    throttle : Throttle or sequence of Throttle
-        Its parameters; a sequence is one case each, with friction and backlash of the same form.
-    duty : float or array_like, shape (n,)
-        Duty [-], -1 to 1, positive opens. Sample k acts from ``time_s[k]`` to ``time_s[k + 1]``.
+    throttle : Throttle, Preset, str or path-like, or a sequence of them
+        The throttle; or a preset, its name or its file; a sequence is one case each, with friction and backlash of the
+        same form.
+    duty : float or array_like, shape (n,), or a signal with its time
+        Duty [-], -1 to 1, positive opens. Sample k acts from ``time_s[k]`` to ``time_s[k + 1]``. A Dataset, DataFrame
+        or mapping with ``time_s`` and ``duty``, and a DataArray or Series over ``time_s``, bring their time.
     time_s : array_like, shape (n,), optional
         Even, increasing times [s]; without it samples are `sample_s` apart and start at 0.
     sample_s : float
@@ -95,15 +99,22 @@ def simulate(
     >>> runs["angle_deg"][:, -1].values.round(1).tolist()
     [7.9, 8.0, 7.9]
     """
+    if time_s is None and is_timed(duty):
+        time_s, duty = columns_of(duty, ("time_s", "duty"), what="duty")
     times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
     supply = _signal("supply_v", supply_v, column.size)
     air = _signal("airflow_torque_nm", airflow_torque_nm, column.size)
+    body: Throttle | list[Throttle]
+    if isinstance(throttle, Sequence) and not isinstance(throttle, str):
+        body = [throttle_of(each) for each in throttle]
+    else:
+        body = throttle_of(throttle)
     given = None if start_deg is None else np.asarray(start_deg, dtype=np.float64)
     settings = {"bridge": bridge, "sample_s": sample, "step_s": step_s}
     options: dict[str, Any] = {**settings, "supply_v": supply, "airflow_torque_nm": air}
-    if not isinstance(throttle, Throttle) or (given is not None and given.ndim):
+    if not isinstance(body, Throttle) or (given is not None and given.ndim):
         starts = np.empty(0) if given is None else np.atleast_1d(given)
-        cases = [throttle] * starts.size if isinstance(throttle, Throttle) else list(throttle)
+        cases = [body] * starts.size if isinstance(body, Throttle) else body
         if not cases:
             raise ParameterError("throttle, start_deg: there is no case: give at least one")
         if given is None:
@@ -121,15 +132,15 @@ def simulate(
             },
             attrs=settings,
         )
-    start = throttle.limp_home_deg if given is None else float(given)
-    raw = _core.throttle.simulate(throttle, column, start_deg=start, **options)
+    start = body.limp_home_deg if given is None else float(given)
+    raw = _core.throttle.simulate(body, column, start_deg=start, **options)
     variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", times), "duty": ("time_s", column)}
     variables |= {name: ("time_s", values) for name, values in raw.items()}
     if supply.size:
         variables["supply_v"] = ("time_s", supply)
     if air.any():
         variables["airflow_torque_nm"] = ("time_s", air)
-    return labelled_dataset(variables, attrs={"start_deg": start, **settings, **throttle.to_dict()})
+    return labelled_dataset(variables, attrs={"start_deg": start, **settings, **body.to_dict()})
 
 
 def step_summary(run: xr.Dataset) -> dict[str, float]:

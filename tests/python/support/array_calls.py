@@ -13,7 +13,7 @@ from idle_loop import idle_loop
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import DiscreteModel, Pid, RecedingHorizon
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
-from mgdd.io.checks import check_trace
+from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
 from mgdd.rig import RigRecord
@@ -227,6 +227,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
     "maps.CalibrationMap.replaced": (lambda t: table(FUEL, TIMING, 0.2).replaced(t).values, (TIMING - 1.0,)),
     "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
+    "maps.CalibrationMap.__call__": (lambda x: table(FUEL, TIMING, 0.2)(fuel_mg=x), (OPEN,)),
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
     "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
     "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
@@ -302,7 +303,7 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "identify.SmoothThrottle.simulate": (run(SMOOTH), (TIME, DUTY)),
     "throttle.PseudoWiener.simulate": (run(MODEL), (TIME, DUTY)),
     "throttle.PseudoWiener.predict": (ahead(MODEL), (TIME, DUTY, ANGLE)),
-    "io.checks.check_trace": (check_trace, (CRANK, BAR)),
+    "io.pressure_checks.check_trace": (check_trace, (CRANK, BAR)),
     "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
     "throttle.characteristics.mass_flow_kg_per_s": (
         lambda area, drop: mass_flow_kg_per_s(area_m2=area, pressure_drop_kpa=drop), (1e-6 * OPEN, 1.0 + OPEN),

@@ -16,7 +16,7 @@ from mgdd import io, presets
 from mgdd.design import design_points
 from mgdd.guide import TimingMap
 from mgdd.identify import FirstPrincipleModel, SmoothThrottle, load_throttle_model
-from mgdd.io.netcdf_file import read_netcdf
+from mgdd.io.binary_files import read_netcdf
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import read_points
 from mgdd.loop import Reference

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.engine import OperatingPoint
+from mgdd._core.optimize import Limit
 from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import DEFAULT_CAD, check_request
 from mgdd.errors import ConvergenceError, Interrupted, hand_over
@@ -16,6 +17,8 @@ from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
 from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
 from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import limits_of
+from mgdd.presets.meant import CylinderLike
 
 if TYPE_CHECKING:
     from mgdd.identify.engine.tdc import TdcEstimate
@@ -27,14 +30,14 @@ _MARGIN_CAD = 5.0  # the search reaches this far beyond the fitted timing
 
 def best_timing(
     traces: Sequence[Any],
-    cylinder: Cylinder,
+    cylinder: CylinderLike,
     *,
     family: ModelFamily | None = None,
     fuel_heat_j: float | Sequence[float | None] | None = None,
     bounds: Bounds | None = None,
     point: OperatingPoint | None = None,
     objective: str = "imep_closed_bar",
-    limits: Mapping[str, float] | None = None,
+    limits: Mapping[str, float] | Sequence[Limit] | None = None,
     bounds_cad: tuple[float, float] | None = None,
     pegging: str = "none",
     pegging_exponent: float = 1.35,
@@ -56,7 +59,7 @@ def best_timing(
         Which models, and what is plausible; `ModelFamily()` if left out.
     objective : str
         As in `mgdd.engine.find_optimum`. Closed-cycle work is the default because a closed-valve trace carries no more.
-    limits : dict, optional
+    limits : mapping of str to float, or sequence of Limit, optional
         Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
         Searched range of SOC, as in `mgdd.engine.find_optimum`; where nothing is said it reaches 5 °CA beyond the
@@ -88,8 +91,8 @@ def best_timing(
     >>> [(member.member.wall_heat_scale, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
     [(0.5, 4), (1.0, 7), (1.5, 10)]
     """
-    limits = limits or {}
-    check_request(objective, limits)
+    kept = {limit.name: limit.upper - limit.margin for limit in limits_of(limits)}
+    check_request(objective, kept)
     request = Request.of(
         traces, cylinder, free=None, fuel_heat_j=fuel_heat_j, bounds=bounds, point=point, start_values=None,
         step_cad=step_cad, integrator=integrator, options=None,
@@ -107,7 +110,7 @@ def best_timing(
         raise ConvergenceError("no model of the family could be fitted to these traces: check geometry, TDC, pegging")
     scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
     answers = [
-        tuple(_answer(member, at, objective, limits, bounds_cad, scheme) for member in members)
+        tuple(_answer(member, at, objective, kept, bounds_cad, scheme) for member in members)
         for at in range(len(request.traces))
     ]
     return hand_over([_over_family(label, own) for label, own in zip(request.labels, answers, strict=True)], stop)

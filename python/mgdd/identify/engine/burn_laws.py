@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from mgdd import _core
-from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.engine import OperatingPoint
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit
+from mgdd.presets.meant import CylinderLike, cylinder_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +28,7 @@ LAWS = (
 
 def compare_laws(
     traces: Sequence[xr.Dataset],
-    cylinder: Cylinder,
+    cylinder: CylinderLike,
     *,
     point: OperatingPoint | None = None,
     laws: Sequence[tuple[str, str]] = LAWS,
@@ -62,7 +63,7 @@ def compare_laws(
     >>> [fit.kind for fit in fits][:2]
     ['triangle, gamma 1.37', 'wiebe, gamma 1.37']
     """
-    fits = []
+    cylinder, fits = cylinder_of(cylinder), []
     for shape, gamma in laws:
         start = min(
             cylinder.wall_heat_scale, _core.identify.wall_heat_scale_upper

@@ -17,6 +17,7 @@ from mgdd.identify.engine.findings import findings_of
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed
 from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.presets.meant import CylinderLike
 from mgdd.results import FitReport
 from mgdd.results.fit import FitQuality
 from mgdd.results.labels import ANGLE, labelled_dataset
@@ -29,7 +30,7 @@ __all__ = ["fit_cylinder", "fit_request"]
 
 def fit_cylinder(
     traces: Sequence[Any],
-    cylinder: Cylinder,
+    cylinder: CylinderLike,
     *,
     free: Sequence[str] | None = None,
     fuel_heat_j: float | Sequence[float | None] | None = None,
@@ -51,8 +52,8 @@ def fit_cylinder(
         ``pressure_bar(crank_angle_cad)`` each. Attributes ``speed_rpm``, ``trapped_mass_g``, ``ivc_temperature_k``,
         ``fuel_mg``, ``soi_cad`` and ``spark_cad`` are used where present; ``file`` names the trace. Samples outside
         IVC..EVO are dropped.
-    cylinder : Cylinder
-        Start and constants; its ``burn_shape`` and ``gamma_model`` choose the laws.
+    cylinder : Cylinder, Preset, str or path-like
+        As in `mgdd.engine.simulate`: start and constants; its ``burn_shape`` and ``gamma_model`` choose the laws.
     free : sequence of str, optional
         Parameters to fit: per trace ``soc_cad burn_duration_cad fuel_heat_j`` and, of the Wiebe laws, ``wiebe_m
         second_fraction second_delay_cad second_duration_cad second_wiebe_m``; for all traces any field of the

@@ -15,8 +15,8 @@ from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
-from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,9 +34,8 @@ _UNITS = {"gamma": "", "pegging_bar": " bar", "tdc_cad": " CAD"}
 _CORRELATION = float(_core.identify.correlation_limit)
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class WallHeatProfile:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WallHeatProfile(Result):
     """What the traces say about the wall-heat scale.
 
     Parameters
@@ -83,19 +82,7 @@ class WallHeatProfile:
     reasons: tuple[str, ...]
     dataset: xr.Dataset
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw the best reachable RMSE over the scale: a flat curve means the traces do not fix it.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes; the shaded band holds the scales within 10 % of the best RMSE.
-        """
+    def _draw(self, ax: Any) -> Any:
         from mgdd.plot.calibration import wall_heat_profile as draw
 
         return draw(self.dataset, ax=ax)

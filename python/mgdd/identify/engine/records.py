@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.results import Fit
-from mgdd.results.describe import described
 from mgdd.results.labels import VARIABLES, labelled_dataset
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,9 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table", "starts_of"]
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class Load:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Load(Result):
     """One load of a calibration: its burn and how well the model meets the measurement.
 
     Parameters
@@ -83,19 +82,12 @@ class Load:
     heat_loss_fraction: float
     overlay: xr.Dataset = field(repr=False)
 
-    def plot(self, *, ax: Any = None) -> Any:
-        """Draw measured points under the model's line, and their difference in a panel below.
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The overlay, its figures beside it."""
+        return self.overlay
 
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The upper axes; the residual panel is ``ax.figure.axes[-1]``.
-        """
+    def _draw(self, ax: Any) -> Any:
         from mgdd.plot.calibration import calibration_overlay
 
         return calibration_overlay(self.overlay, ax=ax)

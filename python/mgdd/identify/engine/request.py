@@ -15,8 +15,9 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io.trace_forms import one_cycle
+from mgdd.io.pressure import one_cycle
 from mgdd.optimize.fit_options import FitOptions
+from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Request:
     def of(
         cls,
         traces: Sequence[Any],
-        cylinder: Cylinder,
+        cylinder: CylinderLike,
         *,
         free: Sequence[str] | None,
         fuel_heat_j: float | Sequence[float | None] | None,
@@ -73,6 +74,7 @@ class Request:
         """Check the arguments of `fit_cylinder` against each other."""
         if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
             raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
+        cylinder = cylinder_of(cylinder)
         given = [one_cycle(trace) for trace in traces]
         if not given:
             raise DataError("no traces: a calibration needs at least one")

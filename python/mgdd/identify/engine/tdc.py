@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.engine import OperatingPoint
 from mgdd.engine import analyze, simulate
 from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
@@ -16,8 +16,10 @@ from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import of_law
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Bounds, Request, closed
-from mgdd.results.describe import described
+from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import Result
+from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,14 +30,14 @@ __all__ = ["TdcEstimate", "estimate_tdc"]
 _SCALES = (0.3, 1.0, 1.5)  # of the wall heat, for the loss angle: the plausible range of a ModelFamily
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
 _MODEL_CAD = 0.3  # what another burn law or gamma law moves the least RMSE, seen on simulated and measured traces
+_ENDS = (("low_cad", "lowest"), ("high_cad", "highest"))
 _PEAK_CAD = 5.0
 _STEP_CAD = 0.25
 _NOISE_CAD, _LEAK_CAD = 0.1, 0.3  # what noise and a leak past the rings add to the modelled loss angle
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class TdcEstimate:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TdcEstimate(Result):
     """Where top dead centre stands in the angles of a trace.
 
     Parameters
@@ -52,7 +54,7 @@ class TdcEstimate:
     others_cad : tuple of float
         Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
-        Fired: ``rmse_percent`` over ``tdc_offset_cad``; motored: empty.
+        ``low_cad`` and ``high_cad``; fired also ``rmse_percent`` over ``tdc_offset_cad``.
 
     Examples
     --------
@@ -71,6 +73,11 @@ class TdcEstimate:
     loss_angle_cad: tuple[float, ...] = ()
     others_cad: tuple[float, ...] = ()
     dataset: xr.Dataset = field(repr=False)
+
+    def __post_init__(self) -> None:
+        labels = {name: unit_attributes("°CA", f"{end} possible offset") for name, end in _ENDS}
+        ends = {name: ((), getattr(self, name), own) for name, own in labels.items()}
+        object.__setattr__(self, "dataset", self.dataset.assign(ends))
 
     @property
     def suspect(self) -> bool:
@@ -98,34 +105,17 @@ class TdcEstimate:
         said = f"the {self.method} has the angles {self.tdc_offset_cad:+.2f} °CA too large ({how}): suspect TDC"
         return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off"]
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the least RMSE over the TDC offset.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The band is the range of possible offsets.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            A motored estimate, which has no scan.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.calibration import tdc_scan
 
         if "rmse_percent" not in self.dataset:
             raise DataError("a motored estimate has no scan to draw: its peak and loss angle say all")
-        return tdc_scan(self.dataset, (self.low_cad, self.high_cad), ax=ax)
+        return tdc_scan(self, ax=ax)
 
 
 def estimate_tdc(
     traces: Sequence[Any],
-    cylinder: Cylinder,
+    cylinder: CylinderLike,
     *,
     point: OperatingPoint | None = None,
     fuel_heat_j: float | Sequence[float | None] | None = None,
@@ -139,8 +129,8 @@ def estimate_tdc(
     ----------
     traces, point, fuel_heat_j, bounds
         As in `mgdd.identify.fit_cylinder`; absolute pressure, all motored or all fired.
-    cylinder : Cylinder
-        Geometry; of a fired trace also the gamma law, whose parameter is fitted.
+    cylinder : Cylinder, Preset, str or path-like
+        As in `mgdd.engine.simulate`: geometry; of a fired trace also the gamma law, whose parameter is fitted.
     span_cad : float
         Offsets up to this size are tried on fired traces, 0.5 to 10 [°CA].
     progress : callable, optional
@@ -183,6 +173,7 @@ def estimate_tdc(
     """
     if not 0.5 <= span_cad <= 10.0:
         raise ParameterError.of("span_cad", span_cad, "0.5 to 10 °CA")
+    cylinder = cylinder_of(cylinder)
     request = Request.of(
         traces, cylinder.replace(burn_shape="double_wiebe"), free=None, fuel_heat_j=fuel_heat_j, bounds=bounds,
         point=point, start_values=None, step_cad=0.5, integrator="trapezoid", options=None,

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.identify.engine.family import Member
 from mgdd.results.describe import described
+from mgdd.results.labels import Label, labelled_dataset, named_label
+from mgdd.results.result import Result
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
 
 __all__ = ["RANGED", "BestTiming", "MemberTiming"]
@@ -17,6 +20,11 @@ RANGED = (
     "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
     "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",
 )  # fmt: skip
+
+
+def _label(name: str) -> Label:
+    label = named_label(name)
+    return Label("°CA", label.long_name) if name.endswith(("shift_cad", "soi_cad")) else label
 
 
 @described
@@ -90,9 +98,8 @@ class MemberTiming:
         return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class BestTiming:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BestTiming(Result):
     """Best timing of one load, over a family of models.
 
     Parameters
@@ -131,6 +138,16 @@ class BestTiming:
     free_shift_cad: tuple[float, float]
     free_gain_percent: tuple[float, float]
 
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Every member's answer over ``member``; attributes name the trace and the best member."""
+        rows = [member.to_dict() for member in self.members]
+        names = [name for name in (rows[0] if rows else ()) if name != "name"]
+        columns = {name: ("member", [row[name] for row in rows], *_label(name)) for name in names}
+        members = ("member", [row["name"] for row in rows], "-", "member of the family")
+        best = "" if self.best is None else self.best.member.name
+        return labelled_dataset({"member": members, **columns}, attrs={"file": self.file, "best": best})
+
     def to_dict(self) -> dict[str, Any]:
         """Give file, ranges, best member and all members as plain values.
 
@@ -146,19 +163,7 @@ class BestTiming:
             "members": [member.to_dict() for member in self.members],
         }
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw each member's best CA50 as a strip: filled where plausible, ringed the best.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            One row per member; the shaded band is the range of the plausible ones.
-        """
+    def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.family import family_strip
 
         return family_strip(self, ax=ax)

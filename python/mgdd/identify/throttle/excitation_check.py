@@ -12,9 +12,10 @@ from mgdd.errors import ParameterError, argument
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
 from mgdd.results import Finding
-from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import Result
 from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import as_signal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,9 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["ExcitationCheck", "check_excitation"]
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class ExcitationCheck:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ExcitationCheck(Result):
     """What the prior model does under an excitation, and the verdict.
 
     Parameters
@@ -62,6 +62,16 @@ class ExcitationCheck:
     rms_current_a: float
     prediction: xr.Dataset = field(repr=False)
 
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The prediction."""
+        return self.prediction
+
+    def _draw(self, ax: Any) -> Any:
+        from mgdd.plot.throttle_run import throttle_run
+
+        return throttle_run(self.prediction, ax=ax)
+
     def summary(self) -> str:
         """Return a short summary.
 
@@ -97,7 +107,7 @@ class ExcitationCheck:
 
 
 def check_excitation(
-    excitation: xr.Dataset,
+    excitation: Any,
     prior: Any,
     *,
     angle_window_deg: tuple[float, float] | None = None,
@@ -109,11 +119,11 @@ def check_excitation(
 
     Parameters
     ----------
-    excitation : xarray.Dataset
+    excitation : Dataset, DataFrame, mapping of columns, DataArray or Series
         ``duty`` over ``time_s``, as `chirp` and its sisters make it.
-    prior : Throttle, Model or callable
-        What is known of the throttle, for example a preset. A callable gets ``(time_s, duty, start_deg)`` and gives
-        the angle [deg], or a mapping with ``angle_deg`` and ``current_a``.
+    prior : Throttle, Preset, str or path-like, Model, Fit or callable
+        What is known of the throttle: its parameters, a preset or its name, or a fitted model. A callable gets
+        ``(time_s, duty, start_deg)`` and gives the angle [deg], or a mapping with ``angle_deg`` and ``current_a``.
     angle_window_deg : (float, float), optional
         Where the plate may go [deg]; None keeps it 1 deg away from its stops.
     max_rate_deg_per_s : float, optional
@@ -146,6 +156,7 @@ def check_excitation(
     >>> check_excitation(triangle(offset=0.0, amplitude=0.2), lazy).passed
     True
     """
+    excitation = as_signal(excitation, ("time_s", "duty"), what="excitation")
     time, duty = _signal_of(excitation)
     known = prior_of(prior)
     window = known.window_deg if angle_window_deg is None else angle_window_deg

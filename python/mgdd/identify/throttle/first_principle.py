@@ -13,7 +13,7 @@ from mgdd.identify.starts import rank, search_starts
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
 from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
 from mgdd.identify.throttle.first_principle_start import group_starts
-from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.fit_options import FitOptions, fit_options
@@ -22,7 +22,6 @@ from mgdd.results import Finding, Fit, FitReport
 
 if TYPE_CHECKING:
     import numpy as np
-    import xarray as xr
     from numpy.typing import NDArray
 
 __all__ = ["fit_first_principle"]
@@ -32,9 +31,9 @@ SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
 
 
 def fit_first_principle(
-    log: xr.Dataset,
+    log: Any,
     *,
-    test: xr.Dataset | None = None,
+    test: Any = None,
     start_values: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
@@ -60,9 +59,9 @@ def fit_first_principle(
 
     Parameters
     ----------
-    log : xarray.Dataset
+    log : Dataset, DataFrame or mapping of columns
         ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], evenly sampled.
-    test : xarray.Dataset, optional
+    test : Dataset, DataFrame or mapping of columns, optional
         Another log; gives the quality ``test``.
     start_values : mapping of str to float, optional
         Start values of some groups; taken as they are instead of the regression.
@@ -113,6 +112,8 @@ def fit_first_principle(
     >>> fit.train.nrmse_fit_percent > 99.0
     True
     """
+    log = as_log(log)
+    test = None if test is None else as_log(test, "test")
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
     share_known = any(SHARE in given for given in (start_values or {}, fixed or {}, free))
     problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed, stops_deg=(closed_deg, open_deg))

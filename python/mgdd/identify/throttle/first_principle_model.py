@@ -12,8 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.io.model_parameters import ModelParameters
-from mgdd.io.parameters import FIT_NOTES, ParameterFile, Wanted, wanted
+from mgdd.io.parameters import FIT_NOTES, ModelParameters, ParameterFile, Wanted, wanted
 from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
 

@@ -13,16 +13,21 @@ from mgdd.results.fit import FitQuality
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
-from mgdd.signals.model import columns_of
+from mgdd.signals.model import as_signal, columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LOG_COLUMNS", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
+__all__ = ["LOG_COLUMNS", "as_log", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
 
 # What the start of a free run still carries of the unknown speed and current.
 DISCARD_S = 0.05
 LOG_COLUMNS = ("time_s", "duty", "angle_deg")
+
+
+def as_log(log: Any, what: str = "log") -> xr.Dataset:
+    """Return a log as a Dataset, of any form of a signal."""
+    return as_signal(log, LOG_COLUMNS, what=what, optional=("current_a", "supply_v"))
 
 
 def discarded(step_s: float, size: int) -> int:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle_problem import shows_limp_home
 from mgdd.identify.throttle.fits import CHOICES, PSEUDO_WIENER, check_kind, fit_kind
-from mgdd.identify.throttle.free_run import free_run, quality_of
+from mgdd.identify.throttle.free_run import as_log, free_run, quality_of
 from mgdd.identify.throttle.limp_home import doubts, read_off, stuck_elsewhere
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
-from mgdd.io.throttle_checks import check_throttle_log
+from mgdd.io.throttle_checks import check_sides, check_throttle_log
 from mgdd.results import Finding, Fit
 from mgdd.results.finding import unique
 from mgdd.results.fit import FitQuality
@@ -36,10 +36,10 @@ _PLATEAU_DEG, _PLATEAU_VISITS = 0.4, 3
 
 
 def identify_throttle(
-    log: xr.Dataset,
+    log: Any,
     model: str = "auto",
     *,
-    test: xr.Dataset | None = None,
+    test: Any = None,
     limp_home_deg: float | None = None,
     two_sided: bool = False,
     closed_deg: float = 0.0,
@@ -51,14 +51,14 @@ def identify_throttle(
 
     Parameters
     ----------
-    log : xarray.Dataset
+    log : Dataset, DataFrame or mapping of columns
         As `mgdd.io.read_throttle_log` gives it.
     model : {"auto", "first_principle", "pw_r", "pw_w", "pw_p"}
         Kind of the model. ``first_principle``: the groups of the plant, with as much of electrical lag, delay, Stribeck
         drop, presliding and gap as the log supports. ``pw_r``, ``pw_w``, ``pw_p``: pseudo-Wiener with friction inside,
         strict Wiener, Wiener with play. ``auto`` (the default): the groups, or PW-R fitted from them where that runs
         better on a quarter of the log that neither has seen; the findings say why.
-    test : xarray.Dataset, optional
+    test : Dataset, DataFrame or mapping of columns, optional
         Another log, for the quality ``test``.
     limp_home_deg : float, optional
         Limp-home angle [deg], if it is known. None: the groups estimate it from a log that has been on both sides;
@@ -100,6 +100,8 @@ def identify_throttle(
     >>> fit.kind, fit.train.nrmse_fit_percent > 98.0, fit.parameters["delay_samples"]
     ('first_principle', True, 0.0)
     """
+    log = as_log(log)
+    test = None if test is None else as_log(test, "test")
     if model not in CHOICES:
         raise ParameterError.of("model", model, f"one of {', '.join(map(repr, CHOICES))}")
     check_kind(model, two_sided=two_sided, delay_samples=delay_samples)
@@ -109,12 +111,12 @@ def identify_throttle(
     if test is not None:
         check_throttle_log(test)
     limp_home = limp_home_deg
-    if limp_home is None and (two_sided or model in PSEUDO_WIENER or (model == "auto" and not shows_limp_home(log))):
-        limp_home = read_off(log)
-    if two_sided:
-        check_throttle_log(log, two_sided=True, limp_home_deg=limp_home)
     # What both sides of a log settle is better estimated than read.
-    estimated = limp_home_deg is None and model not in PSEUDO_WIENER and shows_limp_home(log)
+    estimated = limp_home is None and model not in PSEUDO_WIENER and shows_limp_home(log)
+    if limp_home is None and (two_sided or model in PSEUDO_WIENER or (model == "auto" and not estimated)):
+        limp_home = read_off(log)
+    if two_sided and limp_home is not None:
+        check_sides(log, limp_home)
     fit = fit_kind(
         log, model, limp_home_deg=None if estimated else limp_home, two_sided=two_sided, delay_samples=delay_samples,
         stops_deg=(closed_deg, open_deg), options=options,

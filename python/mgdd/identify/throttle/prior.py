@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import ParameterError
-from mgdd.results import Fit
+from mgdd.presets.meant import throttle_model_of
 from mgdd.throttle import Throttle, simulate
 
 if TYPE_CHECKING:
@@ -78,10 +78,9 @@ class Prior:
 
 def prior_of(model: Any) -> Prior:
     """Return what a throttle, a fitted model or a callable says of itself."""
+    model = throttle_model_of(model)
     if isinstance(model, Throttle):
         return _of_throttle(model)
-    if isinstance(model, Fit):
-        return prior_of(model.model)
     if hasattr(model, "simulate") and hasattr(model, "parameters"):
         return _of_model(model)
     if callable(model):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, hand_over, or_partial
 from mgdd.identify.throttle.delay_report import delay_at_end
-from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
@@ -28,7 +28,7 @@ _STARTS = MappingProxyType({"pw_r": 9, "pw_w": 16, "pw_p": 16})
 
 
 def fit_pseudo_wiener(
-    log: xr.Dataset | Sequence[xr.Dataset],
+    log: Any,
     kind: str = "pw_r",
     *,
     limp_home_deg: float | None = None,
@@ -45,7 +45,7 @@ def fit_pseudo_wiener(
 
     Parameters
     ----------
-    log : xarray.Dataset or sequence of them
+    log : Dataset, DataFrame or mapping of columns, or a sequence of them
         ``duty`` [-] and ``angle_deg`` [deg] over an even ``time_s`` [s].
     kind : {"pw_r", "pw_w", "pw_p"}
         Friction and preload inside the block; strict Wiener; Wiener with play.
@@ -103,7 +103,7 @@ def fit_pseudo_wiener(
     0.08
     """
     chosen = fit_options(options, n_starts=_STARTS.get(kind, 1), seed=1, max_iterations=150)
-    logs = cast("list[xr.Dataset]", [log] if hasattr(log, "variables") else list(log))
+    logs = [as_log(one) for one in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]
     if not logs:
         raise DataError("no logs: a fit needs at least one")
     sample_s = _sample(logs)

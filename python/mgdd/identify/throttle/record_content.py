@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.results import Finding
-from mgdd.results.describe import described
+from mgdd.results.result import NumbersResult
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
@@ -32,9 +32,8 @@ _FAST_DEG_PER_S = 60.0
 _TRIANGLE_HZ = 0.05
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class RecordContent:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RecordContent(NumbersResult):
     """Sides, directions, speeds and stops of one record.
 
     Parameters

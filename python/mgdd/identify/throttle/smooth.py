@@ -14,8 +14,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, or_partial
 from mgdd.identify.starts import rank, search_starts
-from mgdd.io.model_parameters import ModelParameters
-from mgdd.io.parameters import wanted
+from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.parallel.pool import MakesExecutor

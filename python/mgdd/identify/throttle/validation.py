@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import ParameterError
-from mgdd.identify.throttle.free_run import LOG_COLUMNS, discarded, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import LOG_COLUMNS, as_log, discarded, free_run, quality_of, source_of
 from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io.throttle_checks import check_throttle_log
 from mgdd.results import Finding, Fit, FitReport, Model
-from mgdd.results.describe import described
 from mgdd.results.fit import FitQuality
+from mgdd.results.result import Result, merged
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
 from mgdd.signals.model import columns_of
@@ -31,9 +31,8 @@ _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
 
 
-@described
-@dataclass(frozen=True, kw_only=True)
-class ThrottleValidation:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ThrottleValidation(Result):
     """A model against a log.
 
     Parameters
@@ -70,6 +69,11 @@ class ThrottleValidation:
     free_run: xr.Dataset = field(repr=False)
     findings: tuple[Finding, ...] = ()
     source: str = "log"
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Free run, error ahead and correlations of the residual."""
+        return merged(self.free_run, self.n_step, self.tests.dataset)
 
     def summary(self) -> str:
         """Return a short summary.
@@ -117,15 +121,10 @@ class ThrottleValidation:
         from mgdd.plot.identification import error_growth, residual_correlation
         from mgdd.plot.throttle import free_run
 
-        parts = {
-            "free_run": (free_run, self.free_run),
-            "n_step": (error_growth, self.n_step),
-            "residuals": (residual_correlation, self.tests.correlations),
-        }
+        parts = {"free_run": free_run, "n_step": error_growth, "residuals": residual_correlation}
         if what not in parts:
             raise ParameterError.of("what", what, f"one of {', '.join(parts)}")
-        draw, dataset = parts[what]
-        return draw(dataset, ax=ax)
+        return parts[what](self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Give figures and sentences as a dict, without the runs.
@@ -164,7 +163,7 @@ class ThrottleValidation:
 
 def validate_throttle(
     model: Model | Fit,
-    log: xr.Dataset,
+    log: Any,
     *,
     horizons_s: Sequence[float] | None = None,
     limp_home_deg: float | None = None,
@@ -175,7 +174,7 @@ def validate_throttle(
     ----------
     model : Model or Fit
         The model; a fit also says which of its parameters are entangled.
-    log : xarray.Dataset
+    log : Dataset, DataFrame or mapping of columns
         The log.
     horizons_s : sequence of float
         How far ahead predictions are tested [s]. None: 5, 20 and 50 ms, each as the nearest whole sample.
@@ -203,6 +202,7 @@ def validate_throttle(
     >>> validate_throttle(model, log).quality.nrmse_fit_percent
     100.0
     """
+    log = as_log(log)
     check_throttle_log(log)
     fit = model if isinstance(model, Fit) else None
     own = model.model if isinstance(model, Fit) else model

@@ -11,9 +11,8 @@ from typing import Any
 
 from mgdd._core.rig import SignalLayout
 from mgdd.errors import DataError, did_you_mean
-from mgdd.io.existing_file import existing_file
 from mgdd.io.extras import import_extra
-from mgdd.io.plain_text import decoded
+from mgdd.io.files import decoded, existing_file
 
 __all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
 

@@ -7,7 +7,7 @@ import sys
 from enum import StrEnum
 
 from mgdd.errors import ParameterError, RigError, argument
-from mgdd.io.plain_text import read_plain_text
+from mgdd.io.files import read_plain_text
 from mgdd.loop import Plant
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.local_bus import LocalBus

@@ -9,7 +9,7 @@ from typing import Self
 
 from mgdd._core.rig import Frame
 from mgdd.errors import RigError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.files import existing_file
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.recorded import stamped_frames

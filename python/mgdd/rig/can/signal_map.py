@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
+from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError, did_you_mean
+from mgdd.optimize.optimum import limit_names_of
 from mgdd.results.describe import described
 from mgdd.rig.can.dbc import DbcFile
 from mgdd.rig.can.map_reader import MapReader
@@ -138,12 +140,17 @@ class SignalMap:
         except ParameterError as error:
             raise error.reworded(f"{file}: {error}") from error
 
-    def with_goals(self, *, limits: Sequence[str] | None = None, objective: Mapping[str, float] | None = None) -> Self:
+    def with_goals(
+        self,
+        *,
+        limits: Mapping[str, float] | Sequence[Limit | str] | None = None,
+        objective: Mapping[str, float] | None = None,
+    ) -> Self:
         """Give the same map with other limits and components of J.
 
         Parameters
         ----------
-        limits : sequence of str, optional
+        limits : sequence of str, or limits by name or as Limit, optional
             Measured values to report as limits; as they are if left out.
         objective : mapping of str to float, optional
             Weight of each measured value; as it is if left out.
@@ -158,7 +165,7 @@ class SignalMap:
         mgdd.errors.ParameterError
             A name that is not measured, a weight that is not finite.
         """
-        wanted = self.limits if limits is None else tuple(limits)
+        wanted = self.limits if limits is None else tuple(limit_names_of(limits))
         weights = dict(self.objective if objective is None else objective)
         known = self.value_names
         for what, names in (("limits", wanted), ("objective", tuple(weights))):

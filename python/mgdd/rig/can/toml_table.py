@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from mgdd.errors import DataError, ParameterError, did_you_mean
-from mgdd.io.parameter_entries import FORMS, Form, fits
-from mgdd.io.toml_text import text_of, toml_of
+from mgdd.io.files import parsed, read_plain_text
+from mgdd.io.parameters import FORMS, Form, fits
 
 __all__ = ["TomlTable"]
 
@@ -33,8 +33,7 @@ class TomlTable:
     @classmethod
     def read(cls, file: Path) -> TomlTable:
         """Read a file; DataError where it is not TOML."""
-        text, origin = text_of(file)
-        return cls(toml_of(text, origin), origin=origin)
+        return cls(parsed(read_plain_text(file, only_utf8=True), str(file), "TOML"), origin=str(file))
 
     def key(self, name: str) -> str:
         """Give a key with its table in front."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from mgdd.errors import DataError, Error, ParameterError, RigError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.files import existing_file
 from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap
@@ -26,7 +26,7 @@ from mgdd.rig.experiment.settings import (
     scaled,
 )
 from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan, throttle_named
-from mgdd.rig.recorded import read_record
+from mgdd.rig.recorded import RecordedRun, readable_record
 from mgdd.rig.safety_envelope import SafetyEnvelope
 
 __all__ = ["CheckedExperiment", "check_experiment"]
@@ -51,8 +51,8 @@ class CheckedExperiment:
         Of a throttle.
     signal_map : SignalMap or None
         Of a mode with a bus.
-    record : pathlib.Path or None
-        Of ``replay``.
+    record, recorded : pathlib.Path and RecordedRun, or None
+        Of ``replay``: the file, and what was read from it.
     loop : LoopChoice or None
         Of a task with a controller: which loop steps it, and why.
     """
@@ -63,6 +63,7 @@ class CheckedExperiment:
     envelope: SafetyEnvelope | None
     signal_map: SignalMap | None
     record: Path | None
+    recorded: RecordedRun | None = field(default=None, compare=False)
     loop: LoopChoice | None = None
 
     @property
@@ -164,18 +165,22 @@ def _checked(experiment: Experiment) -> CheckedExperiment:
     signal_map = _map_of(experiment) if mode in _BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
+    recorded = None if record is None else readable_record(record)
     plan: IdentifyPlan | TrackPlan | SeekPlan
     if isinstance(settings, SeekTask):
         plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder), None, None
     else:
-        sample_s = _sample_s(experiment, signal_map) if record is None else _recorded_sample_s(experiment, record)
+        # Over a bus the DBC of the recorded run said the time between its samples.
+        said = None if recorded is None else recorded.config.get("sample_s")
+        sample_s = _sample_s(experiment, signal_map) if said is None else float(said)
         envelope = _envelope(experiment, sample_s)
         plan = _throttle_plan(settings, sample_s, experiment, envelope)
     if mode in _SIMULATED:
         _require_plant(experiment, sample_s)
     checked = CheckedExperiment(
-        experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record
-    )
+        experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record,
+        recorded=recorded,
+    )  # fmt: skip
     if signal_map is not None:
         _require_names(checked, signal_map)
     return replace(checked, loop=chosen_loop(experiment, signal_map))
@@ -187,12 +192,6 @@ def _record_of(experiment: Experiment) -> Path | None:
     if experiment.replay.record is None:
         raise ParameterError("mode = 'replay': needs [replay] record, the file of a run")
     return existing_file(_beside(experiment, experiment.replay.record))
-
-
-def _recorded_sample_s(experiment: Experiment, record: Path) -> float:
-    """Give the time between samples that the recorded run had: over a bus its DBC said it."""
-    recorded = read_record(record).config.get("sample_s")
-    return _sample_s(experiment, None) if recorded is None else float(recorded)
 
 
 def _beside(experiment: Experiment, name: str) -> str:

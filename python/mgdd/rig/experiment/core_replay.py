@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from mgdd.rig.experiment.core_samples import LOOP_TABLE, task_columns
 from mgdd.rig.experiment.outcome import Outcome
 from mgdd.rig.experiment.run_record import RunRecord
 from mgdd.rig.experiment.throttle_tasks import TrackPlan
-from mgdd.rig.recorded import readable_record
+from mgdd.rig.recorded import RecordedRun
 from mgdd.rig.safety import SafetyGate
 
 __all__ = ["loop_rows", "replayed"]
@@ -25,9 +24,9 @@ _SENT = _core.rig.send_results.index("sent")
 _NOTHING = math.nan
 
 
-def loop_rows(record: Path) -> list[dict[str, float]]:
+def loop_rows(recorded: RecordedRun) -> list[dict[str, float]]:
     """Give the rows of the loop in a record; none for the record of another loop."""
-    table = readable_record(record).samples.get(LOOP_TABLE)
+    table = recorded.samples.get(LOOP_TABLE)
     if table is None:
         return []
     names = [str(name) for name in table.data_vars]

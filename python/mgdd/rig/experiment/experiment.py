@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from mgdd.errors import ParameterError
-from mgdd.io.toml_text import text_of, toml_of
+from mgdd.io.files import parsed, read_plain_text
 from mgdd.results.describe import described
 from mgdd.rig.can.toml_table import TomlTable
 from mgdd.rig.experiment.settings import (
@@ -117,13 +117,12 @@ class Experiment:
         mgdd.errors.ParameterError
             An unknown key, a value of another form or outside its range.
         """
-        text, origin = text_of(path)
-        return cls.from_toml(text, origin=origin)
+        return cls.from_toml(read_plain_text(path, only_utf8=True), origin=str(path))
 
     @classmethod
     def from_toml(cls, text: str, *, origin: str = "experiment") -> Self:
         """Read the text of an experiment file; errors as those of `load`."""
-        table = TomlTable(toml_of(text, origin), origin=origin)
+        table = TomlTable(parsed(text, origin, "TOML"), origin=origin)
         kind, version = table.take("kind", "text"), table.take("format", "integer")
         if kind != _KIND:
             raise table.error("kind", kind, repr(_KIND))

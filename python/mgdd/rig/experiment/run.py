@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.results.describe import described
+from mgdd.results.describe import Row, rows_of
+from mgdd.results.result import Result
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
 from mgdd.rig.experiment.core_replay import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
@@ -29,12 +30,13 @@ from mgdd.rig.experiment.watched import Cycle, Watched
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 __all__ = ["ExperimentResult", "run_experiment"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ExperimentResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ExperimentResult(Result):
     """What an experiment came to.
 
     Parameters
@@ -67,6 +69,18 @@ class ExperimentResult:
     interrupted: bool = False
     folder: Path | None = None
 
+    def _rows(self) -> list[Row]:
+        return rows_of({**self.figures, "folder": str(self.folder)})
+
+    def _draw(self, ax: Axes | None) -> Axes:
+        from mgdd.plot import seeking
+        from mgdd.plot.throttle_run import throttle_run
+        from mgdd.plot.throttle_track import throttle_track
+
+        if "cycle" in self.dataset.dims:
+            return seeking(self, ax=ax)
+        return (throttle_track if "reference_deg" in self.dataset else throttle_run)(self, ax=ax)
+
     def to_dict(self) -> dict[str, Any]:
         """Give all but the signals.
 
@@ -85,9 +99,6 @@ class ExperimentResult:
             "counters": self.counters,
             "events": list(self.events),
         }
-
-
-described(ExperimentResult, rows=lambda result: {**result.to_dict()["result"], "folder": str(result.folder)})
 
 
 def run_experiment(
@@ -195,7 +206,7 @@ def _steered(
             watch(cycle)
 
     if isinstance(checked.plan, TrackPlan):
-        again = loop_rows(checked.record) if checked.record is not None else []
+        again = loop_rows(checked.recorded) if checked.recorded is not None else []
         if again:
             return _again(checked, checked.plan, again, record)
         if checked.loop is not None and checked.loop.name == "core":

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd.errors import RigError
-from mgdd.io.whole_file import write_whole
+from mgdd.io.files import write_whole
 from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from mgdd.errors import ParameterError, RigError
-from mgdd.results.describe import described
+from mgdd.results.describe import Row, rows_of
+from mgdd.results.result import NumbersResult
 from mgdd.rig.experiment.checked import check_experiment
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.own_node import own_node
@@ -42,8 +43,8 @@ pace = "real_time"
 _SIGNALS = {"sigint": signal.SIGINT, "sigterm": signal.SIGTERM, "sigkill": signal.SIGKILL}
 
 
-@dataclass(frozen=True, kw_only=True)
-class SelfTest:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SelfTest(NumbersResult):
     """How long the plate took to limp-home after each way to die.
 
     Parameters
@@ -63,6 +64,9 @@ class SelfTest:
     limit_s: float
     notes: Mapping[str, str]
     loop: str = "python"
+
+    def _rows(self) -> list[Row]:
+        return rows_of({**self.ways_to_die, "limit_s": self.limit_s, "passed": self.passed})
 
     @property
     def passed(self) -> bool:
@@ -210,6 +214,3 @@ class _Host:
             _, complaint = self._process.communicate()
             raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'it said nothing'}")
         return line
-
-
-described(SelfTest, rows=lambda test: {**test.ways_to_die, "limit_s": test.limit_s, "passed": test.passed})

@@ -11,7 +11,7 @@ from typing import Any, Self, TypeVar
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.excitation_design import EXCITATIONS
 from mgdd.identify.throttle.fits import CHOICES
-from mgdd.io.parameter_entries import fits
+from mgdd.io.parameters import fits
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.rig.can.toml_table import TomlTable
 

@@ -107,8 +107,8 @@ def rig_of(
     experiment, mode = checked.experiment, checked.experiment.mode
     if mode == "simulate":
         return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
-    if checked.record is not None:
-        return ReplayRig(RigRecord.read(checked.record), strict=False)
+    if checked.recorded is not None:
+        return ReplayRig(RigRecord.of_run(checked.recorded, f"{checked.record}"), strict=False)
     connection = experiment.bus.connection
     if connection is None:
         connection = stack.enter_context(own_node(checked))

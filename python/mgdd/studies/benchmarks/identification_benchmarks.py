@@ -5,25 +5,28 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
+from mgdd.plot.measured import measured_and_model
+from mgdd.plot.style import residual_below
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals import nrmse_fit_percent, rmse
-from mgdd.studies.base import Progress, StudyResult, finish, run_parts
+from mgdd.studies.base import Parts, Progress, StudyResult
 from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
-from mgdd.studies.benchmarks.figures import draw
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
+from mgdd.studies.figures import new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     Vector = NDArray[np.float64]
@@ -31,7 +34,6 @@ if TYPE_CHECKING:
 __all__ = ["run_identification_benchmarks"]
 
 Result = TypeVar("Result")
-
 _NAME = "identification-benchmarks"
 _DRIVE_WINDOW, _TANKS_WINDOW, _CIRCUIT_WINDOW = 20, 50, 50
 _DRIVE_STARTS, _QUICK_STARTS = 48, 4
@@ -39,20 +41,41 @@ _HOLD_OUT_STARTS = 16
 _LAST_CYCLE, _SECOND_CYCLE = 18_650, 6220  # first samples of them; a motion cycle of the training record takes 6.2 s
 _QUICK_CIRCUIT = 20_000  # samples of the estimation record
 
-_FIT = "fit 100 (1 - |e| / |y - mean y|), free run"
-_RMSE = "RMSE, free run"
-_PUBLISHED = {
-    "emps": "96.8 dynoNet; 25.4 best linear model, Janot et al. 2019 (both as quoted by Forgione and Piga 2021)",
-    "cascaded_tanks": "0.18 to 0.20 physical grey boxes of 2017 and 2018 (recalled; the papers were not at hand)",
-    "wh2009": (
-        "0.28 Schoukens et al. 2014; 1.2 dynoNet (both as quoted by Forgione and Piga 2021); 44 best linear model"
+
+class _Set(NamedTuple):
+    """How a set is judged: figure and its unit, what others published, what may be seen; and what is measured there."""
+
+    metric: str
+    unit: str
+    published: str
+    window: str
+    measured: tuple[str, str]
+    caption: str
+
+
+_SETS = {
+    "emps": _Set(
+        "fit 100 (1 - |e| / |y - mean y|), free run", "%",
+        "96.8 dynoNet; 25.4 best linear model, Janot et al. 2019 (both as quoted by Forgione and Piga 2021)",
+        "position and speed at the start from samples 0 to 19, scored from sample 20",
+        ("m", "position"),
+        "Drive with friction, pulses record: free run from the measured voltage",
     ),
-}
-_WINDOWS = {
-    "emps": "position and speed at the start from samples 0 to 19, scored from sample 20",
-    "cascaded_tanks": "two levels at the start estimated on test samples 0 to 49, scored on all 1024",
-    "wh2009": "filters from rest, test samples 0 to 49 not scored",
-}
+    "cascaded_tanks": _Set(
+        "RMSE, free run", "V",
+        "0.18 to 0.20 physical grey boxes of 2017 and 2018 (recalled; the papers were not at hand)",
+        "two levels at the start estimated on test samples 0 to 49, scored on all 1024",
+        ("V", "level"),
+        "Cascaded tanks, test record: free run from two estimated levels",
+    ),
+    "wh2009": _Set(
+        "RMSE, free run", "mV",
+        "0.28 Schoukens et al. 2014; 1.2 dynoNet (both as quoted by Forgione and Piga 2021); 44 best linear model",
+        "filters from rest, test samples 0 to 49 not scored",
+        ("V", "output voltage"),
+        "Wiener-Hammerstein circuit, 4 ms of the test record: free run from rest",
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,10 +101,8 @@ def run_identification_benchmarks(
     ----------
     quick : bool
         Fewer starts for the drive, 20 000 samples for the circuit, no simpler forms of the circuit.
-    figures : bool
-        Whether to draw.
-    progress : callable, optional
-        Called with a few words before each fit.
+    figures, progress
+        As in `mgdd.studies.run_study`, and so are the errors.
 
     Returns
     -------
@@ -124,32 +145,27 @@ def run_identification_benchmarks(
         parts += make(train, test, quick)
     if not parts:
         raise DataError(f"the study {_NAME} needs at least one of {', '.join(missing)}: {reason}")
-    cases, interrupted = run_parts(parts, progress)
+    work = Parts(progress)
+    cases = work(parts)
     drawn = [case for case in cases if case.drawn]
-    dataset = _dataset(cases, drawn)
-    summary = {
-        "study": _NAME,
-        "seeds": 0,
-        "quick": quick,
-        "missing": missing,
-        "interrupted": interrupted,
-        "rows": [case.row for case in cases],
-    }
-    return finish(dataset, summary, draw if figures else None)
+    return work.finish(
+        _NAME, _dataset(cases, drawn), _draw if figures else None,
+        seeds=0,
+        quick=quick,
+        missing=missing,
+        rows=[case.row for case in cases],
+    )  # fmt: skip
 
 
-def _row(name: str, model: str, train: float, test: float, metric: str, unit: str, **more: Any) -> dict[str, Any]:
+def _row(
+    name: str, model: str, figures: tuple[float, float], seconds: float, n_parameters: int, status: str, **more: Any
+) -> dict[str, Any]:
+    judged, (train, test) = _SETS[name], figures
     return {
-        "set": name,
-        "model": model,
-        "train": train,
-        "test": test,
-        "metric": metric,
-        "unit": unit,
-        "published": _PUBLISHED[name],
-        "window": _WINDOWS[name],
-        **more,
-    }
+        "set": name, "model": model, "train": train, "test": test, "metric": judged.metric, "unit": judged.unit,
+        "published": judged.published, "window": judged.window, "n_parameters": n_parameters, "seconds": seconds,
+        "status": status, **more,
+    }  # fmt: skip
 
 
 def _timed(fit: Callable[[], Result]) -> tuple[Result, float]:
@@ -192,26 +208,16 @@ def _drive(train: xr.Dataset, test: xr.Dataset, text: str, friction: str, drift:
     truth = {key: record["position_m"].to_numpy()[_DRIVE_WINDOW:] for key, record in (("train", train), ("test", test))}
     scores = {key: nrmse_fit_percent(truth[key], runs[key]) for key in runs}
     percents = 100.0 * (1.0 - np.asarray(fit.start_rmse) / truth["train"].std())
+    row = _row(
+        "emps", text, (scores["train"], scores["test"]), seconds, len(fit.report.names), fit.report.status,
+        hold_out=None if quick else _hold_out(train, friction, drift),
+        starts=len(fit.start_rmse),
+        starts_within_0_05=int(np.sum(percents > percents[0] - 0.05)),
+    )  # fmt: skip
     return _Case(
-        row=_row(
-            "emps",
-            text,
-            scores["train"],
-            scores["test"],
-            _FIT,
-            "%",
-            n_parameters=len(fit.report.names),
-            seconds=seconds,
-            status=fit.report.status,
-            hold_out=None if quick else _hold_out(train, friction, drift),
-            starts=len(fit.start_rmse),
-            starts_within_0_05=int(np.sum(percents > percents[0] - 0.05)),
-        ),
-        time_s=test["time_s"].to_numpy()[_DRIVE_WINDOW:],
-        measured=truth["test"],
-        simulated=runs["test"],
+        row=row, time_s=test["time_s"].to_numpy()[_DRIVE_WINDOW:], measured=truth["test"], simulated=runs["test"],
         drawn=friction == "stribeck" and drift,
-    )
+    )  # fmt: skip
 
 
 def _tank_parts(train: xr.Dataset, test: xr.Dataset, quick: bool) -> list[tuple[str, partial[_Case]]]:
@@ -230,17 +236,15 @@ def _tanks(train: xr.Dataset, test: xr.Dataset, text: str, form: str) -> _Case:
     state = fit.model.estimate_state(test, window=_TANKS_WINDOW)
     run = fit.model.simulate(test, initial_state=state)["level_v"].to_numpy()
     truth = test["level_v"].to_numpy()
+    more = {"test_without_window": rmse(truth[_TANKS_WINDOW:], run[_TANKS_WINDOW:])}
     row = _row(
         "cascaded_tanks",
         text,
-        fit.report.rmse,
-        rmse(truth, run),
-        _RMSE,
-        "V",
-        n_parameters=len(fit.report.names),
-        seconds=seconds,
-        status=fit.report.status,
-        test_without_window=rmse(truth[_TANKS_WINDOW:], run[_TANKS_WINDOW:]),
+        (fit.report.rmse, rmse(truth, run)),
+        seconds,
+        len(fit.report.names),
+        fit.report.status,
+        **more,
     )
     return _Case(row=row, time_s=test["time_s"].to_numpy(), measured=truth, simulated=run, drawn=form == "grey_box")
 
@@ -256,24 +260,16 @@ def _circuit_parts(train: xr.Dataset, test: xr.Dataset, quick: bool) -> list[tup
 def _linear(train: xr.Dataset, test: xr.Dataset) -> _Case:
     fit, seconds = _timed(partial(fit_linear, train))
     run, truth = (one["output_v"].to_numpy()[_CIRCUIT_WINDOW:] for one in (fit.simulate(test), test))
-    more = {"n_parameters": 13, "seconds": seconds, "status": "best of 15 passes"}
-    return _Case(row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * rmse(truth, run), _RMSE, "mV", **more))
+    figures = 1e3 * fit.rmse, 1e3 * rmse(truth, run)
+    return _Case(row=_row("wh2009", "linear, order 6", figures, seconds, 13, "best of 15 passes"))
 
 
 def _circuit(train: xr.Dataset, test: xr.Dataset, quick: bool) -> _Case:
     fit, seconds = _timed(partial(fit_wiener_hammerstein, train, scan_samples=8000 if quick else 15_000))
     run, truth = (one["output_v"].to_numpy()[_CIRCUIT_WINDOW:] for one in (fit.model.simulate(test), test))
-    row = _row(
-        "wh2009",
-        "filter of order 3, cubic spline, filter of order 4",
-        1e3 * fit.report.rmse,
-        1e3 * rmse(truth, run),
-        _RMSE,
-        "mV",
-        n_parameters=len(fit.report.names),
-        seconds=seconds,
-        status=fit.report.status,
-    )
+    figures = 1e3 * fit.report.rmse, 1e3 * rmse(truth, run)
+    name = "filter of order 3, cubic spline, filter of order 4"
+    row = _row("wh2009", name, figures, seconds, len(fit.report.names), fit.report.status)
     return _Case(row=row, time_s=test["time_s"].to_numpy()[_CIRCUIT_WINDOW:], measured=truth, simulated=run, drawn=True)
 
 
@@ -287,12 +283,30 @@ def _dataset(cases: list[_Case], drawn: list[_Case]) -> xr.Dataset:
         "test": ("case", [row["test"] for row in rows], "in the unit of the row", "figure on the test record"),
         "unit": ("case", [row["unit"] for row in rows], "-", "unit of the row"),
     }
-    units = {"emps": ("m", "position"), "cascaded_tanks": ("V", "level"), "wh2009": ("V", "output voltage")}
     for case in drawn:
         name = case.row["set"]
-        unit, what = units[name]
+        unit, what = _SETS[name].measured
         at = f"{name}_time_s"
         variables[at] = (at, case.time_s, "s", "time")
         variables[f"{name}_measured"] = (at, case.measured, unit, f"{what}, measured")
         variables[f"{name}_simulated"] = (at, case.simulated, unit, f"{what}, free run")
     return labelled_dataset(variables)
+
+
+_SHOWN = {"wh2009": slice(20_000, 20_205)}
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    """Draw measured and free run over each other, and the residual below; nothing is registered with pyplot."""
+    return {own.caption: _overlay(dataset, name) for name, own in _SETS.items() if f"{name}_measured" in dataset}
+
+
+def _overlay(dataset: xr.Dataset, name: str) -> Figure:
+    own = {f"{name}_{column}": column for column in ("time_s", "measured", "simulated")}
+    run = dataset[list(own)].rename(own).rename(simulated="model").isel(time_s=_SHOWN.get(name, slice(None)))
+    residual = (run["model"] - run["measured"]).assign_attrs(run["measured"].attrs)
+    figure = new_figure(8.0, 5.0)
+    ax = figure.add_subplot()
+    measured_and_model(run, ax=ax).set_xlabel("")
+    residual_below(ax, run.assign(residual=residual), "time_s", "residual")
+    return figure

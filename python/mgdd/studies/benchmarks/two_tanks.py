@@ -11,8 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
-from mgdd.io.model_parameters import ModelParameters
-from mgdd.io.parameters import wanted
+from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport

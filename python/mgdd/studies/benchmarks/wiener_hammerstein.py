@@ -27,12 +27,8 @@ if TYPE_CHECKING:
     Vector = NDArray[np.float64]
 
 __all__ = [
-    "LinearApproximation",
-    "WienerHammersteinFit",
-    "WienerHammersteinModel",
-    "fit_linear",
-    "fit_wiener_hammerstein",
-]
+    "LinearApproximation", "WienerHammersteinFit", "WienerHammersteinModel", "fit_linear", "fit_wiener_hammerstein",
+]  # fmt: skip
 
 _LABELS = MappingProxyType({"input_v": Label("V", "input voltage"), "output_v": Label("V", "output voltage")})
 _SKIP = 100  # samples in which a filter that starts at rest forgets it
@@ -366,13 +362,9 @@ def fit_wiener_hammerstein(
     report, seen = last[-1], y if len(last) > 1 else some_y
     wrapped = FitReport.from_core(report, seen[_SKIP:])
     fitted = WienerHammersteinModel(
-        first_order=first_order,
-        last_order=last_order,
-        n_curve=n_curve,
-        lower=model.lower,
-        upper=model.upper,
+        first_order=first_order, last_order=last_order, n_curve=n_curve, lower=model.lower, upper=model.upper,
         values=np.asarray(report.values),
-    )
+    )  # fmt: skip
     modelled = fitted.simulate(record)["output_v"].to_numpy()
     run = fit_run(record["time_s"].to_numpy()[_SKIP:], y[_SKIP:], modelled[_SKIP:], _LABELS["output_v"])
     fit = fit_of(wrapped, fitted, run, (float(one.rmse) for one in reports))
@@ -413,12 +405,9 @@ def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
 
 def _core_model(model: WienerHammersteinModel) -> _core.systems.WienerHammerstein:
     return _core.systems.WienerHammerstein(
-        first_order=model.first_order,
-        last_order=model.last_order,
-        n_curve=model.n_curve,
-        lower=model.lower,
+        first_order=model.first_order, last_order=model.last_order, n_curve=model.n_curve, lower=model.lower,
         upper=model.upper,
-    )
+    )  # fmt: skip
 
 
 def _fit(

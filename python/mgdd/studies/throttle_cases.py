@@ -1,20 +1,31 @@
-"""Tuned sets of PID and sliding mode for the throttle presets, from a design study, and what their supervisor knows."""
+"""What studies of throttles share: tuned sets of PID and sliding mode, their supervisor, and three noisy records."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
 
 from mgdd import presets
 from mgdd.control import Pid, SlidingMode, ThrottleSupervisor
+from mgdd.identify.throttle.free_run import free_run, quality_of
 from mgdd.loop.controller_families import FAMILIES, Setup, groups_of
-from mgdd.throttle import Throttle
+from mgdd.results.labels import labelled_dataset
+from mgdd.results.model import Model
+from mgdd.signals import amplitude_random_steps, chirp
+from mgdd.throttle import Throttle, simulate
 
-__all__ = ["Baseline", "baselines", "controller_of", "settings_of", "supervisor_of", "throttle_of"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "DURATION_S", "LSB_DEG", "NOISE_DEG", "RECORDS", "SAMPLE_S", "Baseline", "Controller", "baselines", "controller_of",
+    "judged_run", "noisy_records", "settings_of", "supervisor_of", "throttle_of",
+]  # fmt: skip
 
 Controller = Pid | SlidingMode
-
 RETURN_S = {"P1": 0.4, "P2": 0.4, "P3": 0.8}  # from anywhere to limp-home with the bridge open
 
 
@@ -84,3 +95,37 @@ def supervisor_of(preset: str) -> ThrottleSupervisor:
         **groups.spring,
         **groups.motion,
     )
+
+
+DURATION_S, SAMPLE_S = 12.0, 1e-3
+NOISE_DEG, LSB_DEG = 0.03, 90.0 / 4096.0
+RECORDS = ("train", "chirp", "steps")
+
+
+def noisy_records(throttle: Throttle, noise: list[np.random.Generator]) -> dict[str, xr.Dataset]:
+    """Simulate training chirp, test chirp and steps of 150 ms from rest at limp-home, through a noisy 12-bit sensor."""
+    duties = (
+        chirp(DURATION_S, offset=0.15, amplitude=0.20, low_hz=0.2, high_hz=6.0, step_s=SAMPLE_S),
+        chirp(DURATION_S, offset=0.15, amplitude=0.18, low_hz=0.3, high_hz=5.0, step_s=SAMPLE_S),
+        amplitude_random_steps(DURATION_S, offset=0.15, amplitude=0.20, hold_s=0.15, step_s=SAMPLE_S),
+    )
+    out = {}
+    for name, signal, rng in zip(RECORDS, duties, noise, strict=True):
+        time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
+        true = simulate(throttle, duty, time_s=time)["angle_deg"].to_numpy()
+        noisy = true + NOISE_DEG * rng.standard_normal(true.size)
+        out[name] = labelled_dataset(
+            {
+                "time_s": ("time_s", time, "s", "time"),
+                "duty": ("time_s", duty, "-", "duty"),
+                "angle_deg": ("time_s", np.round(noisy / LSB_DEG) * LSB_DEG, "deg", "measured angle"),
+                "true_deg": ("time_s", true, "deg", "true angle"),
+            }
+        )
+    return out
+
+
+def judged_run(model: Model, log: xr.Dataset) -> tuple[xr.Dataset, float]:
+    """Give the free run of a model over a record and its fit [%], as every throttle fit states it."""
+    run = free_run(model, log)
+    return run, cast("float", quality_of([run]).nrmse_fit_percent)

@@ -1,16 +1,28 @@
-"""Report of the measured-traces study: what its page says, from the summary alone."""
+"""Report of the measured-traces study: what its page says, from the summary alone, and its figures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from mgdd import plot
+from mgdd.engine import timing_sweep
+from mgdd.identify.engine.profile import WallHeatProfile
+from mgdd.identify.engine.records import Load
+from mgdd.plot.calibration import wall_heat_profile
+from mgdd.plot.family import family_strips
+from mgdd.plot.style import drawn
+from mgdd.studies.figures import new_figure
 from mgdd.studies.sections import Section, Table, as_number
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["measured_sections"]
+    from mgdd.identify.engine.family import Member
+    from mgdd.identify.engine.timing_records import BestTiming
+
+__all__ = ["draw", "measured_sections"]
 
 _ANALYSIS = {
     "p_max_bar": ("p_max [bar]", ".1f"),
@@ -54,7 +66,6 @@ _MEMBERS = {
     "ca50_cad": ("best CA50, own p_max kept [°CA aTDC]", ".1f"),
     "free_ca50_cad": ("best CA50, no limit [°CA aTDC]", ".1f"),
 }
-
 _TIMING_TEXT = (
     "{kept} of {n} models are plausible for at least one load. Each cell: the answer of the headline model, then the "
     "range over all plausible ones. Where the range is wide, these traces do not tell the best timing: wall heat and "
@@ -144,26 +155,32 @@ def _headline(s: Mapping[str, Any]) -> tuple[str, ...]:
     return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=kept, n=n)
 
 
+def _table(first: Sequence[str], columns: Mapping[str, tuple[str, Any]], rest: Sequence[str], body: Any) -> Table:
+    heads = (*first, *(head for head, _ in columns.values()), *rest)
+    return Table(columns=heads, rows=tuple(map(tuple, body)))
+
+
+def _cells(values: Mapping[str, Any], columns: Mapping[str, tuple[str, str]]) -> list[str]:
+    return [as_number(values[name], form) for name, (_, form) in columns.items()]
+
+
 def _timing(rows: Sequence[Mapping[str, Any]]) -> Table:
     def cell(row: Mapping[str, Any], name: str, digits: int) -> str:
         if row["best"] is None:
             return "not known"
         return f"{as_number(row['best'][name], f'z.{digits}f')} ({_span(row[name], digits)})"
 
-    body = [(row["file"], *(cell(row, name, digits) for name, (_, digits) in _TIMING.items())) for row in rows]
-    return Table(columns=("trace", *(head for head, _ in _TIMING.values())), rows=tuple(body))
+    body = ((row["file"], *(cell(row, name, digits) for name, (_, digits) in _TIMING.items())) for row in rows)
+    return _table(["trace"], _TIMING, [], body)
 
 
 def _members(rows: Sequence[Mapping[str, Any]]) -> Table:
-    body = []
-    for at, first in enumerate(rows[0]["members"]):
-        for row in rows:
-            own = row["members"][at]
-            values = (as_number(own[name], form) for name, (_, form) in _MEMBERS.items())
-            verdict = own["why_not"] or "yes"
-            body.append((first["name"] if row is rows[0] else "", row["file"], *values, verdict))
-    heads = (head for head, _ in _MEMBERS.values())
-    return Table(columns=("model", "trace", *heads, "plausible"), rows=tuple(body))
+    body = (
+        (first["name"] if row is rows[0] else "", row["file"], *_cells(row["members"][at], _MEMBERS),
+         row["members"][at]["why_not"] or "yes")
+        for at, first in enumerate(rows[0]["members"]) for row in rows
+    )  # fmt: skip
+    return _table(["model", "trace"], _MEMBERS, ["plausible"], body)
 
 
 def _laws(laws: Sequence[Mapping[str, Any]]) -> Table:
@@ -183,33 +200,56 @@ def _laws(laws: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _wall_heat(profiles: Mapping[str, Mapping[str, Any]]) -> Table:
-    body = [
+    body = (
         (
-            law,
-            *(as_number(profile[name], form) for name, (_, form) in _WALL.items()),
-            str(profile["correlated_with"]),
+            law, *_cells(profile, _WALL), str(profile["correlated_with"]),
             _span((profile["range_low"], profile["range_high"]), 2),
             _span((profile["possible_low"], profile["possible_high"]), 2),
             "yes" if profile["identifiable"] else "no",
         )
         for law, profile in profiles.items()
-    ]
-    heads = (
-        "law",
-        *(head for head, _ in _WALL.values()),
-        "with",
-        "as good within 10 % [-]",
-        "possible in all [-]",
-        "identifiable",
-    )
-    return Table(columns=heads, rows=tuple(body))
+    )  # fmt: skip
+    return _table(["law"], _WALL, ["with", "as good within 10 % [-]", "possible in all [-]", "identifiable"], body)
 
 
 def _per_trace(rows: Sequence[Mapping[str, Any]], part: str, columns: Mapping[str, tuple[str, str]]) -> Table:
-    body = [(row["file"], *(as_number(row[part][name], form) for name, (_, form) in columns.items())) for row in rows]
-    return Table(columns=("trace", *(head for head, _ in columns.values())), rows=tuple(body))
+    return _table(["trace"], columns, [], ((row["file"], *_cells(row[part], columns)) for row in rows))
 
 
 def _span(pair: Sequence[float], digits: int) -> str:
     low, high = (as_number(value, f"z.{digits}f") for value in pair)
     return low if low == high else f"{low} to {high}"
+
+
+def draw(
+    analyses: Sequence[xr.Dataset],
+    main: Member,
+    profiles: Mapping[str, WallHeatProfile],
+    timing: Sequence[BestTiming],
+) -> dict[str, Figure]:
+    """Draw the figures of the study by caption; nothing is registered with pyplot."""
+    out = {
+        "Best timing by every member of the family, without a pressure limit": family_strips(timing),
+        "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
+        "log p over log V with the polytropic slopes of compression and expansion": _grid(analyses, plot.log_pv),
+        f"Calibration, {main.name}": _grid(main.fit.loads, Load.plot),
+    }
+    for law, profile in profiles.items():
+        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
+            wall_heat_profile, profile.dataset, size=(13.0, 4.8)
+        )
+    sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in main.fit.loads]
+    out[f"Efficiency and NOx proxies over timing, {main.name}"] = _grid(sweeps, plot.timing, label=True)
+    return out
+
+
+def _grid(datasets: Sequence[Any], function: Any, *, label: bool = False) -> Figure:
+    columns = min(2, len(datasets))
+    rows = -(-len(datasets) // columns)
+    figure = new_figure(13.0, 4.8 * rows)
+    for i, dataset in enumerate(datasets):
+        part = figure.add_subplot(rows, columns, i + 1)
+        function(dataset, ax=part)
+        if label:  # plots of a trace name their file themselves
+            part.annotate(dataset.attrs["file"], (0.5, 0.04), xycoords="axes fraction", ha="center")
+    return figure

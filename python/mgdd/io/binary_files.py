@@ -1,21 +1,69 @@
-"""Columns of a MATLAB file: vectors, fields of a struct, or the columns of one matrix."""
+"""Binary files: classic netCDF, read whole and written whole, and the columns of a MATLAB file."""
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.files import existing_file, write_whole
 
 if TYPE_CHECKING:
     import os
 
+    import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["MatColumns", "read_mat"]
+__all__ = [
+    "MatColumns",
+    "read_mat",
+    "read_netcdf",
+    "write_netcdf",
+]
+
+_CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
+
+
+def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a netCDF file of the classic formats (version 3) into memory; another format or a cut file is a DataError.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.errors import DataError
+    >>> from mgdd.io.binary_files import read_netcdf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "table.nc"
+    ...     _ = file.write_text("speed_rpm,fuel_mg")
+    ...     try:
+    ...         read_netcdf(file)
+    ...     except DataError as error:
+    ...         print(str(error).rpartition("/")[2])
+    table.nc: not a netCDF file: it begins with b'speed_rp'; a text table ends in .csv
+    """
+    import xarray as xr
+
+    file = existing_file(path)
+    content = file.read_bytes()
+    if content.startswith(_HDF5):
+        raise DataError(
+            f"{file}: netCDF 4 (HDF5), only the classic format is read: convert it, nccopy -k classic OLD.nc NEW.nc, "
+            "or write it with to_netcdf(path, engine='scipy')"
+        )
+    if not content.startswith(_CLASSIC):
+        raise DataError(f"{file}: not a netCDF file: it begins with {content[:8]!r}; a text table ends in .csv")
+    try:
+        return xr.load_dataset(io.BytesIO(content), engine="scipy")
+    except (ValueError, TypeError, LookupError) as error:  # what scipy makes of missing bytes
+        raise DataError(f"{file}: cannot be read ({error}): the file was cut off or damaged; write it again") from error
+
+
+def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a Dataset of numbers and texts as classic netCDF, as `write_whole` does."""
+    write_whole(path, lambda half: dataset.to_netcdf(half, engine="scipy"))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,162 @@
+"""The one gate for a cylinder, an operating point or a throttle: a preset, its name or file, a fit, or the object."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from mgdd._arguments import shown
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.throttle import Throttle
+from mgdd.errors import ParameterError
+from mgdd.presets.preset import Preset, available, load
+from mgdd.results import Fit
+
+__all__ = ["CylinderLike", "PointLike", "ThrottleLike", "cylinder_of", "engine_of", "throttle_model_of", "throttle_of"]
+
+CylinderLike = str | os.PathLike[str] | Preset | Cylinder | Fit
+PointLike = OperatingPoint | Preset | Mapping[str, float]
+ThrottleLike = str | os.PathLike[str] | Preset | Throttle
+
+
+def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
+    """Return the cylinder that is meant.
+
+    Parameters
+    ----------
+    given : Cylinder, Preset, str, path-like or fit
+        The cylinder; a preset of an engine, its name, or its ``.toml`` file; or a fit of a cylinder.
+    argument : str
+        Its name, for the error.
+
+    Returns
+    -------
+    mgdd.engine.Cylinder
+        The cylinder.
+
+    Raises
+    ------
+    ParameterError
+        Anything else, or a preset of a throttle.
+
+    Examples
+    --------
+    >>> from mgdd.presets.meant import cylinder_of
+    >>> cylinder_of("puma_single").bore_mm
+    86.0
+    """
+    meant = _loaded(given, "engine")
+    if isinstance(meant, Preset):
+        return meant.cylinder
+    meant = getattr(meant, "model", meant)  # of a fit
+    if isinstance(meant, Cylinder):
+        return meant
+    raise _refusal(argument, given, "a Cylinder", "engine")
+
+
+def engine_of(
+    cylinder: Any, point: Any = None, *, argument: str = "cylinder", **fields: float | None
+) -> tuple[Cylinder, OperatingPoint]:
+    """Return the cylinder and the operating point that are meant.
+
+    Parameters
+    ----------
+    cylinder : Cylinder, Preset, str, path-like or fit
+        As of `cylinder_of`.
+    point : OperatingPoint, Preset or mapping of str to float, optional
+        The operating point; numbers by name replace those of the preset's nominal one, of ``OperatingPoint()`` where no
+        preset is given. The nominal one if left out, which only a preset has.
+    argument : str
+        Name of the cylinder, for the error.
+    **fields
+        Further numbers of the point; None leaves one as it is.
+
+    Returns
+    -------
+    tuple of Cylinder and OperatingPoint
+        Both.
+
+    Raises
+    ------
+    ParameterError
+        Anything else, or an unknown number.
+    TypeError
+        A cylinder without a point.
+
+    Examples
+    --------
+    >>> from mgdd.presets.meant import engine_of
+    >>> engine_of("puma_single", {"speed_rpm": 1200.0})[1].speed_rpm
+    1200.0
+    """
+    meant = _loaded(cylinder, "engine")
+    own, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
+    if isinstance(point, Preset):
+        point = point.point
+    changes = {name: value for name, value in fields.items() if value is not None}
+    if isinstance(point, Mapping):
+        point, changes = nominal, {**point, **changes}
+    elif point is not None and not isinstance(point, OperatingPoint):
+        bound = "an OperatingPoint, a preset, or numbers by name, as {'speed_rpm': 1200.0}"
+        raise ParameterError(f"point = {shown(point)}: must be {bound}", field="point", value=point, bound=bound)
+    elif point is None and not changes and not isinstance(meant, Preset):
+        raise TypeError(
+            "point is missing: a Cylinder has no operating point of its own; give an OperatingPoint, or numbers by "
+            "name as {'speed_rpm': 1200.0}, or a preset instead of the Cylinder"
+        )
+    whole = nominal if point is None else point
+    return own, whole.replace(**changes) if changes else whole
+
+
+def throttle_of(given: Any, argument: str = "throttle") -> Throttle:
+    """Return the throttle that is meant.
+
+    Parameters
+    ----------
+    given : Throttle, Preset, str or path-like
+        The throttle; or a preset of one, its name, or its ``.toml`` file.
+    argument : str
+        Its name, for the error.
+
+    Returns
+    -------
+    mgdd.throttle.Throttle
+        The throttle.
+
+    Raises
+    ------
+    ParameterError
+        Anything else, or a preset of an engine.
+
+    Examples
+    --------
+    >>> from mgdd.presets.meant import throttle_of
+    >>> throttle_of("P1").limp_home_deg
+    8.0
+    """
+    meant = _loaded(given, "throttle")
+    if isinstance(meant, Preset):
+        return meant.throttle
+    if isinstance(meant, Throttle):
+        return meant
+    raise _refusal(argument, given, "a Throttle", "throttle")
+
+
+def throttle_model_of(given: Any) -> Any:
+    """Return the throttle of a preset or of its name, the model of a fit, and everything else as it is."""
+    meant = _loaded(given, "throttle")
+    return meant.throttle if isinstance(meant, Preset) else getattr(meant, "model", meant)
+
+
+def _loaded(given: Any, kind: str) -> Any:
+    return load(given, kind=kind) if isinstance(given, str | os.PathLike) else given
+
+
+def _refusal(argument: str, given: Any, wanted: str, kind: str) -> ParameterError:
+    bound = f"{wanted}, a preset, or the name of one: {', '.join(available(kind))}"
+    part = getattr(given, argument, None)
+    remedy = f"; give its .{argument}" if isinstance(part, Cylinder | Throttle) else ""
+    return ParameterError(
+        f"{argument} = {shown(given)}: must be {bound}{remedy}", field=argument, value=given, bound=bound
+    )
