@@ -119,7 +119,7 @@ examples: dev ## install the C++ library into build/prefix, build and run the pr
 
 # --- quality ------------------------------------------------------------------------------------------------
 CPP_FILES = $(shell find cpp tests -name '*.hpp' -o -name '*.cpp')
-STUBGEN   = $(DEV) $(PY) -m pybind11_stubgen mgdd._core
+STUBGEN   = $(DEV) $(PY) tools/stubs.py mgdd._core
 
 .PHONY: lint format stubs asan tsan clang mingw-check tidy bench docs
 lint: $(VENV)/.stamp-test ## ruff, mypy --strict, clang-format, codespell: look, change nothing

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/identify/output_error.hpp"
 #include "mgdd/identify/throttle/smooth_kernel.hpp"
@@ -76,7 +77,7 @@ void one_set(benchmark::State& state) {
     accumulate(SmoothPlant{}, log().record(), n_samples, shifted(1.02), sums);
     benchmark::DoNotOptimize(sums);
   }
-  state.SetLabel(std::string(to_string(instruction_set())));
+  state.SetLabel(std::string(name_of(instruction_set())));
 }
 BENCHMARK(one_set)->Unit(benchmark::kMillisecond);
 

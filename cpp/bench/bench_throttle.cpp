@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/control/pid.hpp"
 #include "mgdd/loop/throttle_loop.hpp"
 #include "mgdd/throttle/simulation.hpp"
@@ -36,7 +36,7 @@ Throttle preset(std::int64_t form) {
 }
 
 void report(benchmark::State& state, double seconds) {
-  state.SetLabel(std::string(mgdd::name_of(friction_names(), static_cast<Friction>(state.range(0)))));
+  state.SetLabel(std::string(name_of(static_cast<Friction>(state.range(0)))));
   state.counters["times_real_time"] =
       benchmark::Counter(seconds, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kDefaults);
 }

@@ -110,6 +110,9 @@ auto over() {
 /// Errors of mgdd in place of pybind11's list of signatures, for every function and class of the module; call it last.
 void make_refusals_readable(const py::module_& m);
 
+/// Gives a function the signature that Python's own tools read.
+void show_signature(PyCFunctionObject* function, const py::detail::function_record* record);
+
 void bind_errors(py::module_& m);
 
 }  // namespace mgdd::bindings

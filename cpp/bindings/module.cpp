@@ -1,6 +1,7 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/platform.hpp"
 #include "mgdd/math/dispatch.hpp"
 #include "nouns.hpp"
@@ -24,7 +25,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("compiled_simd_level", &mgdd::compiled_simd_level, "Instruction set of this build.");
   m.def("processor_simd_levels", &mgdd::processor_simd_levels, "Vector instruction sets of this processor.");
   m.def(
-      "instruction_set", [] { return as_str(mgdd::to_string(mgdd::instruction_set())); },
+      "instruction_set", [] { return as_str(mgdd::name_of(mgdd::instruction_set())); },
       "Instruction set that the kernels run in: the widest of this processor, or MGDD_INSTRUCTION_SET.");
   m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);

@@ -125,24 +125,29 @@ PyObject* call_plain(PyObject* self, PyObject* arguments, PyObject* named) {
   return result;
 }
 
+const py::detail::function_record* record_of(PyObject* object) {
+  if (!PyCFunction_Check(object) || PyCFunction_GET_SELF(object) == nullptr) return nullptr;
+  return py::detail::function_record_ptr_from_PyObject(PyCFunction_GET_SELF(object));
+}
+
 void wrap(PyObject* object, const std::string& setter = "") {
   if (PyInstanceMethod_Check(object)) object = PyInstanceMethod_GET_FUNCTION(object);
-  if (!PyCFunction_Check(object) || PyCFunction_GET_SELF(object) == nullptr ||
-      py::detail::function_record_ptr_from_PyObject(PyCFunction_GET_SELF(object)) == nullptr) {
-    return;
-  }
+  const py::detail::function_record* record = record_of(object);
+  if (record == nullptr) return;
   if (!setter.empty()) setter_names()[PyCFunction_GET_SELF(object)] = setter;
-  PyMethodDef* method = reinterpret_cast<PyCFunctionObject*>(object)->m_ml;
+  auto* function = reinterpret_cast<PyCFunctionObject*>(object);
+  PyMethodDef* method = function->m_ml;
   void (*const now)() = reinterpret_cast<void (*)()>(method->ml_meth);
-  if ((method->ml_flags & METH_FASTCALL) != 0) {
-    if (now == reinterpret_cast<void (*)()>(&call_fast)) return;
+  const bool fast = (method->ml_flags & METH_FASTCALL) != 0;
+  void (*const ours)() = fast ? reinterpret_cast<void (*)()>(&call_fast) : reinterpret_cast<void (*)()>(&call_plain);
+  if (now == ours) return;
+  if (fast) {
     fast_dispatcher = reinterpret_cast<Fast>(now);
-    method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&call_fast));
   } else {
-    if (now == reinterpret_cast<void (*)()>(&call_plain)) return;
     plain_dispatcher = reinterpret_cast<PlainCall>(now);
-    method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&call_plain));
   }
+  method->ml_meth = reinterpret_cast<PyCFunction>(ours);
+  show_signature(function, record);
 }
 
 void wrap_members(const py::handle& owner) {

@@ -1,216 +1,257 @@
-// Parameter records from their tables of fields: description, reading of one changed value, short text, and the class.
+// Parameter records of Python from the tables of common/record.hpp: keyword-only __init__, properties, `fields`,
+// `to_dict`, `replace`, comparison, hash, text and pickle; and settings of what is stepped or asked.
 #pragma once
 
 #include <cstddef>
-#include <optional>
+#include <functional>
 #include <string>
 #include <string_view>
-#include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 
 namespace mgdd::bindings {
 
-/// Unit, bounds, meaning and default of a number.
-inline py::dict describe(const FieldInfo& info, const py::object& standard) {
-  py::dict record;
-  record["unit"] = as_str(info.unit);
-  record["lower"] = info.domain.lower;
-  record["lower_open"] = info.domain.lower_open;
-  record["upper"] = info.domain.upper;
-  record["meaning"] = as_str(info.meaning);
-  record["default"] = standard;
-  return record;
-}
+/// How Python writes a member of type T: as an `Argument`, which pybind11 converts.
+template <class T>
+struct Written {
+  using Argument = T;
 
-/// Names, meaning and default of a choice.
-py::dict describe_choice(std::string_view chosen, const std::vector<std::string_view>& choices,
-                         std::string_view meaning);
-
-/// `Name(key=value)` with the keywords that differ from the standard.
-py::str short_representation(const char* name, const py::dict& now, const py::dict& standard);
-
-/// One real number; ParameterError naming the key otherwise.
-double as_number(const py::handle& key, const py::handle& value);
-
-/// One name; ParameterError naming the key otherwise.
-std::string as_name(const py::handle& key, const py::handle& value);
-
-/// ParameterError that proposes the closest known name.
-[[noreturn]] void unknown_field(const char* owner, const py::handle& key, const py::dict& known);
-
-/// A choice of a parameter record, by name; `doc` is its meaning.
-template <class Place>
-struct Named : Row<Place> {
-  using typename Row<Place>::Record;
-  using Enum = typename Row<Place>::Value;
+  static Argument get(const T& member) { return member; }
+  static void put(T& member, Argument given, const FieldInfo&, std::size_t) { member = std::move(given); }
+};
+template <class Enum>
+  requires std::is_enum_v<Enum>
+struct Written<Enum> {
   using Argument = std::string;
-  Names<Enum> (*names)() noexcept;
 
-  void put(Record& record, const std::string& chosen) const {
-    this->at(record) = parse_name(names(), this->name, chosen);
-  }
-  void read(Record& record, const py::handle& key, const py::handle& value) const { put(record, as_name(key, value)); }
-  Argument get(const Record& record) const { return std::string(name_of(names(), this->at(record))); }
-  py::dict described(const Record& standard) const {
-    std::vector<std::string_view> valid;
-    for (const auto& [value, text] : names())
-      valid.push_back(text);
-    return describe_choice(get(standard), valid, this->doc);
+  static Argument get(Enum member) { return std::string(name_of(member)); }
+  static void put(Enum& member, const Argument& given, const FieldInfo& info, std::size_t) {
+    member = parse_name<Enum>(info.name, given);
   }
 };
-template <class Place>
-Named<Place> named(const char* name, Place place, Names<typename PlaceOf<Place>::Value> (*names)() noexcept,
-                   const char* meaning) {
-  return {{name, place, meaning}, names};
+
+/// A value of the core as Python has it.
+template <class Value>
+py::object as_python(const Value& value) {
+  if constexpr (std::is_base_of_v<py::object, Value>) {
+    return value;
+  } else {
+    return py::cast(value);
+  }
 }
 
-/// A number of a parameter record that may be left open.
-template <class Place>
-struct Open : Row<Place> {
-  using typename Row<Place>::Record;
-  using Argument = std::optional<double>;
-  const FieldInfo* info;
-
-  void put(Record& record, Argument given) const { this->at(record) = given; }
-  void read(Record& record, const py::handle& key, const py::handle& value) const {
-    put(record, value.is_none() ? Argument() : Argument(as_number(key, value)));
-  }
-  Argument get(const Record& record) const { return this->at(record); }
-  py::dict described(const Record&) const { return describe(*info, py::none()); }
+/// One member of a record, without its type.
+struct Member {
+  FieldInfo info;
+  std::string kind;     ///< as a signature names it
+  py::object standard;  ///< its default as a keyword shows it
+  py::object initial;   ///< ... and as `get` gives it
+  bool per_input;       ///< a default of one number counts for every input
+  py::object choices;   ///< names, or none
+  bool number;
+  std::function<py::object(const void*)> get;
+  std::function<bool(void*, const py::handle&)> put;  ///< false for a value of another kind
 };
-template <class Place>
-Open<Place> open_number(const FieldInfo& info, Place place) {
-  return {{info.name.data(), place, info.meaning.data()}, &info};
-}
 
-/// A record within a parameter record, with a class of its own; None is its default.
-template <class Place>
-struct Inner : Row<Place> {
-  using typename Row<Place>::Record;
-  using Value = typename Row<Place>::Value;
-  using Argument = std::optional<Value>;
+/// The members of a record in the order of its table.
+class Members {
+ public:
+  void add(Member member) { members_.push_back(std::move(member)); }
 
-  void put(Record& record, Argument given) const {
-    if (given) this->at(record) = std::move(*given);
-  }
-  void read(Record& record, const py::handle& key, const py::handle& value) const {
-    if (!py::isinstance<Value>(value)) {
-      refuse(py::str(key), value, "a " + py::cast<std::string>(py::type::of<Value>().attr("__name__")));
-    }
-    put(record, value.cast<Value>());
-  }
-  Value get(const Record& record) const { return this->at(record); }
-  py::dict described(const Record& standard) const {
-    py::dict record;
-    record["unit"] = "-";
-    record["meaning"] = this->doc;
-    record["default"] = get(standard);
-    return record;
-  }
+  /// How many may be given by place.
+  void set_places(std::size_t places) { places_ = places; }
+  /// Puts arguments into a record; false for an unknown one, one that is missing, or a value of another kind.
+  bool take(void* record, const py::args& places, const py::kwargs& keywords) const;
+  /// Changes a record; ParameterError that names the key and, where it is unknown, proposes another.
+  void change(void* record, const char* owner, const py::dict& changes) const;
+  py::dict to_dict(const void* record) const;
+  /// Every member by name: unit, bounds or choices, meaning, default.
+  py::dict described() const;
+  /// `Name(key=value)` with what differs from the defaults.
+  py::str text(const char* name, const void* record) const;
+  /// Gives __init__ of a class the signature and the help of its keywords.
+  void show(const py::object& cls) const;
+
+ private:
+  std::vector<Member> members_;
+  std::size_t places_ = 0;
 };
-template <class Place>
-Inner<Place> inner(const char* name, Place place, const char* meaning) {
-  return {{name, place, meaning}};
-}
-template <class Place>
-py::arg_v keyword(const Inner<Place>& row, const typename PlaceOf<Place>::Record&) {
-  return py::arg_v(row.name, py::none());
+
+/// How a signature names an argument of this type.
+template <class Argument>
+std::string kind_text() {
+  const py::cpp_function probe([](const Argument&) {});
+  const std::string_view text =
+      py::detail::function_record_ptr_from_PyObject(PyCFunction_GET_SELF(probe.ptr()))->signature;
+  const std::size_t from = text.find(": ") + 2;
+  return std::string(text.substr(from, text.rfind(") -> ") - from));
 }
 
-template <std::size_t>
-using Number = double;
+/// Inputs of the record that have one number each, where it knows them.
+template <class Record>
+std::size_t inputs_in(const Record& record) {
+  if constexpr (requires { record.space.size(); }) return static_cast<std::size_t>(record.space.size());
+  return 1;
+}
 
-/// A parameter record from its table of numbers and its other rows: __init__, properties, `fields`, `to_dict`,
-/// `replace`, comparison, hash, short text and pickle. Checked by `validate`.
-template <class Record, class Fields, class... Rows, std::size_t... I>
-void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields, const std::tuple<Rows...>& rows,
-                 std::index_sequence<I...>) {
-  const Record standard{};
-  std::apply(
-      [&](const Rows&... row) {
-        cls.def(py::init([fields, rows](Number<I>... values, typename Rows::Argument... given) {
-                  Record made;
-                  ((fields[I].in(made) = values), ...);
-                  std::apply([&](const Rows&... each) { (each.put(made, std::move(given)), ...); }, rows);
-                  validate(made);
-                  return made;
-                }),
-                py::kw_only(), (py::arg(fields[I].info.name.data()) = fields[I].in(standard))...,
-                keyword(row, standard)...);
-        (cls.def_property_readonly(row.name, [row](const Record& self) { return row.get(self); }, row.doc), ...);
-      },
-      rows);
-  for (const auto& field : fields) {
-    const std::string doc = std::string(field.info.meaning) + " [" + std::string(field.info.unit) + "]";
+template <class Record, class T>
+Member member_of(const Field<Record, T>& field, const Record& standard) {
+  using W = Written<T>;
+  using Argument = typename W::Argument;
+  const bool none = field.info.form == DefaultForm::none;
+  py::object choices = py::none();
+  if constexpr (std::is_enum_v<T>) {
+    py::list valid;
+    for (const auto& [value, name] : names<T>())
+      valid.append(as_str(name));
+    choices = py::tuple(valid);
+  }
+  const py::object initial = as_python(W::get(field.in(standard)));
+  py::object shown = none ? py::object(py::none()) : initial;
+  constexpr bool per_input = requires { W::shown(field.in(standard)); };
+  if constexpr (per_input) shown = W::shown(field.in(standard));
+  return {field.info,
+          kind_text<Argument>() + (none ? " | None" : ""),
+          shown,
+          initial,
+          per_input,
+          choices,
+          std::is_arithmetic_v<T> && !std::is_same_v<T, bool>,
+          [field](const void* record) { return as_python(W::get(field.in(*static_cast<const Record*>(record)))); },
+          [field, none](void* record, const py::handle& value) {
+            auto& owner = *static_cast<Record*>(record);
+            if (none && value.is_none()) {
+              field.in(owner) = field.in(Record{});
+              return true;
+            }
+            if (std::is_arithmetic_v<T> && !std::is_same_v<T, bool> && py::isinstance<py::bool_>(value)) {
+              refuse(std::string(field.info.name), value, "one number");  // 1.0 to pybind11
+            }
+            py::detail::make_caster<Argument> caster;
+            if (!caster.load(value, true)) return false;
+            W::put(field.in(owner), py::detail::cast_op<Argument>(std::move(caster)), field.info, inputs_in(owner));
+            if constexpr (std::is_arithmetic_v<T>) {
+              if (none) require_in(field.info, static_cast<double>(field.in(owner)));
+            }
+            return true;
+          }};
+}
+
+/// The table of a record for Python, of which the first `places` may be given by place; it lives as long as the module.
+template <class Record, class Table>
+const Members& members_of(const Table& table, const Record& standard, std::size_t places = 0) {
+  auto* members = new Members;
+  members->set_places(places);
+  const auto add = [&](const auto& field) { members->add(member_of(field, standard)); };
+  for_each_field(table, add);
+  return *members;
+}
+
+/// __init__: what `make` makes of a record filled from its arguments.
+template <class Record, class Class, class Make>
+void bind_keywords(Class& cls, const Members& members, Make make) {
+  cls.def(py::init([&members, make](const py::args& places, const py::kwargs& keywords) {
+    Record record{};
+    if (!members.take(&record, places, keywords)) throw py::reference_cast_error();
+    return make(std::move(record));
+  }));
+  members.show(cls);
+}
+
+/// A record of its own, immutable. `check` throws for what it may not be.
+template <class Record, class Check>
+void bind_record(py::class_<Record>& cls, const char* name, Check check, std::size_t places = 0) {
+  const auto table = fields_of(Record{});
+  const Members& members = members_of(table, Record{}, places);
+  bind_keywords<Record>(cls, members, [check](Record made) {
+    check(made);
+    return made;
+  });
+  const auto property = [&cls]<class T>(const Field<Record, T>& field) {
+    std::string doc(field.info.meaning);
+    if (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) doc += " [" + std::string(field.info.unit) + "]";
     cls.def_property_readonly(
-        field.info.name.data(), [field](const Record& self) { return field.in(self); }, doc.c_str());
-  }
-  const auto to_dict = [fields, rows](const Record& self) {
-    py::dict out;
-    for (const auto& field : fields)
-      out[as_str(field.info.name)] = field.in(self);
-    std::apply([&](const Rows&... row) { ((out[row.name] = row.get(self)), ...); }, rows);
-    return out;
+        std::string(field.info.name).c_str(), [field](const Record& self) { return Written<T>::get(field.in(self)); },
+        doc.c_str());
   };
-  const auto replaced = [name, fields, rows, to_dict](const Record& from, const py::dict& changes) {
-    Record made = from;
-    for (const auto& change : changes) {
-      const py::handle key = change.first, value = change.second;
-      const auto given = py::cast<std::string>(key);
-      const auto field = find_field(fields, given);
-      if (field != fields.end()) {
-        field->in(made) = as_number(key, value);
-        continue;
-      }
-      const auto take = [&](const auto& row) {
-        if (given != row.name) return false;
-        row.read(made, key, value);
-        return true;
-      };
-      if (!std::apply([&](const Rows&... row) { return (take(row) || ...); }, rows)) {
-        unknown_field(name, key, to_dict(from));
-      }
-    }
-    validate(made);
+  for_each_field(table, property);
+  const auto replaced = [&members, name, check](Record made, const py::dict& changes) {
+    members.change(&made, name, changes);
+    check(made);
     return made;
   };
   cls.def_static(
-      "fields",
-      [fields, rows] {
-        const Record plain{};
-        py::dict out;
-        for (const auto& field : fields)
-          out[as_str(field.info.name)] = describe(field.info, py::float_(field.in(plain)));
-        std::apply([&](const Rows&... row) { ((out[row.name] = row.described(plain)), ...); }, rows);
-        return out;
-      },
+      "fields", [&members] { return members.described(); },
       "Every field by name: unit, bounds or choices, meaning, default.");
-  cls.def("to_dict", to_dict, "All fields as a new dict.");
   cls.def(
       "replace", [replaced](const Record& self, const py::kwargs& changes) { return replaced(self, changes); },
       "A validated copy with some fields changed; an unknown name is a ParameterError.");
+  cls.def("to_dict", [&members](const Record& self) { return members.to_dict(&self); }, "All fields as a new dict.");
   cls.def("__eq__", [](const Record& self, const py::object& other) {
     return py::isinstance<Record>(other) && self == other.cast<const Record&>();
   });
-  cls.def("__hash__", [to_dict](const Record& self) { return py::hash(py::tuple(to_dict(self).attr("values")())); });
-  cls.def("__repr__",
-          [name, to_dict](const Record& self) { return short_representation(name, to_dict(self), to_dict(Record{})); });
-  cls.def(py::pickle([to_dict](const Record& self) { return py::make_tuple(1, to_dict(self)); },
+  cls.def("__hash__",
+          [&members](const Record& self) { return py::hash(py::tuple(members.to_dict(&self).attr("values")())); });
+  cls.def("__repr__", [&members, name](const Record& self) { return members.text(name, &self); });
+  cls.def(py::pickle([&members](const Record& self) { return py::make_tuple(1, members.to_dict(&self)); },
                      [replaced](const py::tuple& state) {
                        require_pickle_version(state);
                        return replaced(Record{}, state[1].cast<py::dict>());
                      }));
 }
-
-template <std::size_t n, class Record, class Fields, class... Rows>
-void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields, const std::tuple<Rows...>& rows) {
-  bind_record(cls, name, fields, rows, std::make_index_sequence<n>{});
+template <class Record>
+void bind_record(py::class_<Record>& cls, const char* name) {
+  bind_record(cls, name, [](const Record& made) { validate(made); });
 }
+
+/// What is stepped with such settings: __init__, `fields`, `settings`, saved state, and copies that go on bit for bit.
+template <class Stepped>
+void bind_stepped(py::class_<Stepped>& cls, const char* name) {
+  using Settings = std::remove_cvref_t<decltype(std::declval<const Stepped&>().settings())>;
+  const Members& members = members_of(fields_of(Settings{}), Settings{});
+  bind_keywords<Settings>(cls, members, [](const Settings& settings) { return Stepped(settings); });
+  cls.def_static(
+      "fields", [&members] { return members.described(); },
+      "Every setting by name: unit, bounds or choices, meaning, default.");
+  cls.def_property_readonly(
+      "settings", [&members](const Stepped& self) { return members.to_dict(&self.settings()); },
+      "All settings as a new dict: keywords that make the controller again.");
+  cls.def_property(
+      "state", [](const Stepped& self) { return save_state(self); },
+      [](Stepped& self, const StateColumns& columns) { restore_state(self, columns); },
+      "What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.");
+  cls.def("__repr__", [&members, name](const Stepped& self) { return members.text(name, &self.settings()); });
+  cls.def(py::pickle(
+      [&members](const Stepped& self) {
+        return py::make_tuple(1, members.to_dict(&self.settings()), save_state(self));
+      },
+      [](const py::tuple& saved) {
+        require_pickle_version(saved);
+        auto made = py::type::of<Stepped>()(**saved[1].cast<py::dict>()).template cast<Stepped>();
+        restore_state(made, saved[2].cast<StateColumns>());
+        return made;
+      }));
+}
+
+/// The same for a controller: `step` and its duty too.
+template <class Controller>
+void bind_controller(py::class_<Controller>& cls, const char* name) {
+  bind_stepped(cls, name);
+  cls.def(
+      "step", [](Controller& self, double reference, double measured) { return self.step(reference, measured); },
+      py::arg("reference_deg"), py::arg("measurement_deg"),
+      "Duty [-] of this sample for a reference and a measured angle [deg].\n\nNaN repeats the last value; before the "
+      "first ones the duty is 0.");
+  cls.def_property_readonly("duty", &Controller::duty, "Duty of the last sample [-].");
+}
+
+/// One number; ParameterError naming the key otherwise.
+double as_number(const py::handle& key, const py::handle& value);
 
 }  // namespace mgdd::bindings

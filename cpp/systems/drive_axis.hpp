@@ -6,7 +6,7 @@
 
 #include <array>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/dry_friction.hpp"
 

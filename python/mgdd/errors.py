@@ -35,6 +35,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 # Letters: of a value that a message quotes, and of a whole message. What a file carries may be of any length.
 _LONGEST_VALUE, _LONGEST_MESSAGE = 400, 4000
 _LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length

@@ -1,11 +1,9 @@
 // Binds include/mgdd/control: PID and sliding mode, one sample at a time.
-#include <tuple>
-#include <utility>
 
 #include "binding.hpp"
-#include "controller_binding.hpp"
 #include "mgdd/control/pid.hpp"
 #include "mgdd/control/sliding_mode.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -81,7 +79,7 @@ Examples
 >>> abs(values["angle_deg"] - 40.0) < 0.3
 True
 )");
-  bind_controller(cls, "Pid", PidSettings{}, pid_fields(), std::tuple<>{}, std::make_index_sequence<n_pid_fields>{});
+  bind_controller(cls, "Pid");
   cls.def("reset", py::overload_cast<>(&Pid::reset), "As made: no integral, no rates.");
   cls.def(
       "take_over", py::overload_cast<double, double, double>(&Pid::reset), py::arg("reference_deg"),
@@ -158,10 +156,7 @@ Examples
 >>> abs(values["angle_deg"] - 40.0) < 0.3
 True
 )");
-  bind_controller(cls, "SlidingMode", SlidingModeSettings{}, sliding_mode_fields(),
-                  std::tuple{named("reaching", &SlidingModeSettings::reaching, &reaching_law_names,
-                                   "law that drives the plate to the surface")},
-                  std::make_index_sequence<n_sliding_mode_fields>{});
+  bind_controller(cls, "SlidingMode");
   cls.def("reset", &SlidingMode::reset, "As made: no integral, no rates.");
   cls.def_property_readonly("surface_deg_per_s", &SlidingMode::surface_deg_per_s, "s of the last sample [deg/s].");
 }

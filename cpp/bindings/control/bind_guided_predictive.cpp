@@ -1,14 +1,12 @@
 // Binds include/mgdd/control/guided_predictive.hpp.
 #include <map>
 #include <string>
-#include <tuple>
-#include <utility>
 #include <vector>
 
 #include "binding.hpp"
-#include "controller_binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/control/guided_predictive.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -141,17 +139,8 @@ True
 }  // namespace
 
 void bind_guided_predictive(py::module_& m) {
-  using S = GuidedPredictiveSettings;
   py::class_<GuidedPredictive> cls(m, "GuidedPredictive", guided_predictive_doc);
-  bind_controller(
-      cls, "GuidedPredictive", S{}, guided_predictive_fields(),
-      std::tuple{named("prediction", &S::prediction, &prediction_names, "what the horizon is predicted with"),
-                 named("switching", &S::switching, &side_switching_names, "how it knows its side of limp-home"),
-                 explained("delay_samples", &S::delay_samples, "from a duty to its effect, 0 to 20"),
-                 explained("move_steps", &S::move_steps, "prediction steps for which each duty is held"),
-                 explained("gauss_newton_steps", &S::gauss_newton_steps, "at most, per sample"),
-                 explained("friction_learning", &S::friction_learning, "learn friction levels and gain")},
-      std::make_index_sequence<n_guided_predictive_fields>{});
+  bind_controller(cls, "GuidedPredictive");
   cls.def(
       "step",
       [](GuidedPredictive& self, double reference, double measured, const InputArray& preview) {

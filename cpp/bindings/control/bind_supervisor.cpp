@@ -2,12 +2,11 @@
 #include <array>
 #include <limits>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include "binding.hpp"
-#include "controller_binding.hpp"
 #include "mgdd/control/supervisor.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -104,8 +103,7 @@ Examples
 >>> supervisor.decide(0.3), supervisor.mode, supervisor.reason
 ((0.3, False), 'limited', 'reference_range')
 )");
-  bind_stepped(cls, "ThrottleSupervisor", SupervisorSettings{}, supervisor_fields(), std::tuple<>{},
-               std::make_index_sequence<n_supervisor_fields>{});
+  bind_stepped(cls, "ThrottleSupervisor");
   cls.def("observe", &observe, py::arg("reference_deg"), py::arg("angles_deg"), py::kw_only(), py::arg("age_s") = 0.0,
           py::arg("supply_v") = py::none(), py::arg("sensor_fault") = false,
           R"(First half of a sample, before the controller.
@@ -137,22 +135,18 @@ tuple of float
       "Second half of a sample: duty [-] for the bridge and whether it is open, for the duty that the controller asks "
       "for.");
   cls.def(
-      "acknowledge",
-      [](ThrottleSupervisor& self) { return as_str(name_of(supervisor_reason_names(), self.acknowledge())); },
+      "acknowledge", [](ThrottleSupervisor& self) { return as_str(name_of(self.acknowledge())); },
       "Back to normal where the cause is gone: nothing wrong for `healthy_s`, and an open bridge has brought the plate "
       "to limp-home.\n\nReturns the reason that stands, ``'none'`` where it was accepted.");
   cls.def("reset", &ThrottleSupervisor::reset, "As made.");
   cls.def_property_readonly(
-      "mode",
-      [](const ThrottleSupervisor& self) { return as_str(name_of(supervisor_mode_names(), self.order().mode)); },
+      "mode", [](const ThrottleSupervisor& self) { return as_str(name_of(self.order().mode)); },
       "Mode of the last sample: ``normal``, ``holding``, ``limited`` or ``limp_home``.");
   cls.def_property_readonly(
-      "reason",
-      [](const ThrottleSupervisor& self) { return as_str(name_of(supervisor_reason_names(), self.order().reason)); },
+      "reason", [](const ThrottleSupervisor& self) { return as_str(name_of(self.order().reason)); },
       "Reason of the mode, or the last one since it was acknowledged.");
   cls.def_property_readonly(
-      "return_test",
-      [](const ThrottleSupervisor& self) { return as_str(name_of(return_test_names(), self.return_test())); },
+      "return_test", [](const ThrottleSupervisor& self) { return as_str(name_of(self.return_test())); },
       "Whether the open bridge has brought the plate to limp-home: ``none`` (not open), ``pending``, ``passed`` or "
       "``failed``.");
   cls.def_property_readonly(

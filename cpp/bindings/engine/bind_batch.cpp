@@ -29,9 +29,9 @@ py::dict batch(const Cylinder& cylinder, const OperatingPoint& point, double soc
   const BatchCases cases = cases_of(cylinder, point, soc_cad, names, rows);
   BatchSettings settings;
   settings.step_cad = step_cad;
-  settings.integrator = parse_integrator(integrator);
+  settings.integrator = parse_name<Integrator>("integrator", integrator);
   settings.threads = threads;
-  settings.form = parse_batch_form(form);
+  settings.form = parse_name<BatchForm>("form", form);
   py::dict out;
   std::vector<IndicatorMember> members;
   std::vector<double*> columns;
@@ -57,7 +57,7 @@ void bind_batch(py::module_& m) {
       [](const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, const std::vector<std::string>& names,
          const InputArray& rows) {
         const BatchCases cases = cases_of(cylinder, point, soc_cad, names, rows);
-        return std::string(to_string(without_gil([&] { return form_of(cases, BatchForm::automatic); })));
+        return std::string(name_of(without_gil([&] { return form_of(cases, BatchForm::automatic); })));
       },
       arg("cylinder"), arg("point"), arg("soc_cad"), arg("names"), arg("rows"),
       "What `form='automatic'` stands for: pass it on where a batch is cut into pieces.");

@@ -26,7 +26,7 @@ py::dict to_dict(const Indicators<double>& indicators) {
 // Traces of one cycle; rates belong to the step that ends at the sample, and are zero at the first.
 py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, double step_cad,
                   const std::string& integrator) {
-  const Integrator scheme = parse_integrator(integrator);
+  const Integrator scheme = parse_name<Integrator>("integrator", integrator);
   const CycleTrace t = without_gil([&] { return trace_cycle(cylinder, point, soc_cad, step_cad, scheme); });
   py::dict out;
   out["indicators"] = to_dict(t.indicators);
@@ -60,13 +60,13 @@ py::dict to_columns(const std::vector<Indicators<double>>& rows) {
 py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const InputArray& soc_cad, double step_cad,
               const std::string& integrator) {
   const std::vector<double> timings = to_column(soc_cad, "soc_cad");
-  const Integrator scheme = parse_integrator(integrator);
+  const Integrator scheme = parse_name<Integrator>("integrator", integrator);
   return to_columns(without_gil([&] { return scan_timings(cylinder, point, timings, step_cad, scheme); }));
 }
 
 py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                             const std::vector<std::string>& names, double step_cad, const std::string& integrator) {
-  const Integrator scheme = parse_integrator(integrator);
+  const Integrator scheme = parse_name<Integrator>("integrator", integrator);
   const Sensitivities s = without_gil([&] { return sensitivities(cylinder, point, soc_cad, names, step_cad, scheme); });
   py::dict out;
   out["crank_angle_cad"] = to_array(s.angles_cad);
@@ -78,7 +78,7 @@ py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
 
 py::dict bind_convergence(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, double step_cad,
                           const std::string& integrator) {
-  const Integrator scheme = parse_integrator(integrator);
+  const Integrator scheme = parse_name<Integrator>("integrator", integrator);
   py::dict out;
   for (const auto& e : without_gil([&] { return convergence(cylinder, point, soc_cad, step_cad, scheme); }))
     out[as_str(e.name)] = py::make_tuple(e.value, e.extrapolated, e.error, e.order, as_str(e.unit));

@@ -1,5 +1,4 @@
 // Binds engine/cylinder.hpp: the parameter records. Both are immutable in Python; `replace` makes changed copies.
-#include <tuple>
 
 #include "binding.hpp"
 #include "mgdd/common/units.hpp"
@@ -8,14 +7,7 @@
 #include "record_binding.hpp"
 
 namespace mgdd::bindings {
-namespace {
-
 using namespace engine;
-
-using C = Cylinder;
-using Op = OperatingPoint;
-
-}  // namespace
 
 void bind_cylinder(py::module_& m) {
   py::class_<Cylinder> cylinder(
@@ -38,17 +30,7 @@ Examples
 >>> c.replace(burn_shape="wiebe").burn_shape
 'wiebe'
 )");
-  constexpr auto fields = cylinder_fields<double>();
-  bind_record<fields.size()>(
-      cylinder, "Cylinder", fields,
-      std::tuple{
-          named("burn_shape", Path{&C::burn, &BurnParameters<double>::burn_shape}, &burn_shape_names, "burn law"),
-          named("gamma_model", Path{&C::gas, &GasParameters<double>::gamma_model}, &gamma_model_names,
-                "gamma against T"),
-          named("wall_heat_model", Path{&C::wall_heat, &WallHeatParameters<double>::wall_heat_model},
-                &wall_heat_model_names, "wall-heat correlation"),
-          named("ignition_model", Path{&C::ignition, &IgnitionParameters<double>::ignition_model},
-                &ignition_model_names, "ignition-delay correlation")});
+  bind_record(cylinder, "Cylinder");
   cylinder.def_property_readonly(
       "swept_volume_l", [](const Cylinder& c) { return Geometry<double>(c.geometry).swept_m3 / units::m3_per_l; },
       "Swept volume [L].");
@@ -74,11 +56,7 @@ Examples
 >>> OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0)
 OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0)
 )");
-  constexpr auto point_fields = operating_point_fields<double>();
-  bind_record<point_fields.size()>(point, "OperatingPoint", point_fields,
-                                   std::tuple{open_number(burn_duration_info, &Op::burn_duration_cad),
-                                              open_number(trapped_mass_info, &Op::trapped_mass_g),
-                                              open_number(ivc_temperature_info, &Op::ivc_temperature_k)});
+  bind_record(point, "OperatingPoint");
 }
 
 }  // namespace mgdd::bindings

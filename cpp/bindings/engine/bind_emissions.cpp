@@ -1,14 +1,12 @@
 // Binds engine/emissions.hpp: NOx proxy, NOx model, soft sensor and the fit to a sweep.
-#include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/emissions.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -17,7 +15,7 @@ using namespace engine;
 
 NoxFit fit(const InputArray& t_max_k, const InputArray& nox_ppm, const std::string& map, double reference_k) {
   const std::vector<double> t = to_column(t_max_k, "t_max_k"), nox = to_column(nox_ppm, "nox_ppm");
-  const NoxMap form = parse_nox_map(map);
+  const NoxMap form = parse_name<NoxMap>("map", map);
   const py::gil_scoped_release release;
   return fit_nox_proxy(t, nox, form, reference_k);
 }
@@ -50,12 +48,7 @@ Examples
 >>> float(NoxProxy().arrhenius_ppm(1900.0))
 1200.0
 )");
-  using P = NoxProxy;
-  bind_rows(proxy, "NoxProxy",
-            std::tuple{plain("reference_temperature_k", &P::reference_temperature_k, "T0 [K]."),
-                       plain("reference_nox_ppm", &P::reference_nox_ppm, "NOx0 [ppm]."),
-                       plain("activation_temperature_k", &P::activation_temperature_k, "b [K].")},
-            [](const P& made) { validate(made); });
+  bind_record(proxy, "NoxProxy");
   proxy
       .def(
           "affine_log_ppm",
@@ -104,13 +97,7 @@ Examples
 >>> float(NoxModel(intake_o2_fraction=0.1045).ppm(1900.0))
 150.0
 )");
-  using M = NoxModel;
-  bind_rows(model, "NoxModel",
-            std::tuple{or_default("proxy", &M::proxy, "Constants of the map."),
-                       choice("map", &M::map, &parse_nox_map, "Name of the map."),
-                       plain("intake_o2_fraction", &M::intake_o2_fraction, "Intake oxygen by volume [-]."),
-                       plain("o2_exponent", &M::o2_exponent, "n [-].")},
-            [](const M& made) { validate(made); });
+  bind_record(model, "NoxModel");
   model.def(
       "ppm",
       [](const NoxModel& self, const InputArray& t) {
@@ -144,11 +131,7 @@ Examples
 >>> round(float(sensor.ppm(1900.0, ln_bias=bias)), 1)
 1258.6
 )");
-  using S = SoftSensor;
-  bind_rows(sensor, "SoftSensor",
-            std::tuple{or_default("model", &S::model, "NOx from T_max."),
-                       plain("correction_gain", &S::correction_gain, "c per cycle [-].")},
-            [](const S& soft) { validate(soft); });
+  bind_record(sensor, "SoftSensor");
   sensor
       .def(
           "ppm",
@@ -186,7 +169,7 @@ Examples
       .def_property_readonly(
           "proxy", [](const NoxFit& self) { return self.proxy; }, "The fitted constants.")
       .def_property_readonly(
-          "map", [](const NoxFit& self) { return as_str(to_string(self.map)); }, "Name of the map.")
+          "map", [](const NoxFit& self) { return as_str(name_of(self.map)); }, "Name of the map.")
       .def_readonly("points", &NoxFit::points, "Number of points.")
       .def_readonly("residual_ln", &NoxFit::residual_ln, "Standard deviation of ln NOx about the fit [-].")
       .def_readonly("reference_nox_stderr_ppm", &NoxFit::reference_nox_stderr_ppm, "Standard error of NOx0 [ppm].")
@@ -195,7 +178,7 @@ Examples
       .def("__repr__", [](const NoxFit& self) {
         py::dict keywords;
         keywords["proxy"] = self.proxy;
-        keywords["map"] = as_str(to_string(self.map));
+        keywords["map"] = as_str(name_of(self.map));
         keywords["points"] = self.points;
         keywords["residual_ln"] = self.residual_ln;
         keywords["reference_nox_stderr_ppm"] = self.reference_nox_stderr_ppm;

@@ -15,7 +15,7 @@ using namespace engine;
 
 py::dict to_dict(const PerformanceTerm& t) {
   py::dict out;
-  out["signal"] = as_str(to_string(t.signal));
+  out["signal"] = as_str(name_of(t.signal));
   out["weight"] = t.weight;
   out["reference"] = t.reference;
   out["above"] = t.above;
@@ -35,7 +35,7 @@ py::dict to_dict(const Performance& p) {
 PerformanceSignals signals_of(const Performance& p, const py::dict& given) {
   PerformanceSignals signals;
   for (const PerformanceTerm& term : p.terms()) {
-    const py::str name = as_str(to_string(term.signal));
+    const py::str name = as_str(name_of(term.signal));
     if (!given.contains(name)) {
       throw about("signals",
                   ParameterError("signals lack '" + std::string(name) + "': a term of the performance uses it"));
@@ -78,13 +78,13 @@ Examples
 -0.5
 )");
   term.def(py::init([](const std::string& signal, double weight, double reference, std::optional<double> above) {
-             const PerformanceTerm made{parse_performance_signal(signal), weight, reference, above};
+             const PerformanceTerm made{parse_name<PerformanceSignal>("signal", signal), weight, reference, above};
              static_cast<void>(Performance{made});  // checks the term
              return made;
            }),
            arg("signal"), arg("weight") = 1.0, py::kw_only(), arg("reference") = 1.0, arg("above") = py::none())
       .def_property_readonly(
-          "signal", [](const PerformanceTerm& t) { return as_str(to_string(t.signal)); }, "Name of the signal.")
+          "signal", [](const PerformanceTerm& t) { return as_str(name_of(t.signal)); }, "Name of the signal.")
       .def_readonly("weight", &PerformanceTerm::weight, "Unit of J per unit of x / reference.")
       .def_readonly("reference", &PerformanceTerm::reference, "In the unit of the signal.")
       .def_readonly("above", &PerformanceTerm::above, "Limit of a hinge, or None.")

@@ -2,15 +2,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "mgdd/engine/pressure/trace_check.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -101,28 +100,7 @@ void bind_pressure(py::module_& m) {
   using py::arg;
   using O = TraceOptions;
   py::class_<O> options(m, "TraceOptions");
-  bind_keywords(options,
-                std::tuple{choice("pegging", &O::pegging, &parse_pegging),
-                           plain("pegging_exponent", &O::pegging_exponent),
-                           plain("inlet_pressure_kpa", &O::inlet_pressure_kpa),
-                           choice("gamma_source", &O::gamma_source, &parse_analysis_gamma),
-                           plain("gamma", &O::gamma),
-                           plain("gamma_compression", &O::gamma_compression),
-                           plain("gamma_combustion", &O::gamma_combustion),
-                           plain("heat_from_cad", &O::heat_from_cad),
-                           plain("heat_to_cad", &O::heat_to_cad),
-                           plain("earliest_burn_cad", &O::earliest_burn_cad),
-                           plain("burn_from_cad", &O::burn_from_cad),
-                           plain("total_at_end", &O::total_at_end),
-                           plain("fractions_of_gross", &O::fractions_of_gross),
-                           choice("smoothing", &O::smoothing, &parse_smoothing),
-                           plain("smoothing_width_cad", &O::smoothing_width_cad),
-                           plain("smoothing_cutoff_hz", &O::smoothing_cutoff_hz),
-                           plain("intake_pressure_kpa", &O::intake_pressure_kpa),
-                           plain("intake_factor", &O::intake_factor),
-                           plain("bmep_bar", &O::bmep_bar),
-                           plain("fuel_heat_j", &O::fuel_heat_j)},
-                [](const O&) {});
+  bind_keywords<O>(options, members_of(fields_of(O{}), O{}), [](O made) { return made; });
   m.def("analyze", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
   m.def("analyze_cycles", &bind_analyze_cycles, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"),

@@ -2,7 +2,6 @@
 #include <limits>
 #include <span>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "mgdd/guide/curve_seeking.hpp"
@@ -83,26 +82,8 @@ Examples
 
 void bind_curve_seeking(py::module_& m) {
   using B = BoundSeeker<CurveSeeking>;
-  using S = CurveSeekingSettings;
-  using optimize::ComponentLag;
   py::class_<B> cls(m, "CurveSeeking", "Seeking guided by a curve; see mgdd.guide.CurveSeeking.");
-  const auto rows = std::tuple{needed("curve", &S::curve),
-                               positive_or_own("prior_sd", &S::prior_sd),
-                               plain("scale_sd", &S::scale_sd),
-                               plain("discrepancy", &S::discrepancy),
-                               plain("noise_sd", &S::noise_sd),
-                               plain("memory_cycles", &S::memory_cycles),
-                               positive_or_own("amplitude_max", &S::amplitude_max),
-                               or_none("rate", &S::rate, inf),
-                               plain("delay_cycles", Path{&S::sensor, &ComponentLag::delay_cycles}),
-                               plain("lag_cycles", Path{&S::sensor, &ComponentLag::lag_cycles}),
-                               plain("delay_uncertainty", &S::delay_uncertainty),
-                               plain("hand_over", &S::hand_over),
-                               plain("maximize", &S::maximize),
-                               plain("limits", &S::limits),
-                               or_default("limit_curves", &S::limit_curves)};
-  const S standard;
-  bind_settings<CurveSeeking>(cls, "CurveSeeking", standard, rows, py::arg("lower"), py::arg("upper"));
+  bind_settings<CurveSeeking>(cls, "CurveSeeking");
   cls.def(
          "guide", [](B& b, const Curve& curve) { return b.use()->guide(curve); }, py::arg("curve"),
          "The operating point has changed, and the guide's curve with it.")

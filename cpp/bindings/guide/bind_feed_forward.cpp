@@ -48,7 +48,7 @@ void bind_feed_forward(py::module_& m) {
          "_offer",
          [](BoundFeedForward& b, const std::vector<double>& optimum, const std::vector<double>& curvature,
             const std::string& cause) {
-           const guide::GuideCause why = guide::parse_guide_cause(cause);
+           const guide::GuideCause why = parse_name<guide::GuideCause>("cause", cause);
            guide::GuideValue value;
            if (optimum.size() <= optimize::max_inputs)
              value.optimum = optimize::Inputs::Map(optimum.data(), static_cast<Eigen::Index>(optimum.size()));
@@ -92,7 +92,7 @@ void bind_feed_forward(py::module_& m) {
           "trust", [](const BoundFeedForward& b) { return b.use()->path().trust().value(); },
           "Trust in the guide, 0 to 1: share of its next move that is made.")
       .def_property_readonly(
-          "verdict", [](const BoundFeedForward& b) { return as_str(to_string(b.use()->path().trust().verdict())); },
+          "verdict", [](const BoundFeedForward& b) { return as_str(name_of(b.use()->path().trust().verdict())); },
           "What the last test of the guide said: ``untested``, ``undecided``, ``confirmed`` or ``wrong``.")
       .def_property_readonly(
           "noise_sd", [](const BoundFeedForward& b) { return b.use()->path().trust().noise_sd(); },

@@ -124,7 +124,7 @@ void bind_guided_engine(py::module_& m) {
           "calibration_status",
           [](const BoundGuided& b) {
             const auto engine = b.use();
-            return std::string(engine->calibration() ? to_string(engine->calibration()->status()) : "none");
+            return std::string(engine->calibration() ? name_of(engine->calibration()->status()) : "none");
           },
           "What became of the last cycle in the calibration; ``none`` without one.")
       .def_property(

@@ -22,14 +22,14 @@ BoundOptimum make_optimum(const engine::Cylinder& cylinder, const engine::Perfor
   s.cylinder = cylinder;
   s.performance = performance;
   s.nox = nox;
-  s.method = guide::parse_optimum_method(method);
+  s.method = parse_name<guide::OptimumMethod>("method", method);
   std::tie(s.lower_cad, s.upper_cad) = bounds_cad;
   s.step_size = step_size;
   s.difference_cad = difference_cad;
   s.tolerance_cad = tolerance_cad;
   s.iterations = iterations;
   s.step_cad = step_cad;
-  s.integrator = engine::parse_integrator(integrator);
+  s.integrator = parse_name<engine::Integrator>("integrator", integrator);
   return {"ModelOptimum", guide::ModelOptimum(s)};
 }
 
@@ -37,14 +37,14 @@ py::dict to_dict(const guide::ModelOptimumSettings& s) {
   py::dict out;
   out["performance"] = s.performance;
   out["nox"] = s.nox;
-  out["method"] = as_str(to_string(s.method));
+  out["method"] = as_str(name_of(s.method));
   out["bounds_cad"] = py::make_tuple(s.lower_cad, s.upper_cad);
   out["step_size"] = s.step_size;
   out["difference_cad"] = s.difference_cad;
   out["tolerance_cad"] = s.tolerance_cad;
   out["iterations"] = s.iterations;
   out["step_cad"] = s.step_cad;
-  out["integrator"] = as_str(to_string(s.integrator));
+  out["integrator"] = as_str(name_of(s.integrator));
   return out;
 }
 
@@ -66,7 +66,7 @@ void bind_model_optimum(py::module_& m) {
         out["j"] = found.j;
         out["curvature"] = found.curvature;
         out["at_bound"] = found.at_bound;
-        out["method"] = as_str(to_string(found.method));
+        out["method"] = as_str(name_of(found.method));
         out["iterations"] = found.iterations;
         return out;
       },

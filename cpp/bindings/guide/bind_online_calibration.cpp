@@ -4,7 +4,6 @@
 #include <map>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "binding.hpp"
@@ -41,7 +40,7 @@ py::dict settings_of(const OnlineCalibrationSettings& s) {
   }
   py::dict out;
   out["cylinder"] = s.cylinder;
-  out["method"] = as_str(to_string(s.method));
+  out["method"] = as_str(name_of(s.method));
   out["parameters"] = names_where(s.wanted);
   out["uncertainty"] = uncertainty;
   out["window_cycles"] = s.window.window_cycles;
@@ -52,7 +51,7 @@ py::dict settings_of(const OnlineCalibrationSettings& s) {
   out["jump_factor"] = s.jump_factor;
   out["trials_per_update"] = s.trials_per_update;
   out["step_cad"] = s.step_cad;
-  out["integrator"] = as_str(to_string(s.integrator));
+  out["integrator"] = as_str(name_of(s.integrator));
   return out;
 }
 
@@ -63,7 +62,7 @@ BoundCalibration make_calibration(const engine::Cylinder& cylinder, const std::s
                                   const std::string& integrator) {
   OnlineCalibrationSettings s;
   s.cylinder = cylinder;
-  s.method = parse_calibration_method(method);
+  s.method = parse_name<CalibrationMethod>("method", method);
   s.wanted.fill(false);
   for (const std::string& name : parameters)
     s.wanted[static_cast<std::size_t>(parse_calibrated("parameters", name))] = true;
@@ -81,7 +80,7 @@ BoundCalibration make_calibration(const engine::Cylinder& cylinder, const std::s
   s.jump_factor = jump_factor;
   s.trials_per_update = trials_per_update;
   s.step_cad = step_cad;
-  s.integrator = engine::parse_integrator(integrator);
+  s.integrator = parse_name<engine::Integrator>("integrator", integrator);
   return {"OnlineCalibration", OnlineCalibration(s)};
 }
 
@@ -91,7 +90,7 @@ py::dict verdicts(const BoundCalibration& b) {
   for (int i = 0; i < n_calibrated; ++i) {
     if (!calibration->settings().wanted[static_cast<std::size_t>(i)]) continue;
     out[as_str(info_of(i).field.name)] =
-        py::make_tuple(as_str(to_string(calibration->verdict(i).knowledge)), calibration->explain(i));
+        py::make_tuple(as_str(name_of(calibration->verdict(i).knowledge)), calibration->explain(i));
   }
   return out;
 }
@@ -133,12 +132,12 @@ void bind_online_calibration(py::module_& m) {
           [](BoundCalibration& b, const InputArray& pressure_bar, const engine::OperatingPoint& point, double soc_cad,
              bool misfire) {
             const std::vector<double> pressure = to_column(pressure_bar, "pressure_bar");
-            return as_str(to_string(b.use()->offer(pressure, point, soc_cad, misfire)));
+            return as_str(name_of(b.use()->offer(pressure, point, soc_cad, misfire)));
           },
           arg("pressure_bar"), arg("point"), arg("soc_cad"), py::kw_only(), arg("misfire") = false,
           "Takes one cycle; the status says what became of it.")
       .def(
-          "update", [](BoundCalibration& b) { return as_str(to_string(b.use()->update())); },
+          "update", [](BoundCalibration& b) { return as_str(name_of(b.use()->update())); },
           "One step of the calibration; the status says what became of it.")
       .def(
           "restart", [](BoundCalibration& b) { b.use()->restart(); }, "Forget all cycles, keep the parameters.")
@@ -150,7 +149,7 @@ void bind_online_calibration(py::module_& m) {
           "determined", [](const BoundCalibration& b) { return b.use()->determined(); },
           "Whether the data determine every parameter that is adapted.")
       .def_property_readonly(
-          "status", [](const BoundCalibration& b) { return as_str(to_string(b.use()->status())); }, "Of the last call.")
+          "status", [](const BoundCalibration& b) { return as_str(name_of(b.use()->status())); }, "Of the last call.")
       .def_property_readonly(
           "cylinder", [](const BoundCalibration& b) { return b.use()->cylinder(); },
           "The guide's cylinder with the adapted parameters.")

@@ -1,6 +1,5 @@
 // Binds include/mgdd/identify: the calibration of the cycle model to measured traces.
 #include <map>
-#include <optional>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -69,7 +68,7 @@ void bind_cylinder_fit(py::module_& m) {
         for (const auto& [name, range] : bounds)
           options.bounds.push_back({name, range.first, range.second});
         options.step_cad = step_cad;
-        options.integrator = engine::parse_integrator(integrator);
+        options.integrator = parse_name<engine::Integrator>("integrator", integrator);
         options.search.max_iterations = max_iterations;
         return hand_over(interruptible([&](std::stop_token stop) {
           options.search.stop = std::move(stop);

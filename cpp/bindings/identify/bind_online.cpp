@@ -74,7 +74,7 @@ void bind_online(py::module_& m) {
           logs.push_back({std::move(u), std::move(y)});
         }
         PseudoWienerFitOptions o;
-        o.sides = parse_name(sides_names(), "sides", sides);
+        o.sides = parse_name<Sides>("sides", sides);
         o.free = free;
         o.delays = delays;
         o.starts = starts;

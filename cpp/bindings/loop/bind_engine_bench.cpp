@@ -9,49 +9,36 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "loop/bench_columns.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/engine_bench.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
+
+/// Pairs of first cycle and operating point.
+template <>
+struct Written<std::vector<loop::ScheduledPoint>> {
+  using Argument = std::vector<std::pair<std::int64_t, engine::OperatingPoint>>;
+
+  static Argument get(const std::vector<loop::ScheduledPoint>& schedule) {
+    Argument out;
+    for (const loop::ScheduledPoint& entry : schedule)
+      out.emplace_back(entry.cycle, entry.point);
+    return out;
+  }
+  static void put(std::vector<loop::ScheduledPoint>& schedule, const Argument& given, const FieldInfo&, std::size_t) {
+    schedule.clear();
+    for (const auto& [cycle, point] : given)
+      schedule.push_back({cycle, point});
+  }
+};
+
 namespace {
 
 using namespace loop;
 using engine::indicator_fields;
-
-using Schedule = std::vector<std::pair<std::int64_t, engine::OperatingPoint>>;
-
-py::dict to_dict(const BenchSettings& s) {
-  Schedule schedule;
-  for (const ScheduledPoint& entry : s.schedule)
-    schedule.emplace_back(entry.cycle, entry.point);
-  py::dict out;
-  out["cylinder"] = s.cylinder;
-  out["schedule"] = schedule;
-  out["performance"] = s.performance;
-  out["nox_sensor"] = as_str(to_string(s.nox_sensor));
-  out["limits"] = s.limits;
-  out["soc_scatter_cad"] = s.soc_scatter_cad;
-  out["efficiency_noise_percent"] = s.efficiency_noise_percent;
-  out["misfire_probability"] = s.misfire_probability;
-  out["soc_drift_cad_per_kcycle"] = s.soc_drift_cad_per_kcycle;
-  out["wall_heat_drift_per_kcycle"] = s.wall_heat_drift_per_kcycle;
-  out["pressure_noise_bar"] = s.pressure_noise_bar;
-  out["tdc_error_cad"] = s.tdc_error_cad;
-  out["pressure_gain_error"] = s.pressure_gain_error;
-  out["pressure_offset_bar"] = s.pressure_offset_bar;
-  out["true_nox"] = s.true_nox;
-  out["soft_sensor"] = s.soft_sensor;
-  out["analyser"] = s.analyser;
-  out["fast_sensor"] = s.fast_sensor;
-  out["delay_whole_objective"] = s.delay_whole_objective;
-  out["step_cad"] = s.step_cad;
-  out["integrator"] = as_str(to_string(s.integrator));
-  out["seed"] = s.seed;
-  return out;
-}
 
 py::dict to_dict(const BenchCycle& c, const std::vector<std::string>& limit_names) {
   py::dict out;
@@ -144,42 +131,6 @@ py::array_t<double> noise_free_limits(BoundBench& bound, const InputArray& soc_c
   return out;
 }
 
-BoundBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
-                const std::optional<engine::Performance>& performance, const std::string& nox_sensor,
-                const std::vector<std::string>& limits, double soc_scatter_cad, double efficiency_noise_percent,
-                double misfire_probability, double soc_drift_cad_per_kcycle, double wall_heat_drift_per_kcycle,
-                double pressure_noise_bar, double tdc_error_cad, double pressure_gain_error, double pressure_offset_bar,
-                const std::optional<engine::NoxModel>& true_nox, const std::optional<engine::SoftSensor>& soft_sensor,
-                const std::optional<SensorDynamics>& analyser, const std::optional<SensorDynamics>& fast_sensor,
-                bool delay_whole_objective, double step_cad, const std::string& integrator, std::uint64_t seed) {
-  BenchSettings s;
-  s.cylinder = cylinder;
-  s.schedule.clear();
-  for (const auto& [cycle, point] : schedule)
-    s.schedule.push_back({cycle, point});
-  s.performance = performance.value_or(s.performance);
-  s.nox_sensor = parse_nox_sensor(nox_sensor);
-  s.limits = limits;
-  s.soc_scatter_cad = soc_scatter_cad;
-  s.efficiency_noise_percent = efficiency_noise_percent;
-  s.misfire_probability = misfire_probability;
-  s.soc_drift_cad_per_kcycle = soc_drift_cad_per_kcycle;
-  s.wall_heat_drift_per_kcycle = wall_heat_drift_per_kcycle;
-  s.pressure_noise_bar = pressure_noise_bar;
-  s.tdc_error_cad = tdc_error_cad;
-  s.pressure_gain_error = pressure_gain_error;
-  s.pressure_offset_bar = pressure_offset_bar;
-  s.true_nox = true_nox.value_or(s.true_nox);
-  s.soft_sensor = soft_sensor.value_or(s.soft_sensor);
-  s.analyser = analyser.value_or(s.analyser);
-  s.fast_sensor = fast_sensor.value_or(s.fast_sensor);
-  s.delay_whole_objective = delay_whole_objective;
-  s.step_cad = step_cad;
-  s.integrator = engine::parse_integrator(integrator);
-  s.seed = seed;
-  return {"EngineBench", EngineBench(s)};
-}
-
 double checked_speed(double speed_rpm) {
   require_within("speed_rpm", speed_rpm, 0.0, 1e5, "rpm");
   return speed_rpm;
@@ -214,14 +165,7 @@ Examples
 >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
 38
 )");
-  using D = SensorDynamics;
-  bind_rows(
-      dynamics, "SensorDynamics",
-      std::tuple{plain("delay_s", &D::delay_s, "Transport delay [s]."), plain("lag_s", &D::lag_s, "Time constant [s]."),
-                 plain("noise_fraction", &D::noise_fraction, "Relative noise [-]."),
-                 plain("delay_cycles", &D::delay_cycles, "Delay in cycles, or None."),
-                 plain("lag_cycles", &D::lag_cycles, "Time constant in cycles, or None.")},
-      [](const D& made) { validate("sensor", made); });
+  bind_record(dynamics, "SensorDynamics", [](const SensorDynamics& made) { validate("sensor", made); });
   dynamics
       .def(
           "delay_at",
@@ -238,20 +182,13 @@ Examples
 void bind_engine_bench(py::module_& m) {
   using py::arg;
   bind_dynamics(m);
-  const BenchSettings d;
   using B = BoundBench;
-  py::class_<B>(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.")
-      .def(py::init(&make), py::kw_only(), arg("cylinder"), arg("schedule"), arg("performance") = py::none(),
-           arg("nox_sensor") = std::string(to_string(d.nox_sensor)), arg("limits") = std::vector<std::string>{},
-           arg("soc_scatter_cad") = d.soc_scatter_cad, arg("efficiency_noise_percent") = d.efficiency_noise_percent,
-           arg("misfire_probability") = d.misfire_probability,
-           arg("soc_drift_cad_per_kcycle") = d.soc_drift_cad_per_kcycle,
-           arg("wall_heat_drift_per_kcycle") = d.wall_heat_drift_per_kcycle,
-           arg("pressure_noise_bar") = d.pressure_noise_bar, arg("tdc_error_cad") = d.tdc_error_cad,
-           arg("pressure_gain_error") = d.pressure_gain_error, arg("pressure_offset_bar") = d.pressure_offset_bar,
-           arg("true_nox") = py::none(), arg("soft_sensor") = py::none(), arg("analyser") = py::none(),
-           arg("fast_sensor") = py::none(), arg("delay_whole_objective") = d.delay_whole_objective,
-           arg("step_cad") = d.step_cad, arg("integrator") = std::string(to_string(d.integrator)), arg("seed") = d.seed)
+  py::class_<B> cls(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.");
+  const Members& members = members_of(fields_of(BenchSettings{}), BenchSettings{});
+  bind_keywords<BenchSettings>(cls, members, [](const BenchSettings& s) { return B("EngineBench", EngineBench(s)); });
+  cls.def_static(
+         "fields", [&members] { return members.described(); },
+         "Every setting by name: unit, bounds or choices, meaning, default.")
       .def(
           "step",
           [](B& b, double soc_cad) {
@@ -311,7 +248,7 @@ void bind_engine_bench(py::module_& m) {
           "analyser_gain", [](const B& b) { return b.use()->analyser_gain(); },
           "Gain of the analyser's lag filter at the next cycle [-].")
       .def_property_readonly(
-          "settings", [](const B& b) { return to_dict(b.constant().settings()); },
+          "settings", [&members](const B& b) { return members.to_dict(&b.constant().settings()); },
           "Constructor keywords as a new dict.")
       .def("__repr__",
            [](const B& b) {
@@ -319,9 +256,9 @@ void bind_engine_bench(py::module_& m) {
              return py::str("<EngineBench at cycle {}, {!r}>").format(cycle, b.constant().point_at(cycle));
            })
       .def(py::pickle(
-          [](const B& b) {
+          [&members](const B& b) {
             const StateColumns state = save_state(*b.use());
-            return py::make_tuple(1, to_dict(b.constant().settings()), state);
+            return py::make_tuple(1, members.to_dict(&b.constant().settings()), state);
           },
           [](const py::tuple& state) {
             require_pickle_version(state);

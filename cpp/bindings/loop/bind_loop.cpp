@@ -107,7 +107,7 @@ py::dict seek_many(const std::vector<BoundBench*>& benches, const py::list& seek
   plan.seeds = seeds;
   plan.cycles = cycles;
   plan.threads = threads;
-  plan.form = engine::parse_batch_form(form);
+  plan.form = parse_name<engine::BatchForm>("form", form);
   return hand_over(
       interruptible([&plan](const std::stop_token& stop) {
         return monte_carlo(plan, [&stop] { return stop.stop_requested(); });
@@ -129,7 +129,7 @@ void bind_loop(py::module_& m) {
         py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),
         py::arg("form") = "automatic", "Whole loops on all cores; behind mgdd.loop.monte_carlo.");
   m.def(
-      "loop_form", [](std::size_t loops) { return std::string(to_string(form_of_loops(loops, LoopForm::automatic))); },
+      "loop_form", [](std::size_t loops) { return std::string(name_of(form_of_loops(loops, LoopForm::automatic))); },
       py::arg("loops"), "Form that so many loops take; who cuts them into pieces passes it on.");
 }
 

@@ -1,7 +1,6 @@
 // Binds include/mgdd/control/mgdd1.hpp with the models that guide it, those of Python too.
 #include <map>
 #include <string>
-#include <utility>
 #include <variant>
 
 #include "binding.hpp"
@@ -78,12 +77,7 @@ void bind_mgdd1(py::module_& m) {
                  throttle::prepare(guide.parameters));
            }),
            py::arg("guide"), py::kw_only(), py::arg("horizon_samples"), py::arg("delay_samples"), py::arg("numbers"))
-      .def_static("fields", [] {
-        py::dict out;
-        for (const auto& field : control::mgdd1_fields())
-          out[as_str(field.info.name)] = describe(field.info, py::float_(field.in(control::Mgdd1Settings{})));
-        return out;
-      });
+      .def_static("fields", [] { return members_of(control::mgdd1_fields(), control::Mgdd1Settings{}).described(); });
   bind_steps(plain);
   py::class_<ObjectGuidedMgdd1> guided(m, "ObjectGuidedMgdd1",
                                        "The same guided by a Python object; use mgdd.control.Mgdd1.");

@@ -2,7 +2,6 @@
 // It stands here because it needs the models of the throttle.
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -179,13 +178,7 @@ void bind_receding_horizon(py::module_& m) {
           },
           arg("model"), py::kw_only(), arg("n_states"), arg("sample_s"), arg("observer_gain"), arg("horizon_samples"),
           arg("max_iterations"), arg("max_sweeps"), arg("numbers"))
-      .def_static("fields",
-                  [] {
-                    py::dict out;
-                    for (const auto& field : horizon_fields())
-                      out[as_str(field.info.name)] = describe(field.info, py::float_(field.in(HorizonSettings{})));
-                    return out;
-                  })
+      .def_static("fields", [] { return members_of(horizon_fields(), HorizonSettings{}).described(); })
       .def(
           "step",
           [](BoundHorizon& self, const InputArray& reference, double measured) {
@@ -216,9 +209,7 @@ void bind_receding_horizon(py::module_& m) {
           "n_states", [](const BoundHorizon& self) { return ask(self, [](const auto& c) { return n_states(c); }); })
       .def_property_readonly(
           "status",
-          [](const BoundHorizon& self) {
-            return as_str(name_of(horizon_status_names(), ask(self, [](const auto& c) { return c.status(); })));
-          })
+          [](const BoundHorizon& self) { return as_str(name_of(ask(self, [](const auto& c) { return c.status(); }))); })
       .def_property_readonly(
           "sweeps",
           [](const BoundHorizon& self) { return ask(self, [](const auto& c) { return c.horizon().sweeps(); }); })

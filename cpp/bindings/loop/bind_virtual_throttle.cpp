@@ -20,7 +20,7 @@ using PlantFault = std::tuple<std::string, double, double, std::optional<double>
 
 ThrottleFault fault_from(const PlantFault& given) {
   const auto& [kind, from_s, size, until_s] = given;
-  return {parse_name(throttle_fault_names(), "kind", kind), from_s, size, until_s};
+  return {parse_name<ThrottleFaultKind>("kind", kind), from_s, size, until_s};
 }
 
 py::dict to_dict(const VirtualThrottleSample& s, const VirtualThrottleSettings& settings) {
@@ -45,7 +45,7 @@ py::dict to_dict(const VirtualThrottleSample& s, const VirtualThrottleSettings& 
 
 void bind_virtual_throttle(py::module_& m) {
   py::list kinds;
-  for (const auto& [kind, name] : throttle_fault_names())
+  for (const auto& [kind, name] : names<ThrottleFaultKind>())
     kinds.append(as_str(name));
   m.attr("throttle_fault_kinds") = py::tuple(kinds);
   py::class_<VirtualThrottle>(m, "VirtualThrottle",
@@ -63,7 +63,7 @@ void bind_virtual_throttle(py::module_& m) {
             s.sample_s = sample_s;
             s.step_s = step_s;
             s.start_deg = start_deg;
-            s.bridge = parse_name(throttle::bridge_names(), "bridge", bridge);
+            s.bridge = parse_name<throttle::Bridge>("bridge", bridge);
             s.seed = seed;
             return VirtualThrottle(s);
           }),

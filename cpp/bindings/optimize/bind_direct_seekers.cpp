@@ -2,7 +2,6 @@
 #include <numbers>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "mgdd/optimize/seekers/tuner.hpp"
@@ -16,28 +15,8 @@ using namespace optimize;
 
 void bind_spsa(py::module_& m) {
   using B = BoundSeeker<Spsa>;
-  using S = SpsaSettings;
   py::class_<B> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
-  const auto rows = std::tuple{choice("form", &S::form, &parse_spsa_form),
-                               choice("schedule", &S::schedule, &parse_gain_schedule),
-                               positive_or_own("gain", &S::gain),
-                               plain("stability", &S::stability),
-                               plain("gain_exponent", &S::gain_exponent),
-                               plain("perturbation", &S::perturbation),
-                               plain("perturbation_exponent", &S::perturbation_exponent),
-                               positive_or_own("step_max", &S::step_max),
-                               plain("averaging", &S::averaging),
-                               plain("blocking", &S::blocking),
-                               plain("noise_sd", &S::noise_sd),
-                               plain("initial_hessian", &S::initial_hessian),
-                               plain("hessian_prior", &S::hessian_prior),
-                               plain("limit_amplitude", &S::limit_amplitude),
-                               plain("seed", &S::seed),
-                               plain("maximize", &S::maximize),
-                               plain("limits", &S::limits),
-                               plain("curvature", &S::curvature)};
-  const S standard;
-  bind_settings<Spsa>(cls, "Spsa", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  bind_settings<Spsa>(cls, "Spsa");
   cls.def_property_readonly(
          "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
          "Averaged Hessian of the second-order form, shape (inputs, inputs).")
@@ -58,19 +37,8 @@ void bind_spsa(py::module_& m) {
 
 void bind_gradient_descent(py::module_& m) {
   using B = BoundSeeker<GradientDescent>;
-  using S = GradientDescentSettings;
   py::class_<B> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
-  const auto rows = std::tuple{positive_or_own("step_size", &S::step_size),
-                               plain("difference", &S::difference),
-                               per_input_or_none("rate", &S::rate),
-                               plain("tolerance", &S::tolerance),
-                               plain("iterations", &S::iterations),
-                               plain("maximize", &S::maximize),
-                               plain("limits", &S::limits),
-                               plain("curvature", &S::curvature)};
-  const S standard;
-  bind_settings<GradientDescent>(cls, "GradientDescent", standard, rows, py::arg("lower") = -inf,
-                                 py::arg("upper") = inf);
+  bind_settings<GradientDescent>(cls, "GradientDescent");
   cls.def_property_readonly(
          "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
       .def_property_readonly(
@@ -89,13 +57,8 @@ void bind_gradient_descent(py::module_& m) {
 
 void bind_golden_section(py::module_& m) {
   using B = BoundSeeker<GoldenSection>;
-  using S = GoldenSectionSettings;
   py::class_<B> cls(m, "GoldenSection", "Golden-section search; see mgdd.optimize.GoldenSection.");
-  const auto rows = std::tuple{plain("noise_sd", &S::noise_sd),       plain("significance", &S::significance),
-                               plain("samples_max", &S::samples_max), plain("tolerance", &S::tolerance),
-                               plain("maximize", &S::maximize),       plain("limits", &S::limits)};
-  const S standard;
-  bind_settings<GoldenSection>(cls, "GoldenSection", standard, rows, py::arg("lower"), py::arg("upper"));
+  bind_settings<GoldenSection>(cls, "GoldenSection");
   cls.def_property_readonly(
          "bracket",
          [](const B& b) {
@@ -117,7 +80,7 @@ void bind_tuner(py::module_& m) {
          std::optional<double> cycles, std::optional<double> distance, std::optional<double> arrival,
          std::optional<double> amplitude_max) {
         TuningSpec w;
-        w.method = parse_tuned_method(method);
+        w.method = parse_name<TunedMethod>("method", method);
         w.noise_sd = noise_sd;
         w.curvature = curvature;
         w.lag = {delay_cycles, lag_cycles};
@@ -130,7 +93,7 @@ void bind_tuner(py::module_& m) {
         w.amplitude_max = amplitude_max;
         const Tuning t = tune(w);
         py::dict out;
-        out["method"] = std::string(to_string(t.method));
+        out["method"] = std::string(name_of(t.method));
         out["amplitude"] = t.amplitude;
         out["period"] = t.period;
         out["gain"] = t.gain;

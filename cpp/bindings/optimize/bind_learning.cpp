@@ -23,7 +23,7 @@ BoundLearner make(const InputArray& initial, const std::string& law, const Input
                   std::optional<double> error_weight, std::optional<double> input_weight,
                   std::optional<double> change_weight, double lower, double upper, double rate, bool guard) {
   LearningSettings settings{.initial = to_column(initial, "initial"),
-                            .law = optimize::parse_learning_law(law),
+                            .law = parse_name<optimize::LearningLaw>("law", law),
                             .impulse_response = to_column(impulse_response, "impulse_response"),
                             .relative_degree = relative_degree,
                             .k_p = k_p,

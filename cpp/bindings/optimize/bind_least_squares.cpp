@@ -3,11 +3,11 @@
 #include <string>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/math/autocorrelation.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/multi_start.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -107,49 +107,16 @@ auto by_value(Member FitReport::* member) {
   return [member](const FitReport& report) -> Member { return report.*member; };
 }
 
-py::tuple parameter_state(const Parameter& p) {
-  return py::make_tuple(p.name, p.lower, p.upper, p.log_scaled);
-}
-
 void bind_parameter(py::module_& m) {
-  py::class_<Parameter>(m, "Parameter", "One unknown of a fit: name, bounds, and whether it is searched as its log.")
-      .def(py::init([](std::string name, double lower, double upper, bool log_scaled) {
-             return Parameter{std::move(name), lower, upper, log_scaled};
-           }),
-           py::kw_only(), py::arg("name"), py::arg("lower") = Parameter{}.lower, py::arg("upper") = Parameter{}.upper,
-           py::arg("log_scaled") = false)
-      .def_readonly("name", &Parameter::name, "Name in reports and messages.")
-      .def_readonly("lower", &Parameter::lower, "Lower bound, -inf for none.")
-      .def_readonly("upper", &Parameter::upper, "Upper bound, inf for none.")
-      .def_readonly("log_scaled", &Parameter::log_scaled, "Searched as log(p); needs lower > 0.")
-      .def(
-          "__eq__", [](const Parameter& a, const Parameter& b) { return a == b; }, py::is_operator())
-      .def(
-          "__repr__",
-          [](const Parameter& p) {
-            return py::str("Parameter(name={!r}, lower={!r}, upper={!r}, log_scaled={!r})").format(*parameter_state(p));
-          })
-      .def(py::pickle(&parameter_state, [](const py::tuple& t) {
-        return Parameter{t[0].cast<std::string>(), t[1].cast<double>(), t[2].cast<double>(), t[3].cast<bool>()};
-      }));
+  py::class_<Parameter> cls(m, "Parameter",
+                            "One unknown of a fit: name, bounds, and whether it is searched as its log.");
+  bind_record(cls, "Parameter", [](const Parameter&) {});
 }
 
 void bind_options(py::module_& m) {
-  using O = LeastSquaresOptions;
-  py::class_<O> options(m, "LeastSquaresOptions", "When a least-squares search ends and what it reports.");
-  bind_rows(options, "LeastSquaresOptions",
-            std::tuple{plain("max_iterations", &O::max_iterations, "Trial steps."),
-                       plain("cost_tolerance", &O::cost_tolerance, "Relative decrease of the cost [-]."),
-                       plain("step_tolerance", &O::step_tolerance, "Step over parameters, scaled [-]."),
-                       plain("gradient_tolerance", &O::gradient_tolerance,
-                             "Cosine between the residual and a free Jacobian column [-]."),
-                       plain("initial_damping", &O::initial_damping, "Relative to unit columns [-]."),
-                       plain("correlation_limit", &O::correlation_limit,
-                             "Correlation beyond which two parameters count as unidentifiable [-]."),
-                       plain("rank_tolerance", &O::rank_tolerance,
-                             "Singular value, relative to the largest, that counts as zero [-]."),
-                       plain("evaluate_together", &O::evaluate_together, "Residual and Jacobian in one call.")},
-            [](const O& made) { made.validate(); });
+  py::class_<LeastSquaresOptions> options(m, "LeastSquaresOptions",
+                                          "When a least-squares search ends and what it reports.");
+  bind_record(options, "LeastSquaresOptions", [](const LeastSquaresOptions& made) { made.validate(); });
 }
 
 void bind_report(py::module_& m) {
@@ -188,8 +155,7 @@ void bind_report(py::module_& m) {
       .def_property_readonly("n_residuals", by_value(&FitReport::n_residuals), "Number of residuals.")
       .def_property_readonly("history", &history, "Arrays cost, damping, step_norm, accepted per trial step.")
       .def_property_readonly(
-          "status", [](const FitReport& r) { return std::string(optimize::to_string(r.status)); },
-          "Why the search ended.")
+          "status", [](const FitReport& r) { return std::string(name_of(r.status)); }, "Why the search ended.")
       .def_property_readonly(
           "message", [](const FitReport& r) { return std::string(optimize::explain(r.status)); },
           "The status as a sentence.")

@@ -7,32 +7,15 @@
 #include "binding.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
 using namespace optimize;
 
-/// Name and limit, and what is not as by default.
-py::str limit_text(const Limit& l) {
-  const Limit standard;
-  py::str out = py::str("Limit({!r}, {!r}").format(l.name, l.upper);
-  const auto add = [&](const char* name, const auto& value, const auto& usual) {
-    if (value != usual) out = py::str("{}, {}={!r}").format(out, name, value);
-  };
-  add("margin", l.margin, standard.margin);
-  add("method", std::string(to_string(l.method)), std::string(to_string(standard.method)));
-  add("weight", l.weight, standard.weight);
-  add("scale", l.scale, standard.scale);
-  add("delay_cycles", l.lag.delay_cycles, standard.lag.delay_cycles);
-  add("lag_cycles", l.lag.lag_cycles, standard.lag.lag_cycles);
-  add("margin_sd", l.margin_sd, standard.margin_sd);
-  add("delay_uncertainty", l.delay_uncertainty, standard.delay_uncertainty);
-  return py::str("{})").format(out);
-}
-
 void bind_limit(py::module_& m) {
-  py::class_<Limit>(m, "Limit", R"(An upper limit on a measured quantity, kept by a seeker.
+  py::class_<Limit> cls(m, "Limit", R"(An upper limit on a measured quantity, kept by a seeker.
 
 Parameters
 ----------
@@ -73,50 +56,12 @@ Examples
 >>> from mgdd.optimize import Limit
 >>> Limit("p_max_bar", 95.0, margin=1.0)
 Limit('p_max_bar', 95.0, margin=1.0)
-)")
-      .def(py::init([](std::string name, double upper, double margin, const std::string& method, double weight,
-                       double scale, double delay_cycles, double lag_cycles, double margin_sd, int delay_uncertainty) {
-             const ComponentLag lag{delay_cycles, lag_cycles};
-             Limit limit{std::move(name), upper, margin,    parse_limit_method(method), weight,
-                         scale,           lag,   margin_sd, delay_uncertainty};
-             validate({limit});
-             return limit;
-           }),
-           py::arg("name"), py::arg("upper"), py::kw_only(), py::arg("margin") = 0.0, py::arg("method") = "switching",
-           py::arg("weight") = 1.0, py::arg("scale") = 0.0, py::arg("delay_cycles") = 0.0, py::arg("lag_cycles") = 0.0,
-           py::arg("margin_sd") = Limit{}.margin_sd, py::arg("delay_uncertainty") = Limit{}.delay_uncertainty)
-      .def_readonly("name", &Limit::name, "What is limited.")
-      .def_readonly("upper", &Limit::upper, "The limit.")
-      .def_readonly("margin", &Limit::margin, "Kept free below the limit.")
-      .def_property_readonly(
-          "method", [](const Limit& l) { return std::string(to_string(l.method)); }, "How J knows of the limit.")
-      .def_readonly("weight", &Limit::weight, "Of penalty or barrier.")
-      .def_readonly("scale", &Limit::scale, "Unit of the excess.")
-      .def_property_readonly(
-          "delay_cycles", [](const Limit& l) { return l.lag.delay_cycles; }, "Transport delay of the reading.")
-      .def_property_readonly(
-          "lag_cycles", [](const Limit& l) { return l.lag.lag_cycles; }, "Time constant of its lag.")
-      .def_readonly("margin_sd", &Limit::margin_sd, "Margin in standard deviations of the reading.")
-      .def_readonly("delay_uncertainty", &Limit::delay_uncertainty, "Cycles that the delay may be off to either side.")
-      .def(
-          "__eq__", [](const Limit& a, const Limit& b) { return a == b; }, py::is_operator())
-      .def("__repr__", &limit_text)
-      .def(py::pickle(
-          [](const Limit& l) {
-            return py::make_tuple(l.name, l.upper, l.margin, std::string(to_string(l.method)), l.weight, l.scale,
-                                  l.lag.delay_cycles, l.lag.lag_cycles, l.margin_sd, l.delay_uncertainty);
-          },
-          [](const py::tuple& t) {
-            const auto number = [&](std::size_t at) { return t[at].cast<double>(); };
-            const LimitMethod method = parse_limit_method(t[3].cast<std::string>());
-            const ComponentLag lag{number(6), number(7)};
-            return Limit{t[0].cast<std::string>(), number(1), number(2), method, number(4), number(5), lag, number(8),
-                         t[9].cast<int>()};
-          }));
+)");
+  bind_record(cls, "Limit", [](const Limit& limit) { validate({limit}); }, 2);
 }
 
 void bind_component_lag(py::module_& m) {
-  py::class_<ComponentLag>(m, "ComponentLag", R"(What stands between the plant and one measured component of J.
+  py::class_<ComponentLag> cls(m, "ComponentLag", R"(What stands between the plant and one measured component of J.
 
 Parameters
 ----------
@@ -136,32 +81,17 @@ Examples
 >>> gain, phase_deg = ComponentLag(delay_cycles=42, lag_cycles=25).response(period=10)
 >>> round(gain, 4), round(phase_deg % 360.0, 1)
 (0.0646, 140.5)
-)")
-      .def(py::init([](double delay, double lag) {
-             const ComponentLag out{delay, lag};
-             validate(std::vector<ComponentLag>{out});
-             return out;
-           }),
-           py::kw_only(), py::arg("delay_cycles") = 0.0, py::arg("lag_cycles") = 0.0)
-      .def_readonly("delay_cycles", &ComponentLag::delay_cycles, "Transport delay [cycles].")
-      .def_readonly("lag_cycles", &ComponentLag::lag_cycles, "Time constant of the lag [cycles].")
-      .def(
-          "response",
-          [](const ComponentLag& self, int period, int harmonic) {
-            if (period < 1 || harmonic < 1) throw ParameterError("period and harmonic: must be >= 1");
-            const SensorResponse r = sensor_response(self, harmonic, period);
-            return std::pair(r.gain, r.phase_rad * 180.0 / std::numbers::pi);
-          },
-          py::kw_only(), py::arg("period"), py::arg("harmonic") = 1,
-          "Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.")
-      .def(
-          "__eq__", [](const ComponentLag& a, const ComponentLag& b) { return a == b; }, py::is_operator())
-      .def("__repr__",
-           [](const ComponentLag& l) {
-             return py::str("ComponentLag(delay_cycles={!r}, lag_cycles={!r})").format(l.delay_cycles, l.lag_cycles);
-           })
-      .def(py::pickle([](const ComponentLag& l) { return py::make_tuple(l.delay_cycles, l.lag_cycles); },
-                      [](const py::tuple& t) { return ComponentLag{t[0].cast<double>(), t[1].cast<double>()}; }));
+)");
+  bind_record(cls, "ComponentLag", [](const ComponentLag& lag) { validate(std::vector<ComponentLag>{lag}); });
+  cls.def(
+      "response",
+      [](const ComponentLag& self, int period, int harmonic) {
+        if (period < 1 || harmonic < 1) throw ParameterError("period and harmonic: must be >= 1");
+        const SensorResponse r = sensor_response(self, harmonic, period);
+        return std::pair(r.gain, r.phase_rad * 180.0 / std::numbers::pi);
+      },
+      py::kw_only(), py::arg("period"), py::arg("harmonic") = 1,
+      "Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.");
 }
 
 }  // namespace

@@ -122,7 +122,7 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
             const auto r = b.use();
             py::dict states;
             for (std::size_t i = 0; i < r->limit_count(); ++i)
-              states[as_str(r->settings().limits[i].name)] = as_str(to_string(optimize::limit_state_of(*r, i)));
+              states[as_str(r->settings().limits[i].name)] = as_str(name_of(optimize::limit_state_of(*r, i)));
             return states;
           },
           "State of every limit by name: 'free' holds nothing back, 'active' turned the last step or is broken,\n"

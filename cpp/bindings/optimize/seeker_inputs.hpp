@@ -43,14 +43,6 @@ inline optimize::Inputs inputs_from(const py::object& value, std::string_view na
   return Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size()));
 }
 
-inline optimize::SearchSpace space_from(const py::object& start, const py::object& lower, const py::object& upper) {
-  optimize::SearchSpace space;
-  space.start = inputs_from(start, "start", 1);
-  space.lower = inputs_from(lower, "lower", space.size());
-  space.upper = inputs_from(upper, "upper", space.size());
-  return space;
-}
-
 inline py::array_t<double> input_array(const optimize::Inputs& values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
@@ -60,15 +52,6 @@ inline std::vector<double> list_of(const optimize::Inputs& values) {
 }
 inline std::optional<std::vector<double>> list_or_none(const optimize::Inputs& values) {
   return values.size() == 0 ? std::nullopt : std::optional(list_of(values));
-}
-
-/// The arguments `start`, `lower` and `upper` again.
-inline py::dict space_dict(const optimize::SearchSpace& space) {
-  py::dict out;
-  out["start"] = list_of(space.start);
-  out["lower"] = list_of(space.lower);
-  out["upper"] = list_of(space.upper);
-  return out;
 }
 
 /// Numbers of a reading, kept alive as long as the spans into them.

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/rig/e2e.hpp"
 #include "record_binding.hpp"
@@ -38,46 +37,41 @@ Crc8 crc_from(const CrcArgument& given) {
 }
 
 CrcArgument crc_argument(const Crc8& crc) {
-  if (const auto name = name_of(crc)) return std::string(*name);
+  if (const auto name = crc_name(crc)) return std::string(*name);
   return CrcNumbers{crc.polynomial, crc.start, crc.final_xor};
 }
 
+}  // namespace
+
 /// A CRC-8 by name, or as (polynomial, start, final xor).
-template <class Place>
-struct Crc : Row<Place> {
-  using typename Row<Place>::Record;
+template <>
+struct Written<Crc8> {
   using Argument = CrcArgument;
 
-  void put(Record& record, const Argument& given) const { this->at(record) = crc_from(given); }
-  Argument get(const Record& record) const { return crc_argument(this->at(record)); }
+  static Argument get(const Crc8& crc) { return crc_argument(crc); }
+  static void put(Crc8& crc, const Argument& given, const FieldInfo&, std::size_t) { crc = crc_from(given); }
 };
 
-/// Sixteen bytes, or None where the mode does not use them.
-template <class Place>
-struct DataIdList : Row<Place> {
-  using typename Row<Place>::Record;
+/// Sixteen bytes, or None.
+template <>
+struct Written<std::optional<std::array<std::uint8_t, 16>>> {
   using Argument = std::optional<std::vector<int>>;
 
-  void put(Record& record, const Argument& given) const {
-    const bool wanted = record.data_id_mode == DataIdMode::list;
-    if (!given && !wanted) return;
-    auto& bytes = this->at(record);
-    if (!given || !wanted || given->size() != bytes.size()) {
-      throw about(this->name, ParameterError(wanted ? "data_id_list: must be 16 bytes for data_id_mode='list'"
-                                                    : "data_id_list: must be None unless data_id_mode is 'list'"));
-    }
-    for (std::size_t i = 0; i < bytes.size(); ++i)
-      bytes[i] = as_byte(this->name, (*given)[i]);
+  static py::object get(const std::optional<std::array<std::uint8_t, 16>>& bytes) {
+    return bytes ? py::object(py::tuple(py::cast(*bytes))) : py::none();
   }
-  py::object get(const Record& record) const {
-    if (record.data_id_mode != DataIdMode::list) return py::none();
-    return py::tuple(py::cast(this->at(record)));
+  static void put(std::optional<std::array<std::uint8_t, 16>>& bytes, const Argument& given, const FieldInfo& info,
+                  std::size_t) {
+    bytes.reset();
+    if (!given) return;
+    bytes.emplace();
+    if (given->size() != bytes->size()) throw about(info.name, ParameterError("data_id_list: must be 16 bytes"));
+    for (std::size_t i = 0; i < bytes->size(); ++i)
+      (*bytes)[i] = as_byte(std::string(info.name), (*given)[i]);
   }
 };
-template <class Place>
-py::arg_v keyword(const DataIdList<Place>& row, const E2eSettings&) {
-  return py::arg_v(row.name, py::none());
-}
+
+namespace {
 
 py::bytes protected_payload(const E2eSettings& settings, int counter, const py::buffer& payload) {
   std::vector<std::uint8_t> bytes = to_payload(payload);
@@ -93,7 +87,7 @@ py::bytes protected_payload(const E2eSettings& settings, int counter, const py::
 
 py::dict counts(const E2eCheck& check) {
   py::dict out;
-  for (const auto& [status, name] : e2e_status_names())
+  for (const auto& [status, name] : names<E2eStatus>())
     out[as_str(name)] = check.counts().of(status);
   out["missing"] = check.counts().missing;
   return out;
@@ -171,30 +165,14 @@ Examples
 void bind_e2e(py::module_& m) {
   using S = E2eSettings;
   py::class_<S> settings(m, "E2eSettings", settings_doc);
-  bind_rows(
-      settings, "E2eSettings",
-      std::tuple{Crc<Crc8 S::*>{{"crc", &S::crc, "Name, or (polynomial, start, final xor)."}},
-                 plain("data_id", &S::data_id, "Identifier under the CRC."),
-                 named("data_id_mode", &S::data_id_mode, &data_id_mode_names, "Bytes of it under the CRC."),
-                 DataIdList<std::array<std::uint8_t, 16> S::*>{
-                     {"data_id_list", &S::data_id_list, "Sixteen bytes of the mode 'list', or None."}},
-                 plain("size", &S::size, "Bytes of the payload."), plain("crc_byte", &S::crc_byte, "Place of the CRC."),
-                 plain("counter_byte", &S::counter_byte, "Place of the counter."),
-                 named("counter_place", &S::counter_place, &counter_place_names, "Its bits in the byte."),
-                 plain("counter_modulus", &S::counter_modulus, "Values of the counter."),
-                 plain("max_step", &S::max_step, "Largest good step."),
-                 plain("bad_until_invalid", &S::bad_until_invalid, "Bad frames in a row."),
-                 plain("good_until_valid", &S::good_until_valid, "Good frames in a row.")},
-      [](const S& made) { validate(made); });
+  bind_record(settings, "E2eSettings");
   settings.def("next_counter", &next_counter, py::arg("counter"), "The counter that follows.");
 
   py::class_<E2eCheck>(m, "E2eCheck", check_doc)
       .def(py::init<const S&>(), py::arg("settings"))
       .def(
           "push",
-          [](E2eCheck& self, const py::buffer& payload) {
-            return as_str(name_of(e2e_status_names(), self.push(to_payload(payload))));
-          },
+          [](E2eCheck& self, const py::buffer& payload) { return as_str(name_of(self.push(to_payload(payload)))); },
           py::arg("payload"),
           "Judge the next payload: 'ok', 'initial', 'repeated', 'lost', 'wrong_crc', 'wrong_length' or "
           "'wrong_counter'.")

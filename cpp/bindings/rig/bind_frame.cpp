@@ -3,11 +3,9 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <tuple>
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/rig/bus_monitor.hpp"
 #include "mgdd/rig/frame.hpp"
@@ -19,25 +17,19 @@ namespace {
 
 using rig::Frame;
 
-/// Payload and size in one, as bytes.
-struct Data {
-  const char* name = "data";
-  const char* doc = "Payload, up to 64 bytes.";
-  using Argument = py::buffer;  // a message of python-can holds a bytearray
-
-  void put(Frame& frame, const py::buffer& given) const {
-    const std::vector<std::uint8_t> bytes = to_payload(given);
-    std::copy(bytes.begin(), bytes.end(), frame.data.begin());
-    frame.size = static_cast<std::uint8_t>(bytes.size());
-  }
-  py::bytes get(const Frame& frame) const { return as_bytes(frame.payload()); }
-};
-py::arg_v keyword(const Data& row, const Frame&) {
-  return py::arg_v(row.name, py::bytes());
-}
-
-void check(const Frame& frame) {
-  require_within("id", frame.id, 0, frame.extended || frame.error ? 0x1FFFFFFF : 0x7FF);
+// The payload comes as any buffer: a message of python-can holds a bytearray.
+Frame frame_of(std::uint32_t id, const py::buffer& data, bool extended, bool error, bool received, bool fd,
+               bool bit_rate_switch, bool remote, int channel, std::int64_t monotonic_ns, std::int64_t bus_ns) {
+  require_within("id", id, 0, extended || error ? 0x1FFFFFFF : 0x7FF);
+  Frame frame{};
+  const std::vector<std::uint8_t> bytes = to_payload(data);
+  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+  frame.size = static_cast<std::uint8_t>(bytes.size());
+  frame.id = id, frame.extended = extended, frame.error = error, frame.received = received, frame.fd = fd;
+  frame.bit_rate_switch = bit_rate_switch, frame.remote = remote;
+  frame.channel = static_cast<decltype(frame.channel)>(channel);
+  frame.monotonic_ns = monotonic_ns, frame.bus_ns = bus_ns;
+  return frame;
 }
 
 }  // namespace
@@ -66,16 +58,29 @@ Examples
 >>> Frame(id=0x121, data=bytes(3), received=True).data
 b'\x00\x00\x00'
 )");
-  bind_rows(
-      cls, "Frame",
-      std::tuple{needed("id", &F::id, "Identifier."), Data{}, plain("extended", &F::extended, "29-bit identifier."),
-                 plain("error", &F::error, "News of a bus error."),
-                 plain("received", &F::received, "From the bus rather than sent by us."),
-                 plain("fd", &F::fd, "CAN FD."), plain("bit_rate_switch", &F::bit_rate_switch, "Fast data."),
-                 plain("remote", &F::remote, "Request of a frame."), plain("channel", &F::channel, "Which bus."),
-                 plain("monotonic_ns", &F::monotonic_ns, "When received or handed to the bus [ns]."),
-                 plain("bus_ns", &F::bus_ns, "Stamp of the driver [ns]; 0: none.")},
-      &check);
+  using py::arg;
+  cls.def(py::init(&frame_of), py::kw_only(), arg("id"), arg("data") = py::bytes(), arg("extended") = false,
+          arg("error") = false, arg("received") = false, arg("fd") = false, arg("bit_rate_switch") = false,
+          arg("remote") = false, arg("channel") = 0, arg("monotonic_ns") = 0, arg("bus_ns") = 0)
+      .def_readonly("id", &F::id, "Identifier.")
+      .def_property_readonly(
+          "data", [](const F& f) { return as_bytes(f.payload()); }, "Payload, up to 64 bytes.")
+      .def_readonly("extended", &F::extended, "29-bit identifier.")
+      .def_readonly("error", &F::error, "News of a bus error.")
+      .def_readonly("received", &F::received, "From the bus rather than sent by us.")
+      .def_readonly("fd", &F::fd, "CAN FD.")
+      .def_readonly("bit_rate_switch", &F::bit_rate_switch, "Fast data.")
+      .def_readonly("remote", &F::remote, "Request of a frame.")
+      .def_readonly("channel", &F::channel, "Which bus.")
+      .def_readonly("monotonic_ns", &F::monotonic_ns, "When received or handed to the bus [ns].")
+      .def_readonly("bus_ns", &F::bus_ns, "Stamp of the driver [ns]; 0: none.");
+  bind_value(cls, "Frame", [](const F& f) {
+    py::dict out;
+    for (const char* name : {"id", "data", "extended", "error", "received", "fd", "bit_rate_switch", "remote",
+                             "channel", "monotonic_ns", "bus_ns"})
+      out[name] = py::cast(f).attr(name);
+    return out;
+  });
   m.def(
       "error_classes",
       [](const Frame& frame) {

@@ -36,9 +36,9 @@ MessageOf<SignalOf> message_of(const MessageArgument& given) {
   MessageOf<SignalOf> message{.id = id, .extended = extended, .size = size, .protection = protection};
   for (const auto& [name, layout, fixed, at_rest, missing_raw] : signals) {
     if constexpr (std::is_same_v<SignalOf, CommandedSignal>) {
-      message.signals.push_back({parse_name(commanded_names(), "signals", name), layout, fixed, at_rest});
+      message.signals.push_back({parse_name<Commanded>("signals", name), layout, fixed, at_rest});
     } else {
-      message.signals.push_back({parse_name(measured_names(), "signals", name), layout, missing_raw});
+      message.signals.push_back({parse_name<Measured>("signals", name), layout, missing_raw});
     }
   }
   return message;
@@ -120,7 +120,7 @@ py::dict samples(RealtimeLoop& loop) {
       rows, [&](const S& s) { return s.age_ns < 0 ? std::numeric_limits<double>::quiet_NaN() : us(s.age_ns); });
   out["missed"] = column<std::int64_t>(rows, [](const S& s) { return s.missed; });
   out["reference_deg"] = column<double>(rows, [](const S& s) { return s.reference_deg; });
-  for (const auto& [what, name] : measured_names()) {
+  for (const auto& [what, name] : names<Measured>()) {
     const auto at = static_cast<std::size_t>(what);
     out[as_str(name)] = column<double>(rows, [at](const S& s) { return s.measured[at]; });
   }
@@ -142,9 +142,8 @@ py::list events(RealtimeLoop& loop) {
   py::list out;
   AuditEntry e;
   while (loop.cycle().pop_event(e)) {
-    out.append(py::make_tuple(e.cycle, as_str(name_of(safety_state_names(), e.from)),
-                              as_str(name_of(safety_state_names(), e.to)),
-                              as_str(name_of(safety_reason_names(), e.reason)), e.count));
+    out.append(
+        py::make_tuple(e.cycle, as_str(name_of(e.from)), as_str(name_of(e.to)), as_str(name_of(e.reason)), e.count));
   }
   return out;
 }
@@ -176,9 +175,9 @@ bool wait(const RealtimeLoop& loop, std::optional<double> timeout_s) {
 }  // namespace
 
 void bind_realtime_loop(py::module_& m) {
-  m.attr("measured_names") = all_names(measured_names());
-  m.attr("commanded_names") = all_names(commanded_names());
-  m.attr("send_results") = all_names(send_result_names());
+  m.attr("measured_names") = all_names(names<Measured>());
+  m.attr("commanded_names") = all_names(names<Commanded>());
+  m.attr("send_results") = all_names(names<SendResult>());
   const ScheduleSettings schedule;
   const CycleSettings settings;
   py::class_<RealtimeLoop>(m, "RealtimeLoop", "A controller in a thread of its own; behind mgdd.rig.RealtimeLoop.")
@@ -224,7 +223,7 @@ void bind_realtime_loop(py::module_& m) {
       .def(
           "request",
           [](RealtimeLoop& l, const std::string& request) {
-            return l.cycle().request(parse_name(safety_request_names(), "request", request));
+            return l.cycle().request(parse_name<SafetyRequest>("request", request));
           },
           py::arg("request"))
       .def("samples", &samples, "Samples since the last call, as a dict of columns.")
@@ -240,14 +239,10 @@ void bind_realtime_loop(py::module_& m) {
       .def_property_readonly("patience_s", &RealtimeLoop::patience_s)
       .def_property_readonly("running", [](const RealtimeLoop& l) { return l.thread().running(); })
       .def_property_readonly("queued_references", [](const RealtimeLoop& l) { return l.cycle().queued_references(); })
-      .def_property_readonly(
-          "state", [](const RealtimeLoop& l) { return as_str(name_of(safety_state_names(), l.cycle().state())); })
-      .def_property_readonly(
-          "reason", [](const RealtimeLoop& l) { return as_str(name_of(safety_reason_names(), l.cycle().reason())); })
-      .def_property_readonly(
-          "cause", [](const RealtimeLoop& l) { return as_str(name_of(safety_reason_names(), l.cycle().cause())); })
-      .def_property_readonly(
-          "bus_state", [](const RealtimeLoop& l) { return as_str(name_of(bus_state_names(), l.cycle().bus_state())); });
+      .def_property_readonly("state", [](const RealtimeLoop& l) { return as_str(name_of(l.cycle().state())); })
+      .def_property_readonly("reason", [](const RealtimeLoop& l) { return as_str(name_of(l.cycle().reason())); })
+      .def_property_readonly("cause", [](const RealtimeLoop& l) { return as_str(name_of(l.cycle().cause())); })
+      .def_property_readonly("bus_state", [](const RealtimeLoop& l) { return as_str(name_of(l.cycle().bus_state())); });
 }
 
 }  // namespace mgdd::bindings

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "binding.hpp"
@@ -30,9 +29,8 @@ using Entry = std::tuple<std::int64_t, py::str, py::str, py::str, std::int64_t>;
 std::vector<Entry> drained(SafetyGate& gate) {
   std::vector<Entry> out;
   while (const auto entry = gate.audit().pop()) {
-    out.emplace_back(entry->cycle, as_str(name_of(safety_state_names(), entry->from)),
-                     as_str(name_of(safety_state_names(), entry->to)),
-                     as_str(name_of(safety_reason_names(), entry->reason)), entry->count);
+    out.emplace_back(entry->cycle, as_str(name_of(entry->from)), as_str(name_of(entry->to)),
+                     as_str(name_of(entry->reason)), entry->count);
   }
   return out;
 }
@@ -50,10 +48,10 @@ void observe(SafetyGate& gate, std::int64_t good_frames, std::int64_t bad_frames
                 .age_s = age_s.value_or(unknown),
                 .sensor_v = sensor_v.value_or(std::array{unknown, unknown}),
                 .angle_deg = angle_deg.value_or(unknown),
-                .bus = parse_name(bus_state_names(), "bus", bus),
+                .bus = parse_name<BusState>("bus", bus),
                 .sent = sent,
                 .missed_deadlines = counted("missed_deadlines", missed_deadlines),
-                .request = parse_name(safety_request_names(), "request", request)});
+                .request = parse_name<SafetyRequest>("request", request)});
 }
 
 void bind_envelope(py::module_& m) {
@@ -113,11 +111,7 @@ Examples
 >>> SafetyEnvelope.from_toml(SafetyEnvelope(duty_limit=0.5).to_toml()) == SafetyEnvelope(duty_limit=0.5)
 True
 )");
-  std::array<Field<SafetyEnvelope>, n_envelope_fields> fields{};
-  std::ranges::copy(envelope_fields(), fields.begin());
-  bind_record<n_envelope_fields>(cls, "SafetyEnvelope", fields,
-                                 std::tuple{named("bus_fault_from", &SafetyEnvelope::bus_fault_from, &bus_state_names,
-                                                  "state of the CAN controller from which on it is limp")});
+  bind_record(cls, "SafetyEnvelope");
 }
 
 void bind_drive(py::module_& m) {
@@ -156,10 +150,10 @@ Drive(duty=0.0, bridge_open=True, send=True)
 }  // namespace
 
 void bind_safety(py::module_& m) {
-  m.attr("safety_states") = names_of(safety_state_names());
-  m.attr("safety_reasons") = names_of(safety_reason_names());
-  m.attr("safety_requests") = names_of(safety_request_names());
-  m.attr("bus_states") = names_of(bus_state_names());
+  m.attr("safety_states") = names_of(names<SafetyState>());
+  m.attr("safety_reasons") = names_of(names<SafetyReason>());
+  m.attr("safety_requests") = names_of(names<SafetyRequest>());
+  m.attr("bus_states") = names_of(names<BusState>());
   bind_envelope(m);
   bind_drive(m);
   py::class_<SafetyGate> cls(m, "SafetyGate", "The gate of the core; behind mgdd.rig.SafetyGate.");
@@ -200,8 +194,7 @@ mgdd.errors.ParameterError
   cls.def(
       "request",
       [](SafetyGate& gate, const std::string& name) {
-        return as_str(
-            name_of(safety_reason_names(), gate.request(parse_name(safety_request_names(), "request", name))));
+        return as_str(name_of(gate.request(parse_name<SafetyRequest>("request", name))));
       },
       py::arg("request"),
       "Ask for another state between two cycles.\n\nReturns what stands against it, ``'none'`` where it was accepted.");
@@ -210,18 +203,17 @@ mgdd.errors.ParameterError
   cls.def(
       "count",
       [](const SafetyGate& gate, const std::string& reason) {
-        return gate.count(parse_name(safety_reason_names(), "reason", reason));
+        return gate.count(parse_name<SafetyReason>("reason", reason));
       },
       py::arg("reason"), "Changes of state for a reason so far.");
   cls.def_property_readonly("envelope", &SafetyGate::envelope, py::return_value_policy::copy, "The envelope.");
   cls.def_property_readonly(
-      "mode", [](const SafetyGate& gate) { return as_str(name_of(safety_state_names(), gate.state())); },
+      "mode", [](const SafetyGate& gate) { return as_str(name_of(gate.state())); },
       "``init``, ``armed``, ``run``, ``limp`` or ``fault``.");
   cls.def_property_readonly(
-      "reason", [](const SafetyGate& gate) { return as_str(name_of(safety_reason_names(), gate.reason())); },
-      "Why that state was entered.");
+      "reason", [](const SafetyGate& gate) { return as_str(name_of(gate.reason())); }, "Why that state was entered.");
   cls.def_property_readonly(
-      "cause", [](const SafetyGate& gate) { return as_str(name_of(safety_reason_names(), gate.cause())); },
+      "cause", [](const SafetyGate& gate) { return as_str(name_of(gate.cause())); },
       "What is wrong now; arming, starting and a reset wait for its end.");
   cls.def_property_readonly("drive", &SafetyGate::drive, "The drive of the last cycle.");
   cls.def_property_readonly("rms_duty", &SafetyGate::rms_duty, "RMS duty of the heat model [-].");

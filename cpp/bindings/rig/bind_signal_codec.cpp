@@ -1,17 +1,14 @@
 // Binds rig/signal_codec.hpp: one signal in a payload, a column of payloads, the check of a message.
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/rig/signal_codec.hpp"
 #include "record_binding.hpp"
@@ -45,7 +42,7 @@ void require_packed(PackStatus status, const SignalLayout& layout, double value,
 }
 
 py::bytes pack_value(const SignalLayout& layout, const py::buffer& payload, double value, const std::string& beyond) {
-  const OutOfRange rule = parse_name(out_of_range_names(), "out_of_range", beyond);
+  const OutOfRange rule = parse_name<OutOfRange>("out_of_range", beyond);
   std::vector<std::uint8_t> bytes = to_payload(payload);
   require_packed(pack(layout, value, rule, bytes), layout, value, bytes.size());
   return as_bytes(bytes);
@@ -169,15 +166,7 @@ Examples
 >>> payload.hex(), duty.unpack(payload)
 ('0000300800000000', -1.0)
 )");
-  bind_rows(cls, "SignalLayout",
-            std::tuple{needed("start", &S::start, "First bit, as a DBC counts."), needed("length", &S::length, "Bits."),
-                       named("byte_order", &S::byte_order, &byte_order_names, "Order of the bytes."),
-                       named("raw_type", &S::type, &raw_type_names, "Meaning of the bits."),
-                       plain("scale", &S::scale, "Physical value of one step."),
-                       plain("offset", &S::offset, "Physical value of the raw 0."),
-                       plain("minimum", &S::minimum, "Lowest physical value, or None."),
-                       plain("maximum", &S::maximum, "Highest physical value, or None.")},
-            [](const S& layout) { validate(layout); });
+  bind_record(cls, "SignalLayout");
   cls.def("pack", &pack_value, py::arg("payload"), py::arg("value"), py::arg("out_of_range") = "clamp",
           "The payload with this physical value; beyond its range it is clamped, or with 'refuse' a ParameterError.");
   cls.def("unpack", &unpack_value, py::arg("payload"), "The physical value.");

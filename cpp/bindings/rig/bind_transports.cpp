@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -54,7 +53,7 @@ void bind_state(py::class_<T, std::shared_ptr<T>>& cls) {
       "counts", [](const T& t) { return counts_of(t.counts(), t.monitor()); },
       "Frames by what became of them, and error frames by kind, as a new dict.");
   cls.def_property_readonly(
-      "bus_state", [](const T& t) { return as_str(name_of(bus_state_names(), t.bus_state())); },
+      "bus_state", [](const T& t) { return as_str(name_of(t.bus_state())); },
       "``\"active\"``, ``\"warning\"``, ``\"passive\"`` or ``\"off\"``.");
   cls.def_property_readonly("in_use", [](T& t) { return t.claim().taken(); }, "Whether a loop takes its frames.");
 }
@@ -223,7 +222,7 @@ mgdd.errors.RigError
       "send",
       [](T& t, const Frame& frame) {
         require_free(t.claim());
-        return as_str(name_of(send_result_names(), without_gil([&] { return t.send(frame); })));
+        return as_str(name_of(without_gil([&] { return t.send(frame); })));
       },
       py::arg("frame"), R"(Send a frame now.
 

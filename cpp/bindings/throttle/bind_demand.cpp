@@ -217,9 +217,7 @@ void bind_equations(py::class_<Chain>& cls) {
 
 void bind_chain(py::module_& m) {
   py::class_<Chain> cls(m, "DemandChain", "Parameters of the chain; see mgdd.throttle.DemandChain.");
-  bind_record<n_demand_fields>(
-      cls, "DemandChain", demand_fields(),
-      std::tuple{inner("pedal_map", &Chain::pedal_map, "torque that the pedal wants over the speed")});
+  bind_record(cls, "DemandChain");
   bind_equations(cls);
   cls.def(
       "_steady",

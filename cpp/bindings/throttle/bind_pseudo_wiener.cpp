@@ -85,8 +85,7 @@ void bind_pseudo_wiener(py::module_& m) {
            }),
            arg("kind"), arg("parameters"), py::kw_only(), arg("switching") = "predicted",
            arg("friction") = "set_valued")
-      .def_property_readonly(
-          "kind", [](const BoundModel& s) { return as_str(name_of(pseudo_wiener_names(), kind_of(s.parameters))); })
+      .def_property_readonly("kind", [](const BoundModel& s) { return as_str(name_of(kind_of(s.parameters))); })
       .def_property_readonly("parameters", [](const BoundModel& s) { return parameters_of(s.parameters); })
       .def("__eq__",
            [](const BoundModel& s, const py::object& other) {
@@ -154,7 +153,7 @@ void bind_pseudo_wiener(py::module_& m) {
       "pseudo_wiener_units",
       [](const std::string& kind) {
         py::dict out;
-        for (const NamedNumber& number : named_numbers(parse_name(pseudo_wiener_names(), "kind", kind)))
+        for (const NamedNumber& number : named_numbers(parse_name<PseudoWienerKind>("kind", kind)))
           out[as_str(number.name)] = as_str(number.unit);
         return out;
       },

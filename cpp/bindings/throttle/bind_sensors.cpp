@@ -3,12 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "binding.hpp"
-#include "keywords.hpp"
 #include "mgdd/throttle/sensors.hpp"
+#include "record_binding.hpp"
 #include "throttle/sensor_fault_binding.hpp"
 
 namespace mgdd::bindings {
@@ -98,22 +97,10 @@ Examples
 12
 )");
   using P = SensorPair;
-  bind_rows(cls, "SensorPair",
-            std::tuple{plain("closed_v", &P::closed_v, "First sensor at 0 deg [V]."),
-                       plain("span_v", &P::span_v, "Rise of the first sensor over the travel [V]."),
-                       plain("travel_deg", &P::travel_deg, "Angle of the full span [deg]."),
-                       plain("supply_v", &P::supply_v, "Supply of sensors and converter [V]."),
-                       plain("noise_v", &P::noise_v, "Noise of each sensor, rms [V]."),
-                       plain("lag_s", &P::lag_s, "Time constant of the anti-alias filter [s]."),
-                       plain("adc_bits", &P::adc_bits, "Bits of the converter."),
-                       plain("sum_tolerance_v", &P::sum_tolerance_v, "Tolerance of the sum [V]."),
-                       plain("low_v", &P::low_v, "Lowest healthy voltage [V]."),
-                       plain("high_v", &P::high_v, "Highest healthy voltage [V]."),
-                       plain("debounce_s", &P::debounce_s, "Time a check must fail [s].")},
-            [](const P& pair) { validate(pair); });
+  bind_record(cls, "SensorPair");
   cls.def_property_readonly("lsb_v", &P::lsb_v, "Step of the converter [V].");
   py::list kinds;
-  for (const auto& [kind, name] : sensor_fault_names())
+  for (const auto& [kind, name] : names<SensorFaultKind>())
     kinds.append(as_str(name));
   m.attr("sensor_fault_kinds") = py::tuple(kinds);
   m.def("sense", &sense, py::arg("pair"), py::arg("angle_deg"), py::kw_only(), py::arg("sample_s"), py::arg("seed"),

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <span>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "binding.hpp"
@@ -41,10 +40,7 @@ Throttle(stiction_nm=0.3, limp_home_deg=10.0, friction='stribeck')
 >>> t.replace(supply_v=14.4).supply_v
 14.4
 )");
-  bind_record<n_throttle_fields>(
-      cls, "Throttle", fields(),
-      std::tuple{named("friction", &Throttle::friction, &friction_names, "law of the dry friction"),
-                 named("backlash", &Throttle::backlash, &backlash_names, "play between gear and plate")});
+  bind_record(cls, "Throttle");
   cls.def_property_readonly("stall_torque_nm", &Throttle::stall_torque_nm,
                             "Stall torque per unit duty, g = K (V - V_drop)/R [N m].");
   cls.def_property_readonly("damping_nms_per_rad", &Throttle::damping_nms_per_rad,
@@ -57,7 +53,7 @@ struct Inputs {
       : duty_column(to_column(duty, "duty")),
         supply_column(to_column(supply, "supply_v")),
         air_column(to_column(air, "airflow_torque_nm")),
-        bridge(parse_name(bridge_names(), "bridge", bridge_name)) {
+        bridge(parse_name<Bridge>("bridge", bridge_name)) {
     if (duty_column.empty()) throw about("duty", ShapeError("duty has no samples"));
     validate({duty_column, supply_column, air_column, bridge});  // whole columns: `part` cuts what is checked
   }

@@ -16,7 +16,7 @@ using SensorFaultArgument = std::tuple<std::string, double, double, std::optiona
 
 inline throttle::SensorFault sensor_fault_from(const SensorFaultArgument& given) {
   const auto& [kind, from_s, size, until_s] = given;
-  return {parse_name(throttle::sensor_fault_names(), "kind", kind), from_s, size, until_s};
+  return {parse_name<throttle::SensorFaultKind>("kind", kind), from_s, size, until_s};
 }
 
 inline std::array<throttle::SensorFault, 2> sensor_faults_from(const std::array<SensorFaultArgument, 2>& given) {

@@ -14,12 +14,11 @@ using P = PlateSettings;
 using L = FrictionLearnerSettings;
 using R = BeliefReviewSettings;
 
-constexpr Domain share = closed(0.0, 1.0);
 constexpr Domain price = closed(0.0, 1e9);
 constexpr Domain rate = closed(0.0, 1e9);
 constexpr Domain angle = closed(-1e3, 1e3);
 
-constexpr std::array<Field<Gp>, n_guided_predictive_fields> guided_predictive_table = joined(
+constexpr auto guided_predictive_table = joined(
     std::array{
         field<&Gp::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
         field<&Gp::plate, &P::gain_deg_per_s2>(
@@ -73,25 +72,14 @@ constexpr std::array<Field<Gp>, n_guided_predictive_fields> guided_predictive_ta
             {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
     });
 
-constexpr std::array<std::pair<Prediction, std::string_view>, 2> predictions{
-    {{Prediction::nonlinear, "nonlinear"}, {Prediction::linear, "linear"}}};
-constexpr std::array<std::pair<SideSwitching, std::string_view>, 2> switchings{
-    {{SideSwitching::predicted, "predicted"}, {SideSwitching::measured, "measured"}}};
-
 }  // namespace
 
-std::span<const Field<Gp>, n_guided_predictive_fields> guided_predictive_fields() noexcept {
+std::span<const Field<Gp>> guided_predictive_fields() noexcept {
   return guided_predictive_table;
-}
-Names<Prediction> prediction_names() noexcept {
-  return predictions;
-}
-Names<SideSwitching> side_switching_names() noexcept {
-  return switchings;
 }
 
 void validate(const Gp& s) {
-  require_fields(guided_predictive_table, s);
+  require_fields(fields_of(s), s);
   require_duty_range(s.lower, s.upper);
   const P& p = s.plate;
   if (!(p.closed_deg < p.open_deg)) {
@@ -100,8 +88,6 @@ void validate(const Gp& s) {
   if (!(s.lowest_deg < s.highest_deg)) {
     throw ParameterError("highest_deg", s.highest_deg, "must be > lowest_deg = " + text(s.lowest_deg), "deg");
   }
-  require_within("delay_samples", s.delay_samples, 0, longest_control_delay);
-  require_within("gauss_newton_steps", s.gauss_newton_steps, 1, 100);
   int steps = 0;
   for (std::size_t i = 0; i < s.move_steps.size(); ++i) {
     require_within("move_steps[" + std::to_string(i) + "]", s.move_steps[i], 1, longest_guided_horizon);

@@ -1,7 +1,6 @@
 #include "mgdd/control/horizon_settings.hpp"
 
 #include <array>
-#include <utility>
 
 #include "mgdd/common/error.hpp"
 
@@ -14,7 +13,7 @@ constexpr Domain horizon_weight = closed(0.0, 1e12);
 constexpr Domain bound = closed(-1e12, 1e12);
 constexpr Domain anywhere = closed(-unbounded, unbounded);
 
-constexpr std::array<Field<Hz>, n_horizon_fields> horizon_table{{
+constexpr std::array horizon_table{
     field<&Hz::output_weight>(
         {"output_weight", "-", horizon_weight, "weight of each squared output error but the last"}),
     field<&Hz::terminal_weight>({"terminal_weight", "-", horizon_weight, "weight of the last squared output error"}),
@@ -30,22 +29,12 @@ constexpr std::array<Field<Hz>, n_horizon_fields> horizon_table{{
     field<&Hz::output_limit_weight>(
         {"output_limit_weight", "-", horizon_weight, "price of the squared excess over them"}),
     field<&Hz::tolerance>({"tolerance", "-", above(0.0, 1e12), "converged where no input changes by more"}),
-}};
-
-constexpr std::array<std::pair<HorizonStatus, std::string_view>, 3> status_names{{
-    {HorizonStatus::converged, "converged"},
-    {HorizonStatus::iteration_limit, "iteration_limit"},
-    {HorizonStatus::not_finite, "not_finite"},
-}};
+};
 
 }  // namespace
 
-std::span<const Field<HorizonSettings>, n_horizon_fields> horizon_fields() noexcept {
+std::span<const Field<HorizonSettings>> horizon_fields() noexcept {
   return horizon_table;
-}
-
-Names<HorizonStatus> horizon_status_names() noexcept {
-  return status_names;
 }
 
 void validate(const HorizonSettings& s) {

@@ -8,7 +8,7 @@ namespace {
 using Mg = Mgdd1Settings;
 constexpr Domain mgdd1_weight = closed(0.0, 1e9);
 
-constexpr std::array<Field<Mg>, n_mgdd1_fields> mgdd1_table{{
+constexpr std::array mgdd1_table{
     field<&Mg::adaptation_gain>({"adaptation_gain", "-", above(0.0, 1.0), "share of the Gauss-Newton step"}),
     field<&Mg::difference>({"difference", "-", above(0.0, 0.5), "duty by which the model is asked for its slope"}),
     field<&Mg::error_weight>({"error_weight", "1/degree²", mgdd1_weight, "of the squared error at each sample"}),
@@ -20,11 +20,11 @@ constexpr std::array<Field<Mg>, n_mgdd1_fields> mgdd1_table{{
         {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
     field<&Mg::lower>({"lower", "-", lower_duty, "least duty"}),
     field<&Mg::upper>({"upper", "-", upper_duty, "largest duty"}),
-}};
+};
 
 }  // namespace
 
-std::span<const Field<Mg>, n_mgdd1_fields> mgdd1_fields() noexcept {
+std::span<const Field<Mg>> mgdd1_fields() noexcept {
   return mgdd1_table;
 }
 

@@ -16,7 +16,7 @@ constexpr Domain pid_gain = closed(0.0, 1e3);
 constexpr Domain pid_share = closed(0.0, 1.0);
 constexpr Domain pid_angle = above(0.0, 1e3);
 
-constexpr std::array<Field<Pi>, n_pid_fields> pid_table = joined(
+constexpr auto pid_table = joined(
     std::array{
         field<&Pi::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
         field<&Pi::above, &PidGains::proportional_per_deg>(
@@ -59,7 +59,7 @@ const PidSettings& checked(const PidSettings& settings) {
 
 }  // namespace
 
-std::span<const Field<PidSettings>, n_pid_fields> pid_fields() noexcept {
+std::span<const Field<PidSettings>> pid_fields() noexcept {
   return pid_table;
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <string_view>
-#include <utility>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/control/spring_fields.hpp"
@@ -14,15 +13,9 @@ namespace {
 
 using Sm = SlidingModeSettings;
 
-constexpr std::array<std::pair<ReachingLaw, std::string_view>, 3> law_names{{
-    {ReachingLaw::boundary_layer, "boundary_layer"},
-    {ReachingLaw::implicit, "implicit"},
-    {ReachingLaw::super_twisting, "super_twisting"},
-}};
-
 constexpr Domain sliding_share = closed(0.0, 1.0);
 
-constexpr std::array<Field<Sm>, n_sliding_mode_fields> sliding_mode_table = joined(
+constexpr auto sliding_mode_table = joined(
     std::array{
         field<&Sm::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
         field<&Sm::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
@@ -58,11 +51,7 @@ const SlidingModeSettings& checked(const SlidingModeSettings& settings) {
 
 }  // namespace
 
-Names<ReachingLaw> reaching_law_names() noexcept {
-  return law_names;
-}
-
-std::span<const Field<SlidingModeSettings>, n_sliding_mode_fields> sliding_mode_fields() noexcept {
+std::span<const Field<SlidingModeSettings>> sliding_mode_fields() noexcept {
   return sliding_mode_table;
 }
 

@@ -8,8 +8,6 @@ namespace mgdd::control {
 namespace {
 
 using Sv = SupervisorSettings;
-using Mode = SupervisorMode;
-using Reason = SupervisorReason;
 
 constexpr Domain supervisor_share = closed(0.0, 1.0);
 constexpr Domain degrees = closed(-360.0, 360.0);
@@ -17,7 +15,7 @@ constexpr Domain width = above(0.0, 1e3);
 constexpr Domain time = above(0.0, 60.0);
 constexpr Domain volts = closed(0.0, 100.0);
 
-constexpr std::array<Field<Sv>, n_supervisor_fields> supervisor_table = joined(
+constexpr auto supervisor_table = joined(
     std::array{
         field<&Sv::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
         field<&Sv::closed_deg>({"closed_deg", "deg", degrees, "lower end of the travel"}),
@@ -59,40 +57,9 @@ constexpr std::array<Field<Sv>, n_supervisor_fields> supervisor_table = joined(
         field<&Sv::healthy_s>({"healthy_s", "s", time, "time without any reason before an acknowledgement counts"}),
     });
 
-constexpr std::pair<Mode, std::string_view> modes[] = {
-    {Mode::normal, "normal"}, {Mode::holding, "holding"}, {Mode::limited, "limited"}, {Mode::limp_home, "limp_home"}};
-constexpr std::pair<Reason, std::string_view> reasons[] = {{Reason::none, "none"},
-                                                           {Reason::missing_reference, "missing_reference"},
-                                                           {Reason::reference_range, "reference_range"},
-                                                           {Reason::missing_sample, "missing_sample"},
-                                                           {Reason::stale_sample, "stale_sample"},
-                                                           {Reason::sensor_range, "sensor_range"},
-                                                           {Reason::sensor_disagreement, "sensor_disagreement"},
-                                                           {Reason::invalid_duty, "invalid_duty"},
-                                                           {Reason::supply_low, "supply_low"},
-                                                           {Reason::supply_lost, "supply_lost"},
-                                                           {Reason::jammed, "jammed"},
-                                                           {Reason::spring_lost, "spring_lost"},
-                                                           {Reason::tracking, "tracking"},
-                                                           {Reason::overload, "overload"}};
-constexpr std::pair<ReturnTest, std::string_view> tests[] = {{ReturnTest::none, "none"},
-                                                             {ReturnTest::pending, "pending"},
-                                                             {ReturnTest::passed, "passed"},
-                                                             {ReturnTest::failed, "failed"}};
-
 }  // namespace
 
-Names<SupervisorMode> supervisor_mode_names() noexcept {
-  return modes;
-}
-Names<SupervisorReason> supervisor_reason_names() noexcept {
-  return reasons;
-}
-Names<ReturnTest> return_test_names() noexcept {
-  return tests;
-}
-
-std::span<const Field<SupervisorSettings>, n_supervisor_fields> supervisor_fields() noexcept {
+std::span<const Field<SupervisorSettings>> supervisor_fields() noexcept {
   return supervisor_table;
 }
 

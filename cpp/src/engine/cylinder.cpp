@@ -1,7 +1,5 @@
 #include "mgdd/engine/cylinder.hpp"
 
-#include <utility>
-
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
@@ -21,22 +19,6 @@ std::string hint(std::string_view name, double value) {
   }
   return "";
 }
-
-constexpr std::pair<GammaModel, std::string_view> gamma_names[] = {
-    {GammaModel::constant, "constant"}, {GammaModel::linear, "linear"}, {GammaModel::polynomial, "polynomial"}};
-constexpr std::pair<BurnShape, std::string_view> burn_names[] = {
-    {BurnShape::triangle, "triangle"}, {BurnShape::wiebe, "wiebe"}, {BurnShape::double_wiebe, "double_wiebe"}};
-constexpr std::pair<WallHeatModel, std::string_view> wall_heat_names[] = {{WallHeatModel::woschni, "woschni"},
-                                                                          {WallHeatModel::hohenberg, "hohenberg"}};
-constexpr std::pair<IgnitionModel, std::string_view> ignition_names[] = {
-    {IgnitionModel::watson, "watson"},
-    {IgnitionModel::wolfer, "wolfer"},
-    {IgnitionModel::hardenberg_hase, "hardenberg_hase"},
-    {IgnitionModel::polynomial, "polynomial"}};
-constexpr std::pair<Integrator, std::string_view> integrator_names[] = {{Integrator::trapezoid, "trapezoid"},
-                                                                        {Integrator::split, "split"},
-                                                                        {Integrator::seed, "seed"},
-                                                                        {Integrator::euler, "euler"}};
 
 }  // namespace
 
@@ -70,10 +52,7 @@ void validate(const Cylinder& c) {
 }
 
 void validate(const OperatingPoint& p) {
-  require_fields(operating_point_fields<double>(), p);
-  if (p.burn_duration_cad) require_in(burn_duration_info, *p.burn_duration_cad);
-  if (p.trapped_mass_g) require_in(trapped_mass_info, *p.trapped_mass_g);
-  if (p.ivc_temperature_k) require_in(ivc_temperature_info, *p.ivc_temperature_k);
+  require_fields(fields_of(p), p);
 }
 
 void validate_timing(std::string_view name, double value, const Cylinder& c) {
@@ -91,49 +70,6 @@ void validate_timing(std::string_view name, double value, const Cylinder& c) {
     refuse("must lie in the closed part, from ivc_cad = " + text(c.geometry.ivc_cad) +
            " to evo_cad = " + text(c.geometry.evo_cad));
   }
-}
-
-Names<GammaModel> gamma_model_names() noexcept {
-  return gamma_names;
-}
-Names<BurnShape> burn_shape_names() noexcept {
-  return burn_names;
-}
-Names<WallHeatModel> wall_heat_model_names() noexcept {
-  return wall_heat_names;
-}
-Names<IgnitionModel> ignition_model_names() noexcept {
-  return ignition_names;
-}
-std::string_view to_string(GammaModel v) noexcept {
-  return name_of<GammaModel>(gamma_names, v);
-}
-std::string_view to_string(BurnShape v) noexcept {
-  return name_of<BurnShape>(burn_names, v);
-}
-std::string_view to_string(WallHeatModel v) noexcept {
-  return name_of<WallHeatModel>(wall_heat_names, v);
-}
-std::string_view to_string(IgnitionModel v) noexcept {
-  return name_of<IgnitionModel>(ignition_names, v);
-}
-std::string_view to_string(Integrator v) noexcept {
-  return name_of<Integrator>(integrator_names, v);
-}
-GammaModel parse_gamma_model(std::string_view t) {
-  return parse_name<GammaModel>(gamma_names, "gamma_model", t);
-}
-BurnShape parse_burn_shape(std::string_view t) {
-  return parse_name<BurnShape>(burn_names, "burn_shape", t);
-}
-WallHeatModel parse_wall_heat_model(std::string_view t) {
-  return parse_name<WallHeatModel>(wall_heat_names, "wall_heat_model", t);
-}
-IgnitionModel parse_ignition_model(std::string_view t) {
-  return parse_name<IgnitionModel>(ignition_names, "ignition_model", t);
-}
-Integrator parse_integrator(std::string_view t) {
-  return parse_name<Integrator>(integrator_names, "integrator", t);
 }
 
 }  // namespace mgdd::engine

@@ -1,35 +1,18 @@
 #include "mgdd/engine/emissions.hpp"
 
 #include <algorithm>
-#include <array>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::engine {
 namespace {
 
-constexpr std::pair<NoxMap, std::string_view> map_names[] = {{NoxMap::affine_log, "affine_log"},
-                                                             {NoxMap::arrhenius, "arrhenius"}};
 constexpr std::size_t fewest_points = 5;
-
-constexpr std::array proxy_fields{
-    field<&NoxProxy::reference_temperature_k>({"reference_temperature_k", "K", above(0.0), "T0 of the map"}),
-    field<&NoxProxy::reference_nox_ppm>({"reference_nox_ppm", "ppm", above(0.0), "NOx at T0"}),
-    field<&NoxProxy::activation_temperature_k>({"activation_temperature_k", "K", above(0.0), "b of the Arrhenius map"}),
-};
-constexpr std::array model_fields{
-    field<&NoxModel::intake_o2_fraction>({"intake_o2_fraction", "-", above(0.0, 1.0), "intake oxygen by volume"}),
-    field<&NoxModel::o2_exponent>({"o2_exponent", "-", closed(0.0, 10.0), "exponent of the oxygen factor"}),
-};
-constexpr std::array sensor_fields{
-    field<&SoftSensor::correction_gain>({"correction_gain", "-", closed(0.0, 1.0), "share of the log-ratio per cycle"}),
-};
 
 void require_positive_column(std::string_view name, std::span<const double> column) {
   for (std::size_t i = 0; i < column.size(); ++i) {
@@ -41,25 +24,18 @@ void require_positive_column(std::string_view name, std::span<const double> colu
 
 }  // namespace
 
-std::string_view to_string(NoxMap map) noexcept {
-  return name_of<NoxMap>(map_names, map);
-}
-NoxMap parse_nox_map(std::string_view name) {
-  return parse_name<NoxMap>(map_names, "map", name);
-}
-
 void validate(const NoxProxy& p) {
-  require_fields(proxy_fields, p);
+  require_fields(fields_of(p), p);
 }
 
 void validate(const NoxModel& m) {
   validate(m.proxy);
-  require_fields(model_fields, m);
+  require_fields(fields_of(m), m);
 }
 
 void validate(const SoftSensor& s) {
   validate(s.model);
-  require_fields(sensor_fields, s);
+  require_fields(fields_of(s), s);
 }
 
 NoxFit fit_nox_proxy(std::span<const double> t_max_k, std::span<const double> nox_ppm, NoxMap map,

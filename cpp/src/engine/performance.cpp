@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
@@ -15,22 +14,8 @@ namespace {
 
 using enum PerformanceSignal;
 
-constexpr std::pair<PerformanceSignal, std::string_view> signal_names[] = {{efficiency_percent, "efficiency_percent"},
-                                                                           {imep_gross_bar, "imep_gross_bar"},
-                                                                           {imep_closed_bar, "imep_closed_bar"},
-                                                                           {nox_ppm, "nox_ppm"},
-                                                                           {p_max_bar, "p_max_bar"},
-                                                                           {dp_max_bar_per_cad, "dp_max_bar_per_cad"},
-                                                                           {t_max_k, "t_max_k"}};
-constexpr std::pair<PerformanceSignal, std::string_view> signal_units[] = {{efficiency_percent, "%"},
-                                                                           {imep_gross_bar, "bar"},
-                                                                           {imep_closed_bar, "bar"},
-                                                                           {nox_ppm, "ppm"},
-                                                                           {p_max_bar, "bar"},
-                                                                           {dp_max_bar_per_cad, "bar/°CA"},
-                                                                           {t_max_k, "K"}};
-static_assert(std::size(signal_names) == performance_signal_count);
-static_assert(std::size(signal_units) == performance_signal_count);
+constexpr std::array<std::string_view, performance_signal_count> signal_units{"%",   "bar",     "bar", "ppm",
+                                                                              "bar", "bar/°CA", "K"};
 
 void validate(const PerformanceTerm& term, std::size_t index) {
   const std::string owner = "terms[" + std::to_string(index) + "].";
@@ -47,14 +32,8 @@ void validate(const PerformanceTerm& term, std::size_t index) {
 
 }  // namespace
 
-std::string_view to_string(PerformanceSignal signal) noexcept {
-  return name_of<PerformanceSignal>(signal_names, signal);
-}
-PerformanceSignal parse_performance_signal(std::string_view name) {
-  return parse_name<PerformanceSignal>(signal_names, "signal", name);
-}
 std::string_view unit_of(PerformanceSignal signal) noexcept {
-  return name_of<PerformanceSignal>(signal_units, signal);
+  return signal_units[static_cast<std::size_t>(signal)];
 }
 
 PerformanceSignals signals_of(const Indicators<double>& cycle, double nox) noexcept {

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
@@ -14,15 +13,6 @@ namespace {
 
 constexpr double contradiction_sds = 3.0;
 constexpr double culprit_share = 0.25;  // of the variance that would go if that parameter were known
-
-constexpr std::array<std::pair<Knowledge, std::string_view>, 6> knowledge_names{{
-    {Knowledge::no_data, "no data"},
-    {Knowledge::determined, "determined"},
-    {Knowledge::uncertain, "uncertain"},
-    {Knowledge::held, "held"},
-    {Knowledge::at_bound, "at bound"},
-    {Knowledge::contradicted, "contradicted"},
-}};
 
 std::string name_of_parameter(int parameter) {
   return std::string(info_of(parameter).field.name);
@@ -45,10 +35,6 @@ double determined_below(int parameter, double value) noexcept {
 }
 
 }  // namespace
-
-std::string_view to_string(Knowledge knowledge) noexcept {
-  return name_of<Knowledge>(knowledge_names, knowledge);
-}
 
 CalibrationVector OnlineCalibration::standard_errors() const noexcept {
   return covariance_.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -111,7 +97,7 @@ std::string OnlineCalibration::explain(int parameter) const {
   }
   const double error = std::sqrt(std::max(covariance_(parameter, parameter), 0.0));
   std::string out = name + " = " + short_text(x_[parameter]) + " +- " + with_unit(error, parameter) + ": ";
-  out += to_string(v.knowledge);
+  out += name_of(v.knowledge);
   const auto because = [&] {
     if (v.culprit < 0) return std::string(", by noise");
     return ", mostly because " + name_of_parameter(v.culprit) + " is known to " +

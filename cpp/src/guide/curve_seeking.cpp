@@ -70,7 +70,7 @@ CurveSeekingSettings checked(CurveSeekingSettings s) {
   }
   if (s.amplitude_max == 0.0) s.amplitude_max = amplitude_share * s.prior_sd;
   require_in(above(0.0, 1e12), "amplitude_max", s.amplitude_max);
-  if (!(s.rate > 0.0)) throw ParameterError("rate", s.rate, "must be > 0");
+  if (s.rate && !(*s.rate > 0.0)) throw ParameterError("rate", *s.rate, "must be > 0");
   optimize::validate(std::vector{s.sensor});
   if (!(s.delay_uncertainty >= 0 && s.delay_uncertainty <= most_uncertain)) {
     throw ParameterError("delay_uncertainty", s.delay_uncertainty,
@@ -177,7 +177,9 @@ const Inputs& CurveSeeking::ask() noexcept {
     applied_[0] = estimate_[0] + (centre ? 0.0 : upwards_ ? amplitude() : -amplitude());
   }
   if (sent_count_ > 0) applied_[0] = within_limits(applied_[0]);
-  if (protocol_.cycle > 0) applied_[0] = std::clamp(applied_[0], last - settings_.rate, last + settings_.rate);
+  if (protocol_.cycle > 0 && settings_.rate) {
+    applied_[0] = std::clamp(applied_[0], last - *settings_.rate, last + *settings_.rate);
+  }
   applied_[0] = std::clamp(applied_[0], settings_.space.lower[0], settings_.space.upper[0]);
   return protocol_.ask(applied_);
 }

@@ -9,21 +9,6 @@
 namespace mgdd::guide {
 namespace {
 
-constexpr std::array<std::pair<CalibrationStatus, std::string_view>, 12> status_names{{
-    {CalibrationStatus::accepted, "accepted"},
-    {CalibrationStatus::updated, "updated"},
-    {CalibrationStatus::collecting, "collecting"},
-    {CalibrationStatus::poor_excitation, "poor excitation"},
-    {CalibrationStatus::misfire, "misfire"},
-    {CalibrationStatus::cov, "COV"},
-    {CalibrationStatus::jump, "jump"},
-    {CalibrationStatus::unsteady, "unsteady"},
-    {CalibrationStatus::saturated, "saturated"},
-    {CalibrationStatus::unusable, "unusable numbers"},
-    {CalibrationStatus::wrong_size, "wrong size"},
-    {CalibrationStatus::unphysical, "no such cycle"},
-}};
-
 constexpr double changed_fraction = 0.05;   // of speed, fuel, intake pressure or temperature: another operating point
 constexpr std::ptrdiff_t flat_samples = 4;  // at the maximum; the top of a real trace is round
 constexpr double percent = 100.0;
@@ -60,10 +45,6 @@ bool is_saturated(std::span<const double> pressure) noexcept {
 }
 
 }  // namespace
-
-std::string_view to_string(CalibrationStatus status) noexcept {
-  return name_of<CalibrationStatus>(status_names, status);
-}
 
 CycleWindow::CycleWindow(const CycleWindowSettings& settings, std::span<const double> volume_m3, double swept_m3)
     : settings_(settings), volume_m3_(volume_m3.begin(), volume_m3.end()), swept_m3_(swept_m3) {

@@ -1,7 +1,6 @@
 #include "mgdd/guide/guide_path.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -12,12 +11,6 @@ namespace mgdd::guide {
 namespace {
 
 using optimize::Inputs;
-
-constexpr std::array<std::pair<GuideCause, std::string_view>, 3> cause_names{{
-    {GuideCause::new_point, "new_point"},
-    {GuideCause::following, "following"},
-    {GuideCause::calibration, "calibration"},
-}};
 
 constexpr double least_room = 0.01;  // share of a move: with less room inside the bounds it is not tested
 
@@ -45,13 +38,6 @@ double bend_of(const Inputs& curvature, const Inputs& move) noexcept {
 }
 
 }  // namespace
-
-std::string_view to_string(GuideCause v) noexcept {
-  return name_of<GuideCause>(cause_names, v);
-}
-GuideCause parse_guide_cause(std::string_view name) {
-  return parse_name<GuideCause>(cause_names, "cause", name);
-}
 
 double share_within(const Inputs& from, const Inputs& move, const optimize::SearchSpace& space) noexcept {
   double share = 1.0;

@@ -11,11 +11,6 @@
 namespace mgdd::guide {
 namespace {
 
-constexpr std::array<std::pair<OptimumMethod, std::string_view>, 2> method_names{{
-    {OptimumMethod::gradient, "gradient"},
-    {OptimumMethod::golden_section, "golden_section"},
-}};
-
 constexpr double scan_cad = 5.0;                        // guards against flat regions and edges
 constexpr int golden_evaluations = 20;                  // from 10 CAD to 0.002
 constexpr double golden = 0.38196601125010515;          // (3 - sqrt 5)/2
@@ -64,13 +59,6 @@ bool inside_domains(const engine::OperatingPoint& point) noexcept {
 }
 
 }  // namespace
-
-std::string_view to_string(OptimumMethod v) noexcept {
-  return name_of<OptimumMethod>(method_names, v);
-}
-OptimumMethod parse_optimum_method(std::string_view name) {
-  return parse_name<OptimumMethod>(method_names, "method", name);
-}
 
 void validate(const ModelOptimumSettings& s) {
   engine::validate(s.cylinder);

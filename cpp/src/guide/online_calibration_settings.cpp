@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <string>
-#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
@@ -15,20 +14,8 @@ constexpr double gamma_lower = 1.15, gamma_upper = 1.6;
 constexpr double compression_lower = 3.0, compression_upper = 99.0;
 constexpr double wall_lower_k = 300.0, wall_upper_k = 1700.0;
 
-constexpr std::array<std::pair<CalibrationMethod, std::string_view>, 3> calibration_method_names{{
-    {CalibrationMethod::extremum_seeking, "extremum_seeking"},
-    {CalibrationMethod::gauss_newton, "gauss_newton"},
-    {CalibrationMethod::recursive, "recursive"},
-}};
-
 }  // namespace
 
-std::string_view to_string(CalibrationMethod method) noexcept {
-  return name_of<CalibrationMethod>(calibration_method_names, method);
-}
-CalibrationMethod parse_calibration_method(std::string_view name) {
-  return parse_name<CalibrationMethod>(calibration_method_names, "method", name);
-}
 int parse_calibrated(std::string_view field, std::string_view name) {
   std::string valid;
   for (int i = 0; i < n_calibrated; ++i) {

@@ -1,22 +1,13 @@
 #include "mgdd/guide/trust.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
 
 namespace mgdd::guide {
 namespace {
-
-constexpr std::array<std::pair<Verdict, std::string_view>, 4> verdict_names{{
-    {Verdict::untested, "untested"},
-    {Verdict::undecided, "undecided"},
-    {Verdict::confirmed, "confirmed"},
-    {Verdict::wrong, "wrong"},
-}};
 
 constexpr double anything_sd = 1.0;        // of the share, of a guide that is not as good as it was
 constexpr double noise_memory = 40.0;      // cycles behind the plane
@@ -29,10 +20,6 @@ constexpr double refusal_share = 0.9;      // of the trust left after a value th
 constexpr double unmeasured_share = 0.5;   // ... of the doubt, or of the trust, left after a verdict without curvature
 
 }  // namespace
-
-std::string_view to_string(Verdict v) noexcept {
-  return name_of<Verdict>(verdict_names, v);
-}
 
 void validate(const TrustSettings& s) {
   require_within("initial", s.initial, 0.0, 1.0);

@@ -3,41 +3,16 @@
 #include <array>
 #include <cmath>
 #include <string>
-#include <utility>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 
 namespace mgdd::loop {
 namespace {
-
-constexpr std::pair<NoxSensor, std::string_view> sensor_names[] = {{NoxSensor::none, "none"},
-                                                                   {NoxSensor::analyser, "analyser"},
-                                                                   {NoxSensor::fast, "fast"},
-                                                                   {NoxSensor::soft, "soft"},
-                                                                   {NoxSensor::soft_corrected, "soft_corrected"},
-                                                                   {NoxSensor::true_value, "true_value"}};
-
-using S = BenchSettings;
-constexpr std::array setting_fields{
-    field<&S::soc_scatter_cad>({"soc_scatter_cad", "°CA", closed(0.0, 5.0), "standard deviation of SOC"}),
-    field<&S::efficiency_noise_percent>(
-        {"efficiency_noise_percent", "%", closed(0.0, 20.0), "standard deviation of efficiency in points"}),
-    field<&S::misfire_probability>({"misfire_probability", "-", closed(0.0, 1.0), "misfires per cycle"}),
-    field<&S::soc_drift_cad_per_kcycle>(
-        {"soc_drift_cad_per_kcycle", "°CA", closed(-100.0, 100.0), "offset of SOC per 1000 cycles"}),
-    field<&S::wall_heat_drift_per_kcycle>(
-        {"wall_heat_drift_per_kcycle", "-", closed(-100.0, 100.0), "change of wall_heat_scale per 1000 cycles"}),
-    field<&S::pressure_noise_bar>({"pressure_noise_bar", "bar", closed(0.0, 20.0), "standard deviation of a sample"}),
-    field<&S::tdc_error_cad>({"tdc_error_cad", "°CA", closed(-5.0, 5.0), "angles of the trace read that much high"}),
-    field<&S::pressure_gain_error>(
-        {"pressure_gain_error", "-", closed(-0.5, 0.5), "share by which pressure reads high"}),
-    field<&S::pressure_offset_bar>({"pressure_offset_bar", "bar", closed(-5.0, 5.0), "error of pegging"}),
-};
 
 // The refusal of another room, with the field of the bench in front.
 template <class Check>
@@ -93,13 +68,6 @@ void validate_limits(const BenchSettings& s) {
 
 }  // namespace
 
-std::string_view to_string(NoxSensor sensor) noexcept {
-  return name_of<NoxSensor>(sensor_names, sensor);
-}
-NoxSensor parse_nox_sensor(std::string_view name) {
-  return parse_name<NoxSensor>(sensor_names, "nox_sensor", name);
-}
-
 std::array<double, 2> closed_part(const engine::Cylinder& c) noexcept {
   const double lead =
       c.burn.burn_shape == engine::BurnShape::double_wiebe ? std::fmin(0.0, c.burn.second_delay_cad) : 0.0;
@@ -115,7 +83,7 @@ void validate(const BenchSettings& s) {
   engine::validate(s.cylinder);
   static_cast<void>(engine::crank_grid(s.cylinder, s.step_cad));
   validate_schedule(s);
-  require_fields(setting_fields, s);
+  require_fields(fields_of(s), s);
   check_member("true_nox", [&] { engine::validate(s.true_nox); });
   check_member("soft_sensor", [&] { engine::validate(s.soft_sensor); });
   validate("analyser", s.analyser);

@@ -137,7 +137,7 @@ std::vector<LoopRange> groups_of(const MonteCarloPlan& plan, LoopForm form) {
 
 LoopForm form_of_loops(std::size_t loops, LoopForm wanted) {
   if (wanted == LoopForm::shared) {
-    throw ParameterError("form", engine::to_string(wanted), "must be automatic, single or lanes");
+    throw ParameterError("form", name_of(wanted), "must be automatic, single or lanes");
   }
   if (wanted != LoopForm::automatic) return wanted;
   return loops >= EngineBenchLanes::width ? LoopForm::lanes : LoopForm::single;

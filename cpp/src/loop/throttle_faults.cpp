@@ -9,25 +9,12 @@ namespace {
 
 using Kind = ThrottleFaultKind;
 
-constexpr std::pair<Kind, std::string_view> kinds[] = {{Kind::jammed, "jammed"},
-                                                       {Kind::jammed_at, "jammed_at"},
-                                                       {Kind::spring_above, "spring_above"},
-                                                       {Kind::spring_below, "spring_below"},
-                                                       {Kind::supply_sag, "supply_sag"},
-                                                       {Kind::missing_sample, "missing_sample"},
-                                                       {Kind::nan_sample, "nan_sample"},
-                                                       {Kind::stale_sample, "stale_sample"}};
-
 // The sample that begins at a time or next after it; a time that is a whole number of samples but for rounding is one.
 std::int64_t sample_at(double time_s, double sample_s) noexcept {
   return static_cast<std::int64_t>(std::ceil(time_s / sample_s - 1e-6));
 }
 
 }  // namespace
-
-Names<ThrottleFaultKind> throttle_fault_names() noexcept {
-  return kinds;
-}
 
 void validate(const ThrottleFault& fault) {
   require_within("from_s", fault.from_s, 0.0, 1e9, "s");

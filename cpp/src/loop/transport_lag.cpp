@@ -1,24 +1,14 @@
 #include "mgdd/loop/transport_lag.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::loop {
 namespace {
-
-constexpr double longest_s = 60.0;
-constexpr double longest_cycles = 100000.0;
-
-constexpr std::array dynamics_fields{
-    field<&SensorDynamics::delay_s>({"delay_s", "s", closed(0.0, longest_s), "delay of the sample line"}),
-    field<&SensorDynamics::lag_s>({"lag_s", "s", closed(0.0, longest_s), "time constant"}),
-    field<&SensorDynamics::noise_fraction>({"noise_fraction", "-", closed(0.0, 0.2), "noise over reading"}),
-};
 
 // Four-stroke: one cycle lasts 120 / N seconds.
 double cycles(double time_s, double speed_rpm) noexcept {
@@ -39,9 +29,7 @@ double SensorDynamics::gain_at(double speed_rpm) const noexcept {
 
 void validate(std::string_view sensor, const SensorDynamics& d) {
   try {
-    require_fields(dynamics_fields, d);
-    if (d.delay_cycles) require_within("delay_cycles", static_cast<double>(*d.delay_cycles), 0.0, longest_cycles);
-    if (d.lag_cycles) require_within("lag_cycles", *d.lag_cycles, 0.0, longest_cycles);
+    require_fields(fields_of(d), d);
   } catch (const ParameterError& error) {
     throw within(sensor, error);
   }

@@ -69,7 +69,9 @@ std::uint8_t checksum(const E2eSettings& s, std::span<const std::uint8_t> payloa
   const auto own = static_cast<std::size_t>(s.crc_byte);
   for (std::size_t i = 0; i < payload.size(); ++i)
     if (i != own) sum = s.crc.next(sum, payload[i]);
-  if (s.data_id_mode == DataIdMode::list) sum = s.crc.next(sum, s.data_id_list[static_cast<std::size_t>(counter & 15)]);
+  if (s.data_id_mode == DataIdMode::list && s.data_id_list) {
+    sum = s.crc.next(sum, (*s.data_id_list)[static_cast<std::size_t>(counter & 15)]);
+  }
   return static_cast<std::uint8_t>(sum ^ s.crc.final_xor);
 }
 
@@ -84,45 +86,19 @@ Crc8 named_crc8(std::string_view name) {
   throw ParameterError("crc", name, "must be one of " + valid + ", or (polynomial, start, final xor)");
 }
 
-std::optional<std::string_view> name_of(const Crc8& crc) noexcept {
+std::optional<std::string_view> crc_name(const Crc8& crc) noexcept {
   for (const auto& [name, known] : named)
     if (known == crc) return name;
   return std::nullopt;
 }
 
-Names<DataIdMode> data_id_mode_names() noexcept {
-  static constexpr std::array<std::pair<DataIdMode, std::string_view>, 5> names{
-      {{DataIdMode::none, "none"},
-       {DataIdMode::low, "low"},
-       {DataIdMode::both, "both"},
-       {DataIdMode::alternating, "alternating"},
-       {DataIdMode::list, "list"}}};
-  return names;
-}
-
-Names<CounterPlace> counter_place_names() noexcept {
-  static constexpr std::array<std::pair<CounterPlace, std::string_view>, 3> names{
-      {{CounterPlace::low_nibble, "low_nibble"},
-       {CounterPlace::high_nibble, "high_nibble"},
-       {CounterPlace::byte, "byte"}}};
-  return names;
-}
-
-Names<E2eStatus> e2e_status_names() noexcept {
-  static constexpr std::array<std::pair<E2eStatus, std::string_view>, e2e_status_count> names{
-      {{E2eStatus::ok, "ok"},
-       {E2eStatus::initial, "initial"},
-       {E2eStatus::repeated, "repeated"},
-       {E2eStatus::lost, "lost"},
-       {E2eStatus::wrong_crc, "wrong_crc"},
-       {E2eStatus::wrong_length, "wrong_length"},
-       {E2eStatus::wrong_counter, "wrong_counter"}}};
-  return names;
-}
-
 void validate(const E2eSettings& s) {
-  require_within("data_id", s.data_id, 0, 0xFFFF);
-  require_within("size", s.size, 2, max_payload, "bytes");
+  require_fields(fields_of(s), s);
+  if ((s.data_id_mode == DataIdMode::list) != s.data_id_list.has_value()) {
+    throw about("data_id_list",
+                ParameterError(s.data_id_list ? "data_id_list: must be None unless data_id_mode is 'list'"
+                                              : "data_id_list: must be 16 bytes for data_id_mode='list'"));
+  }
   require_within("crc_byte", s.crc_byte, 0, s.size - 1);
   require_within("counter_byte", s.counter_byte, 0, s.size - 1);
   if (s.crc_byte == s.counter_byte) {
@@ -130,8 +106,6 @@ void validate(const E2eSettings& s) {
   }
   require_within("counter_modulus", s.counter_modulus, 2, counter_values(s.counter_place));
   require_within("max_step", s.max_step, 1, s.counter_modulus - 1);
-  require_within("bad_until_invalid", s.bad_until_invalid, 1, 1e6, "frames");
-  require_within("good_until_valid", s.good_until_valid, 1, 1e6, "frames");
 }
 
 bool protect(const E2eSettings& settings, int counter, std::span<std::uint8_t> payload) noexcept {

@@ -5,33 +5,18 @@
 #include <cmath>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "mgdd/common/error.hpp"
 
 namespace mgdd::rig {
 namespace {
 
-constexpr std::array<std::pair<Measured, std::string_view>, n_measured> measured{
-    {{Measured::angle_deg, "angle_deg"},
-     {Measured::first_v, "first_v"},
-     {Measured::second_v, "second_v"},
-     {Measured::supply_v, "supply_v"},
-     {Measured::current_a, "current_a"},
-     {Measured::speed_deg_per_s, "speed_deg_per_s"},
-     {Measured::applied_duty, "applied_duty"}}};
-
-constexpr std::array<std::pair<Commanded, std::string_view>, 4> commanded{{{Commanded::duty, "duty"},
-                                                                           {Commanded::enable, "enable"},
-                                                                           {Commanded::reference_deg, "reference_deg"},
-                                                                           {Commanded::fixed, "fixed"}}};
-
 std::string name(const MeasuredSignal& signal, std::size_t) {
-  return std::string(name_of(measured_names(), signal.what));
+  return std::string(name_of(signal.what));
 }
 // A command may have several fixed numbers.
 std::string name(const CommandedSignal& signal, std::size_t place) {
-  const std::string shown(name_of(commanded_names(), signal.what));
+  const std::string shown(name_of(signal.what));
   return signal.what == Commanded::fixed ? shown + " " + std::to_string(place + 1) : shown;
 }
 
@@ -85,13 +70,6 @@ void require_valid(const MessageOf<SignalOf>& message) {
 
 }  // namespace
 
-Names<Measured> measured_names() noexcept {
-  return measured;
-}
-Names<Commanded> commanded_names() noexcept {
-  return commanded;
-}
-
 void validate(const FrameCodecSettings& s) {
   require_valid(s.command);
   std::array<int, n_measured> times{};
@@ -105,7 +83,7 @@ void validate(const FrameCodecSettings& s) {
     for (const MeasuredSignal& signal : message.signals)
       ++times[static_cast<std::size_t>(signal.what)];
   }
-  for (const auto& [what, text] : measured) {
+  for (const auto& [what, text] : names<Measured>()) {
     const int n = times[static_cast<std::size_t>(what)];
     if (n > 1) refuse(text, " is read from " + std::to_string(n) + " signals: must be one");
     if (n == 0 && static_cast<std::size_t>(what) < n_needed) {

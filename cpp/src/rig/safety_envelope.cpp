@@ -2,7 +2,6 @@
 
 #include <array>
 #include <string_view>
-#include <utility>
 
 #include "mgdd/common/text.hpp"
 
@@ -13,11 +12,6 @@ using E = SafetyEnvelope;
 
 constexpr Domain count = closed(1.0, 1e6);
 constexpr Domain volts = closed(0.0, 100.0);
-
-constexpr std::pair<BusState, std::string_view> bus_states[] = {{BusState::active, "active"},
-                                                                {BusState::warning, "warning"},
-                                                                {BusState::passive, "passive"},
-                                                                {BusState::off, "off"}};
 
 constexpr std::array fields{
     field<&E::cycle_s>({"cycle_s", "s", closed(1e-5, 1.0), "time between two cycles of the gate"}),
@@ -50,7 +44,6 @@ constexpr std::array fields{
     field<&E::open_deg>({"open_deg", "deg", closed(-360.0, 360.0), "upper end of the travel"}),
     field<&E::travel_margin_deg>({"travel_margin_deg", "deg", closed(0.0, 360.0), "by which an angle may leave it"}),
 };
-static_assert(fields.size() == n_envelope_fields);
 
 void require_below(std::string_view name, double value, std::string_view other, double bound, std::string_view unit) {
   if (value < bound) return;
@@ -59,11 +52,7 @@ void require_below(std::string_view name, double value, std::string_view other, 
 
 }  // namespace
 
-Names<BusState> bus_state_names() noexcept {
-  return bus_states;
-}
-
-std::span<const Field<SafetyEnvelope>, n_envelope_fields> envelope_fields() noexcept {
+std::span<const Field<SafetyEnvelope>> envelope_fields() noexcept {
   return fields;
 }
 
@@ -73,7 +62,7 @@ void validate(const SafetyEnvelope& e) {
   require_below("closed_deg", e.closed_deg, "open_deg", e.open_deg, "deg");
   require_within("rms_duty_to_arm", e.rms_duty_to_arm, 0.0, e.rms_duty_limit);
   if (e.bus_fault_from == BusState::active) {
-    throw ParameterError("bus_fault_from", name_of(bus_state_names(), e.bus_fault_from),
+    throw ParameterError("bus_fault_from", name_of(e.bus_fault_from),
                          "must be warning, passive or off: a healthy bus is active");
   }
 }

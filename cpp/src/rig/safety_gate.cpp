@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/control/monitoring.hpp"
@@ -16,10 +15,6 @@ using Request = SafetyRequest;
 
 constexpr double longest_s = 1e9;  // of an age: finite, so that a state can be saved
 
-constexpr std::pair<Request, std::string_view> requests[] = {
-    {Request::none, "none"},     {Request::arm, "arm"},     {Request::run, "run"},    {Request::stop, "stop"},
-    {Request::disarm, "disarm"}, {Request::reset, "reset"}, {Request::abort, "abort"}};
-
 const SafetyEnvelope& checked(const SafetyEnvelope& envelope) {
   validate(envelope);
   return envelope;  // NOLINT(bugprone-return-const-ref-from-parameter): the caller holds it
@@ -31,10 +26,6 @@ double grown(double x) noexcept {
 }
 
 }  // namespace
-
-Names<SafetyRequest> safety_request_names() noexcept {
-  return requests;
-}
 
 SafetyGate::SafetyGate(const SafetyEnvelope& envelope) : envelope_(checked(envelope)) {
   s_.since_sensor.fill(-1.0);

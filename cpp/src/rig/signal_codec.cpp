@@ -1,13 +1,11 @@
 #include "mgdd/rig/signal_codec.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <bitset>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
@@ -125,33 +123,12 @@ bool together(const Signal& a, const Signal& b) noexcept {
 
 }  // namespace
 
-Names<ByteOrder> byte_order_names() noexcept {
-  static constexpr std::array<std::pair<ByteOrder, std::string_view>, 2> names{
-      {{ByteOrder::little_endian, "little_endian"}, {ByteOrder::big_endian, "big_endian"}}};
-  return names;
-}
-
-Names<RawType> raw_type_names() noexcept {
-  static constexpr std::array<std::pair<RawType, std::string_view>, 4> names{{{RawType::unsigned_integer, "unsigned"},
-                                                                              {RawType::signed_integer, "signed"},
-                                                                              {RawType::float32, "float32"},
-                                                                              {RawType::float64, "float64"}}};
-  return names;
-}
-
-Names<OutOfRange> out_of_range_names() noexcept {
-  static constexpr std::array<std::pair<OutOfRange, std::string_view>, 2> names{
-      {{OutOfRange::clamp, "clamp"}, {OutOfRange::refuse, "refuse"}}};
-  return names;
-}
-
 void validate(const SignalLayout& s) {
   require_within("start", s.start, 0, 8 * max_payload - 1, "bits");
   require_within("length", s.length, 1, 64, "bits");
   if (is_float(s.type) && s.length != float_bits(s.type)) {
-    throw ParameterError(
-        "length", s.length,
-        "must be " + std::to_string(float_bits(s.type)) + " of a " + std::string(name_of(raw_type_names(), s.type)));
+    throw ParameterError("length", s.length,
+                         "must be " + std::to_string(float_bits(s.type)) + " of a " + std::string(name_of(s.type)));
   }
   require_in(any_finite, "scale", s.scale);
   if (s.scale == 0.0) throw ParameterError("scale", s.scale, "must not be 0");

@@ -7,40 +7,14 @@
 #include <string>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/field.hpp"
 #include "mgdd/common/random.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/control/monitoring.hpp"
 
 namespace mgdd::throttle {
-namespace {
-
-constexpr std::pair<SensorFaultKind, std::string_view> fault_table[] = {
-    {SensorFaultKind::none, "none"},
-    {SensorFaultKind::open_wire, "open_wire"},
-    {SensorFaultKind::short_to_ground, "short_to_ground"},
-    {SensorFaultKind::short_to_supply, "short_to_supply"},
-    {SensorFaultKind::offset, "offset"},
-    {SensorFaultKind::gain, "gain"},
-    {SensorFaultKind::stuck, "stuck"}};
-
-constexpr std::array pair_fields{
-    field<&SensorPair::supply_v>({"supply_v", "V", closed(0.1, 100.0), "supply of both sensors"}),
-    field<&SensorPair::span_v>({"span_v", "V", above(0.0), "change of voltage over the travel"}),
-    field<&SensorPair::travel_deg>({"travel_deg", "deg", closed(1.0, 360.0), "travel behind that change"}),
-    field<&SensorPair::lag_s>({"lag_s", "s", closed(0.0, 1.0), "time constant of the input filter"}),
-    field<&SensorPair::debounce_s>({"debounce_s", "s", closed(0.0, 60.0), "time a fault must last"}),
-};
-
-}  // namespace
-
-Names<SensorFaultKind> sensor_fault_names() noexcept {
-  return fault_table;
-}
-
 void validate(const SensorPair& p) {
-  require_fields(pair_fields, p);
-  require_within("adc_bits", p.adc_bits, 4.0, 24.0);
+  require_fields(fields_of(p), p);
   require_within("closed_v", p.closed_v, 0.0, p.supply_v, "V");
   if (!(p.closed_v + p.span_v <= p.supply_v)) {
     throw ParameterError("span_v", p.span_v, "closed_v + span_v must be <= supply_v = " + text(p.supply_v) + " V", "V");

@@ -64,13 +64,6 @@ constexpr std::array field_table{
         {"pressure_drop_kpa", "kPa", closed(0.0, 200.0), "pressure drop that loads the plate"}),
 };
 
-constexpr std::pair<Friction, std::string_view> friction_table[] = {
-    {Friction::coulomb, "coulomb"}, {Friction::stiction, "stiction"}, {Friction::stribeck, "stribeck"},
-    {Friction::karnopp, "karnopp"}, {Friction::tanh, "tanh"},         {Friction::lugre, "lugre"}};
-constexpr std::pair<Backlash, std::string_view> backlash_table[] = {
-    {Backlash::none, "none"}, {Backlash::compliance, "compliance"}, {Backlash::hysteresis, "hysteresis"}};
-constexpr std::pair<Bridge, std::string_view> bridge_table[] = {{Bridge::brake, "brake"}, {Bridge::open, "open"}};
-
 // Shape of the closing torque over the opening: largest near 75 deg, none closed or wide open.
 constexpr std::array<double, 11> air_angle_deg{0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 90.0};
 constexpr std::array<double, 11> air_coefficient{0.0,   0.003, 0.008, 0.015, 0.025, 0.040,
@@ -78,17 +71,8 @@ constexpr std::array<double, 11> air_coefficient{0.0,   0.003, 0.008, 0.015, 0.0
 
 }  // namespace
 
-std::span<const Field<Throttle>, n_throttle_fields> fields() noexcept {
+std::span<const Field<Throttle>> fields() noexcept {
   return field_table;
-}
-Names<Friction> friction_names() noexcept {
-  return friction_table;
-}
-Names<Backlash> backlash_names() noexcept {
-  return backlash_table;
-}
-Names<Bridge> bridge_names() noexcept {
-  return bridge_table;
 }
 
 void validate(const Throttle& t) {
@@ -102,10 +86,10 @@ void validate(const Throttle& t) {
                          "deg");
   }
   if (t.friction != Friction::coulomb && t.friction != Friction::tanh && !(t.stiction_nm >= t.coulomb_nm)) {
-    throw ParameterError("stiction_nm", t.stiction_nm,
-                         "must be >= coulomb_nm = " + text(t.coulomb_nm) + " for friction = '" +
-                             std::string(name_of(friction_names(), t.friction)) + "'",
-                         "N m");
+    throw ParameterError(
+        "stiction_nm", t.stiction_nm,
+        "must be >= coulomb_nm = " + text(t.coulomb_nm) + " for friction = '" + std::string(name_of(t.friction)) + "'",
+        "N m");
   }
   if (t.friction == Friction::lugre && !(t.coulomb_nm > 0.0)) {
     throw ParameterError("coulomb_nm", t.coulomb_nm, "must be > 0 for friction = 'lugre'", "N m");

@@ -84,7 +84,34 @@ class Pid:
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
     def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, proportional_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778, integral_above_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3, derivative_above_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667, proportional_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778, integral_below_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3, derivative_below_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, kick: typing.SupportsFloat | typing.SupportsIndex = 0.1205, kick_width_deg: typing.SupportsFloat | typing.SupportsIndex = 0.019, dead_band_deg: typing.SupportsFloat | typing.SupportsIndex = 0.1, integral_window_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, integral_limit: typing.SupportsFloat | typing.SupportsIndex = 0.3, rate_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000346, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0603, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
-        ...
+        """
+        sample_s : time between samples [s]
+        proportional_above_per_deg : duty per error above limp-home [1/degree]
+        integral_above_per_deg_s : integral gain above limp-home [1/(degree*second)]
+        derivative_above_s_per_deg : duty against speed above limp-home [second/degree]
+        proportional_below_per_deg : duty per error below limp-home [1/degree]
+        integral_below_per_deg_s : integral gain below limp-home [1/(degree*second)]
+        derivative_below_s_per_deg : duty against speed below limp-home [second/degree]
+        derivative_lag_s : lag of the measured speed [s]
+        limp_home_deg : rest angle of the springs [deg]
+        ramp_deg : half width over which preload and gains change sides [deg]
+        preload_above : duty against the preload above limp-home
+        spring_above_per_deg : duty against the spring above limp-home [1/degree]
+        preload_below : duty against the preload below limp-home
+        spring_below_per_deg : duty against the spring below limp-home [1/degree]
+        kick : duty towards the reference against stiction
+        kick_width_deg : error at which the kick is full [deg]
+        dead_band_deg : smaller errors count as zero [deg]
+        integral_window_deg : only smaller errors are integrated [deg]
+        integral_limit : bound of the integral
+        rate_s_per_deg : duty per rate of the reference [second/degree]
+        friction : duty in the direction of that rate against dry friction
+        friction_rate_deg_per_s : rate at which it is full [degree/second]
+        reference_lag_s : lag of the rate of the reference [s]
+        reference_jump_deg_per_s : a faster reference steps and has no rate [degree/second]
+        lower : least duty
+        upper : largest duty
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -203,7 +230,31 @@ class SlidingMode:
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
     def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.076, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 136.0, integral_per_s: typing.SupportsFloat | typing.SupportsIndex = 3.03, integral_layers: typing.SupportsFloat | typing.SupportsIndex = 3.0, reference_pole_per_s: typing.SupportsFloat | typing.SupportsIndex = 170.0, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, switching: typing.SupportsFloat | typing.SupportsIndex = 0.793, layer_deg: typing.SupportsFloat | typing.SupportsIndex = 3.46, root_per_root_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.015, twist_per_s: typing.SupportsFloat | typing.SupportsIndex = 2.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, reaching: str = 'implicit') -> None:
-        ...
+        """
+        sample_s : time between samples [s]
+        gain_deg_per_s2 : acceleration per duty [degree/second**2]
+        time_constant_s : time constant of the speed [s]
+        limp_home_deg : rest angle of the springs [deg]
+        ramp_deg : half width over which the preload changes sides [deg]
+        preload_above : duty against the preload above limp-home
+        spring_above_per_deg : duty against the spring above limp-home [1/degree]
+        preload_below : duty against the preload below limp-home
+        spring_below_per_deg : duty against the spring below limp-home [1/degree]
+        friction : duty in the direction of the reference's rate
+        friction_rate_deg_per_s : rate at which it is full [degree/second]
+        bandwidth_per_s : decay of the error on the surface [1/second]
+        integral_per_s : weight of the integral in the surface [1/second]
+        integral_layers : integrates only while |s| is below so many layers
+        reference_pole_per_s : double pole of the reference's filter [1/second]
+        derivative_lag_s : lag of the measured speed [s]
+        switching : duty of the reaching law
+        layer_deg : error at which that duty is full [deg]
+        root_per_root_deg_per_s : super-twisting: duty per root of |s| [(second/degree)**0.5]
+        twist_per_s : super-twisting: rate of its integral [1/second]
+        lower : least duty
+        upper : largest duty
+        reaching : law that drives the plate to the surface
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -347,7 +398,54 @@ class GuidedPredictive:
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
     def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 34549.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, level_memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, rollback_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.5, rollback_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, certify_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
-        ...
+        """
+        sample_s : time between samples [s]
+        gain_deg_per_s2 : acceleration per duty [degree/second²]
+        time_constant_s : of the speed [s]
+        electrical_s : lag of the motor's torque [s]
+        limp_home_deg : rest angle of the springs [deg]
+        ramp_deg : half width over which the preload changes sides [deg]
+        preload_above : duty against the preload above limp-home
+        spring_above_per_deg : duty against the spring above limp-home [1/degree]
+        preload_below : duty against the preload below limp-home
+        spring_below_per_deg : duty against the spring below limp-home [1/degree]
+        friction : duty against dry friction, at the start
+        closed_deg : lower end of the travel [deg]
+        open_deg : upper end of the travel [deg]
+        prediction_step_s : step of the horizon [s]
+        error_weight : of the squared error at each step [1/degree²]
+        speed_weight : of the squared speed at each step [second²/degree²]
+        duty_change_weight : of the squared change of each move
+        lower : least duty
+        upper : largest duty
+        duty_rate_per_s : largest change of the duty [1/second]
+        lowest_deg : least angle of the prediction [deg]
+        highest_deg : largest angle of the prediction [deg]
+        angle_limit_weight : of the squared angle beyond these [1/degree²]
+        observer_angle_per_s : sum of the rates at which the errors of angle and speed die [1/second]
+        observer_speed_per_s2 : and their product [1/second²]
+        noise_deg : standard deviation of the measured angle [deg]
+        learning_rate_per_s : share of what explains an innovation that is learnt [1/second]
+        gain_weight : first variance of the gain factor over that of a friction level
+        damping_weight : of the damping factor
+        level_memory_s : sliding after which a level is as uncertain as at first [s]
+        memory_s : the same for gain and damping [s]
+        least_gain_factor : least learnt gain over the given one
+        largest_gain_factor : largest learnt gain over the given one
+        rollback_ratio : of squared innovations, from which a belief predicts worse
+        rollback_s : sliding over which a worse belief is given up [s]
+        certify_s : sliding over which a better belief is certified [s]
+        bias_rate_per_deg_s : without learning: rate of the one bias [1/(degree*second)]
+        trim_rate_per_deg_s : without learning: rate of the trim [1/(degree*second)]
+        reference_lag_s : lag of the rate of the reference [s]
+        reference_jump_deg_per_s : a faster reference steps and has no rate [degree/second]
+        prediction : what the horizon is predicted with
+        switching : how it knows its side of limp-home
+        delay_samples : from a duty to its effect
+        move_steps : prediction steps for which each duty is held
+        gauss_newton_steps : at most, per sample
+        friction_learning : learn friction levels and gain
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -513,7 +611,45 @@ class ThrottleSupervisor:
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
     def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, limited_open_deg: typing.SupportsFloat | typing.SupportsIndex = 40.0, late_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, silence_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, range_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, disagreement_deg: typing.SupportsFloat | typing.SupportsIndex = 4.5, sensor_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, nominal_supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, supply_low_v: typing.SupportsFloat | typing.SupportsIndex = 9.0, supply_lost_v: typing.SupportsFloat | typing.SupportsIndex = 6.0, supply_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.098, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.3, load: typing.SupportsFloat | typing.SupportsIndex = 0.04, jam_error_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, jam_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, jam_s: typing.SupportsFloat | typing.SupportsIndex = 0.04, balance_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.006, spring_band_deg: typing.SupportsFloat | typing.SupportsIndex = 3.0, spring_evidence_s: typing.SupportsFloat | typing.SupportsIndex = 0.0004, tracking_error_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, tracking_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, overload_duty: typing.SupportsFloat | typing.SupportsIndex = 0.9, overload_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, limp_home_band_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0, return_s: typing.SupportsFloat | typing.SupportsIndex = 0.4, healthy_s: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> None:
-        ...
+        """
+        sample_s : time between samples [s]
+        closed_deg : lower end of the travel [deg]
+        open_deg : upper end of the travel [deg]
+        limited_open_deg : largest reference while the supply is low [deg]
+        late_s : age beyond which an angle is not used [s]
+        silence_s : time without a usable reference, angle or duty: open [s]
+        range_margin_deg : a sensor may say so much more than the travel [deg]
+        disagreement_deg : the sensors may differ by so much [deg]
+        sensor_s : time that a sensor must be wrong: open [s]
+        nominal_supply_v : supply to which duties belong [V]
+        supply_low_v : a lower supply limits the reference [V]
+        supply_lost_v : a lower supply opens the bridge [V]
+        supply_s : time that the supply must be low [s]
+        limp_home_deg : rest angle of the springs [deg]
+        ramp_deg : half width over which the preload changes sides [deg]
+        preload_above : duty against the preload above limp-home
+        spring_above_per_deg : duty against the spring above limp-home [1/degree]
+        preload_below : duty against the preload below limp-home
+        spring_below_per_deg : duty against the spring below limp-home [1/degree]
+        friction : duty against dry friction at breakaway
+        gain_deg_per_s2 : acceleration per duty [degree/second**2]
+        time_constant_s : of the speed [s]
+        uncertainty : share by which springs and friction may differ
+        load : duty that the air may add
+        jam_error_deg : a smaller error does not ask for a move [deg]
+        jam_move_deg : a plate that moves farther is not jammed [deg]
+        jam_s : time without that move: open [s]
+        balance_lag_s : each of two lags of the balance [s]
+        spring_band_deg : no check of the springs nearer to limp-home [deg]
+        spring_evidence_s : sum of the duty beyond what a whole spring allows: open [s]
+        tracking_error_deg : error that must not last [deg]
+        tracking_s : time that it lasts: open [s]
+        overload_duty : duty that must not last away from the stops
+        overload_s : time that it lasts: open [s]
+        limp_home_band_deg : the plate is at limp-home so near to it [deg]
+        return_s : time in which the springs must bring it there [s]
+        healthy_s : time without any reason before an acknowledgement counts [s]
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:

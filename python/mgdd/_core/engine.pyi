@@ -40,7 +40,47 @@ class Cylinder:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 86.0, stroke_mm: typing.SupportsFloat | typing.SupportsIndex = 86.0, connecting_rod_mm: typing.SupportsFloat | typing.SupportsIndex = 155.0, compression_ratio: typing.SupportsFloat | typing.SupportsIndex = 18.2, ivc_cad: typing.SupportsFloat | typing.SupportsIndex = -140.0, evo_cad: typing.SupportsFloat | typing.SupportsIndex = 130.0, bowl_area_factor: typing.SupportsFloat | typing.SupportsIndex = 1.0, ivc_pressure_rise_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.9, lower_heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.8, gamma: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_linear_300k: typing.SupportsFloat | typing.SupportsIndex = 1.38, gamma_linear_slope_per_k: typing.SupportsFloat | typing.SupportsIndex = -8e-05, gamma_polynomial_c0: typing.SupportsFloat | typing.SupportsIndex = 1.338, gamma_polynomial_c1_per_k: typing.SupportsFloat | typing.SupportsIndex = -6e-05, gamma_polynomial_c2_per_k2: typing.SupportsFloat | typing.SupportsIndex = 1e-08, wall_heat_scale: typing.SupportsFloat | typing.SupportsIndex = 0.5, woschni_c2: typing.SupportsFloat | typing.SupportsIndex = 2.28, woschni_cp_m_per_sk: typing.SupportsFloat | typing.SupportsIndex = 0.00324, wall_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 450.0, burn_duration_ref_cad: typing.SupportsFloat | typing.SupportsIndex = 30.0, burn_fuel_ref_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0, burn_speed_ref_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0, burn_fuel_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.6, burn_speed_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.3, wiebe_a: typing.SupportsFloat | typing.SupportsIndex = 6.908, wiebe_m: typing.SupportsFloat | typing.SupportsIndex = 1.5, second_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.6, second_delay_cad: typing.SupportsFloat | typing.SupportsIndex = 3.0, second_duration_cad: typing.SupportsFloat | typing.SupportsIndex = 50.0, second_wiebe_m: typing.SupportsFloat | typing.SupportsIndex = 0.8, cetane_number: typing.SupportsFloat | typing.SupportsIndex = 45.0, ignition_c0_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, ignition_c1: typing.SupportsFloat | typing.SupportsIndex = 0.0, ignition_c2_per_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, burn_shape: str = 'triangle', gamma_model: str = 'constant', wall_heat_model: str = 'woschni', ignition_model: str = 'watson') -> None:
-        ...
+        """
+        bore_mm : cylinder bore [mm]
+        stroke_mm : piston stroke [mm]
+        connecting_rod_mm : connecting rod, eye to eye [mm]
+        compression_ratio : geometric compression ratio
+        ivc_cad : intake valve closing [°CA aTDC]
+        evo_cad : exhaust valve opening [°CA aTDC]
+        bowl_area_factor : head and piston area over two flat discs
+        ivc_pressure_rise_kpa : p(IVC) above the intake pressure [kPa]
+        volumetric_efficiency : trapped over ideal charge at intake conditions
+        lower_heating_value_mj_per_kg : heat of the fuel [MJ/kg]
+        gamma : constant ratio of specific heats
+        gamma_linear_300k : linear gamma(T) at 300 K
+        gamma_linear_slope_per_k : slope of linear gamma(T) [1/K]
+        gamma_polynomial_c0 : polynomial gamma(T), constant
+        gamma_polynomial_c1_per_k : polynomial gamma(T), linear term [1/K]
+        gamma_polynomial_c2_per_k2 : polynomial gamma(T), quadratic term [1/K^2]
+        wall_heat_scale : wall heat over the textbook law (Woschni C1/129.8)
+        woschni_c2 : weight of the mean piston speed
+        woschni_cp_m_per_sk : combustion term of the gas velocity [m/(s K)]
+        wall_temperature_k : mean wall temperature [K]
+        burn_duration_ref_cad : burn duration at the reference point [°CA]
+        burn_fuel_ref_mg : fuel of the reference point [mg]
+        burn_speed_ref_rpm : speed of the reference point [rpm]
+        burn_fuel_exponent : duration law: exponent of fuel
+        burn_speed_exponent : duration law: exponent of speed
+        wiebe_a : Wiebe completeness
+        wiebe_m : Wiebe shape, exponent m + 1
+        second_fraction : share of the heat in the second Wiebe law
+        second_delay_cad : start of the second Wiebe law after the first [°CA]
+        second_duration_cad : duration of the second Wiebe law [°CA]
+        second_wiebe_m : shape of the second Wiebe law
+        cetane_number : for Hardenberg-Hase
+        ignition_c0_cad : polynomial ignition delay, constant [°CA]
+        ignition_c1 : polynomial ignition delay, linear term
+        ignition_c2_per_cad : polynomial ignition delay, quadratic term [1/°CA]
+        burn_shape : burn law
+        gamma_model : gamma against T
+        wall_heat_model : wall-heat correlation
+        ignition_model : ignition-delay correlation
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -289,7 +329,15 @@ class OperatingPoint:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, speed_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0, fuel_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 150.0, intake_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 313.0, burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, trapped_mass_g: typing.SupportsFloat | typing.SupportsIndex | None = None, ivc_temperature_k: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        speed_rpm : engine speed [rpm]
+        fuel_mg : fuel per cycle, 0 = motored [mg]
+        intake_pressure_kpa : intake pressure [kPa]
+        intake_temperature_k : intake temperature [K]
+        burn_duration_cad : burn duration; none = the duration law
+        trapped_mass_g : trapped charge; none = from ivc_temperature_k or volumetric efficiency
+        ivc_temperature_k : charge at IVC; none = volumetric efficiency, for a measured trace the intake temperature + 40 K
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -364,6 +412,11 @@ class NoxProxy:
     >>> float(NoxProxy().arrhenius_ppm(1900.0))
     1200.0
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -371,7 +424,11 @@ class NoxProxy:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 1900.0, reference_nox_ppm: typing.SupportsFloat | typing.SupportsIndex = 1200.0, activation_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 16000.0) -> None:
-        ...
+        """
+        reference_temperature_k : T0 of the map [K]
+        reference_nox_ppm : NOx at T0 [ppm]
+        activation_temperature_k : b of the Arrhenius map [K]
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -384,24 +441,28 @@ class NoxProxy:
         """
         NOx [ppm] by the Arrhenius map.
         """
+    def replace(self, **kwargs) -> NoxProxy:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def activation_temperature_k(self) -> float:
         """
-        b [K].
+        b of the Arrhenius map [K]
         """
     @property
     def reference_nox_ppm(self) -> float:
         """
-        NOx0 [ppm].
+        NOx at T0 [ppm]
         """
     @property
     def reference_temperature_k(self) -> float:
         """
-        T0 [K].
+        T0 of the map [K]
         """
 class NoxModel:
     """
@@ -431,6 +492,11 @@ class NoxModel:
     >>> float(NoxModel(intake_o2_fraction=0.1045).ppm(1900.0))
     150.0
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -438,7 +504,12 @@ class NoxModel:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, proxy: NoxProxy | None = None, map: str = 'affine_log', intake_o2_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.209, o2_exponent: typing.SupportsFloat | typing.SupportsIndex = 3.0) -> None:
-        ...
+        """
+        proxy : constants of the map
+        map : form of the map
+        intake_o2_fraction : intake oxygen by volume
+        o2_exponent : exponent of the oxygen factor
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -447,29 +518,33 @@ class NoxModel:
         """
         NOx [ppm].
         """
+    def replace(self, **kwargs) -> NoxModel:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def intake_o2_fraction(self) -> float:
         """
-        Intake oxygen by volume [-].
+        intake oxygen by volume [-]
         """
     @property
     def map(self) -> str:
         """
-        Name of the map.
+        form of the map
         """
     @property
     def o2_exponent(self) -> float:
         """
-        n [-].
+        exponent of the oxygen factor [-]
         """
     @property
     def proxy(self) -> NoxProxy:
         """
-        Constants of the map.
+        constants of the map
         """
 class SoftSensor:
     """
@@ -498,6 +573,11 @@ class SoftSensor:
     >>> round(float(sensor.ppm(1900.0, ln_bias=bias)), 1)
     1258.6
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -505,7 +585,10 @@ class SoftSensor:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, model: NoxModel | None = None, correction_gain: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> None:
-        ...
+        """
+        model : NOx from the maximum gas temperature
+        correction_gain : share of the log-ratio per cycle
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -518,19 +601,23 @@ class SoftSensor:
         """
         NOx [ppm] at the log-bias b.
         """
+    def replace(self, **kwargs) -> SoftSensor:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def correction_gain(self) -> float:
         """
-        c per cycle [-].
+        share of the log-ratio per cycle [-]
         """
     @property
     def model(self) -> NoxModel:
         """
-        NOx from T_max.
+        NOx from the maximum gas temperature
         """
 class NoxFit:
     """
@@ -730,67 +817,28 @@ class Performance:
         """
 class TraceOptions:
     def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, earliest_burn_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, total_at_end: bool = False, fractions_of_gross: bool = False, smoothing: str = 'automatic', smoothing_width_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing_cutoff_hz: typing.SupportsFloat | typing.SupportsIndex = 3000.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex | None = None, intake_factor: typing.SupportsFloat | typing.SupportsIndex = 1.5, bmep_bar: typing.SupportsFloat | typing.SupportsIndex | None = None, fuel_heat_j: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
-    @property
-    def bmep_bar(self) -> float | None:
-        ...
-    @property
-    def burn_from_cad(self) -> float | None:
-        ...
-    @property
-    def earliest_burn_cad(self) -> float | None:
-        ...
-    @property
-    def fractions_of_gross(self) -> bool:
-        ...
-    @property
-    def fuel_heat_j(self) -> float | None:
-        ...
-    @property
-    def gamma(self) -> float:
-        ...
-    @property
-    def gamma_combustion(self) -> float:
-        ...
-    @property
-    def gamma_compression(self) -> float:
-        ...
-    @property
-    def gamma_source(self) -> str:
-        ...
-    @property
-    def heat_from_cad(self) -> float | None:
-        ...
-    @property
-    def heat_to_cad(self) -> float | None:
-        ...
-    @property
-    def inlet_pressure_kpa(self) -> float:
-        ...
-    @property
-    def intake_factor(self) -> float:
-        ...
-    @property
-    def intake_pressure_kpa(self) -> float | None:
-        ...
-    @property
-    def pegging(self) -> str:
-        ...
-    @property
-    def pegging_exponent(self) -> float:
-        ...
-    @property
-    def smoothing(self) -> str:
-        ...
-    @property
-    def smoothing_cutoff_hz(self) -> float:
-        ...
-    @property
-    def smoothing_width_cad(self) -> float:
-        ...
-    @property
-    def total_at_end(self) -> bool:
-        ...
+        """
+        pegging : how the absolute pressure is found
+        pegging_exponent : polytropic exponent of compression
+        inlet_pressure_kpa : pressure at intake bottom dead centre [kPa]
+        gamma_source : where gamma comes from
+        gamma : constant over the window
+        gamma_compression : before the burn
+        gamma_combustion : from the burn start on
+        heat_from_cad : start of the cumulative heat
+        heat_to_cad : its end
+        earliest_burn_cad : the burn is searched from here on
+        burn_from_cad : the combustion term of the wall heat acts from here
+        total_at_end : report the heat at the end of the window, not its peak
+        fractions_of_gross : burn angles of gross heat
+        smoothing : of the pressure before the heat release
+        smoothing_width_cad : whole width [°CA]
+        smoothing_cutoff_hz : where the gain is 1/2 [Hz]
+        intake_pressure_kpa : what p(IVC) is judged against
+        intake_factor : beyond this factor of it p(IVC) is doubted
+        bmep_bar : a gross IMEP that cannot reach it is refused
+        fuel_heat_j : heat of the stated fuel
+        """
 def analyze(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions) -> dict:
     """
     Pegging, heat release, burn angles, work.

@@ -95,7 +95,26 @@ class CurveSeeking:
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        curve : the guide's J
+        prior_sd : how far the best input may lie from the guide's
+        scale_sd : of the plant's curvature over the guide's
+        discrepancy : error of the curve per unit of its drop
+        noise_sd : of one reading of J
+        memory_cycles : time constant with which readings fade
+        amplitude_max : largest distance from the estimate that is applied
+        rate : largest change of the applied input per cycle
+        delay_cycles : between the plant and J
+        lag_cycles : the same
+        delay_uncertainty : cycles by which the delay may be shorter or longer
+        hand_over : to plain extremum seeking where the guide keeps failing
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        limit_curves : of the guide, one per limit
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.

@@ -39,6 +39,11 @@ class SensorDynamics:
     >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
     38
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -46,7 +51,13 @@ class SensorDynamics:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, noise_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, lag_cycles: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        delay_s : delay of the sample line [s]
+        lag_s : time constant [s]
+        noise_fraction : noise over reading
+        delay_cycles : delay in engine cycles instead
+        lag_cycles : time constant in engine cycles instead
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -59,43 +70,75 @@ class SensorDynamics:
         """
         Gain of the lag filter per cycle [-].
         """
+    def replace(self, **kwargs) -> SensorDynamics:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def delay_cycles(self) -> int | None:
         """
-        Delay in cycles, or None.
+        delay in engine cycles instead
         """
     @property
     def delay_s(self) -> float:
         """
-        Transport delay [s].
+        delay of the sample line [s]
         """
     @property
     def lag_cycles(self) -> float | None:
         """
-        Time constant in cycles, or None.
+        time constant in engine cycles instead
         """
     @property
     def lag_s(self) -> float:
         """
-        Time constant [s].
+        time constant [s]
         """
     @property
     def noise_fraction(self) -> float:
         """
-        Relative noise [-].
+        noise over reading [-]
         """
 class EngineBench:
     """
     The virtual engine bench; use mgdd.loop.EngineBench.
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every setting by name: unit, bounds or choices, meaning, default.
+        """
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
     def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_noise_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, tdc_error_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_gain_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_offset_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
+        """
+        cylinder : the engine
+        schedule : first cycle of each operating point
+        performance : what is to be maximised: gross efficiency in percent
+        nox_sensor : whose NOx enters the performance
+        limits : indicators to report as limits
+        soc_scatter_cad : standard deviation of SOC from cycle to cycle [°CA]
+        efficiency_noise_percent : standard deviation of the measured efficiency in points, with the work and IMEP that belong to it [%]
+        misfire_probability : misfires per cycle, drawn at random
+        soc_drift_cad_per_kcycle : offset of SOC per 1000 cycles [°CA]
+        wall_heat_drift_per_kcycle : change of wall_heat_scale per 1000 cycles
+        pressure_noise_bar : noise of each sample of the pressure trace, standard deviation; indicators have none of it [bar]
+        tdc_error_cad : angles of the pressure trace read that much high [°CA]
+        pressure_gain_error : share by which the pressure trace reads high
+        pressure_offset_bar : by which the pressure trace is pegged too high [bar]
+        true_nox : NOx of the plant from its own maximum gas temperature: an Arrhenius map
+        soft_sensor : the soft sensor: an affine-log map of the same constants
+        analyser : NOx analyser: 3 s late, lag 2 s, noise 1 %
+        fast_sensor : fast NOx sensor: 0.05 s late, lag 0.05 s, noise 3 %
+        delay_whole_objective : every component passes the delay and lag of the analyser, without its noise; NOx is the true one
+        step_cad : step of the cycle model, as in mgdd.engine.simulate [°CA]
+        integrator : of the cycle model, as in mgdd.engine.simulate
+        seed : of all noise
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:

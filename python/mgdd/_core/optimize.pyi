@@ -11,41 +11,65 @@ class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
     """
-    __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: Parameter) -> bool:
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> tuple:
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
         ...
     def __init__(self, *, name: str, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., log_scaled: bool = False) -> None:
-        ...
+        """
+        name : in reports and messages
+        lower : lower bound, -inf for none
+        upper : upper bound, inf for none
+        log_scaled : searched as log(p); needs lower > 0
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def replace(self, **kwargs) -> Parameter:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
     @property
     def log_scaled(self) -> bool:
         """
-        Searched as log(p); needs lower > 0.
+        searched as log(p); needs lower > 0
         """
     @property
     def lower(self) -> float:
         """
-        Lower bound, -inf for none.
+        lower bound, -inf for none [-]
         """
     @property
     def name(self) -> str:
         """
-        Name in reports and messages.
+        in reports and messages
         """
     @property
     def upper(self) -> float:
         """
-        Upper bound, inf for none.
+        upper bound, inf for none [-]
         """
 class LeastSquaresOptions:
     """
     When a least-squares search ends and what it reports.
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -53,54 +77,67 @@ class LeastSquaresOptions:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, step_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, gradient_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 0.001, correlation_limit: typing.SupportsFloat | typing.SupportsIndex = 0.98, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, evaluate_together: bool = True) -> None:
-        ...
+        """
+        max_iterations : trial steps
+        cost_tolerance : relative decrease of the cost that ends a search
+        step_tolerance : relative step that ends a search
+        gradient_tolerance : cosine of the gradient that ends a search
+        initial_damping : damping of the first step, of unit columns
+        correlation_limit : correlation above which two are named
+        rank_tolerance : singular value, over the largest, that counts as zero
+        evaluate_together : residual and Jacobian in one call
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def replace(self, **kwargs) -> LeastSquaresOptions:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def correlation_limit(self) -> float:
         """
-        Correlation beyond which two parameters count as unidentifiable [-].
+        correlation above which two are named [-]
         """
     @property
     def cost_tolerance(self) -> float:
         """
-        Relative decrease of the cost [-].
+        relative decrease of the cost that ends a search [-]
         """
     @property
     def evaluate_together(self) -> bool:
         """
-        Residual and Jacobian in one call.
+        residual and Jacobian in one call
         """
     @property
     def gradient_tolerance(self) -> float:
         """
-        Cosine between the residual and a free Jacobian column [-].
+        cosine of the gradient that ends a search [-]
         """
     @property
     def initial_damping(self) -> float:
         """
-        Relative to unit columns [-].
+        damping of the first step, of unit columns [-]
         """
     @property
     def max_iterations(self) -> int:
         """
-        Trial steps.
+        trial steps [-]
         """
     @property
     def rank_tolerance(self) -> float:
         """
-        Singular value, relative to the largest, that counts as zero [-].
+        singular value, over the largest, that counts as zero [-]
         """
     @property
     def step_tolerance(self) -> float:
         """
-        Step over parameters, scaled [-].
+        relative step that ends a search [-]
         """
 class FitReport:
     """
@@ -271,66 +308,91 @@ class Limit:
     >>> Limit("p_max_bar", 95.0, margin=1.0)
     Limit('p_max_bar', 95.0, margin=1.0)
     """
-    __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: Limit) -> bool:
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> tuple[str, float, float, str, float, float, float, float, float, int]:
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
         ...
     def __init__(self, name: str, upper: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, method: str = 'switching', weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, margin_sd: typing.SupportsFloat | typing.SupportsIndex = 1.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 3) -> None:
-        ...
+        """
+        name : what is limited
+        upper : the limit
+        margin : kept free below the limit
+        method : how J knows of the limit
+        weight : of penalty or barrier
+        scale : unit of the excess; 0: the limit itself
+        delay_cycles : transport delay of the reading
+        lag_cycles : time constant of its lag
+        margin_sd : margin in standard deviations of the reading
+        delay_uncertainty : cycles that the delay may be off to either side
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def replace(self, **kwargs) -> Limit:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
     @property
     def delay_cycles(self) -> float:
         """
-        Transport delay of the reading.
+        transport delay of the reading [-]
         """
     @property
     def delay_uncertainty(self) -> int:
         """
-        Cycles that the delay may be off to either side.
+        cycles that the delay may be off to either side [-]
         """
     @property
     def lag_cycles(self) -> float:
         """
-        Time constant of its lag.
+        time constant of its lag [-]
         """
     @property
     def margin(self) -> float:
         """
-        Kept free below the limit.
+        kept free below the limit [-]
         """
     @property
     def margin_sd(self) -> float:
         """
-        Margin in standard deviations of the reading.
+        margin in standard deviations of the reading [-]
         """
     @property
     def method(self) -> str:
         """
-        How J knows of the limit.
+        how J knows of the limit
         """
     @property
     def name(self) -> str:
         """
-        What is limited.
+        what is limited
         """
     @property
     def scale(self) -> float:
         """
-        Unit of the excess.
+        unit of the excess; 0: the limit itself [-]
         """
     @property
     def upper(self) -> float:
         """
-        The limit.
+        the limit [-]
         """
     @property
     def weight(self) -> float:
         """
-        Of penalty or barrier.
+        of penalty or barrier [-]
         """
 class ComponentLag:
     """
@@ -355,37 +417,75 @@ class ComponentLag:
     >>> round(gain, 4), round(phase_deg % 360.0, 1)
     (0.0646, 140.5)
     """
-    __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: ComponentLag) -> bool:
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> tuple[float, float]:
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
         ...
     def __init__(self, *, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
-        ...
+        """
+        delay_cycles : transport delay in cycles
+        lag_cycles : time constant of the lag in cycles
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def replace(self, **kwargs) -> ComponentLag:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def response(self, *, period: typing.SupportsInt | typing.SupportsIndex, harmonic: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[float, float]:
         """
         Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.
         """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
     @property
     def delay_cycles(self) -> float:
         """
-        Transport delay [cycles].
+        transport delay in cycles [-]
         """
     @property
     def lag_cycles(self) -> float:
         """
-        Time constant of the lag [cycles].
+        time constant of the lag in cycles [-]
         """
 class ExtremumSeeking:
     """
     Extremum seeking; see mgdd.optimize.ExtremumSeeking.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'batch', amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = None, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        form : how the mean of J is removed
+        amplitude : of the dither, per input
+        period : cycles of the common window
+        harmonics : oscillations per window, one per input
+        gain : adaptation gain, per input
+        rate : largest change of the estimate per cycle, per input
+        recovery_rate : largest change on the way back below a limit, per input
+        washout_pole : pole of the high-pass
+        low_pass : share of the new value after demodulation
+        components : delay and lag of each component of J
+        hold_cycles : cycles that the estimate is held at the start
+        amplitude_floor : share of the dither that is left where J is flat
+        full_gradient : slope of J at which the dither is full
+        limit_amplitude : share of the dither while a limit holds the estimate back
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        curvature : J'' where it is known
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -503,7 +603,26 @@ class NewtonSeeking:
     Newton extremum seeking; see mgdd.optimize.NewtonSeeking.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 2.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = None, initial_inverse: typing.Any = None, largest_inverse: typing.SupportsFloat | typing.SupportsIndex | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        amplitude : of the dither, per input
+        period : cycles of the common window
+        harmonics : oscillations per window, one per input
+        time_constant_cycles : of the approach
+        hessian_rate : low-pass of the Hessian per cycle
+        riccati_rate : rate of the Riccati filter per cycle
+        initial_hessian : diagonal to begin with
+        initial_inverse : diagonal of the inverse to begin with
+        largest_inverse : bound of its norm
+        hold_cycles : cycles that the estimate is held at the start
+        rate : largest change of the estimate per cycle, per input
+        components : delay and lag of each component of J
+        limit_amplitude : share of the dither while a limit holds the estimate back
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -621,7 +740,18 @@ class BoundedSeeking:
     Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        amplitude : of the dither, per input
+        period : cycles of the common window
+        harmonics : oscillations per window, one per input
+        kappa : phase per unit of J
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        curvature : J'' where it is known
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -729,7 +859,29 @@ class Spsa:
     Simultaneous perturbation; see mgdd.optimize.Spsa.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex | None = None, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        form : order of the step
+        schedule : how gain and perturbation change
+        gain : of the step
+        stability : iterations that the first gains count for
+        gain_exponent : decay of the gain
+        perturbation : of the input
+        perturbation_exponent : decay of the perturbation
+        step_max : largest change per iteration and input
+        averaging : gradients per iteration
+        blocking : refuse steps that lose
+        noise_sd : of one measurement of J
+        initial_hessian : curvature to begin with
+        hessian_prior : iterations that it counts for
+        limit_amplitude : share of the dither while a limit holds the estimate back
+        seed : of the random signs
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        curvature : J'' where it is known
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -862,7 +1014,19 @@ class GradientDescent:
     Two-sided differences; see mgdd.optimize.GradientDescent.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., step_size: typing.SupportsFloat | typing.SupportsIndex | None = None, difference: typing.SupportsFloat | typing.SupportsIndex = 1.0, rate: typing.Any = None, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        step_size : of the step
+        difference : of the input
+        rate : largest change per step, per input
+        tolerance : converged once every entry of a step is below
+        iterations : steps after which a search that has not converged says so
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        curvature : J'' where it is known
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -985,7 +1149,17 @@ class GoldenSection:
     Golden-section search; see mgdd.optimize.GoldenSection.
     """
     def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
-        ...
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        noise_sd : of one measurement of J
+        significance : standard errors that decide a comparison
+        samples_max : measurements of each inner point
+        tolerance : width of the bracket at which an exact search ends
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        """
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.

@@ -55,6 +55,11 @@ class E2eSettings:
     >>> check.push(protect(E2eSettings(data_id=0x121), 7, bytes(8)))
     'wrong_crc'
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -62,7 +67,20 @@ class E2eSettings:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850', data_id: typing.SupportsInt | typing.SupportsIndex = 0, data_id_mode: str = 'both', data_id_list: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, size: typing.SupportsInt | typing.SupportsIndex = 8, crc_byte: typing.SupportsInt | typing.SupportsIndex = 0, counter_byte: typing.SupportsInt | typing.SupportsIndex = 1, counter_place: str = 'low_nibble', counter_modulus: typing.SupportsInt | typing.SupportsIndex = 16, max_step: typing.SupportsInt | typing.SupportsIndex = 3, bad_until_invalid: typing.SupportsInt | typing.SupportsIndex = 3, good_until_valid: typing.SupportsInt | typing.SupportsIndex = 2) -> None:
-        ...
+        """
+        crc : name, or (polynomial, start, final xor)
+        data_id : identifier under the CRC
+        data_id_mode : bytes of it under the CRC
+        data_id_list : sixteen bytes of the mode 'list'
+        size : of the payload [bytes]
+        crc_byte : place of the CRC
+        counter_byte : place of the counter
+        counter_place : its bits in the byte
+        counter_modulus : values of the counter
+        max_step : largest good step
+        bad_until_invalid : bad frames in a row [frames]
+        good_until_valid : good frames in a row [frames]
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -71,69 +89,73 @@ class E2eSettings:
         """
         The counter that follows.
         """
+    def replace(self, **kwargs) -> E2eSettings:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def bad_until_invalid(self) -> int:
         """
-        Bad frames in a row.
+        bad frames in a row [frames]
         """
     @property
     def counter_byte(self) -> int:
         """
-        Place of the counter.
+        place of the counter [-]
         """
     @property
     def counter_modulus(self) -> int:
         """
-        Values of the counter.
+        values of the counter [-]
         """
     @property
     def counter_place(self) -> str:
         """
-        Its bits in the byte.
+        its bits in the byte
         """
     @property
     def crc(self) -> str | tuple[int, int, int]:
         """
-        Name, or (polynomial, start, final xor).
+        name, or (polynomial, start, final xor)
         """
     @property
     def crc_byte(self) -> int:
         """
-        Place of the CRC.
+        place of the CRC [-]
         """
     @property
     def data_id(self) -> int:
         """
-        Identifier under the CRC.
+        identifier under the CRC [-]
         """
     @property
     def data_id_list(self) -> typing.Any:
         """
-        Sixteen bytes of the mode 'list', or None.
+        sixteen bytes of the mode 'list'
         """
     @property
     def data_id_mode(self) -> str:
         """
-        Bytes of it under the CRC.
+        bytes of it under the CRC
         """
     @property
     def good_until_valid(self) -> int:
         """
-        Good frames in a row.
+        good frames in a row [frames]
         """
     @property
     def max_step(self) -> int:
         """
-        Largest good step.
+        largest good step [-]
         """
     @property
     def size(self) -> int:
         """
-        Bytes of the payload.
+        of the payload [bytes]
         """
 class E2eCheck:
     """
@@ -209,6 +231,11 @@ class SignalLayout:
     >>> payload.hex(), duty.unpack(payload)
     ('0000300800000000', -1.0)
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -216,7 +243,16 @@ class SignalLayout:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, start: typing.SupportsInt | typing.SupportsIndex, length: typing.SupportsInt | typing.SupportsIndex, byte_order: str = 'little_endian', raw_type: str = 'unsigned', scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, minimum: typing.SupportsFloat | typing.SupportsIndex | None = None, maximum: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
-        ...
+        """
+        start : first bit, as a DBC counts
+        length : bits
+        byte_order : order of the bytes
+        raw_type : meaning of the bits
+        scale : physical value of one step
+        offset : physical value of the raw 0
+        minimum : lowest physical value
+        maximum : highest physical value
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -229,9 +265,13 @@ class SignalLayout:
         """
         The payload with this raw number; ParameterError where it does not fit the bits.
         """
+    def replace(self, **kwargs) -> SignalLayout:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     def unpack(self, payload: typing_extensions.Buffer) -> float:
         """
@@ -248,42 +288,42 @@ class SignalLayout:
     @property
     def byte_order(self) -> str:
         """
-        Order of the bytes.
+        order of the bytes
         """
     @property
     def length(self) -> int:
         """
-        Bits.
+        bits [-]
         """
     @property
     def maximum(self) -> float | None:
         """
-        Highest physical value, or None.
+        highest physical value
         """
     @property
     def minimum(self) -> float | None:
         """
-        Lowest physical value, or None.
+        lowest physical value
         """
     @property
     def offset(self) -> float:
         """
-        Physical value of the raw 0.
+        physical value of the raw 0 [-]
         """
     @property
     def raw_type(self) -> str:
         """
-        Meaning of the bits.
+        meaning of the bits
         """
     @property
     def scale(self) -> float:
         """
-        Physical value of one step.
+        physical value of one step [-]
         """
     @property
     def start(self) -> int:
         """
-        First bit, as a DBC counts.
+        first bit, as a DBC counts [-]
         """
 class Frame:
     """
@@ -524,7 +564,35 @@ class SafetyEnvelope:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, cycle_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.8, slew_per_s: typing.SupportsFloat | typing.SupportsIndex = 200.0, ramp_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, invalid_duties: typing.SupportsFloat | typing.SupportsIndex = 1.0, rms_duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.5, rms_duty_to_arm: typing.SupportsFloat | typing.SupportsIndex = 0.4, heat_time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, stall_duty: typing.SupportsFloat | typing.SupportsIndex = 0.6, stall_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, stall_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, largest_age_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, held_cycles: typing.SupportsFloat | typing.SupportsIndex = 1.0, bad_frames: typing.SupportsFloat | typing.SupportsIndex = 3.0, good_frames: typing.SupportsFloat | typing.SupportsIndex = 20.0, missed_deadlines: typing.SupportsFloat | typing.SupportsIndex = 3.0, unsent_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, sensor_sum_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, sensor_sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, sensor_slope_v_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, sensor_cycles: typing.SupportsFloat | typing.SupportsIndex = 4.0, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, travel_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, bus_fault_from: str = 'passive') -> None:
-        ...
+        """
+        cycle_s : time between two cycles of the gate [s]
+        duty_limit : largest duty
+        slew_per_s : largest change of the duty [1/s]
+        ramp_s : time in which the duty grows in after the start [s]
+        invalid_duties : duties in a row that are not finite: FAULT [cycles]
+        rms_duty_limit : largest RMS duty of the heat model: LIMP
+        rms_duty_to_arm : RMS duty to which it cools before arming
+        heat_time_constant_s : lag of the heat model [s]
+        stall_duty : duty that must move the plate
+        stall_move_deg : motion that it must make [deg]
+        stall_s : time without that motion: LIMP [s]
+        largest_age_cycles : age beyond which a measurement is not used [cycles]
+        held_cycles : cycles for which the last duty bridges it, then LIMP [cycles]
+        bad_frames : bad frames in a row: LIMP
+        good_frames : good frames before arming and before a reset
+        missed_deadlines : deadlines missed in a row: LIMP
+        unsent_cycles : commands in a row that did not leave: LIMP [cycles]
+        sensor_sum_v : sum of both sensors [V]
+        sensor_sum_tolerance_v : by which it may be off [V]
+        sensor_low_v : least voltage of a healthy sensor [V]
+        sensor_high_v : largest voltage of a healthy sensor [V]
+        sensor_slope_v_per_s : fastest change of a healthy sensor [V/s]
+        sensor_cycles : measurements in a row that fail a check of the sensors: FAULT [cycles]
+        closed_deg : lower end of the travel [deg]
+        open_deg : upper end of the travel [deg]
+        travel_margin_deg : by which an angle may leave it [deg]
+        bus_fault_from : state of the CAN controller from which on it is limp
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:

@@ -40,7 +40,44 @@ class Throttle:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0021, viscous_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0088, torque_constant_nm_per_a: typing.SupportsFloat | typing.SupportsIndex = 0.383, back_emf_vs_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.383, resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 1.5, inductance_mh: typing.SupportsFloat | typing.SupportsIndex = 1.5, supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, driver_drop_v: typing.SupportsFloat | typing.SupportsIndex = 0.0, driver_resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 0.0, dead_band: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284, stiction_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284, stribeck_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, karnopp_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, tanh_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, bristle_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 81.0, bristle_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.41, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, spring_above_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087, spring_below_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087, preload_above_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396, preload_below_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396, preload_ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.25, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, stop_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 5000.0, stop_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 4.5, backlash_half_deg: typing.SupportsFloat | typing.SupportsIndex = 0.2, gear_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 200.0, gear_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.2, plate_inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0003, plate_friction_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0, pressure_drop_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, friction: str = 'coulomb', backlash: str = 'none') -> None:
-        ...
+        """
+        inertia_kgm2 : inertia of plate, gears and motor at the plate [kg m²]
+        viscous_nms_per_rad : viscous friction [N m s/rad]
+        torque_constant_nm_per_a : motor torque per current at the plate [N m/A]
+        back_emf_vs_per_rad : motor voltage per plate speed [V s/rad]
+        resistance_ohm : armature resistance [ohm]
+        inductance_mh : armature inductance [mH]
+        supply_v : supply of the bridge [V]
+        driver_drop_v : voltage lost in the bridge at full duty [V]
+        driver_resistance_ohm : resistance of the bridge [ohm]
+        dead_band : duty without effect on either side of zero
+        coulomb_nm : Coulomb friction [N m]
+        stiction_nm : breakaway friction [N m]
+        stribeck_rad_per_s : speed of the Stribeck curve [rad/s]
+        karnopp_rad_per_s : half band of rest of Karnopp's form [rad/s]
+        tanh_rad_per_s : width of the smooth form [rad/s]
+        bristle_nm_per_rad : LuGre bristle stiffness [N m/rad]
+        bristle_damping_nms_per_rad : LuGre bristle damping [N m s/rad]
+        limp_home_deg : rest angle without current [deg]
+        spring_above_nm_per_rad : spring above limp-home [N m/rad]
+        spring_below_nm_per_rad : spring below limp-home [N m/rad]
+        preload_above_nm : preload above limp-home [N m]
+        preload_below_nm : preload below limp-home [N m]
+        preload_ramp_deg : half width over which the preload changes sign [deg]
+        closed_deg : lower end stop [deg]
+        open_deg : upper end stop [deg]
+        stop_stiffness_nm_per_rad : stiffness of the end stops [N m/rad]
+        stop_damping_nms_per_rad : damping of the end stops [N m s/rad]
+        backlash_half_deg : half gap of the gear [deg]
+        gear_stiffness_nm_per_rad : contact stiffness of the gear [N m/rad]
+        gear_damping_nms_per_rad : contact damping of the gear [N m s/rad]
+        plate_inertia_kgm2 : inertia on the plate's side of the gap [kg m²]
+        plate_friction_share : share of the friction on the plate's side of the gap
+        bore_mm : bore of the throttle [mm]
+        pressure_drop_kpa : pressure drop that loads the plate [kPa]
+        friction : law of the dry friction
+        backlash : play between gear and plate
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
@@ -281,6 +318,11 @@ class SensorPair:
     >>> SensorPair().adc_bits
     12
     """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -288,44 +330,60 @@ class SensorPair:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, closed_v: typing.SupportsFloat | typing.SupportsIndex = 0.5, span_v: typing.SupportsFloat | typing.SupportsIndex = 4.0, travel_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, supply_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, noise_v: typing.SupportsFloat | typing.SupportsIndex = 0.002, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0003, adc_bits: typing.SupportsInt | typing.SupportsIndex = 12, sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, debounce_s: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> None:
-        ...
+        """
+        closed_v : first sensor at 0 deg [V]
+        span_v : change of voltage over the travel [V]
+        travel_deg : travel behind that change [deg]
+        supply_v : supply of both sensors [V]
+        noise_v : noise of each sensor, rms [V]
+        lag_s : time constant of the input filter [s]
+        adc_bits : bits of the converter
+        sum_tolerance_v : tolerance of the sum [V]
+        low_v : lowest healthy voltage [V]
+        high_v : highest healthy voltage [V]
+        debounce_s : time a fault must last [s]
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def replace(self, **kwargs) -> SensorPair:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
     def to_dict(self) -> dict:
         """
-        Constructor keywords as a new dict.
+        All fields as a new dict.
         """
     @property
     def adc_bits(self) -> int:
         """
-        Bits of the converter.
+        bits of the converter [-]
         """
     @property
     def closed_v(self) -> float:
         """
-        First sensor at 0 deg [V].
+        first sensor at 0 deg [V]
         """
     @property
     def debounce_s(self) -> float:
         """
-        Time a check must fail [s].
+        time a fault must last [s]
         """
     @property
     def high_v(self) -> float:
         """
-        Highest healthy voltage [V].
+        highest healthy voltage [V]
         """
     @property
     def lag_s(self) -> float:
         """
-        Time constant of the anti-alias filter [s].
+        time constant of the input filter [s]
         """
     @property
     def low_v(self) -> float:
         """
-        Lowest healthy voltage [V].
+        lowest healthy voltage [V]
         """
     @property
     def lsb_v(self) -> float:
@@ -335,27 +393,27 @@ class SensorPair:
     @property
     def noise_v(self) -> float:
         """
-        Noise of each sensor, rms [V].
+        noise of each sensor, rms [V]
         """
     @property
     def span_v(self) -> float:
         """
-        Rise of the first sensor over the travel [V].
+        change of voltage over the travel [V]
         """
     @property
     def sum_tolerance_v(self) -> float:
         """
-        Tolerance of the sum [V].
+        tolerance of the sum [V]
         """
     @property
     def supply_v(self) -> float:
         """
-        Supply of sensors and converter [V].
+        supply of both sensors [V]
         """
     @property
     def travel_deg(self) -> float:
         """
-        Angle of the full span [deg].
+        travel behind that change [deg]
         """
 class Stepper:
     """
@@ -511,7 +569,37 @@ class DemandChain:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, indicated_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.33, heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.5, stoichiometric_air_fuel: typing.SupportsFloat | typing.SupportsIndex = 14.7, air_fuel_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, friction_nm: typing.SupportsFloat | typing.SupportsIndex = 15.0, friction_nm_per_rpm: typing.SupportsFloat | typing.SupportsIndex = 0.003, displacement_l: typing.SupportsFloat | typing.SupportsIndex = 2.0, volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.85, manifold_l: typing.SupportsFloat | typing.SupportsIndex = 3.0, manifold_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 310.0, ambient_kpa: typing.SupportsFloat | typing.SupportsIndex = 101.325, ambient_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 298.15, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0, shaft_mm: typing.SupportsFloat | typing.SupportsIndex = 8.0, plate_closed_deg: typing.SupportsFloat | typing.SupportsIndex = 6.0, leak_mm2: typing.SupportsFloat | typing.SupportsIndex = 3.0, discharge_5: typing.SupportsFloat | typing.SupportsIndex = 0.65, discharge_20: typing.SupportsFloat | typing.SupportsIndex = 0.75, discharge_45: typing.SupportsFloat | typing.SupportsIndex = 0.85, discharge_90: typing.SupportsFloat | typing.SupportsIndex = 0.9, discharge_pressure_loss: typing.SupportsFloat | typing.SupportsIndex = 0.1, pressure_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, filling_share: typing.SupportsFloat | typing.SupportsIndex = 1.0, lowest_flow_function: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.95, reference_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 800.0, reference_bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 80.0, widest_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, pedal_map: PedalMap | None = None) -> None:
-        ...
+        """
+        indicated_efficiency : indicated work over the heat of the fuel
+        heating_value_mj_per_kg : lower heating value of the fuel [MJ/kg]
+        stoichiometric_air_fuel : stoichiometric air over fuel by mass
+        air_fuel_ratio : lambda
+        friction_nm : friction torque at standstill [N m]
+        friction_nm_per_rpm : rise of the friction torque with the speed [N m/rpm]
+        displacement_l : displacement of the engine [L]
+        volumetric_efficiency : charge over what the displacement holds of manifold gas
+        manifold_l : volume of the manifold [L]
+        manifold_temperature_k : temperature in the manifold [K]
+        ambient_kpa : pressure before the throttle [kPa]
+        ambient_temperature_k : temperature before the throttle [K]
+        bore_mm : bore of the throttle [mm]
+        shaft_mm : shaft of the plate [mm]
+        plate_closed_deg : plate against the cross-section where the opening is zero [deg]
+        leak_mm2 : area that is open at any angle [mm²]
+        discharge_5 : discharge coefficient up to 5 deg of opening
+        discharge_20 : discharge coefficient at 20 deg
+        discharge_45 : discharge coefficient at 45 deg
+        discharge_90 : discharge coefficient at 90 deg
+        discharge_pressure_loss : share that it loses at equal pressures
+        pressure_lag_s : lag of the wanted manifold pressure [s]
+        filling_share : share fed forward of the air that fills the manifold
+        lowest_flow_function : the flow function is taken no lower
+        highest_ratio : pressure ratio up to which a measured pressure counts
+        reference_rate_deg_per_s : fastest change of the reference [deg/s]
+        reference_bandwidth_per_s : bandwidth of the filter of the reference [1/s]
+        widest_deg : largest reference [deg]
+        pedal_map : torque that the pedal wants over the speed
+        """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:

@@ -25,3 +25,7 @@ __all__ = [
     "SupervisedController",
     "ThrottleSupervisor",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -7,3 +7,7 @@ from mgdd.datasets.origins import fetch
 from mgdd.datasets.readers import load
 
 __all__ = ["available", "fetch", "load", "path"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -10,3 +10,7 @@ from mgdd.design.points import design_points
 from mgdd.design.region import FeasibleRegion
 
 __all__ = ["FeasibleRegion", "design_points"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -29,3 +29,7 @@ __all__ = [
     "simulate",
     "timing_sweep",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

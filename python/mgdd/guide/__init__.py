@@ -33,3 +33,7 @@ from mgdd.guide.online_calibration import OnlineCalibration
 from mgdd.guide.timing_map import TimingMap
 
 __all__ = ["Curve", "CurveSeeking", "FeedForward", "GuidedEngine", "ModelOptimum", "OnlineCalibration", "TimingMap"]
+
+
+def __dir__() -> list[str]:
+    return __all__

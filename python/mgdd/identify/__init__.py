@@ -44,3 +44,7 @@ __all__ = [
     "validate_throttle",
     "wall_heat_profile",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

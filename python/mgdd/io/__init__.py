@@ -18,3 +18,7 @@ __all__ = [
     "write_pressure",
     "write_throttle_log",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

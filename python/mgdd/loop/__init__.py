@@ -43,3 +43,7 @@ __all__ = [
     "tune_controller",
     "tuned_controller",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

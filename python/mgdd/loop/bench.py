@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd._core.engine import NoxModel, OperatingPoint, Performance, SoftSensor
+from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import SensorDynamics
+from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.plant import Measurement, checked_inputs
@@ -30,6 +31,7 @@ _RANDOM = (
 )  # fmt: skip
 
 
+@takes_settings_of(_core.loop.EngineBench, without=("cylinder",))
 class EngineBench(_core.loop.EngineBench):
     """A virtual engine bench: the cycle model with noise, drift and the sensors of a real one.
 
@@ -46,35 +48,12 @@ class EngineBench(_core.loop.EngineBench):
         Operating point; that of the preset if left out. It must carry fuel.
     schedule : sequence of (int, OperatingPoint), optional
         First cycle of each operating point, the first being 0, instead of ``point``.
-    performance : Performance, optional
-        What is to be maximised; gross efficiency in percent if left out.
-    nox_sensor : {"soft", "soft_corrected", "analyser", "fast", "true_value", "none"}
-        Which NOx value enters the performance.
     limits : sequence of str, or limits by name or as Limit
         Up to eight indicators to report as limits, or ``"cov_imep_percent"`` (of the last 50 cycles; 0 at the first).
-    soc_scatter_cad : float
-        Standard deviation of SOC from cycle to cycle [°CA].
-    efficiency_noise_percent : float
-        Standard deviation of the measured efficiency [points], with the work and IMEP that belong to it.
-    misfire_probability : float
-        Of each cycle [-].
-    soc_drift_cad_per_kcycle, wall_heat_drift_per_kcycle : float
-        Offset of SOC [°CA] and of the wall-heat scale [-] per 1000 cycles.
-    pressure_noise_bar, tdc_error_cad, pressure_gain_error, pressure_offset_bar : float
-        Of the pressure sensor: standard deviation of each sample [bar], by how much its angles [°CA] and its pressure
-        [-] read high, and its offset [bar]. Only `pressure` shows them: indicators are those of the true pressure.
-    true_nox : NoxModel, optional
-        NOx of the plant from its own maximum gas temperature; an Arrhenius map if left out.
-    soft_sensor : SoftSensor, optional
-        The soft sensor; an affine-log map with the same constants if left out.
-    analyser, fast_sensor : SensorDynamics, optional
-        Delay, lag and noise: 3 s, 2 s, 1 % and 0.05 s, 0.05 s, 3 % if left out.
-    delay_whole_objective : bool
-        Every component passes the analyser's delay and lag, without its noise; NOx then is the true one.
-    step_cad, integrator
-        As in `mgdd.engine.simulate`.
     seed : int
         Of all noise, in [0, 2**64).
+    **settings
+        As `fields` lists them.
 
     Raises
     ------
@@ -99,26 +78,9 @@ class EngineBench(_core.loop.EngineBench):
         point: PointLike | None = None,
         *,
         schedule: Iterable[tuple[int, OperatingPoint]] | None = None,
-        performance: Performance | None = None,
-        nox_sensor: str = "soft",
         limits: Mapping[str, float] | Sequence[Limit | str] = (),
-        soc_scatter_cad: float = 0.3,
-        efficiency_noise_percent: float = 0.25,
-        misfire_probability: float = 0.0,
-        soc_drift_cad_per_kcycle: float = 0.0,
-        wall_heat_drift_per_kcycle: float = 0.0,
-        pressure_noise_bar: float = 0.0,
-        tdc_error_cad: float = 0.0,
-        pressure_gain_error: float = 0.0,
-        pressure_offset_bar: float = 0.0,
-        true_nox: NoxModel | None = None,
-        soft_sensor: SoftSensor | None = None,
-        analyser: SensorDynamics | None = None,
-        fast_sensor: SensorDynamics | None = None,
-        delay_whole_objective: bool = False,
-        step_cad: float = 1.0,
-        integrator: str = "trapezoid",
         seed: int = 0,
+        **settings: Any,
     ) -> None:
         if schedule is not None and point is not None:
             raise ParameterError("point and schedule were both given: name the operating points in one of them")
@@ -128,26 +90,9 @@ class EngineBench(_core.loop.EngineBench):
         super().__init__(
             cylinder=cylinder,
             schedule=[(0, first)] if schedule is None else list(schedule),
-            performance=performance,
-            nox_sensor=nox_sensor,
             limits=limit_names_of(limits),
-            soc_scatter_cad=soc_scatter_cad,
-            efficiency_noise_percent=efficiency_noise_percent,
-            misfire_probability=misfire_probability,
-            soc_drift_cad_per_kcycle=soc_drift_cad_per_kcycle,
-            wall_heat_drift_per_kcycle=wall_heat_drift_per_kcycle,
-            pressure_noise_bar=pressure_noise_bar,
-            tdc_error_cad=tdc_error_cad,
-            pressure_gain_error=pressure_gain_error,
-            pressure_offset_bar=pressure_offset_bar,
-            true_nox=true_nox,
-            soft_sensor=soft_sensor,
-            analyser=analyser,
-            fast_sensor=fast_sensor,
-            delay_whole_objective=delay_whole_objective,
-            step_cad=step_cad,
-            integrator=integrator,
             seed=seed,
+            **settings,
         )
 
     @property

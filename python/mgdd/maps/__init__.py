@@ -20,3 +20,7 @@ __all__ = [
     "write_dcm",
     "write_map",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

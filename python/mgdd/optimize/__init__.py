@@ -59,3 +59,7 @@ __all__ = [
     "measure_map",
     "tune",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -9,3 +9,7 @@ from __future__ import annotations
 from mgdd.parallel.items import map_items
 
 __all__ = ["map_items"]
+
+
+def __dir__() -> list[str]:
+    return __all__

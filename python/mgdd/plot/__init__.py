@@ -32,3 +32,7 @@ __all__ = [
     "timing",
     "trade_off",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -5,3 +5,7 @@ from __future__ import annotations
 from mgdd.presets.preset import Preset, available, load
 
 __all__ = ["Preset", "available", "load"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -18,3 +18,7 @@ __all__ = [
     "Model",
     "Result",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -60,3 +60,7 @@ __all__ = [
     "repair_record",
     "run_experiment",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

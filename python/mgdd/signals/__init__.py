@@ -20,3 +20,7 @@ __all__ = [
     "triangle",
     "vaf_percent",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -14,3 +14,7 @@ __all__ = [
     "available_studies",
     "run_study",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

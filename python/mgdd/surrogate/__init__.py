@@ -20,3 +20,7 @@ __all__ = [
     "fit_surrogate",
     "random_step_records",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

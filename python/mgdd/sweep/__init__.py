@@ -5,3 +5,7 @@ from __future__ import annotations
 from mgdd.sweep.cycles import sweep
 
 __all__ = ["sweep"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -26,3 +26,7 @@ __all__ = [
     "simulate",
     "to_iosystem",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -15,8 +15,11 @@
 namespace mgdd {
 namespace {
 
-enum class Colour { red, blue };
-constexpr std::pair<Colour, std::string_view> colours[] = {{Colour::red, "red"}, {Colour::blue, "blue"}};
+enum class Colour { red, dark_blue, grey_2 };
+constexpr std::string_view other_name(Colour colour) noexcept {
+  return colour == Colour::dark_blue ? "blue" : "";
+}
+constexpr std::pair<Colour, std::string_view> warm[] = {{Colour::red, "fire"}};
 
 TEST(CommonText, ShortButUnambiguous) {
   EXPECT_EQ(text(-86.0), "-86");
@@ -26,17 +29,21 @@ TEST(CommonText, ShortButUnambiguous) {
 }
 
 TEST(CommonText, NamesGoBothWaysAndListTheValidOnes) {
-  EXPECT_EQ(parse_name<Colour>(colours, "colour", "blue"), Colour::blue);
-  EXPECT_EQ(name_of<Colour>(colours, Colour::red), "red");
-  EXPECT_EQ(name_of<Colour>(colours, static_cast<Colour>(7)), "unknown");
+  static_assert(names<Colour>().size() == 3);
+  EXPECT_EQ(parse_name<Colour>("colour", "blue"), Colour::dark_blue);
+  EXPECT_EQ(parse_name<Colour>("colour", "fire", warm), Colour::red);
+  EXPECT_EQ(name_of(Colour::red), "red");
+  EXPECT_EQ(name_of(Colour::grey_2), "grey_2");
+  EXPECT_EQ(name_of(static_cast<Colour>(7)), "unknown");
+  EXPECT_EQ(name_of(static_cast<Colour>(-1)), "unknown");
   try {
-    parse_name<Colour>(colours, "colour", "green");
+    parse_name<Colour>("colour", "green");
     FAIL();
   } catch (const ParameterError& error) {
-    EXPECT_STREQ(error.what(), "colour = 'green': must be one of red, blue");
+    EXPECT_STREQ(error.what(), "colour = 'green': must be one of red, blue, grey_2");
     EXPECT_EQ(error.field, "colour");
     EXPECT_EQ(std::get<std::string>(error.value), "green");
-    EXPECT_EQ(error.bound, "one of red, blue");
+    EXPECT_EQ(error.bound, "one of red, blue, grey_2");
   }
 }
 

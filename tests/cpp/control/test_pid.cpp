@@ -303,7 +303,7 @@ TEST(Pid, EveryNumberOfTheSettingsHasOneField) {
   double at = 0.5;
   for (const auto& field : pid_fields())
     field.in(s) = at += 1.0;
-  EXPECT_EQ(sizeof(PidSettings), n_pid_fields * sizeof(double));
+  EXPECT_EQ(sizeof(PidSettings), pid_fields().size() * sizeof(double));
   std::vector<double> seen;
   for (const auto& field : pid_fields())
     seen.push_back(field.in(s));

@@ -179,7 +179,7 @@ TEST(RecedingHorizon, EveryNumberOfTheSettingsHasOneField) {
   double at = 0.5;
   for (const auto& field : horizon_fields())
     field.in(s) = at += 1.0;
-  EXPECT_EQ(sizeof(HorizonSettings), n_horizon_fields * sizeof(double) + 2 * sizeof(int));
+  EXPECT_EQ(sizeof(HorizonSettings), horizon_fields().size() * sizeof(double) + 2 * sizeof(int));
   at = 0.5;
   for (const auto& field : horizon_fields())
     EXPECT_EQ(field.in(s), at += 1.0);

@@ -319,9 +319,9 @@ TEST(Supervisor, EveryBadSettingIsNamedAndEveryNameHasAValue) {
   refuses([](auto& s) { s.spring.limp_home_deg = 0.0; }, "limp_home_deg");
   refuses([](auto& s) { s.supply_lost_v = 9.5; }, "supply_lost_v");
   refuses([](auto& s) { s.late_s = 0.03; }, "late_s");
-  EXPECT_EQ(supervisor_mode_names().size(), 4u);
-  EXPECT_EQ(supervisor_reason_names().size(), 14u);
-  EXPECT_EQ(return_test_names().size(), 4u);
+  EXPECT_EQ(names<SupervisorMode>().size(), 4u);
+  EXPECT_EQ(names<SupervisorReason>().size(), 14u);
+  EXPECT_EQ(names<ReturnTest>().size(), 4u);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ TEST(Batch, LanesGiveTheCyclesOneByOneForEveryLaw) {
         const Columns lanes = run(table.cases, settings);
         settings.form = BatchForm::single;
         EXPECT_LT(difference(lanes, run(table.cases, settings)), 1e-10)
-            << to_string(shape) << to_string(wall) << to_string(scheme);
+            << name_of(shape) << name_of(wall) << name_of(scheme);
       }
     }
   }
@@ -128,7 +128,7 @@ TEST(Batch, SharedPointsGiveTheCyclesOneByOneToAMillionth) {
         table.cases.cylinder.wall_heat.wall_heat_scale = scale;
         EXPECT_EQ(form_of(table.cases, BatchForm::automatic), BatchForm::shared);
         EXPECT_LT(difference(run(table.cases, BatchForm::shared), run(table.cases, BatchForm::single)), 1e-6)
-            << to_string(shape) << to_string(wall) << scale;
+            << name_of(shape) << name_of(wall) << scale;
       }
     }
   }
@@ -281,7 +281,7 @@ TEST(Batch, DerivativesInLanesAreThoseOfOneCycle) {
             const double wanted = expected.*members[o];
             const double now = found[i * members.size() + o][row];
             EXPECT_NEAR(now, wanted, 1e-8 * std::max(1.0, std::abs(wanted)))
-                << along[i] << ' ' << indicator_fields<double>()[o].name << ' ' << to_string(shape) << to_string(wall);
+                << along[i] << ' ' << indicator_fields<double>()[o].name << ' ' << name_of(shape) << name_of(wall);
           }
         }
       }

@@ -91,7 +91,7 @@ TEST(EngineCycle, ObeysTheFirstLawInEveryVariant) {
             const double spent = cycle.model.booked_work_j(k, cycle.work) + cycle.model.energy_change_j(k, cycle.work);
             worst = std::max(worst, std::abs(heat - spent));
           }
-          EXPECT_LT(worst, 1e-9 * 856.0) << to_string(integrator) << " " << to_string(gamma);
+          EXPECT_LT(worst, 1e-9 * 856.0) << name_of(integrator) << " " << name_of(gamma);
         }
       }
     }

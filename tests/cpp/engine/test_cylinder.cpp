@@ -97,21 +97,21 @@ TEST(EngineCylinder, TimingMustLieInItsWindowAndInTheClosedPart) {
 
 TEST(EngineCylinder, NamesGoBothWays) {
   for (const char* name : {"triangle", "wiebe", "double_wiebe"}) {
-    EXPECT_EQ(to_string(parse_burn_shape(name)), name);
+    EXPECT_EQ(name_of(parse_name<BurnShape>("burn_shape", name)), name);
   }
   for (const char* name : {"constant", "linear", "polynomial"}) {
-    EXPECT_EQ(to_string(parse_gamma_model(name)), name);
+    EXPECT_EQ(name_of(parse_name<GammaModel>("gamma_model", name)), name);
   }
   for (const char* name : {"woschni", "hohenberg"}) {
-    EXPECT_EQ(to_string(parse_wall_heat_model(name)), name);
+    EXPECT_EQ(name_of(parse_name<WallHeatModel>("wall_heat_model", name)), name);
   }
   for (const char* name : {"watson", "wolfer", "hardenberg_hase", "polynomial"}) {
-    EXPECT_EQ(to_string(parse_ignition_model(name)), name);
+    EXPECT_EQ(name_of(parse_name<IgnitionModel>("ignition_model", name)), name);
   }
   for (const char* name : {"trapezoid", "split", "seed", "euler"}) {
-    EXPECT_EQ(to_string(parse_integrator(name)), name);
+    EXPECT_EQ(name_of(parse_name<Integrator>("integrator", name)), name);
   }
-  const std::string message = refusal([] { parse_integrator("rk4"); });
+  const std::string message = refusal([] { parse_name<Integrator>("integrator", "rk4"); });
   EXPECT_TRUE(contains(message, "integrator = 'rk4'") && contains(message, "split")) << message;
 }
 

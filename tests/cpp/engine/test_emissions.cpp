@@ -32,7 +32,7 @@ TEST(NoxModel, TheMapsAgreeInValueAndSlopeAtTheReference) {
   EXPECT_DOUBLE_EQ(arrhenius.ppm(1900.0), 1200.0);
   EXPECT_NEAR(line.ppm(1901.0) / line.ppm(1899.0), arrhenius.ppm(1901.0) / arrhenius.ppm(1899.0), 1e-8);
   EXPECT_GT(line.ppm(2200.0), 1.05 * arrhenius.ppm(2200.0));
-  EXPECT_EQ(parse_nox_map(to_string(NoxMap::arrhenius)), NoxMap::arrhenius);
+  EXPECT_EQ(parse_name<NoxMap>("map", name_of(NoxMap::arrhenius)), NoxMap::arrhenius);
 }
 
 TEST(NoxModel, OxygenActsByItsPower) {

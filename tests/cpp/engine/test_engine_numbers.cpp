@@ -40,10 +40,10 @@ std::string refusal(Call call) {
 TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
   const Cylinder c;
   test_support::expect_preset(c, cylinder_fields<double>(),
-                              {{"burn_shape", to_string(c.burn.burn_shape)},
-                               {"gamma_model", to_string(c.gas.gamma_model)},
-                               {"wall_heat_model", to_string(c.wall_heat.wall_heat_model)},
-                               {"ignition_model", to_string(c.ignition.ignition_model)}},
+                              {{"burn_shape", name_of(c.burn.burn_shape)},
+                               {"gamma_model", name_of(c.gas.gamma_model)},
+                               {"wall_heat_model", name_of(c.wall_heat.wall_heat_model)},
+                               {"ignition_model", name_of(c.ignition.ignition_model)}},
                               "puma_single", "cylinder");
   test_support::expect_preset(OperatingPoint{}, operating_point_fields<double>(), {}, "puma_single", "point");
   EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
@@ -75,36 +75,33 @@ TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
 }
 
 TEST(EngineNumbers, NamesOfTheOptions) {
-  test::expect_names(
-      parse_gamma_model,
+  test::expect_names<GammaModel>(
       {{GammaModel::constant, "constant"}, {GammaModel::linear, "linear"}, {GammaModel::polynomial, "polynomial"}});
-  test::expect_names(
-      parse_burn_shape,
+  test::expect_names<BurnShape>(
       {{BurnShape::triangle, "triangle"}, {BurnShape::wiebe, "wiebe"}, {BurnShape::double_wiebe, "double_wiebe"}});
-  test::expect_names(parse_wall_heat_model,
-                     {{WallHeatModel::woschni, "woschni"}, {WallHeatModel::hohenberg, "hohenberg"}});
-  test::expect_names(parse_ignition_model, {{IgnitionModel::watson, "watson"},
-                                            {IgnitionModel::wolfer, "wolfer"},
-                                            {IgnitionModel::hardenberg_hase, "hardenberg_hase"},
-                                            {IgnitionModel::polynomial, "polynomial"}});
-  test::expect_names(
-      parse_integrator,
-      {{Integrator::trapezoid, "trapezoid"}, {Integrator::split, "split"}, {Integrator::euler, "euler"}});
-  test::expect_names(parse_pegging, {{Pegging::none, "none"},
-                                     {Pegging::inlet, "inlet"},
-                                     {Pegging::two_point, "two_point"},
-                                     {Pegging::least_squares, "least_squares"}});
-  test::expect_names(
-      parse_analysis_gamma,
+  test::expect_names<WallHeatModel>({{WallHeatModel::woschni, "woschni"}, {WallHeatModel::hohenberg, "hohenberg"}});
+  test::expect_names<IgnitionModel>({{IgnitionModel::watson, "watson"},
+                                     {IgnitionModel::wolfer, "wolfer"},
+                                     {IgnitionModel::hardenberg_hase, "hardenberg_hase"},
+                                     {IgnitionModel::polynomial, "polynomial"}});
+  test::expect_names<Integrator>({{Integrator::trapezoid, "trapezoid"},
+                                  {Integrator::split, "split"},
+                                  {Integrator::seed, "seed"},
+                                  {Integrator::euler, "euler"}});
+  test::expect_names<Pegging>({{Pegging::none, "none"},
+                               {Pegging::inlet, "inlet"},
+                               {Pegging::two_point, "two_point"},
+                               {Pegging::least_squares, "least_squares"}});
+  test::expect_names<AnalysisGamma>(
       {{AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}});
-  test::expect_names(parse_performance_signal, {{PerformanceSignal::efficiency_percent, "efficiency_percent"},
-                                                {PerformanceSignal::imep_gross_bar, "imep_gross_bar"},
-                                                {PerformanceSignal::imep_closed_bar, "imep_closed_bar"},
-                                                {PerformanceSignal::nox_ppm, "nox_ppm"},
-                                                {PerformanceSignal::p_max_bar, "p_max_bar"},
-                                                {PerformanceSignal::dp_max_bar_per_cad, "dp_max_bar_per_cad"},
-                                                {PerformanceSignal::t_max_k, "t_max_k"}});
-  test::expect_names(parse_nox_map, {{NoxMap::affine_log, "affine_log"}, {NoxMap::arrhenius, "arrhenius"}});
+  test::expect_names<PerformanceSignal>({{PerformanceSignal::efficiency_percent, "efficiency_percent"},
+                                         {PerformanceSignal::imep_gross_bar, "imep_gross_bar"},
+                                         {PerformanceSignal::imep_closed_bar, "imep_closed_bar"},
+                                         {PerformanceSignal::nox_ppm, "nox_ppm"},
+                                         {PerformanceSignal::p_max_bar, "p_max_bar"},
+                                         {PerformanceSignal::dp_max_bar_per_cad, "dp_max_bar_per_cad"},
+                                         {PerformanceSignal::t_max_k, "t_max_k"}});
+  test::expect_names<NoxMap>({{NoxMap::affine_log, "affine_log"}, {NoxMap::arrhenius, "arrhenius"}});
 }
 
 // --- what is allowed ------------------------------------------------------------------------------------------

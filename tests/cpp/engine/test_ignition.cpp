@@ -27,7 +27,7 @@ TEST(EngineIgnition, DelayIsWhereTheIntegralReachesOne) {
   const Cycle cycle = run(fine);
   for (const char* name : {"watson", "wolfer"}) {
     EngineCase c;
-    c.cylinder.ignition.ignition_model = parse_ignition_model(name);
+    c.cylinder.ignition.ignition_model = parse_name<IgnitionModel>("ignition_model", name);
     for (const double soi : {-25.0, -12.0, -3.0, 6.0}) {
       const IgnitionTiming t = start_of_combustion(c.cylinder, c.point, soi);
       ASSERT_TRUE(t.ignites);

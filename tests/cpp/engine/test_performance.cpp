@@ -61,7 +61,7 @@ TEST(Performance, EverySignalReachesItsTerm) {
   for (std::size_t i = 0; i < performance_signal_count; ++i) {
     const auto signal = static_cast<PerformanceSignal>(i);
     EXPECT_DOUBLE_EQ((Performance{{.signal = signal, .weight = 3.0, .reference = 2.0}}.value(s)), 1.5 * s.values[i]);
-    EXPECT_EQ(parse_performance_signal(to_string(signal)), signal);
+    EXPECT_EQ(parse_name<PerformanceSignal>("signal", name_of(signal)), signal);
     EXPECT_NE(unit_of(signal), "unknown");
   }
 }
@@ -85,7 +85,7 @@ TEST(Performance, RefusesWhatCannotBeATerm) {
             "terms[0].weight = nan: must be finite");
   EXPECT_EQ(message_of({{.signal = static_cast<PerformanceSignal>(99)}}), "terms[0].signal = 99: is not a signal");
   EXPECT_THROW(efficiency_and_nox(-0.1), ParameterError);
-  EXPECT_THROW(parse_performance_signal("torque"), ParameterError);
+  EXPECT_THROW(parse_name<PerformanceSignal>("signal", "torque"), ParameterError);
 }
 
 }  // namespace

@@ -57,8 +57,8 @@ TEST(EngineRealTime, NothingIsAllocatedInAnyVariant) {
             c.cylinder.wall_heat.wall_heat_model = wall;
             c.cylinder.burn.burn_shape = burn;
             c.point.fuel_mg = fuel;
-            EXPECT_EQ(allocations<double>(c), 0u) << to_string(integrator) << " " << to_string(burn);
-            EXPECT_EQ(allocations<Dual<4>>(c), 0u) << to_string(integrator) << " " << to_string(burn);
+            EXPECT_EQ(allocations<double>(c), 0u) << name_of(integrator) << " " << name_of(burn);
+            EXPECT_EQ(allocations<Dual<4>>(c), 0u) << name_of(integrator) << " " << name_of(burn);
             ++variants;
           }
         }

@@ -82,7 +82,7 @@ TEST(EngineSensitivity, AgreesWithDifferencesForEveryInputAndLaw) {
         c.cylinder.burn.burn_shape = shape;
         c.cylinder.gas.gamma_model = gamma;
         c.cylinder.wall_heat.wall_heat_model = wall;
-        compare(c, std::string(to_string(shape)) + " " + std::string(to_string(gamma)));
+        compare(c, std::string(name_of(shape)) + " " + std::string(name_of(gamma)));
       }
     }
   }
@@ -93,7 +93,7 @@ TEST(EngineSensitivity, AgreesWithDifferencesForEveryIntegrator) {
     EngineCase c = smooth();
     c.integrator = integrator;
     c.step_cad = 0.7;
-    compare(c, std::string(to_string(integrator)));
+    compare(c, std::string(name_of(integrator)));
   }
 }
 

@@ -86,8 +86,8 @@ TEST(EngineTraceCheck, AnalysisRefusesBadOptions) {
   for (const TraceOptions& o : bad) {
     EXPECT_THROW(analyze_trace(t.angle, t.pressure, {}, {}, o), ParameterError);
   }
-  EXPECT_THROW(parse_pegging("auto"), ParameterError);
-  EXPECT_THROW(parse_analysis_gamma("1.33"), ParameterError);
+  EXPECT_THROW(parse_name<Pegging>("pegging", "auto"), ParameterError);
+  EXPECT_THROW(parse_name<AnalysisGamma>("gamma", "1.33"), ParameterError);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 // Options of the analysis: which values belong to their domains, and the names of the choices.
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/engine/pressure/trace_options.hpp"
 
 #include <functional>
@@ -72,8 +73,8 @@ TEST(EngineTraceOptions, AWindowHasTwoEnds) {
 
 TEST(EngineTraceOptions, NamesComeBack) {
   for (const char* name : {"automatic", "none", "savitzky_golay", "low_pass", "angle_window"})
-    EXPECT_EQ(to_string(parse_smoothing(name)), name);
-  EXPECT_THROW(parse_smoothing("wavelet"), ParameterError);
+    EXPECT_EQ(name_of(parse_name<Smoothing>("smoothing", name)), name);
+  EXPECT_THROW(parse_name<Smoothing>("smoothing", "wavelet"), ParameterError);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ TEST(ModelOptimum, AgreesWithAnotherSearchOverLoadSpeedAndModel) {
       const ModelOptimumResult found = ModelOptimum(s).find(c.point);
       ASSERT_TRUE(found.found) << words;
       EXPECT_EQ(found.method, method) << words;
-      EXPECT_NEAR(found.soc_cad, expected, 0.06) << words << to_string(method);
+      EXPECT_NEAR(found.soc_cad, expected, 0.06) << words << name_of(method);
       EXPECT_FALSE(found.at_bound);
       EXPECT_GT(found.curvature, -0.08) << words;
       EXPECT_LT(found.curvature, -0.02) << words;

@@ -32,7 +32,7 @@ TEST(OnlineCalibration, EveryMethodFindsTheWallHeatOfACleanEngine) {
       loop::EngineBench bench(steady_bench());
       OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method, start)));
       run(bench, calibration, 120);
-      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.01) << to_string(method) << " from " << start;
+      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.01) << name_of(method) << " from " << start;
       EXPECT_TRUE(calibration.determined()) << calibration.explain(wall);
       EXPECT_EQ(calibration.cylinder().wall_heat.wall_heat_scale, calibration.parameters()[wall]);
       engine::Cylinder rest = calibration.cylinder();
@@ -80,7 +80,7 @@ TEST(OnlineCalibration, WhatIsKnownBeforehandLeavesRoomForAWrongTiming) {
       loop::EngineBench bench(steady_bench(0.1));
       OnlineCalibration calibration(wrong_guide(method));
       run(bench, calibration, 60, -6.0, error);
-      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.025) << to_string(method) << " " << error;
+      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.025) << name_of(method) << " " << error;
       EXPECT_NEAR(calibration.parameters()[Calibrated::soc_offset], -error, 0.05);
     }
   }
@@ -104,8 +104,8 @@ TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
         run(bench, calibration, 150);
         const double bias = calibration.parameters()[wall] / 0.5 - 1.0;
         EXPECT_TRUE(std::abs(bias) < 0.05 || !calibration.determined())
-            << to_string(method) << " tdc " << s.tdc_error_cad << " gain " << s.pressure_gain_error << " noise "
-            << noise << " " << calibration.explain(wall);
+            << name_of(method) << " tdc " << s.tdc_error_cad << " gain " << s.pressure_gain_error << " noise " << noise
+            << " " << calibration.explain(wall);
         if (method != CalibrationMethod::extremum_seeking && noise < 0.2) {
           EXPECT_LT(std::abs(bias), 0.05) << calibration.explain(wall);
           EXPECT_TRUE(calibration.determined()) << calibration.explain(wall);
@@ -137,8 +137,8 @@ TEST(OnlineCalibration, AModelOfAnotherShapeIsNotBelieved) {
       loop::EngineBench bench(s);
       OnlineCalibration calibration(wrong_guide(method));
       run(bench, calibration, 150);
-      EXPECT_FALSE(calibration.determined()) << to_string(method) << kind << " " << calibration.explain(wall);
-      EXPECT_EQ(calibration.jumps(), 0) << to_string(method) << kind;  // a misfit that stays is not a change
+      EXPECT_FALSE(calibration.determined()) << name_of(method) << kind << " " << calibration.explain(wall);
+      EXPECT_EQ(calibration.jumps(), 0) << name_of(method) << kind;  // a misfit that stays is not a change
     }
   }
 }
@@ -194,9 +194,9 @@ TEST(OnlineCalibration, StandardErrorsHoldForWhiteNoise) {
   for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
     for (const double noise : {0.1, 0.5}) {
       const Coverage c = coverage_of(method, noise, 0.0, 40);
-      EXPECT_GT(c.within_95, 0.88) << to_string(method) << " " << noise;  // 0.95 less three of 0.022
-      EXPECT_LT(c.spread, 1.2) << to_string(method) << " " << noise;
-      EXPECT_GT(c.spread, 0.7) << to_string(method) << " " << noise;
+      EXPECT_GT(c.within_95, 0.88) << name_of(method) << " " << noise;  // 0.95 less three of 0.022
+      EXPECT_LT(c.spread, 1.2) << name_of(method) << " " << noise;
+      EXPECT_GT(c.spread, 0.7) << name_of(method) << " " << noise;
     }
   }
 }
@@ -205,8 +205,8 @@ TEST(OnlineCalibration, StandardErrorsHoldForCorrelatedNoise) {
   for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
     for (const double correlation : {0.5, 0.9}) {
       const Coverage c = coverage_of(method, 0.3, correlation, 40);
-      EXPECT_GT(c.within_95, 0.88) << to_string(method) << " " << correlation;
-      EXPECT_LT(c.spread, 1.25) << to_string(method) << " " << correlation;
+      EXPECT_GT(c.within_95, 0.88) << name_of(method) << " " << correlation;
+      EXPECT_LT(c.spread, 1.25) << name_of(method) << " " << correlation;
     }
   }
 }
@@ -233,8 +233,8 @@ TEST(OnlineCalibration, StandardErrorsHoldWhereTheTimingScatters) {
         within += std::abs(z) < 1.96 ? 1.0 / seeds : 0.0;
         spread += z * z / seeds;
       }
-      EXPECT_GT(within, 0.88) << to_string(method) << " " << noise;
-      EXPECT_LT(std::sqrt(spread), 1.2) << to_string(method) << " " << noise;
+      EXPECT_GT(within, 0.88) << name_of(method) << " " << noise;
+      EXPECT_LT(std::sqrt(spread), 1.2) << name_of(method) << " " << noise;
     }
   }
 }

@@ -127,10 +127,10 @@ TEST(OnlineCalibrationPlants, IntervalsOfEveryParameterHoldOverRandomPlants) {
         holds[place(i)] += std::abs(z_of(calibration, p, i)) < 1.96 ? 1.0 : 0.0;
       }
     }
-    EXPECT_LE(wrong, plants / 20) << to_string(method);
+    EXPECT_LE(wrong, plants / 20) << name_of(method);
     for (int i = 0; i < n_calibrated; ++i) {
       EXPECT_GE(runs[place(i)], 40.0);
-      EXPECT_GE(holds[place(i)] / runs[place(i)], 0.85) << to_string(method) << " " << info_of(i).field.name;
+      EXPECT_GE(holds[place(i)] / runs[place(i)], 0.85) << name_of(method) << " " << info_of(i).field.name;
     }
   }
 }
@@ -149,7 +149,7 @@ TEST(OnlineCalibrationPlants, EachErrorOfTheEngineIsInTheInterval) {
           holds += std::abs(z_of(calibration, p, wall)) < 1.96 ? 1 : 0;
           EXPECT_FALSE(sure_and_wrong(calibration)) << calibration.explain(wall);
         }
-        EXPECT_GE(holds, 0.85 * seeds) << to_string(method) << " " << which << " " << sign;
+        EXPECT_GE(holds, 0.85 * seeds) << name_of(method) << " " << which << " " << sign;
       }
     }
   }
@@ -199,7 +199,7 @@ TEST(OnlineCalibrationPlants, ScatterOfTheTimingIsNotTakenForAJump) {
       Plant p = plant(seed, 0.0, 0.0, 0.0);
       jumps += taught(p, method, 150).jumps();
     }
-    EXPECT_LE(jumps, 1) << to_string(method);
+    EXPECT_LE(jumps, 1) << name_of(method);
   }
 }
 

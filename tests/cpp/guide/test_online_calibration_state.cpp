@@ -61,8 +61,8 @@ TEST(OnlineCalibrationLoop, FollowsAnEngineThatSeeks) {
         late += k >= 40 && std::abs(calibration.parameters()[wall] - 0.5) > 0.015 ? 1 : 0;
       }
       EXPECT_GT(std::abs(seeker.estimate()[0] + 15.0), 3.0);  // it did move
-      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.015) << to_string(method) << " " << scatter;
-      EXPECT_EQ(late, 0) << to_string(method) << " " << scatter;
+      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.015) << name_of(method) << " " << scatter;
+      EXPECT_EQ(late, 0) << name_of(method) << " " << scatter;
     }
   }
 }
@@ -85,7 +85,7 @@ TEST(OnlineCalibrationLoop, BadCyclesNeverReachIt) {
       each->erase("last_offer");
       each->erase("last_status");
     }
-    EXPECT_EQ(after, before) << to_string(status);
+    EXPECT_EQ(after, before) << name_of(status);
     return status;
   };
   EXPECT_EQ(offered([](auto& p) { p.pop_back(); }), wrong_size);
@@ -120,7 +120,7 @@ TEST(OnlineCalibrationLoop, WaitsAfterAChangeOfOperatingPoint) {
       const CalibrationVector before = calibration.parameters();
       const CalibrationStatus status = cycle_of(bench, calibration);
       const bool waits = (k >= 30 && k < 50) || (k >= 100 && k < 120);
-      EXPECT_EQ(status == unsteady, waits) << k << " " << to_string(status);
+      EXPECT_EQ(status == unsteady, waits) << k << " " << name_of(status);
       if (k < 9 || (k >= 50 && k < 59)) {
         EXPECT_EQ(status, collecting) << k;
       }
@@ -128,7 +128,7 @@ TEST(OnlineCalibrationLoop, WaitsAfterAChangeOfOperatingPoint) {
         EXPECT_EQ(calibration.parameters()[wall], before[wall]) << k;
       }
     }
-    EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02) << to_string(method);
+    EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02) << name_of(method);
   }
 }
 
@@ -158,11 +158,11 @@ TEST(OnlineCalibrationLoop, AJumpIsNotAveragedButLearntAnew) {
     loop::BenchSettings changed = steady_bench(0.05);
     changed.cylinder.wall_heat.wall_heat_scale = 1.2;
     loop::EngineBench other(changed);
-    EXPECT_EQ(to_string(cycle_of(other, calibration)), "jump") << to_string(method);
+    EXPECT_EQ(name_of(cycle_of(other, calibration)), "jump") << name_of(method);
     EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02);  // one cycle is not believed
     run(other, calibration, 60);
-    EXPECT_EQ(calibration.jumps(), 1) << to_string(method);
-    EXPECT_NEAR(calibration.parameters()[wall], 1.2, 0.04) << to_string(method);
+    EXPECT_EQ(calibration.jumps(), 1) << name_of(method);
+    EXPECT_NEAR(calibration.parameters()[wall], 1.2, 0.04) << name_of(method);
     loop::EngineBench again(steady_bench(0.05, 8));
     cycle_of(again, calibration);  // a single odd cycle
     run(other, calibration, 30);
@@ -183,7 +183,7 @@ TEST(OnlineCalibrationLoop, StaysInsideItsBounds) {
         EXPECT_GE(calibration.parameters()[wall], 0.2);
         EXPECT_LE(calibration.parameters()[wall], 2.5);
       }
-      EXPECT_FALSE(calibration.determined()) << to_string(method) << " " << calibration.explain(wall);
+      EXPECT_FALSE(calibration.determined()) << name_of(method) << " " << calibration.explain(wall);
     }
   }
 }
@@ -217,7 +217,7 @@ TEST(OnlineCalibrationLoop, NothingIsAllocatedAndTheStateGoesOnBitForBit) {
         if (k >= cut) {
           EXPECT_EQ(later.offer(shown, point, c.soc_requested_cad, c.misfire), offered);
           EXPECT_EQ(later.update(), updated) << k;
-          EXPECT_EQ(later.parameters(), whole.parameters()) << to_string(method) << cut << " " << k;
+          EXPECT_EQ(later.parameters(), whole.parameters()) << name_of(method) << cut << " " << k;
           EXPECT_EQ(later.standard_errors(), whole.standard_errors());
         }
       }

@@ -120,9 +120,9 @@ TEST(EngineBench, EachSensorReachesThePerformance) {
       c = bench.step(test_support::wandering_soc_cad(k));
     const double values[] = {c.nox_analyser_ppm, c.nox_fast_ppm, c.nox_soft_ppm, c.nox_soft_corrected_ppm,
                              c.nox_true_ppm};
-    EXPECT_EQ(std::count(std::begin(values), std::end(values), -c.components[1]), 1) << to_string(sensor);
-    EXPECT_EQ(-c.components[1], values[static_cast<int>(sensor) - 1]) << to_string(sensor);
-    EXPECT_EQ(parse_nox_sensor(to_string(sensor)), sensor);
+    EXPECT_EQ(std::count(std::begin(values), std::end(values), -c.components[1]), 1) << name_of(sensor);
+    EXPECT_EQ(-c.components[1], values[static_cast<int>(sensor) - 1]) << name_of(sensor);
+    EXPECT_EQ(parse_name<NoxSensor>("nox_sensor", name_of(sensor)), sensor);
   }
 }
 

@@ -164,7 +164,7 @@ TEST(EngineBenchState, NothingIsAllocatedWithAnyOption) {
               bench.step(-60.0 + 20.0 * k);
               if (k == 4) bench.reset(3);
             }
-            EXPECT_EQ(counter.count(), 0u) << to_string(sensor);
+            EXPECT_EQ(counter.count(), 0u) << name_of(sensor);
             ++combinations;
           }
         }
@@ -212,7 +212,7 @@ TEST(EngineBenchSettings, EveryFieldIsCheckedByName) {
   starts("limits: 'torque' is not measured: must be one of cov_imep_percent, imep_closed_bar",
          [](auto& s) { s.limits = {"torque"}; });
   starts("limits has 9 entries: must be at most 8", [](auto& s) { s.limits.assign(9, "p_max_bar"); });
-  EXPECT_THROW(parse_nox_sensor("nose"), ParameterError);
+  EXPECT_THROW(parse_name<NoxSensor>("nox_sensor", "nose"), ParameterError);
   BenchSettings cold;
   cold.cylinder.wall_heat.wall_heat_scale = 100.0;
   cold.schedule[0].point.speed_rpm = 10.0;

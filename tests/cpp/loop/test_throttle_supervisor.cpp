@@ -29,8 +29,7 @@ TEST(ThrottleSupervisorLoop, NoFalseAlarmOnAHundredPlantsOfEachPresetWithNoiseAn
         for (int k = 0; k < driving_samples; ++k) {
           const control::SupervisorOrder order = loop.step(driving_deg(k), air.torque_nm(k)).order;
           ASSERT_EQ(order.mode, SupervisorMode::normal)
-              << 'P' << tuned.preset << " body " << body << " sample " << k << ": "
-              << name_of(control::supervisor_reason_names(), order.reason);
+              << 'P' << tuned.preset << " body " << body << " sample " << k << ": " << name_of(order.reason);
         }
       }
     });

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/platform.hpp"
 #include "mgdd/math/fast_tanh.hpp"
 #include "mgdd/math/lanes.hpp"
@@ -33,14 +34,14 @@ TEST(Dispatch, EveryInstructionSetGivesTheSameBits) {
     if (set > instruction_set()) continue;
     std::array<double, 8> to{};
     dispatch(set, [&]() MGDD_INLINE_LAMBDA { sweep(from, to); });
-    EXPECT_EQ(to, expected) << to_string(set);
+    EXPECT_EQ(to, expected) << name_of(set);
   }
 }
 
 TEST(Dispatch, TakesWhatTheProcessorHas) {
   const auto levels = processor_simd_levels();
   if (instruction_set() == InstructionSet::baseline) return;
-  EXPECT_NE(std::find(levels.begin(), levels.end(), to_string(instruction_set())), levels.end());
+  EXPECT_NE(std::find(levels.begin(), levels.end(), name_of(instruction_set())), levels.end());
 }
 
 }  // namespace

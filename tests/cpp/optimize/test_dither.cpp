@@ -111,7 +111,7 @@ TEST(Dither, EachComponentIsTurnedBackByItsOwnPhase) {
       seeker.tell({j, {}, false});
       if (k >= 800) mean += seeker.gradient() / 40.0;
     }
-    EXPECT_LT((mean - truth).norm(), form == MeanRemoval::batch ? 1e-3 : 1e-9) << to_string(form);
+    EXPECT_LT((mean - truth).norm(), form == MeanRemoval::batch ? 1e-3 : 1e-9) << name_of(form);
     EXPECT_LT((seeker.gradient() - truth).norm(), form == MeanRemoval::batch ? 1e-9 : 10.0);
   }
 }

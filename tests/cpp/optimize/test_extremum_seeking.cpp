@@ -75,7 +75,7 @@ TEST(ExtremumSeeking, AConstantAddedToJChangesNothing) {
     const std::vector<double> a = search(plain, j, 1000, 0.25, 3);
     const std::vector<double> b = search(lifted, [&](double x) { return j(x) + 1e6; }, 1000, 0.25, 3);
     for (std::size_t k = 0; k < a.size(); ++k)
-      ASSERT_NEAR(a[k], b[k], 1e-6) << to_string(form) << " cycle " << k;
+      ASSERT_NEAR(a[k], b[k], 1e-6) << name_of(form) << " cycle " << k;
   }
 }
 
@@ -197,8 +197,8 @@ TEST(ExtremumSeeking, TheWayBackBelowALimitHasItsOwnRate) {
     const bool batch = form == MeanRemoval::batch;
     const auto expect_back = [&](const ExtremumSeekingSettings& s, double rate) {
       const Steps steps = steps_of(s, 22.0);
-      EXPECT_NEAR(steps.down, rate, 1e-12) << to_string(form);
-      EXPECT_NEAR(steps.least_down, rate, 1e-12) << to_string(form);
+      EXPECT_NEAR(steps.down, rate, 1e-12) << name_of(form);
+      EXPECT_NEAR(steps.least_down, rate, 1e-12) << name_of(form);
     };
     ExtremumSeekingSettings s;
     s.form = form;
@@ -206,14 +206,14 @@ TEST(ExtremumSeeking, TheWayBackBelowALimitHasItsOwnRate) {
     for (const double recovery : {0.11, 0.7, 2.3}) {
       s.recovery_rate = scalar_input(recovery);
       expect_back(s, recovery);
-      EXPECT_NEAR(steps_of(s, -20.0).up, batch ? 0.2 : 0.02, 1e-12) << to_string(form) << ": a batch moves once in ten";
+      EXPECT_NEAR(steps_of(s, -20.0).up, batch ? 0.2 : 0.02, 1e-12) << name_of(form) << ": a batch moves once in ten";
     }
     s.recovery_rate = Inputs{};
     expect_back(s, 0.02);
     s.rate = Inputs{};
     s.dither.amplitude = scalar_input(1.7);
     expect_back(s, 1.7);
-    EXPECT_NEAR(steps_of(s, -30.0).up, batch ? 1.7 : 0.51, 1e-12) << to_string(form);
+    EXPECT_NEAR(steps_of(s, -30.0).up, batch ? 1.7 : 0.51, 1e-12) << name_of(form);
   }
   ExtremumSeekingSettings slow;  // a batch comes back as slowly as it is told
   slow.rate = scalar_input(0.5);
@@ -253,7 +253,7 @@ TEST(ExtremumSeeking, ARestartHoldsTheEstimateAsTheStartDoes) {
     ExtremumSeeking seeker(s);
     for (const bool again : {false, true}) {
       const std::vector<double> path = search(seeker, quadratic, 37);
-      EXPECT_EQ(std::ranges::count(path, path.front()), first_move) << to_string(form) << again;
+      EXPECT_EQ(std::ranges::count(path, path.front()), first_move) << name_of(form) << again;
       EXPECT_LT(path.back(), path[first_move - 1]);
       seeker.restart();
     }
@@ -282,7 +282,7 @@ TEST(ExtremumSeeking, ThreeInputsOnOneWindowFindTheirGradientAndOptimum) {
     EXPECT_LT(((form == MeanRemoval::batch ? seeker.gradient() : mean) - truth).norm(), 1e-12);
     for (int k = 0; k < 6000; ++k)
       cycle_of(seeker, j);
-    EXPECT_LT((seeker.estimate() - best).norm(), 0.05) << to_string(form);
+    EXPECT_LT((seeker.estimate() - best).norm(), 0.05) << name_of(form);
   }
 }
 

@@ -13,7 +13,7 @@ std::vector<std::pair<std::string, Seeker>> own_gains(const SearchSpace& space, 
     ExtremumSeekingSettings s;
     s.space = space;
     s.form = form;
-    out.emplace_back(to_string(form), ExtremumSeeking(s));
+    out.emplace_back(name_of(form), ExtremumSeeking(s));
   }
   NewtonSeekingSettings newton;
   newton.space = space;
@@ -26,7 +26,7 @@ std::vector<std::pair<std::string, Seeker>> own_gains(const SearchSpace& space, 
     s.space = space;
     s.form = form;
     s.seed = seed;
-    out.emplace_back(to_string(form), Spsa(s));
+    out.emplace_back(name_of(form), Spsa(s));
   }
   GradientDescentSettings descent;
   descent.space = space;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
 
@@ -99,7 +100,7 @@ TEST(FitReport, StatusesHaveNamesAndOnlyThreeAreSuccess) {
   for (const FitStatus status :
        {FitStatus::not_run, FitStatus::cost_converged, FitStatus::step_converged, FitStatus::gradient_converged,
         FitStatus::iteration_limit, FitStatus::evaluation_failed, FitStatus::stalled}) {
-    EXPECT_NE(to_string(status), "unknown");
+    EXPECT_NE(name_of(status), "unknown");
     EXPECT_NE(explain(status), "unknown");
     successes += is_converged(status) ? 1 : 0;
   }

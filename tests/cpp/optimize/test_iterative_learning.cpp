@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Core>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
 #include "support/reference_algebra.hpp"
@@ -290,7 +291,7 @@ TEST(IterativeLearning, LawsReadTheErrorAsPrinted) {
   const auto expect = [&](const LearningSettings& settings, const Column& change) {
     const VectorXd u = Lifted::next(settings, e);
     for (std::size_t t = 0; t < 4; ++t) {
-      EXPECT_NEAR(u[static_cast<Index>(t)], base.initial[t] + change[t], 1e-15) << to_string(settings.law) << t;
+      EXPECT_NEAR(u[static_cast<Index>(t)], base.initial[t] + change[t], 1e-15) << name_of(settings.law) << t;
     }
     EXPECT_EQ(u[4], u[3]);
   };
@@ -444,7 +445,7 @@ TEST(IterativeLearning, RefusesSettingsThatMakeNoSense) {
   LearningSettings empty = base;
   empty.initial.clear();
   EXPECT_THROW(IterativeLearning{empty}, ShapeError);
-  EXPECT_THROW(static_cast<void>(parse_learning_law("i")), ParameterError);
+  EXPECT_THROW(static_cast<void>(parse_name<LearningLaw>("law", "i")), ParameterError);
   LearningSettings blind = base;
   blind.impulse_response.clear();
   EXPECT_THROW(static_cast<void>(IterativeLearning(blind).convergence()), ParameterError);
@@ -520,7 +521,7 @@ TEST(IterativeLearning, AskAndTellAllocateNothing) {
       learner.ask();
       EXPECT_EQ(learner.try_tell(error), LearningStatus::learned);
     }
-    EXPECT_EQ(counter.count(), 0u) << to_string(settings.law);
+    EXPECT_EQ(counter.count(), 0u) << name_of(settings.law);
   }
 }
 

@@ -35,9 +35,9 @@ TEST(Limits, EverySeekerStopsAtTheLimitAndKeepsItsDitherBelow) {
     const Limit limit{"p_max_bar", 104.0, 0.0, method, method == LimitMethod::barrier ? 0.02 : 1.0, 10.0};
     for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 30.0), 0.0, 1, {limit})) {
       const Outcome out = std::visit([&](auto& seeker) { return run(seeker, 4000, 0.0, 1); }, any);
-      EXPECT_LT(out.mean, 2.02) << name << ", " << to_string(method);
-      EXPECT_GT(out.mean, -2.0) << name << ", " << to_string(method);
-      EXPECT_LE(out.highest, 104.8) << name << ", " << to_string(method);
+      EXPECT_LT(out.mean, 2.02) << name << ", " << name_of(method);
+      EXPECT_GT(out.mean, -2.0) << name << ", " << name_of(method);
+      EXPECT_LE(out.highest, 104.8) << name << ", " << name_of(method);
     }
   }
 }

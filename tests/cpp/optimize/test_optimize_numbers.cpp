@@ -147,25 +147,22 @@ TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
 }
 
 TEST(OptimizeNumbers, NamesOfTheOptions) {
-  test::expect_names(parse_mean_removal, {{MeanRemoval::batch, "batch"},
-                                          {MeanRemoval::moving_average, "moving_average"},
-                                          {MeanRemoval::washout, "washout"}});
-  test::expect_names(parse_spsa_form, {{SpsaForm::first_order, "first_order"},
-                                       {SpsaForm::second_order, "second_order"},
-                                       {SpsaForm::one_measurement, "one_measurement"}});
-  test::expect_names(parse_gain_schedule,
-                     {{GainSchedule::decreasing, "decreasing"}, {GainSchedule::constant, "constant"}});
-  test::expect_names(
-      parse_limit_method,
+  test::expect_names<MeanRemoval>({{MeanRemoval::batch, "batch"},
+                                   {MeanRemoval::moving_average, "moving_average"},
+                                   {MeanRemoval::washout, "washout"}});
+  test::expect_names<SpsaForm>({{SpsaForm::first_order, "first_order"},
+                                {SpsaForm::second_order, "second_order"},
+                                {SpsaForm::one_measurement, "one_measurement"}});
+  test::expect_names<GainSchedule>({{GainSchedule::decreasing, "decreasing"}, {GainSchedule::constant, "constant"}});
+  test::expect_names<LimitMethod>(
       {{LimitMethod::switching, "switching"}, {LimitMethod::penalty, "penalty"}, {LimitMethod::barrier, "barrier"}});
-  test::expect_names(
-      parse_tuned_method,
+  test::expect_names<TunedMethod>(
       {{TunedMethod::batch, "batch"}, {TunedMethod::moving_average, "moving_average"}, {TunedMethod::spsa, "spsa"}});
-  test::expect_names(parse_learning_law, {{LearningLaw::p, "p"},
-                                          {LearningLaw::d, "d"},
-                                          {LearningLaw::pd, "pd"},
-                                          {LearningLaw::q_filter, "q_filter"},
-                                          {LearningLaw::norm_optimal, "norm_optimal"}});
+  test::expect_names<LearningLaw>({{LearningLaw::p, "p"},
+                                   {LearningLaw::d, "d"},
+                                   {LearningLaw::pd, "pd"},
+                                   {LearningLaw::q_filter, "q_filter"},
+                                   {LearningLaw::norm_optimal, "norm_optimal"}});
 }
 
 }  // namespace

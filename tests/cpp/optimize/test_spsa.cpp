@@ -103,7 +103,7 @@ TEST(Spsa, EveryFormFindsTheOptimumOfTwoToFiveInputs) {
           EXPECT_TRUE(blocking || seeker.blocked() == 0);
         }
         EXPECT_LT(worst, form == SpsaForm::one_measurement ? 2.5 : 1.0)
-            << to_string(form) << (blocking ? " blocking, " : ", ") << n << " inputs";
+            << name_of(form) << (blocking ? " blocking, " : ", ") << n << " inputs";
       }
     }
   }

@@ -75,9 +75,9 @@ TEST(Tuner, WhatItPredictsHappens) {
       cycles += first_within(path, 1.0) / 200.0;
       square += std::pow(rms_of(path, 400, 2400), 2) / 200.0;
     }
-    EXPECT_NEAR(std::sqrt(square) / t.rms, 1.0, 0.15) << to_string(method);
-    EXPECT_NEAR(cycles / t.cycles, 1.0, 0.25) << to_string(method);
-    EXPECT_LE(cycles, 100.0) << to_string(method);
+    EXPECT_NEAR(std::sqrt(square) / t.rms, 1.0, 0.15) << name_of(method);
+    EXPECT_NEAR(cycles / t.cycles, 1.0, 0.25) << name_of(method);
+    EXPECT_LE(cycles, 100.0) << name_of(method);
   }
 }
 
@@ -137,7 +137,7 @@ TEST(Tuner, ADelayKnownToTwoCyclesLosesNoRun) {
       for (const int error : {-2, 0, 2}) {
         for (std::uint64_t seed = 0; seed < 20; ++seed) {
           EXPECT_LT(lost_by(t, w.lag, delay + error, 0.0, seed), 6.0)
-              << to_string(method) << " delay " << delay << " error " << error << " seed " << seed;
+              << name_of(method) << " delay " << delay << " error " << error << " seed " << seed;
         }
       }
     }

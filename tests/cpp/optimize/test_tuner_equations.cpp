@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/optimize/seekers/tuner.hpp"
 
 namespace mgdd::optimize {
@@ -171,7 +172,7 @@ TEST(TunerEquations, WhatIsLeftOpenScalesWithTheLengthOfTheNoise) {
     said.amplitude_max = 1.8 * length;
     said.cycles = 50.0;
     const Tuning a = tune(open), b = tune(said);
-    EXPECT_EQ(a.amplitude, b.amplitude) << to_string(method);
+    EXPECT_EQ(a.amplitude, b.amplitude) << name_of(method);
     EXPECT_EQ(a.gain, b.gain);
     EXPECT_EQ(a.rate, b.rate);
     EXPECT_EQ(a.cycles, b.cycles);

@@ -105,8 +105,8 @@ TEST(E2e, AFrameOfAnotherDataIdIsRefused) {
   }
   E2eSettings own = odd(), other = odd();
   own.data_id_mode = other.data_id_mode = DataIdMode::list;
-  own.data_id_list = {1, 2, 3, 4, 5, 6, 7, 8};
-  other.data_id_list = {1, 2, 3, 4, 5, 6, 7, 9};
+  own.data_id_list = std::array<std::uint8_t, 16>{1, 2, 3, 4, 5, 6, 7, 8};
+  other.data_id_list = std::array<std::uint8_t, 16>{1, 2, 3, 4, 5, 6, 7, 9};
   E2eCheck check(own);
   EXPECT_EQ(check.push(sent(other, 6)), E2eStatus::initial);
   EXPECT_EQ(check.push(sent(other, 7)), E2eStatus::wrong_crc);

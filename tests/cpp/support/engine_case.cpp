@@ -32,15 +32,15 @@ std::vector<std::vector<std::string>> read_csv(const std::string& path) {
 
 void set(EngineCase& c, const std::string& name, const std::string& value) {
   if (name == "burn_shape") {
-    c.cylinder.burn.burn_shape = engine::parse_burn_shape(value);
+    c.cylinder.burn.burn_shape = parse_name<engine::BurnShape>("burn_shape", value);
   } else if (name == "gamma_model") {
-    c.cylinder.gas.gamma_model = engine::parse_gamma_model(value);
+    c.cylinder.gas.gamma_model = parse_name<engine::GammaModel>("gamma_model", value);
   } else if (name == "wall_heat_model") {
-    c.cylinder.wall_heat.wall_heat_model = engine::parse_wall_heat_model(value);
+    c.cylinder.wall_heat.wall_heat_model = parse_name<engine::WallHeatModel>("wall_heat_model", value);
   } else if (name == "ignition_model") {
-    c.cylinder.ignition.ignition_model = engine::parse_ignition_model(value);
+    c.cylinder.ignition.ignition_model = parse_name<engine::IgnitionModel>("ignition_model", value);
   } else if (name == "integrator") {
-    c.integrator = engine::parse_integrator(value);
+    c.integrator = parse_name<engine::Integrator>("integrator", value);
   } else if (name == "soc_cad") {
     c.soc_cad = std::stod(value);
   } else if (name == "soi_cad") {

@@ -116,7 +116,7 @@ inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpac
     s.form = form;
     s.gain = Inputs::Constant(space.size(), many ? 0.245 : 0.98);
     s.limits = limits;
-    out.emplace_back("extremum_seeking_" + std::string(to_string(form)), ExtremumSeeking(s));
+    out.emplace_back("extremum_seeking_" + std::string(name_of(form)), ExtremumSeeking(s));
   }
   NewtonSeekingSettings newton;
   newton.space = space;
@@ -139,7 +139,7 @@ inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpac
     s.seed = seed;
     s.curvature = bend;
     s.limits = limits;
-    out.emplace_back("spsa_" + std::string(to_string(form)), Spsa(s));
+    out.emplace_back("spsa_" + std::string(name_of(form)), Spsa(s));
   }
   GradientDescentSettings descent;
   descent.space = space;

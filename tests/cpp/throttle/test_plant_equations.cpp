@@ -270,7 +270,7 @@ TEST_P(PlantEquations, HoldInEveryStep) {
       ThrottleState to = from;
       ThrottleTorques booked;
       plant.step(to, in, booked);
-      const std::string where = std::string(name_of(backlash_names(), backlash)) + ", step " + std::to_string(k);
+      const std::string where = std::string(name_of(backlash)) + ", step " + std::to_string(k);
       (two ? expect_two_masses : expect_one_mass)(p, {p, h, from, in}, to, booked, where);
       if (HasFailure()) return;  // one is enough
     }
@@ -289,7 +289,7 @@ TEST_P(PlantEquations, HoldInEveryStep) {
 INSTANTIATE_TEST_SUITE_P(Friction, PlantEquations,
                          testing::Values(Friction::coulomb, Friction::stiction, Friction::stribeck, Friction::karnopp,
                                          Friction::tanh, Friction::lugre),
-                         [](const auto& form) { return std::string(name_of(friction_names(), form.param)); });
+                         [](const auto& form) { return std::string(name_of(form.param)); });
 
 TEST(AsymmetricThrottle, HasNoDefaultAndNoTwoEqualNumbers) {
   const Throttle p = asymmetric_throttle();

@@ -106,7 +106,7 @@ TEST(ThrottleOptions, LanesHoldTheBitsOfThePlainCode) {
       simulate(ThrottlePlant(cases[i].throttle), signals, 10, state, columns);
       for (std::size_t k = 0; k < duty.size(); ++k) {
         ASSERT_EQ(many[i * duty.size() + k], angle[k])
-            << "case " << i << " sample " << k << " friction " << name_of(friction_names(), base.friction);
+            << "case " << i << " sample " << k << " friction " << name_of(base.friction);
       }
     }
   });
@@ -130,7 +130,7 @@ TEST(ThrottleOptions, AnotherScalarKeepsTheOptions) {
         plant.step(state, input);
         dual.step(other, its);
       }
-      ASSERT_NEAR(dual.output(other).value, plant.output(state), 1e-9) << name_of(friction_names(), t.friction);
+      ASSERT_NEAR(dual.output(other).value, plant.output(state), 1e-9) << name_of(t.friction);
     }
   });
 }

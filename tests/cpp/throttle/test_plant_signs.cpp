@@ -29,8 +29,8 @@ double reached_deg(const Throttle& p, const ThrottleInput& in, double from_deg =
 
 template <class Visit>
 void every_form(Visit visit) {
-  for (const auto& [friction, friction_name] : friction_names()) {
-    for (const auto& [backlash, backlash_name] : backlash_names()) {
+  for (const auto& [friction, friction_name] : names<Friction>()) {
+    for (const auto& [backlash, backlash_name] : names<Backlash>()) {
       Throttle p = asymmetric_throttle();
       p.friction = friction;
       p.backlash = backlash;

@@ -112,7 +112,7 @@ TEST(PseudoWienerVariant, IsWhatItHolds) {
     EXPECT_EQ(kind_of(each[i]), kinds[i]);
     EXPECT_EQ(frame_of(each[i]).delay_samples, 2);
     EXPECT_EQ(prepare(each[i]).index(), i);
-    EXPECT_EQ(pseudo_wiener_names()[i].first, kinds[i]);
+    EXPECT_EQ(names<PseudoWienerKind>()[i].first, kinds[i]);
   }
 }
 

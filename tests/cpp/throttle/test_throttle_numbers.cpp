@@ -35,8 +35,7 @@ std::string message(const Throttle& t) {
 TEST(ThrottleNumbers, DefaultsAreThePresetP1) {
   const Throttle standard;
   test_support::expect_preset(standard, fields(),
-                              {{"friction", name_of(friction_names(), standard.friction)},
-                               {"backlash", name_of(backlash_names(), standard.backlash)}},
+                              {{"friction", name_of(standard.friction)}, {"backlash", name_of(standard.backlash)}},
                               "P1", "throttle");
   EXPECT_EQ(default_step_s, 1e-4);
 }
@@ -114,27 +113,27 @@ TEST(ThrottleNumbers, NamesOfTheOptions) {
   const auto expect = []<class Enum>(Names<Enum> names, const std::vector<std::pair<Enum, std::string_view>>& all) {
     EXPECT_TRUE(std::ranges::equal(names, all)) << all.back().second;
   };
-  expect(friction_names(), {{Friction::coulomb, "coulomb"},
-                            {Friction::stiction, "stiction"},
-                            {Friction::stribeck, "stribeck"},
-                            {Friction::karnopp, "karnopp"},
-                            {Friction::tanh, "tanh"},
-                            {Friction::lugre, "lugre"}});
-  expect(backlash_names(),
+  expect(names<Friction>(), {{Friction::coulomb, "coulomb"},
+                             {Friction::stiction, "stiction"},
+                             {Friction::stribeck, "stribeck"},
+                             {Friction::karnopp, "karnopp"},
+                             {Friction::tanh, "tanh"},
+                             {Friction::lugre, "lugre"}});
+  expect(names<Backlash>(),
          {{Backlash::none, "none"}, {Backlash::compliance, "compliance"}, {Backlash::hysteresis, "hysteresis"}});
-  expect(bridge_names(), {{Bridge::brake, "brake"}, {Bridge::open, "open"}});
-  expect(pseudo_wiener_names(),
+  expect(names<Bridge>(), {{Bridge::brake, "brake"}, {Bridge::open, "open"}});
+  expect(names<PseudoWienerKind>(),
          {{PseudoWienerKind::pw_r, "pw_r"}, {PseudoWienerKind::pw_w, "pw_w"}, {PseudoWienerKind::pw_p, "pw_p"}});
-  expect(switching_names(), {{Switching::predicted, "predicted"}, {Switching::measured, "measured"}});
+  expect(names<Switching>(), {{Switching::predicted, "predicted"}, {Switching::measured, "measured"}});
   expect(dry_friction_names(), {{Friction::coulomb, "set_valued"}, {Friction::tanh, "tanh"}});
-  expect(lag_start_names(), {{LagStart::rest, "rest"}, {LagStart::inverse_map, "inverse_map"}});
-  expect(sensor_fault_names(), {{SensorFaultKind::none, "none"},
-                                {SensorFaultKind::open_wire, "open_wire"},
-                                {SensorFaultKind::short_to_ground, "short_to_ground"},
-                                {SensorFaultKind::short_to_supply, "short_to_supply"},
-                                {SensorFaultKind::offset, "offset"},
-                                {SensorFaultKind::gain, "gain"},
-                                {SensorFaultKind::stuck, "stuck"}});
+  expect(names<LagStart>(), {{LagStart::rest, "rest"}, {LagStart::inverse_map, "inverse_map"}});
+  expect(names<SensorFaultKind>(), {{SensorFaultKind::none, "none"},
+                                    {SensorFaultKind::open_wire, "open_wire"},
+                                    {SensorFaultKind::short_to_ground, "short_to_ground"},
+                                    {SensorFaultKind::short_to_supply, "short_to_supply"},
+                                    {SensorFaultKind::offset, "offset"},
+                                    {SensorFaultKind::gain, "gain"},
+                                    {SensorFaultKind::stuck, "stuck"}});
 }
 
 // --- what is allowed ------------------------------------------------------------------------------------------
@@ -174,7 +173,7 @@ TEST(ThrottleNumbers, RulesBetweenFields) {
   EXPECT_EQ(with([](Throttle& t) { t.limp_home_deg = t.open_deg; }), "");
   EXPECT_NE(with([](Throttle& t) { t.limp_home_deg = t.closed_deg - 0.1; }).find("limp_home_deg"), std::string::npos);
   EXPECT_NE(with([](Throttle& t) { t.limp_home_deg = t.open_deg + 0.1; }).find("limp_home_deg"), std::string::npos);
-  for (const auto& [form, name] : friction_names()) {
+  for (const auto& [form, name] : names<Friction>()) {
     const bool uses = form != Friction::coulomb && form != Friction::tanh;
     const auto friction = [form = form](double coulomb, double stiction) {
       return [=](Throttle& t) { t.friction = form, t.coulomb_nm = coulomb, t.stiction_nm = stiction; };

@@ -5,9 +5,10 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <tuple>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/control/belief_review.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/friction_learner.hpp"
@@ -24,14 +25,12 @@ enum class Prediction {
   nonlinear,  ///< springs and friction as they are
   linear,     ///< the spring of the measured side without end, friction only fed forward: a linear-quadratic step
 };
-Names<Prediction> prediction_names() noexcept;
 
 /// How a prediction knows its side of limp-home.
 enum class SideSwitching {
   predicted,  ///< by the predicted angle
   measured,   ///< that of the last measurement, with a dead band of 0.3 deg
 };
-Names<SideSwitching> side_switching_names() noexcept;
 
 struct GuidedPredictiveSettings {
   double sample_s = 1e-3;
@@ -78,8 +77,18 @@ struct GuidedPredictiveSettings {
 };
 
 /// All numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_guided_predictive_fields = 40;
-std::span<const Field<GuidedPredictiveSettings>, n_guided_predictive_fields> guided_predictive_fields() noexcept;
+std::span<const Field<GuidedPredictiveSettings>> guided_predictive_fields() noexcept;
+inline auto fields_of(const GuidedPredictiveSettings&) {
+  using S = GuidedPredictiveSettings;
+  return std::tuple{
+      guided_predictive_fields(),
+      field<&S::prediction>("prediction", "what the horizon is predicted with"),
+      field<&S::switching>("switching", "how it knows its side of limp-home"),
+      field<&S::delay_samples>({"delay_samples", "-", closed(0.0, longest_control_delay), "from a duty to its effect"}),
+      field<&S::move_steps>("move_steps", "prediction steps for which each duty is held"),
+      field<&S::gauss_newton_steps>({"gauss_newton_steps", "-", closed(1.0, 100.0), "at most, per sample"}),
+      field<&S::friction_learning>("friction_learning", "learn friction levels and gain")};
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const GuidedPredictiveSettings& settings);

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::control {
 
@@ -29,8 +29,7 @@ struct HorizonSettings {
 };
 
 /// The real numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_horizon_fields = 11;
-std::span<const Field<HorizonSettings>, n_horizon_fields> horizon_fields() noexcept;
+std::span<const Field<HorizonSettings>> horizon_fields() noexcept;
 
 /// ParameterError naming field, value and bound.
 void validate(const HorizonSettings& settings);
@@ -41,6 +40,5 @@ enum class HorizonStatus {
   iteration_limit,  ///< the inputs are feasible and the best so far
   not_finite,       ///< a state, reference or prediction: the last input is repeated
 };
-Names<HorizonStatus> horizon_status_names() noexcept;
 
 }  // namespace mgdd::control

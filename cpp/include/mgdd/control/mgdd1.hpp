@@ -14,7 +14,7 @@
 #include <type_traits>
 
 #include "mgdd/common/bounds.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
@@ -41,8 +41,7 @@ struct Mgdd1Settings {
   bool operator==(const Mgdd1Settings&) const = default;
 };
 
-inline constexpr std::size_t n_mgdd1_fields = 9;
-std::span<const Field<Mgdd1Settings>, n_mgdd1_fields> mgdd1_fields() noexcept;
+std::span<const Field<Mgdd1Settings>> mgdd1_fields() noexcept;
 
 /// ParameterError naming field, value and bound.
 void validate(const Mgdd1Settings& settings);

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <span>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
@@ -50,8 +50,10 @@ struct PidSettings {
 };
 
 /// All numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_pid_fields = 26;
-std::span<const Field<PidSettings>, n_pid_fields> pid_fields() noexcept;
+std::span<const Field<PidSettings>> pid_fields() noexcept;
+inline auto fields_of(const PidSettings&) {
+  return pid_fields();
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const PidSettings& settings);

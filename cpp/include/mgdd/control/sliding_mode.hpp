@@ -8,9 +8,10 @@
 
 #include <cstddef>
 #include <span>
+#include <tuple>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
@@ -24,7 +25,6 @@ enum class ReachingLaw {
   implicit,        ///< the backward Euler step of the same: the layer grows by what one sample carries s
   super_twisting,  ///< continuous duty; removes a disturbance whose rate is below `twist_per_s`
 };
-Names<ReachingLaw> reaching_law_names() noexcept;
 
 struct SlidingModeSettings {
   double sample_s = 1e-3;
@@ -57,8 +57,11 @@ struct SlidingModeSettings {
 };
 
 /// All numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_sliding_mode_fields = 22;
-std::span<const Field<SlidingModeSettings>, n_sliding_mode_fields> sliding_mode_fields() noexcept;
+std::span<const Field<SlidingModeSettings>> sliding_mode_fields() noexcept;
+inline auto fields_of(const SlidingModeSettings&) {
+  return std::tuple{sliding_mode_fields(),
+                    field<&SlidingModeSettings::reaching>("reaching", "law that drives the plate to the surface")};
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const SlidingModeSettings& settings);

@@ -5,7 +5,7 @@
 #include <array>
 #include <string_view>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/control/holding_duty.hpp"
 
 namespace mgdd::control {

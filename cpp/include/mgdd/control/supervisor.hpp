@@ -14,9 +14,8 @@
 #include <span>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/common/visit_enum.hpp"
 #include "mgdd/control/holding_duty.hpp"
 #include "mgdd/dynamics/lag.hpp"
 
@@ -28,7 +27,6 @@ enum class SupervisorMode {
   limited,    ///< the reference is limited; stays until acknowledged
   limp_home,  ///< the bridge is open; stays until acknowledged
 };
-Names<SupervisorMode> supervisor_mode_names() noexcept;
 
 /// Of two in the mode `limited`, the later one here is reported.
 enum class SupervisorReason {
@@ -47,7 +45,6 @@ enum class SupervisorReason {
   tracking,     ///< the error stays large
   overload,     ///< the duty stays large
 };
-Names<SupervisorReason> supervisor_reason_names() noexcept;
 
 /// Default-spring test: whether the plate is at limp-home with the bridge open.
 enum class ReturnTest {
@@ -56,7 +53,6 @@ enum class ReturnTest {
   passed,
   failed,  ///< not there after `return_s`: jammed, or its spring is lost
 };
-Names<ReturnTest> return_test_names() noexcept;
 
 struct SupervisorSettings {
   double sample_s = 1e-3;
@@ -105,8 +101,10 @@ struct SupervisorSettings {
 };
 
 /// All numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_supervisor_fields = 37;
-std::span<const Field<SupervisorSettings>, n_supervisor_fields> supervisor_fields() noexcept;
+std::span<const Field<SupervisorSettings>> supervisor_fields() noexcept;
+inline auto fields_of(const SupervisorSettings&) {
+  return supervisor_fields();
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const SupervisorSettings& settings);
@@ -161,10 +159,10 @@ class ThrottleSupervisor {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     auto& s = self.state_;
-    visit_enum(v, "mode", s.order.mode, n_modes);
-    visit_enum(v, "reason", s.order.reason, n_reasons);
-    visit_enum(v, "latched", s.latched, n_modes);
-    visit_enum(v, "return_test", s.test, n_tests);
+    visit_enum(v, "mode", s.order.mode);
+    visit_enum(v, "reason", s.order.reason);
+    visit_enum(v, "latched", s.latched);
+    visit_enum(v, "return_test", s.test);
     v("duty", s.order.duty);
     v("bridge_open", s.order.bridge_open);
     v("restricted", s.restricted);
@@ -220,8 +218,6 @@ class ThrottleSupervisor {
     double imbalance = 0.0, motion = 0.0;  // what is not explained, and what inertia and back-EMF explain
     double evidence_s = 0.0;
   };
-
-  static constexpr std::int64_t n_modes = 4, n_reasons = 14, n_tests = 4;
 
   void raise(SupervisorMode mode, SupervisorReason reason) noexcept;
   bool raise_after(Count which, bool failing, double after_s, SupervisorMode mode, SupervisorReason reason) noexcept;

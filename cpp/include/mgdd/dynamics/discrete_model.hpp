@@ -10,7 +10,7 @@
 #include <tuple>
 #include <type_traits>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/math/select.hpp"
 
 namespace mgdd::dynamics {

@@ -9,9 +9,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/math/dual.hpp"
 
 namespace mgdd::engine {
@@ -213,6 +214,21 @@ inline constexpr FieldInfo ivc_temperature_info{
     "ivc_temperature_k", "K", above(0.0, 1500.0),
     "charge at IVC; none = volumetric efficiency, for a measured trace the intake temperature + 40 K"};
 
+/// Everything that Python and the files show of them.
+constexpr auto fields_of(const Cylinder&) {
+  using C = Cylinder;
+  return std::tuple{
+      cylinder_fields<double>(), field<&C::burn, &BurnParameters<double>::burn_shape>("burn_shape", "burn law"),
+      field<&C::gas, &GasParameters<double>::gamma_model>("gamma_model", "gamma against T"),
+      field<&C::wall_heat, &WallHeatParameters<double>::wall_heat_model>("wall_heat_model", "wall-heat correlation"),
+      field<&C::ignition, &IgnitionParameters<double>::ignition_model>("ignition_model", "ignition-delay correlation")};
+}
+constexpr auto fields_of(const OperatingPoint&) {
+  using P = OperatingPoint;
+  return std::tuple{operating_point_fields<double>(), field<&P::burn_duration_cad>(burn_duration_info),
+                    field<&P::trapped_mass_g>(trapped_mass_info), field<&P::ivc_temperature_k>(ivc_temperature_info)};
+}
+
 /// Throws ParameterError naming the first field outside its domain, its value and the bound.
 void validate(const Cylinder& cylinder);
 void validate(const OperatingPoint& point);
@@ -224,20 +240,6 @@ inline constexpr double timing_lower_cad = -60.0;
 inline constexpr double timing_upper_cad = 20.0;
 
 /// Names of the variants as the field types them, and back; an unknown name is a ParameterError listing the valid ones.
-Names<GammaModel> gamma_model_names() noexcept;
-Names<BurnShape> burn_shape_names() noexcept;
-Names<WallHeatModel> wall_heat_model_names() noexcept;
-Names<IgnitionModel> ignition_model_names() noexcept;
-std::string_view to_string(GammaModel v) noexcept;
-std::string_view to_string(BurnShape v) noexcept;
-std::string_view to_string(WallHeatModel v) noexcept;
-std::string_view to_string(IgnitionModel v) noexcept;
-std::string_view to_string(Integrator v) noexcept;
-GammaModel parse_gamma_model(std::string_view name);
-BurnShape parse_burn_shape(std::string_view name);
-WallHeatModel parse_wall_heat_model(std::string_view name);
-IgnitionModel parse_ignition_model(std::string_view name);
-Integrator parse_integrator(std::string_view name);
 
 /// Copies a cylinder or a point into another scalar type (constants, no derivative).
 template <class T>

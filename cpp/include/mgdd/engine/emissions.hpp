@@ -3,10 +3,15 @@
 // the oxygen factor; bulk maxima (1800 to 2200 K) lie below flame temperature. noexcept, no heap, but for the fit.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <tuple>
+
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::engine {
 
@@ -31,12 +36,19 @@ struct NoxProxy {
   bool operator==(const NoxProxy&) const = default;
 };
 
+constexpr auto fields_of(const NoxProxy&) {
+  using P = NoxProxy;
+  return std::array{
+      field<&P::reference_temperature_k>({"reference_temperature_k", "K", above(0.0), "T0 of the map"}),
+      field<&P::reference_nox_ppm>({"reference_nox_ppm", "ppm", above(0.0), "NOx at T0"}),
+      field<&P::activation_temperature_k>({"activation_temperature_k", "K", above(0.0), "b of the Arrhenius map"}),
+  };
+}
+
 /// ParameterError for a constant that is not > 0.
 void validate(const NoxProxy& proxy);
 
 enum class NoxMap { affine_log, arrhenius };
-std::string_view to_string(NoxMap map) noexcept;
-NoxMap parse_nox_map(std::string_view name);
 
 inline constexpr double air_o2_fraction = 0.209;  ///< [-] by volume
 
@@ -55,6 +67,16 @@ struct NoxModel {
 
   bool operator==(const NoxModel&) const = default;
 };
+
+constexpr auto fields_of(const NoxModel&) {
+  using M = NoxModel;
+  return std::tuple{
+      field<&M::proxy>("proxy", "constants of the map", DefaultForm::none),
+      field<&M::map>("map", "form of the map"),
+      field<&M::intake_o2_fraction>({"intake_o2_fraction", "-", above(0.0, 1.0), "intake oxygen by volume"}),
+      field<&M::o2_exponent>({"o2_exponent", "-", closed(0.0, 10.0), "exponent of the oxygen factor"}),
+  };
+}
 
 /// ParameterError names field, value and bound.
 void validate(const NoxModel& model);
@@ -77,6 +99,14 @@ struct SoftSensor {
 
   bool operator==(const SoftSensor&) const = default;
 };
+
+constexpr auto fields_of(const SoftSensor&) {
+  return std::tuple{
+      field<&SoftSensor::model>("model", "NOx from the maximum gas temperature", DefaultForm::none),
+      field<&SoftSensor::correction_gain>(
+          {"correction_gain", "-", closed(0.0, 1.0), "share of the log-ratio per cycle"}),
+  };
+}
 
 void validate(const SoftSensor& sensor);
 

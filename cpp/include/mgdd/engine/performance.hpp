@@ -12,6 +12,7 @@
 #include <span>
 #include <string_view>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/engine/indicators.hpp"
 
 namespace mgdd::engine {
@@ -25,11 +26,8 @@ enum class PerformanceSignal {
   dp_max_bar_per_cad,
   t_max_k,
 };
-inline constexpr std::size_t performance_signal_count = 7;
+inline constexpr std::size_t performance_signal_count = names<PerformanceSignal>().size();
 
-std::string_view to_string(PerformanceSignal signal) noexcept;
-/// ParameterError that lists the valid names.
-PerformanceSignal parse_performance_signal(std::string_view name);
 /// Unit of a signal as printed.
 std::string_view unit_of(PerformanceSignal signal) noexcept;
 

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::guide {
 

@@ -11,9 +11,11 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/curve_filter.hpp"
@@ -30,19 +32,44 @@ struct CurveSeekingSettings {
   /// How far the plant's best input may lie from the guide's: one standard deviation, input unit; 0 = a quarter of the
   /// bounds.
   double prior_sd = 0.0;
-  double scale_sd = 0.3;              ///< of the plant's curvature over the guide's, about 1
-  double discrepancy = 0.25;          ///< error of the curve per unit of its drop
-  std::optional<double> noise_sd{};   ///< of one reading of J, > 0; none: learnt
-  double memory_cycles = 143.0;       ///< readings fade with this time constant
-  double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.25 prior_sd
-  double rate = optimize::unlimited;  ///< largest change of the applied input per cycle
-  optimize::ComponentLag sensor{};    ///< between the plant and J; the delay is rounded to whole cycles
-  int delay_uncertainty = 4;          ///< cycles by which the delay may be shorter or longer: it is learnt
-  bool hand_over = true;              ///< to plain extremum seeking where the guide keeps failing
+  double scale_sd = 0.3;             ///< of the plant's curvature over the guide's, about 1
+  double discrepancy = 0.25;         ///< error of the curve per unit of its drop
+  std::optional<double> noise_sd{};  ///< of one reading of J, > 0; none: learnt
+  double memory_cycles = 143.0;      ///< readings fade with this time constant
+  double amplitude_max = 0.0;        ///< largest distance from the estimate that is applied; 0 = 0.25 prior_sd
+  std::optional<double> rate{};      ///< largest change of the applied input per cycle; none: no bound
+  optimize::ComponentLag sensor{};   ///< between the plant and J; the delay is rounded to whole cycles
+  int delay_uncertainty = 4;         ///< cycles by which the delay may be shorter or longer: it is learnt
+  bool hand_over = true;             ///< to plain extremum seeking where the guide keeps failing
   bool maximize = true;
   std::vector<optimize::Limit> limits{};
   std::vector<Curve> limit_curves{};  ///< of the guide, one per limit, or none: then their slopes are learnt by trying
 };
+inline auto fields_of(const CurveSeekingSettings&) {
+  using S = CurveSeekingSettings;
+  using Lag = optimize::ComponentLag;
+  const auto own = [](const char* name, const char* meaning) {
+    return FieldInfo{name, "-", above(0.0), meaning, DefaultForm::none};
+  };
+  return std::tuple{
+      optimize::space_fields<&S::space, DefaultForm::required>(),
+      field<&S::curve>("curve", "the guide's J", DefaultForm::required),
+      field<&S::prior_sd>(own("prior_sd", "how far the best input may lie from the guide's")),
+      field<&S::scale_sd>("scale_sd", "of the plant's curvature over the guide's"),
+      field<&S::discrepancy>("discrepancy", "error of the curve per unit of its drop"),
+      field<&S::noise_sd>("noise_sd", "of one reading of J"),
+      field<&S::memory_cycles>("memory_cycles", "time constant with which readings fade"),
+      field<&S::amplitude_max>(own("amplitude_max", "largest distance from the estimate that is applied")),
+      field<&S::rate>("rate", "largest change of the applied input per cycle"),
+      field<&S::sensor, &Lag::delay_cycles>("delay_cycles", "between the plant and J"),
+      field<&S::sensor, &Lag::lag_cycles>("lag_cycles", "the same"),
+      field<&S::delay_uncertainty>("delay_uncertainty", "cycles by which the delay may be shorter or longer"),
+      field<&S::hand_over>("hand_over", "to plain extremum seeking where the guide keeps failing"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+      field<&S::limit_curves>("limit_curves", "of the guide, one per limit", DefaultForm::none),
+  };
+}
 
 class CurveSeeking {
  public:

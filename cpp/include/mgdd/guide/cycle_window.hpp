@@ -29,7 +29,22 @@ enum class CalibrationStatus {
   wrong_size,       ///< not one pressure per angle of the model
   unphysical,       ///< the model has no such cycle
 };
-std::string_view to_string(CalibrationStatus status) noexcept;
+constexpr std::string_view other_name(CalibrationStatus status) noexcept {
+  switch (status) {
+    case CalibrationStatus::poor_excitation:
+      return "poor excitation";
+    case CalibrationStatus::cov:
+      return "COV";
+    case CalibrationStatus::unusable:
+      return "unusable numbers";
+    case CalibrationStatus::wrong_size:
+      return "wrong size";
+    case CalibrationStatus::unphysical:
+      return "no such cycle";
+    default:
+      return "";
+  }
+}
 
 struct CycleWindowSettings {
   int window_cycles = 10;          ///< M, in [2, 500]

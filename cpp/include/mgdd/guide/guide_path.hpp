@@ -15,8 +15,6 @@
 namespace mgdd::guide {
 
 enum class GuideCause { new_point, following, calibration };
-std::string_view to_string(GuideCause v) noexcept;
-GuideCause parse_guide_cause(std::string_view name);
 
 /// followed: taken; refused: not finite, out of bounds, of another size; busy: between ask and tell.
 enum class GuideStatus { followed, refused, busy };

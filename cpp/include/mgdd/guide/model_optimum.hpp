@@ -22,8 +22,6 @@
 namespace mgdd::guide {
 
 enum class OptimumMethod { gradient, golden_section };
-std::string_view to_string(OptimumMethod v) noexcept;
-OptimumMethod parse_optimum_method(std::string_view name);
 
 struct ModelOptimumSettings {
   engine::Cylinder cylinder{};

@@ -33,7 +33,9 @@ enum class Knowledge {
   at_bound,      ///< the data want it beyond its bound
   contradicted,  ///< a nuisance had to move more than three of its standard deviations: the model itself does not fit
 };
-std::string_view to_string(Knowledge knowledge) noexcept;
+constexpr std::string_view other_name(Knowledge knowledge) noexcept {
+  return knowledge == Knowledge::no_data ? "no data" : knowledge == Knowledge::at_bound ? "at bound" : "";
+}
 
 struct CalibrationVerdict {
   Knowledge knowledge = Knowledge::no_data;

@@ -14,8 +14,6 @@
 namespace mgdd::guide {
 
 enum class CalibrationMethod { extremum_seeking, gauss_newton, recursive };
-std::string_view to_string(CalibrationMethod method) noexcept;
-CalibrationMethod parse_calibration_method(std::string_view name);
 
 /// Place of a parameter in a CalibrationVector; ParameterError of `field` that lists the names.
 int parse_calibrated(std::string_view field, std::string_view name);

@@ -17,7 +17,6 @@ namespace mgdd::guide {
 
 /// What the last test of a guide said: J fell, rose, or did neither by more than the noise.
 enum class Verdict { untested, undecided, confirmed, wrong };
-std::string_view to_string(Verdict v) noexcept;
 
 struct TrustSettings {
   double initial = 1.0;              ///< before the first test, in [0, 1]

@@ -13,7 +13,7 @@
 #include <Eigen/Core>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/identify/output_error.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 

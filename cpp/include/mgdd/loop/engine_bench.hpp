@@ -10,8 +10,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/emissions.hpp"
@@ -23,8 +26,6 @@ namespace mgdd::loop {
 
 /// Which NOx value enters the performance.
 enum class NoxSensor { none, analyser, fast, soft, soft_corrected, true_value };
-std::string_view to_string(NoxSensor sensor) noexcept;
-NoxSensor parse_nox_sensor(std::string_view name);
 
 /// Streams of the random numbers that the bench draws; others are free for seekers and studies.
 enum class BenchStream : std::uint64_t { soc = 0, efficiency = 1, misfire = 2, analyser = 3, fast = 4, pressure = 5 };
@@ -72,6 +73,48 @@ struct BenchSettings {
   std::vector<std::string> limits{};   ///< at most 8 names of indicators, or cov_imep_percent
   std::uint64_t seed = 0;
 };
+constexpr auto fields_of(const BenchSettings&) {
+  using S = BenchSettings;
+  return std::tuple{
+      field<&S::cylinder>("cylinder", "the engine", DefaultForm::required),
+      field<&S::schedule>("schedule", "first cycle of each operating point", DefaultForm::required),
+      field<&S::performance>("performance", "what is to be maximised: gross efficiency in percent", DefaultForm::none),
+      field<&S::nox_sensor>("nox_sensor", "whose NOx enters the performance"),
+      field<&S::limits>("limits", "indicators to report as limits"),
+      field<&S::soc_scatter_cad>(
+          {"soc_scatter_cad", "°CA", closed(0.0, 5.0), "standard deviation of SOC from cycle to cycle"}),
+      field<&S::efficiency_noise_percent>(
+          {"efficiency_noise_percent", "%", closed(0.0, 20.0),
+           "standard deviation of the measured efficiency in points, with the work and IMEP that belong to it"}),
+      field<&S::misfire_probability>(
+          {"misfire_probability", "-", closed(0.0, 1.0), "misfires per cycle, drawn at random"}),
+      field<&S::soc_drift_cad_per_kcycle>(
+          {"soc_drift_cad_per_kcycle", "°CA", closed(-100.0, 100.0), "offset of SOC per 1000 cycles"}),
+      field<&S::wall_heat_drift_per_kcycle>(
+          {"wall_heat_drift_per_kcycle", "-", closed(-100.0, 100.0), "change of wall_heat_scale per 1000 cycles"}),
+      field<&S::pressure_noise_bar>(
+          {"pressure_noise_bar", "bar", closed(0.0, 20.0),
+           "noise of each sample of the pressure trace, standard deviation; indicators have none of it"}),
+      field<&S::tdc_error_cad>(
+          {"tdc_error_cad", "°CA", closed(-5.0, 5.0), "angles of the pressure trace read that much high"}),
+      field<&S::pressure_gain_error>(
+          {"pressure_gain_error", "-", closed(-0.5, 0.5), "share by which the pressure trace reads high"}),
+      field<&S::pressure_offset_bar>(
+          {"pressure_offset_bar", "bar", closed(-5.0, 5.0), "by which the pressure trace is pegged too high"}),
+      field<&S::true_nox>("true_nox", "NOx of the plant from its own maximum gas temperature: an Arrhenius map",
+                          DefaultForm::none),
+      field<&S::soft_sensor>("soft_sensor", "the soft sensor: an affine-log map of the same constants",
+                             DefaultForm::none),
+      field<&S::analyser>("analyser", "NOx analyser: 3 s late, lag 2 s, noise 1 %", DefaultForm::none),
+      field<&S::fast_sensor>("fast_sensor", "fast NOx sensor: 0.05 s late, lag 0.05 s, noise 3 %", DefaultForm::none),
+      field<&S::delay_whole_objective>(
+          "delay_whole_objective",
+          "every component passes the delay and lag of the analyser, without its noise; NOx is the true one"),
+      field<&S::step_cad>({"step_cad", "°CA", {}, "step of the cycle model, as in mgdd.engine.simulate"}),
+      field<&S::integrator>("integrator", "of the cycle model, as in mgdd.engine.simulate"),
+      field<&S::seed>("seed", "of all noise"),
+  };
+}
 
 /// ParameterError names field, value and bound.
 void validate(const BenchSettings& settings);

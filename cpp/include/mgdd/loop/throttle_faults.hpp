@@ -22,7 +22,6 @@ enum class ThrottleFaultKind {
   nan_sample,      ///< one arrives, and its numbers are NaN
   stale_sample,    ///< the last good one arrives again
 };
-Names<ThrottleFaultKind> throttle_fault_names() noexcept;
 
 /// What goes wrong, during the samples that begin in [from_s, until_s).
 struct ThrottleFault {

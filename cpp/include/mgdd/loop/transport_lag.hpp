@@ -8,7 +8,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
+
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::loop {
 
@@ -27,6 +30,18 @@ struct SensorDynamics {
 
   bool operator==(const SensorDynamics&) const = default;
 };
+
+constexpr auto fields_of(const SensorDynamics&) {
+  using D = SensorDynamics;
+  constexpr Domain cycles = closed(0.0, 100000.0);
+  return std::tuple{
+      field<&D::delay_s>({"delay_s", "s", closed(0.0, 60.0), "delay of the sample line"}),
+      field<&D::lag_s>({"lag_s", "s", closed(0.0, 60.0), "time constant"}),
+      field<&D::noise_fraction>({"noise_fraction", "-", closed(0.0, 0.2), "noise over reading"}),
+      field<&D::delay_cycles>({"delay_cycles", "-", cycles, "delay in engine cycles instead"}),
+      field<&D::lag_cycles>({"lag_cycles", "-", cycles, "time constant in engine cycles instead"}),
+  };
+}
 
 /// ParameterError names `sensor`.field, value and bound.
 void validate(std::string_view sensor, const SensorDynamics& dynamics);

@@ -20,7 +20,6 @@
 namespace mgdd {
 
 enum class InstructionSet { baseline, avx2, avx512f };
-std::string_view to_string(InstructionSet set) noexcept;
 
 /// The one that the environment variable MGDD_INSTRUCTION_SET names, or the widest that this processor has and the
 /// compiler knows. ParameterError for a name that is unknown, or of a set that the processor lacks.

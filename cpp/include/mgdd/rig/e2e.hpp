@@ -9,8 +9,11 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <tuple>
 
 #include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
+#include "mgdd/rig/frame.hpp"
 
 namespace mgdd::rig {
 
@@ -42,9 +45,8 @@ inline constexpr Crc8 crc8_h2f{.polynomial = 0x2F};  ///< CRC-8H2F of AUTOSAR; o
 
 /// "sae_j1850", "h2f"; ParameterError lists the names.
 Crc8 named_crc8(std::string_view name);
-/// Its name, where it has one; beside that of an enumerator.
-using mgdd::name_of;
-std::optional<std::string_view> name_of(const Crc8& crc) noexcept;
+/// Its name, where it has one.
+std::optional<std::string_view> crc_name(const Crc8& crc) noexcept;
 
 /// Which bytes of the data identifier the CRC covers beside the payload.
 enum class DataIdMode {
@@ -54,17 +56,15 @@ enum class DataIdMode {
   alternating,  ///< low byte where the counter is even, otherwise the high one, before the payload
   list,         ///< the byte that the counter chooses from a list of 16, after the payload
 };
-Names<DataIdMode> data_id_mode_names() noexcept;
 
 enum class CounterPlace { low_nibble, high_nibble, byte };
-Names<CounterPlace> counter_place_names() noexcept;
 
 struct E2eSettings {
   Crc8 crc{};
   int data_id = 0;  ///< 0 to 65535
   DataIdMode data_id_mode = DataIdMode::both;
-  std::array<std::uint8_t, 16> data_id_list{};  ///< of the mode `list`
-  int size = 8;                                 ///< bytes of the payload
+  std::optional<std::array<std::uint8_t, 16>> data_id_list{};  ///< of the mode `list` only
+  int size = 8;                                                ///< bytes of the payload
   int crc_byte = 0;
   int counter_byte = 1;
   CounterPlace counter_place = CounterPlace::low_nibble;
@@ -75,6 +75,25 @@ struct E2eSettings {
 
   bool operator==(const E2eSettings&) const = default;
 };
+
+constexpr auto fields_of(const E2eSettings&) {
+  using S = E2eSettings;
+  constexpr Domain in_a_row = closed(1.0, 1e6);
+  return std::tuple{
+      field<&S::crc>("crc", "name, or (polynomial, start, final xor)"),
+      field<&S::data_id>({"data_id", "-", closed(0.0, 0xFFFF), "identifier under the CRC"}),
+      field<&S::data_id_mode>("data_id_mode", "bytes of it under the CRC"),
+      field<&S::data_id_list>("data_id_list", "sixteen bytes of the mode 'list'"),
+      field<&S::size>({"size", "bytes", closed(2.0, max_payload), "of the payload"}),
+      field<&S::crc_byte>("crc_byte", "place of the CRC"),
+      field<&S::counter_byte>("counter_byte", "place of the counter"),
+      field<&S::counter_place>("counter_place", "its bits in the byte"),
+      field<&S::counter_modulus>("counter_modulus", "values of the counter"),
+      field<&S::max_step>("max_step", "largest good step"),
+      field<&S::bad_until_invalid>({"bad_until_invalid", "frames", in_a_row, "bad frames in a row"}),
+      field<&S::good_until_valid>({"good_until_valid", "frames", in_a_row, "good frames in a row"}),
+  };
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const E2eSettings& settings);
@@ -97,8 +116,7 @@ enum class E2eStatus {
   wrong_length,   ///< the same
   wrong_counter,  ///< a correct CRC with a counter outside of the modulus; the same
 };
-inline constexpr std::size_t e2e_status_count = 7;
-Names<E2eStatus> e2e_status_names() noexcept;
+inline constexpr std::size_t e2e_status_count = names<E2eStatus>().size();
 
 struct E2eCounts {
   std::array<std::uint64_t, e2e_status_count> by_status{};  ///< frames, by the number of the enumerator

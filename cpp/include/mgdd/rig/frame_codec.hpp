@@ -20,8 +20,7 @@ namespace mgdd::rig {
 
 /// A number that a loop reads from the bus; the first three it needs.
 enum class Measured { angle_deg, first_v, second_v, supply_v, current_a, speed_deg_per_s, applied_duty };
-inline constexpr std::size_t n_measured = 7, n_needed = 3;
-Names<Measured> measured_names() noexcept;
+inline constexpr std::size_t n_measured = names<Measured>().size(), n_needed = 3;
 
 /// A number that a loop writes to the bus.
 enum class Commanded {
@@ -30,7 +29,6 @@ enum class Commanded {
   reference_deg,  ///< that the loop follows
   fixed,          ///< one number while driven, one with an open bridge: a mode for example
 };
-Names<Commanded> commanded_names() noexcept;
 
 struct MeasuredSignal {
   Measured what{};

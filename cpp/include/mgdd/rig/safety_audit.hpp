@@ -19,7 +19,6 @@ enum class SafetyState {
   limp,   ///< bridge open; a reset leads to `armed`
   fault,  ///< bridge open; a reset leads to `init`
 };
-Names<SafetyState> safety_state_names() noexcept;
 
 /// Why a state was entered, or what stands against a request.
 enum class SafetyReason {
@@ -44,8 +43,8 @@ enum class SafetyReason {
   travel,        ///< the plate is where it cannot be
   invalid_duty,  ///< not finite
 };
-Names<SafetyReason> safety_reason_names() noexcept;
-inline constexpr std::size_t n_safety_states = 5, n_safety_reasons = 18;
+inline constexpr std::size_t n_safety_states = names<SafetyState>().size();
+inline constexpr std::size_t n_safety_reasons = names<SafetyReason>().size();
 
 constexpr bool is_fault(SafetyReason reason) noexcept {
   return reason >= SafetyReason::sensor_range;

@@ -6,15 +6,15 @@
 
 #include <cstddef>
 #include <span>
+#include <tuple>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::rig {
 
 /// Error state of a CAN controller (ISO 11898-1); a worse one is larger.
 enum class BusState { active, warning, passive, off };
-Names<BusState> bus_state_names() noexcept;
 
 struct SafetyEnvelope {
   double cycle_s = 1e-3;
@@ -58,8 +58,11 @@ struct SafetyEnvelope {
 };
 
 /// All numbers of the envelope, in the order in which Python and the files show them.
-inline constexpr std::size_t n_envelope_fields = 26;
-std::span<const Field<SafetyEnvelope>, n_envelope_fields> envelope_fields() noexcept;
+std::span<const Field<SafetyEnvelope>> envelope_fields() noexcept;
+inline auto fields_of(const SafetyEnvelope&) {
+  return std::tuple{envelope_fields(), field<&SafetyEnvelope::bus_fault_from>(
+                                           "bus_fault_from", "state of the CAN controller from which on it is limp")};
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const SafetyEnvelope& envelope);

@@ -13,7 +13,6 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/common/visit_enum.hpp"
 #include "mgdd/rig/safety_audit.hpp"
 #include "mgdd/rig/safety_envelope.hpp"
 
@@ -29,7 +28,6 @@ enum class SafetyRequest {
   reset,   ///< limp to armed, fault to init
   abort,   ///< armed or run to limp
 };
-Names<SafetyRequest> safety_request_names() noexcept;
 
 inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -93,10 +91,10 @@ class SafetyGate {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     auto& s = self.s_;
-    visit_enum(v, "state", s.state, n_safety_states);
-    visit_enum(v, "reason", s.reason, n_safety_reasons);
-    visit_enum(v, "cause", s.cause, n_safety_reasons);
-    visit_enum(v, "sensor_cause", s.sensor_cause, n_safety_reasons);
+    visit_enum(v, "state", s.state);
+    visit_enum(v, "reason", s.reason);
+    visit_enum(v, "cause", s.cause);
+    visit_enum(v, "sensor_cause", s.sensor_cause);
     v("cycle", s.cycle);
     v("observed", s.observed);
     v("holding", s.holding);

@@ -9,17 +9,20 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::rig {
 
 enum class ByteOrder { little_endian, big_endian };
-Names<ByteOrder> byte_order_names() noexcept;
 
 enum class RawType { unsigned_integer, signed_integer, float32, float64 };
-Names<RawType> raw_type_names() noexcept;
+constexpr std::string_view other_name(RawType type) noexcept {
+  return type == RawType::unsigned_integer ? "unsigned" : type == RawType::signed_integer ? "signed" : "";
+}
 
 struct SignalLayout {
   int start = 0;   ///< as a DBC counts
@@ -34,11 +37,24 @@ struct SignalLayout {
   bool operator==(const SignalLayout&) const = default;
 };
 
+constexpr auto fields_of(const SignalLayout&) {
+  using S = SignalLayout;
+  return std::tuple{
+      field<&S::start>({"start", "-", {}, "first bit, as a DBC counts", DefaultForm::required}),
+      field<&S::length>({"length", "-", {}, "bits", DefaultForm::required}),
+      field<&S::byte_order>("byte_order", "order of the bytes"),
+      field<&S::type>("raw_type", "meaning of the bits"),
+      field<&S::scale>({"scale", "-", {}, "physical value of one step"}),
+      field<&S::offset>({"offset", "-", {}, "physical value of the raw 0"}),
+      field<&S::minimum>({"minimum", "-", {}, "lowest physical value"}),
+      field<&S::maximum>({"maximum", "-", {}, "highest physical value"}),
+  };
+}
+
 /// ParameterError naming field, value and bound.
 void validate(const SignalLayout& layout);
 
 enum class OutOfRange { clamp, refuse };
-Names<OutOfRange> out_of_range_names() noexcept;
 
 enum class PackStatus {
   ok,

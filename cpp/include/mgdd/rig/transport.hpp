@@ -17,7 +17,6 @@ enum class SendResult {
   full,    ///< no room within the time that the transport allows; nothing was sent
   failed,  ///< the frame cannot be sent, or the interface is gone
 };
-Names<SendResult> send_result_names() noexcept;
 
 /// One thread writes, any thread reads.
 struct TransportCounts {

@@ -9,9 +9,11 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <type_traits>
 
 #include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::throttle {
 
@@ -38,6 +40,23 @@ struct SensorPair {
   }
 };
 
+constexpr auto fields_of(const SensorPair&) {
+  using P = SensorPair;
+  return std::tuple{
+      field<&P::closed_v>({"closed_v", "V", {}, "first sensor at 0 deg"}),
+      field<&P::span_v>({"span_v", "V", above(0.0), "change of voltage over the travel"}),
+      field<&P::travel_deg>({"travel_deg", "deg", closed(1.0, 360.0), "travel behind that change"}),
+      field<&P::supply_v>({"supply_v", "V", closed(0.1, 100.0), "supply of both sensors"}),
+      field<&P::noise_v>({"noise_v", "V", {}, "noise of each sensor, rms"}),
+      field<&P::lag_s>({"lag_s", "s", closed(0.0, 1.0), "time constant of the input filter"}),
+      field<&P::adc_bits>({"adc_bits", "-", closed(4.0, 24.0), "bits of the converter"}),
+      field<&P::sum_tolerance_v>({"sum_tolerance_v", "V", {}, "tolerance of the sum"}),
+      field<&P::low_v>({"low_v", "V", {}, "lowest healthy voltage"}),
+      field<&P::high_v>({"high_v", "V", {}, "highest healthy voltage"}),
+      field<&P::debounce_s>({"debounce_s", "s", closed(0.0, 60.0), "time a fault must last"}),
+  };
+}
+
 enum class SensorFaultKind {
   none,
   open_wire,        ///< the input's resistor pulls it to 0 V
@@ -53,7 +72,6 @@ struct SensorFault {
   double size = 0.0;
   std::optional<double> until_s{};  ///< none: it stays
 };
-Names<SensorFaultKind> sensor_fault_names() noexcept;
 
 /// Everything that changes from sample to sample.
 struct SensorState {

@@ -8,10 +8,11 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/dynamics/dry_friction.hpp"
 
 namespace mgdd::throttle {
@@ -94,12 +95,11 @@ struct Throttle {
 };
 
 /// All numbers of a throttle, in the order of the struct.
-inline constexpr std::size_t n_throttle_fields = 34;
-std::span<const Field<Throttle>, n_throttle_fields> fields() noexcept;
-
-Names<Friction> friction_names() noexcept;
-Names<Backlash> backlash_names() noexcept;
-Names<Bridge> bridge_names() noexcept;
+std::span<const Field<Throttle>> fields() noexcept;
+inline auto fields_of(const Throttle&) {
+  return std::tuple{fields(), field<&Throttle::friction>("friction", "law of the dry friction"),
+                    field<&Throttle::backlash>("backlash", "play between gear and plate")};
+}
 
 /// ParameterError naming field, value and bound: domains, limp-home inside the travel, stiction >= Coulomb, a plate
 /// lighter than the whole.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <string>
-#include <utility>
 
 #include "batch_worker.hpp"
 #include "mgdd/common/enum_names.hpp"
@@ -15,11 +14,6 @@ namespace {
 
 constexpr std::size_t job_size = 4096;  ///< cases that one thread takes at a time
 constexpr double shared_pays = 30.0;    ///< cases of an operating point that make up for its tables
-
-constexpr std::pair<BatchForm, std::string_view> form_names[] = {{BatchForm::automatic, "automatic"},
-                                                                 {BatchForm::single, "single"},
-                                                                 {BatchForm::lanes, "lanes"},
-                                                                 {BatchForm::shared, "shared"}};
 
 /// Runs every case; the number of those that are not physical.
 template <class T>
@@ -53,13 +47,6 @@ void differentiate_alone(const CaseReader& reader, const BatchSettings& settings
 }
 
 }  // namespace
-
-std::string_view to_string(BatchForm form) noexcept {
-  return name_of<BatchForm>(form_names, form);
-}
-BatchForm parse_batch_form(std::string_view name) {
-  return parse_name<BatchForm>(form_names, "form", name);
-}
 
 void validate(const BatchCases& cases) {
   CaseReader(cases).require_valid();

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/engine/batch/batch.hpp"
 #include "mgdd/engine/sensitivity.hpp"
 

@@ -85,7 +85,7 @@ Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const Tra
       unit[i] = 0.0;
     }
   }
-  name_ = std::string(to_string(kind)) + " over " + text(o.smoothing_width_cad) + " °CA (" + std::to_string(samples) +
+  name_ = std::string(name_of(kind)) + " over " + text(o.smoothing_width_cad) + " °CA (" + std::to_string(samples) +
           " samples)";
 }
 

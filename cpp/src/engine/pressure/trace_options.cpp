@@ -10,42 +10,11 @@
 namespace mgdd::engine {
 namespace {
 
-constexpr std::pair<Pegging, std::string_view> pegging_names[] = {{Pegging::none, "none"},
-                                                                  {Pegging::inlet, "inlet"},
-                                                                  {Pegging::two_point, "two_point"},
-                                                                  {Pegging::least_squares, "least_squares"}};
-constexpr std::pair<AnalysisGamma, std::string_view> gamma_names[] = {
-    {AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}};
-constexpr std::pair<Smoothing, std::string_view> smoothing_names[] = {{Smoothing::automatic, "automatic"},
-                                                                      {Smoothing::none, "none"},
-                                                                      {Smoothing::savitzky_golay, "savitzky_golay"},
-                                                                      {Smoothing::low_pass, "low_pass"},
-                                                                      {Smoothing::angle_window, "angle_window"}};
-
 void require(bool holds, const char* name, double value, const std::string& bound, const char* unit = "") {
   if (!holds) throw ParameterError(name, value, "must be " + bound, unit);
 }
 
 }  // namespace
-
-std::string_view to_string(Pegging v) noexcept {
-  return name_of<Pegging>(pegging_names, v);
-}
-std::string_view to_string(AnalysisGamma v) noexcept {
-  return name_of<AnalysisGamma>(gamma_names, v);
-}
-std::string_view to_string(Smoothing v) noexcept {
-  return name_of<Smoothing>(smoothing_names, v);
-}
-Pegging parse_pegging(std::string_view t) {
-  return parse_name<Pegging>(pegging_names, "pegging", t);
-}
-AnalysisGamma parse_analysis_gamma(std::string_view t) {
-  return parse_name<AnalysisGamma>(gamma_names, "gamma", t);
-}
-Smoothing parse_smoothing(std::string_view t) {
-  return parse_name<Smoothing>(smoothing_names, "smoothing", t);
-}
 
 void validate(const TraceOptions& o) {
   require(o.pegging_exponent > 1.0 && o.pegging_exponent < 1.7, "pegging_exponent", o.pegging_exponent, "in (1, 1.7)");

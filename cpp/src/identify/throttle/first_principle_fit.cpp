@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::identify {
 

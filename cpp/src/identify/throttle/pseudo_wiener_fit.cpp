@@ -21,12 +21,6 @@ using throttle::PwP;
 using throttle::PwR;
 using throttle::PwW;
 
-constexpr std::array<std::pair<Sides, std::string_view>, 4> side_names{{
-    {Sides::shared, "shared"},
-    {Sides::above, "above"},
-    {Sides::below, "below"},
-    {Sides::both, "both"},
-}};
 constexpr std::size_t numbers_per_side = 7;
 constexpr std::string_view above_prefix = "above_";
 const std::vector<std::string> pw_r_default{"tau_s", "gain_deg_per_s2_per_duty", "preload_duty", "spring_duty_per_deg",
@@ -72,8 +66,7 @@ std::vector<PseudoWienerUnknown> by_name(PseudoWienerKind kind, std::size_t n_de
   for (const std::string& name : o.free) {
     const auto found = std::ranges::find(rows, name, &FieldInfo::name);
     if (found == rows.end()) {
-      throw about("free", ParameterError("free: '" + name + "' is not a parameter of " +
-                                         std::string(name_of(throttle::pseudo_wiener_names(), kind))));
+      throw about("free", ParameterError("free: '" + name + "' is not a parameter of " + std::string(name_of(kind))));
     }
     out.push_back({parameter_of(*found, name), {static_cast<std::size_t>(found - rows.begin())}});
   }
@@ -330,10 +323,6 @@ void check(const std::vector<ThrottleRecord>& records) {
 }
 
 }  // namespace
-
-Names<Sides> sides_names() noexcept {
-  return side_names;
-}
 
 void PseudoWienerFitOptions::validate() const {
   require_within("starts", starts, 1.0, 10000.0);

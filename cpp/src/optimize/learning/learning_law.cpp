@@ -14,11 +14,6 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr std::pair<LearningLaw, std::string_view> law_names[] = {{LearningLaw::p, "p"},
-                                                                  {LearningLaw::d, "d"},
-                                                                  {LearningLaw::pd, "pd"},
-                                                                  {LearningLaw::q_filter, "q_filter"},
-                                                                  {LearningLaw::norm_optimal, "norm_optimal"}};
 constexpr double default_gain = 0.5;       // times 1 / h_m: halves the error of a plant without memory
 constexpr double default_cutoff = 0.2;     // of Nyquist
 constexpr double default_change = 0.1;     // of sigma_max(G)^2: the strongest direction keeps 1/11 of its error
@@ -41,7 +36,7 @@ void require_finite(std::optional<double> value, const char* name) {
 
 void require_unused(bool given, const char* name, LearningLaw law) {
   if (given) {
-    throw about(name, ParameterError(std::string(name) + " does nothing for law '" + std::string(to_string(law)) +
+    throw about(name, ParameterError(std::string(name) + " does nothing for law '" + std::string(name_of(law)) +
                                      "': leave it out, or choose another law"));
   }
 }
@@ -89,14 +84,6 @@ void check_input(const LearningSettings& s) {
 }
 
 }  // namespace
-
-std::string_view to_string(LearningLaw law) noexcept {
-  return name_of<LearningLaw>(law_names, law);
-}
-
-LearningLaw parse_learning_law(std::string_view name) {
-  return parse_name<LearningLaw>(law_names, "law", name);
-}
 
 Eigen::MatrixXd toeplitz(const Eigen::VectorXd& column) {
   const Eigen::Index n = column.size();

@@ -5,6 +5,7 @@
 
 #include <Eigen/SVD>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 
 namespace mgdd::optimize {
@@ -115,28 +116,6 @@ Spectrum spectrum_of(const Eigen::MatrixXd& unit_columns, double rank_tolerance)
 
 }  // namespace
 
-std::string_view to_string(FitStatus status) noexcept {
-  switch (status) {
-    case FitStatus::not_run:
-      return "not_run";
-    case FitStatus::cost_converged:
-      return "cost_converged";
-    case FitStatus::step_converged:
-      return "step_converged";
-    case FitStatus::gradient_converged:
-      return "gradient_converged";
-    case FitStatus::iteration_limit:
-      return "iteration_limit";
-    case FitStatus::evaluation_failed:
-      return "evaluation_failed";
-    case FitStatus::stalled:
-      return "stalled";
-    case FitStatus::interrupted:
-      return "interrupted";
-  }
-  return "unknown";
-}
-
 std::string_view explain(FitStatus status) noexcept {
   switch (status) {
     case FitStatus::not_run:
@@ -167,7 +146,7 @@ bool is_converged(FitStatus status) noexcept {
 }
 
 std::string FitReport::brief() const {
-  std::string text = std::string(to_string(status)) + " after " + std::to_string(iterations) + " iterations, rmse " +
+  std::string text = std::string(name_of(status)) + " after " + std::to_string(iterations) + " iterations, rmse " +
                      formatted("%.6g", rmse);
   for (std::size_t i = 0; i < unidentifiable.size(); ++i) {
     text += (i == 0 ? ", not identifiable: " : ", ") + unidentifiable[i];

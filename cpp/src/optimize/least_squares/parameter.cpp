@@ -1,10 +1,8 @@
 #include "mgdd/optimize/least_squares/parameter.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include "mgdd/common/error.hpp"
@@ -13,23 +11,7 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double off_open_bound = 1e-6;  // of the bound or 1
-
-using O = LeastSquaresOptions;
-constexpr Domain fraction{.lower = 0.0, .upper = 1.0, .upper_open = true};
-constexpr std::array option_fields{
-    field<&O::cost_tolerance>({"cost_tolerance", "-", fraction, "relative decrease of the cost that ends a search"}),
-    field<&O::step_tolerance>({"step_tolerance", "-", fraction, "relative step that ends a search"}),
-    field<&O::gradient_tolerance>({"gradient_tolerance", "-", fraction, "cosine of the gradient that ends a search"}),
-    field<&O::initial_damping>(
-        {"initial_damping", "-", closed(least_damping, largest_damping), "damping of the first step"}),
-    field<&O::correlation_limit>({"correlation_limit", "-", above(0.0, 1.0), "correlation above which two are named"}),
-    field<&O::rank_tolerance>({"rank_tolerance",
-                               "-",
-                               {.lower = epsilon, .upper = 1.0, .upper_open = true},
-                               "singular value, over the largest, that counts as zero"}),
-};
 
 }  // namespace
 
@@ -40,8 +22,7 @@ Parameter parameter_of(const FieldInfo& field, std::string name) {
 }
 
 void LeastSquaresOptions::validate() const {
-  require_within("max_iterations", max_iterations, 1, iteration_ceiling);
-  require_fields(option_fields, *this);
+  require_fields(fields_of(*this), *this);
 }
 
 void validate(const std::vector<Parameter>& parameters) {

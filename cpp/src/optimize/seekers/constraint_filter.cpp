@@ -1,7 +1,6 @@
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -11,18 +10,6 @@
 
 namespace mgdd::optimize {
 namespace {
-
-constexpr std::array<std::pair<LimitMethod, std::string_view>, 3> method_names{{
-    {LimitMethod::switching, "switching"},
-    {LimitMethod::penalty, "penalty"},
-    {LimitMethod::barrier, "barrier"},
-}};
-
-constexpr std::array<std::pair<LimitState, std::string_view>, 3> state_names{{
-    {LimitState::free, "free"},
-    {LimitState::active, "active"},
-    {LimitState::infeasible, "infeasible"},
-}};
 
 constexpr double significance = 2.0;        // standard errors
 constexpr double patience_share = 0.6;      // of the memory: how long the search waits for the slope of a limit
@@ -44,16 +31,6 @@ double share_within(const Inputs& step, const Inputs& most) noexcept {
 }
 
 }  // namespace
-
-std::string_view to_string(LimitState v) noexcept {
-  return name_of<LimitState>(state_names, v);
-}
-std::string_view to_string(LimitMethod v) noexcept {
-  return name_of<LimitMethod>(method_names, v);
-}
-LimitMethod parse_limit_method(std::string_view name) {
-  return parse_name<LimitMethod>(method_names, "method", name);
-}
 
 void validate(const std::vector<Limit>& limits) {
   for (const Limit& limit : limits) {

@@ -1,7 +1,6 @@
 #include "mgdd/optimize/seekers/extremum_seeking.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -10,12 +9,6 @@
 
 namespace mgdd::optimize {
 namespace {
-
-constexpr std::array<std::pair<MeanRemoval, std::string_view>, 3> form_names{{
-    {MeanRemoval::batch, "batch"},
-    {MeanRemoval::moving_average, "moving_average"},
-    {MeanRemoval::washout, "washout"},
-}};
 
 constexpr double limit_memory_windows = 2.0;
 constexpr double least_response = 0.05;      // share of the dither that must arrive before a slope is told
@@ -60,13 +53,6 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
 }
 
 }  // namespace
-
-std::string_view to_string(MeanRemoval v) noexcept {
-  return name_of<MeanRemoval>(form_names, v);
-}
-MeanRemoval parse_mean_removal(std::string_view name) {
-  return parse_name<MeanRemoval>(form_names, "form", name);
-}
 
 std::vector<std::string> ExtremumSeekingSettings::advice() const {
   std::vector<std::string> out;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -13,16 +12,6 @@
 
 namespace mgdd::optimize {
 namespace {
-
-constexpr std::array<std::pair<SpsaForm, std::string_view>, 3> spsa_form_names{{
-    {SpsaForm::first_order, "first_order"},
-    {SpsaForm::second_order, "second_order"},
-    {SpsaForm::one_measurement, "one_measurement"},
-}};
-constexpr std::array<std::pair<GainSchedule, std::string_view>, 2> schedule_names{{
-    {GainSchedule::decreasing, "decreasing"},
-    {GainSchedule::constant, "constant"},
-}};
 
 constexpr double memory = 10.0;              // measurements behind the trend and the limits
 constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
@@ -75,19 +64,6 @@ SpsaSettings checked(SpsaSettings s) {
 }
 
 }  // namespace
-
-std::string_view to_string(SpsaForm v) noexcept {
-  return name_of<SpsaForm>(spsa_form_names, v);
-}
-SpsaForm parse_spsa_form(std::string_view name) {
-  return parse_name<SpsaForm>(spsa_form_names, "form", name);
-}
-std::string_view to_string(GainSchedule v) noexcept {
-  return name_of<GainSchedule>(schedule_names, v);
-}
-GainSchedule parse_gain_schedule(std::string_view name) {
-  return parse_name<GainSchedule>(schedule_names, "schedule", name);
-}
 
 std::vector<std::string> SpsaSettings::advice() const {
   const bool second = form == SpsaForm::second_order;

@@ -1,21 +1,13 @@
 #include "mgdd/optimize/seekers/tuner.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::optimize {
 namespace {
-
-constexpr std::array<std::pair<TunedMethod, std::string_view>, 3> tuned_method_names{{
-    {TunedMethod::batch, "batch"},
-    {TunedMethod::moving_average, "moving_average"},
-    {TunedMethod::spsa, "spsa"},
-}};
 
 constexpr double default_rms = 0.2, default_distance = 5.0, default_arrival = 0.45, default_amplitude_max = 1.8;  // L
 constexpr double default_cycles = 50.0;
@@ -156,13 +148,6 @@ Tuning tune_dither(const Filled& w) {
 }
 
 }  // namespace
-
-std::string_view to_string(TunedMethod v) noexcept {
-  return name_of<TunedMethod>(tuned_method_names, v);
-}
-TunedMethod parse_tuned_method(std::string_view name) {
-  return parse_name<TunedMethod>(tuned_method_names, "method", name);
-}
 
 Tuning tune(const TuningSpec& spec) {
   const Filled w = filled(spec);

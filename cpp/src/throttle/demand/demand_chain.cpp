@@ -87,7 +87,7 @@ void require_not_below(std::string_view name, double value, std::string_view sma
 
 }  // namespace
 
-std::span<const Field<DemandChain>, n_demand_fields> demand_fields() noexcept {
+std::span<const Field<DemandChain>> demand_fields() noexcept {
   return field_table;
 }
 

@@ -20,8 +20,7 @@ void FirstPrinciple::validate() const {
   require_within("open_deg", open_deg, closed_deg + 1.0, 180.0, "deg");
   require_positive("tanh_deg_per_s", tanh_deg_per_s, "deg/s");
   if (friction != Friction::coulomb && friction != Friction::tanh) {
-    throw ParameterError("friction", name_of(friction_names(), friction),
-                         "must be coulomb or tanh, the groups have one level");
+    throw ParameterError("friction", name_of(friction), "must be coulomb or tanh, the groups have one level");
   }
 }
 

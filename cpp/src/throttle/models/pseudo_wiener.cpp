@@ -11,22 +11,9 @@
 namespace mgdd::throttle {
 namespace {
 
-constexpr std::array<std::pair<PseudoWienerKind, std::string_view>, 3> kinds{{
-    {PseudoWienerKind::pw_r, "pw_r"},
-    {PseudoWienerKind::pw_w, "pw_w"},
-    {PseudoWienerKind::pw_p, "pw_p"},
-}};
-constexpr std::array<std::pair<Switching, std::string_view>, 2> switchings{{
-    {Switching::predicted, "predicted"},
-    {Switching::measured, "measured"},
-}};
 constexpr std::array<std::pair<Friction, std::string_view>, 2> frictions{{
     {Friction::coulomb, "set_valued"},
     {Friction::tanh, "tanh"},
-}};
-constexpr std::array<std::pair<LagStart, std::string_view>, 2> starts{{
-    {LagStart::rest, "rest"},
-    {LagStart::inverse_map, "inverse_map"},
 }};
 
 constexpr std::array<FieldInfo, n_pw_r> pw_r_fields{{
@@ -117,17 +104,8 @@ static_assert(fulfilled<PwR> && fulfilled<PwW> && fulfilled<PwP>);
 
 }  // namespace
 
-Names<PseudoWienerKind> pseudo_wiener_names() noexcept {
-  return kinds;
-}
-Names<Switching> switching_names() noexcept {
-  return switchings;
-}
 Names<Friction> dry_friction_names() noexcept {
   return frictions;
-}
-Names<LagStart> lag_start_names() noexcept {
-  return starts;
 }
 
 std::span<const FieldInfo> fields(PseudoWienerKind kind) noexcept {
@@ -185,8 +163,7 @@ void check_pw_r(const PseudoWienerFrame& frame, double ramp_deg, double tanh_deg
   require_within("tanh_deg_per_s", tanh_deg_per_s, 0.1, 1e3, "deg/s");
   require_within("dead_band_deg", dead_band_deg, 0.0, 10.0, "deg");
   if (friction != Friction::coulomb && friction != Friction::tanh) {
-    throw ParameterError("friction", name_of(friction_names(), friction),
-                         "must be coulomb or tanh, PW-R has one level");
+    throw ParameterError("friction", name_of(friction), "must be coulomb or tanh, PW-R has one level");
   }
 }
 

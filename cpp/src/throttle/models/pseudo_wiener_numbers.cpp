@@ -94,7 +94,7 @@ std::vector<NamedNumber> named_numbers(PseudoWienerKind kind) {
 
 PseudoWiener pseudo_wiener_from(std::string_view kind, const std::map<std::string, double>& given,
                                 std::string_view switching, std::string_view friction) {
-  const PseudoWienerKind k = parse_name(pseudo_wiener_names(), "kind", kind);
+  const PseudoWienerKind k = parse_name<PseudoWienerKind>("kind", kind);
   PseudoWiener out = standard(k);
   const auto rows = fields(k);
   std::visit(
@@ -120,8 +120,8 @@ PseudoWiener pseudo_wiener_from(std::string_view kind, const std::map<std::strin
           }
         }
         if constexpr (requires { p.switching; }) {
-          p.switching = parse_name(switching_names(), "switching", switching);
-          p.friction = parse_name(dry_friction_names(), "friction", friction);
+          p.switching = parse_name<Switching>("switching", switching);
+          p.friction = parse_name("friction", friction, dry_friction_names());
         }
       },
       out);

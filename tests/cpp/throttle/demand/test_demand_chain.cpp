@@ -196,7 +196,7 @@ TEST(DemandChain, EveryNumberHasOneField) {
   for (const auto& field : demand_fields())
     field.in(chain) = at += 1.0;
   EXPECT_EQ(sizeof(EngineTorque) + sizeof(IntakeAir) + sizeof(ThrottleBore) + sizeof(ReferenceShape),
-            n_demand_fields * sizeof(double));
+            demand_fields().size() * sizeof(double));
   at = 0.5;
   for (const auto& field : demand_fields())
     EXPECT_EQ(field.in(chain), at += 1.0);

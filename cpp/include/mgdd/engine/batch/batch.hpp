@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/indicators.hpp"
@@ -38,9 +38,7 @@ enum class BatchForm {
            ///< interpolated over the pressure at its end: 1e-6 of `single`; a case outside of that range runs in lanes
 };
 
-std::string_view to_string(BatchForm form) noexcept;
 /// ParameterError that lists the valid names.
-BatchForm parse_batch_form(std::string_view name);
 
 struct BatchSettings {
   double step_cad = default_step_cad;

@@ -2,20 +2,15 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
+#include <tuple>
+
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::engine {
 
 enum class Pegging { none, inlet, two_point, least_squares };
 enum class AnalysisGamma { constant, split, cylinder };
 enum class Smoothing { automatic, none, savitzky_golay, low_pass, angle_window };
-
-std::string_view to_string(Pegging v) noexcept;
-std::string_view to_string(AnalysisGamma v) noexcept;
-std::string_view to_string(Smoothing v) noexcept;
-Pegging parse_pegging(std::string_view name);
-AnalysisGamma parse_analysis_gamma(std::string_view name);
-Smoothing parse_smoothing(std::string_view name);
 
 struct TraceOptions {
   Pegging pegging = Pegging::none;
@@ -43,6 +38,33 @@ struct TraceOptions {
   std::optional<double> bmep_bar;             ///< a gross IMEP that cannot reach it is refused
   std::optional<double> fuel_heat_j;          ///< of the stated fuel; a gross heat far from it is doubted
 };
+
+constexpr auto fields_of(const TraceOptions&) {
+  using O = TraceOptions;
+  const auto cad = [](const char* name, const char* meaning) { return FieldInfo{name, "°CA aTDC", {}, meaning}; };
+  return std::tuple{
+      field<&O::pegging>("pegging", "how the absolute pressure is found"),
+      field<&O::pegging_exponent>({"pegging_exponent", "-", {}, "polytropic exponent of compression"}),
+      field<&O::inlet_pressure_kpa>({"inlet_pressure_kpa", "kPa", {}, "pressure at intake bottom dead centre"}),
+      field<&O::gamma_source>("gamma_source", "where gamma comes from"),
+      field<&O::gamma>({"gamma", "-", {}, "constant over the window"}),
+      field<&O::gamma_compression>({"gamma_compression", "-", {}, "before the burn"}),
+      field<&O::gamma_combustion>({"gamma_combustion", "-", {}, "from the burn start on"}),
+      field<&O::heat_from_cad>(cad("heat_from_cad", "start of the cumulative heat")),
+      field<&O::heat_to_cad>(cad("heat_to_cad", "its end")),
+      field<&O::earliest_burn_cad>(cad("earliest_burn_cad", "the burn is searched from here on")),
+      field<&O::burn_from_cad>(cad("burn_from_cad", "the combustion term of the wall heat acts from here")),
+      field<&O::total_at_end>("total_at_end", "report the heat at the end of the window, not its peak"),
+      field<&O::fractions_of_gross>("fractions_of_gross", "burn angles of gross heat"),
+      field<&O::smoothing>("smoothing", "of the pressure before the heat release"),
+      field<&O::smoothing_width_cad>({"smoothing_width_cad", "°CA", {}, "whole width"}),
+      field<&O::smoothing_cutoff_hz>({"smoothing_cutoff_hz", "Hz", {}, "where the gain is 1/2"}),
+      field<&O::intake_pressure_kpa>({"intake_pressure_kpa", "kPa", {}, "what p(IVC) is judged against"}),
+      field<&O::intake_factor>({"intake_factor", "-", {}, "beyond this factor of it p(IVC) is doubted"}),
+      field<&O::bmep_bar>({"bmep_bar", "bar", {}, "a gross IMEP that cannot reach it is refused"}),
+      field<&O::fuel_heat_j>({"fuel_heat_j", "J", {}, "heat of the stated fuel"}),
+  };
+}
 
 /// ParameterError naming the first option outside its domain.
 void validate(const TraceOptions& options);

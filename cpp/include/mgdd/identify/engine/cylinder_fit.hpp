@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/optimize/least_squares/fit_report.hpp"

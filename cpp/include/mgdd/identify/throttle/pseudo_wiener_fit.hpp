@@ -32,7 +32,6 @@ enum class Sides {
   below,
   both,  ///< a set each
 };
-Names<Sides> sides_names() noexcept;
 
 struct PseudoWienerFitOptions {
   int starts = 12;         ///< per delay and start rule

@@ -26,9 +26,6 @@ enum class LearningLaw {
   norm_optimal,  ///< minimises We |e|^2 + Wu |u|^2 + Wd |u - u_j|^2 on the model
 };
 
-[[nodiscard]] std::string_view to_string(LearningLaw law) noexcept;
-[[nodiscard]] LearningLaw parse_learning_law(std::string_view name);
-
 /// What a learner is told. A setting that its law would not use is refused.
 struct LearningSettings {
   std::vector<double> initial{};  ///< input of trial 0; its length is that of every trial

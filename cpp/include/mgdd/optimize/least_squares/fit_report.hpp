@@ -25,8 +25,6 @@ enum class FitStatus {
   interrupted,         ///< stopped by request; what was found until then is in the report
 };
 
-[[nodiscard]] std::string_view to_string(FitStatus status) noexcept;
-
 /// What the status means, in one sentence.
 [[nodiscard]] std::string_view explain(FitStatus status) noexcept;
 

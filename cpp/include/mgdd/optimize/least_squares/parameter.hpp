@@ -5,11 +5,12 @@
 #include <limits>
 #include <stop_token>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 
 namespace mgdd::optimize {
 
@@ -22,6 +23,14 @@ struct Parameter {
 
   bool operator==(const Parameter&) const = default;
 };
+
+constexpr auto fields_of(const Parameter&) {
+  using P = Parameter;
+  return std::tuple{field<&P::name>("name", "in reports and messages", DefaultForm::required),
+                    field<&P::lower>("lower", "lower bound, -inf for none"),
+                    field<&P::upper>("upper", "upper bound, inf for none"),
+                    field<&P::log_scaled>("log_scaled", "searched as log(p); needs lower > 0")};
+}
 
 /// A field as an unknown of a search, within its domain; an open bound is kept off by a millionth.
 Parameter parameter_of(const FieldInfo& field, std::string name);
@@ -57,6 +66,24 @@ struct LeastSquaresOptions {
 
   bool operator==(const LeastSquaresOptions&) const = default;
 };
+
+constexpr auto fields_of(const LeastSquaresOptions&) {
+  using O = LeastSquaresOptions;
+  constexpr Domain fraction{.lower = 0.0, .upper = 1.0, .upper_open = true};
+  constexpr Domain rank{.lower = std::numeric_limits<double>::epsilon(), .upper = 1.0, .upper_open = true};
+  return std::tuple{
+      field<&O::max_iterations>({"max_iterations", "-", closed(1.0, iteration_ceiling), "trial steps"}),
+      field<&O::cost_tolerance>({"cost_tolerance", "-", fraction, "relative decrease of the cost that ends a search"}),
+      field<&O::step_tolerance>({"step_tolerance", "-", fraction, "relative step that ends a search"}),
+      field<&O::gradient_tolerance>({"gradient_tolerance", "-", fraction, "cosine of the gradient that ends a search"}),
+      field<&O::initial_damping>({"initial_damping", "-", closed(least_damping, largest_damping),
+                                  "damping of the first step, of unit columns"}),
+      field<&O::correlation_limit>(
+          {"correlation_limit", "-", above(0.0, 1.0), "correlation above which two are named"}),
+      field<&O::rank_tolerance>({"rank_tolerance", "-", rank, "singular value, over the largest, that counts as zero"}),
+      field<&O::evaluate_together>("evaluate_together", "residual and Jacobian in one call"),
+  };
+}
 
 /// Throws ParameterError: empty or repeated names, NaN bounds, lower >= upper, log-scaled with lower <= 0.
 void validate(const std::vector<Parameter>& parameters);

@@ -7,8 +7,10 @@
 
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
@@ -27,6 +29,17 @@ struct BoundedSeekingSettings {
 
   std::vector<std::string> advice() const;
 };
+inline auto fields_of(const BoundedSeekingSettings&) {
+  using S = BoundedSeekingSettings;
+  return std::tuple{
+      space_fields<&S::space>(),
+      dither_fields<&S::dither>(),
+      field<&S::kappa>("kappa", "phase per unit of J"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+      field<&S::curvature>("curvature", "J'' where it is known"),
+  };
+}
 
 class BoundedSeeking {
  public:

@@ -7,8 +7,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/causing_inputs.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/nearest_step.hpp"
@@ -17,13 +20,10 @@
 namespace mgdd::optimize {
 
 enum class LimitMethod { switching, penalty, barrier };
-std::string_view to_string(LimitMethod v) noexcept;
-LimitMethod parse_limit_method(std::string_view name);
 
 /// free: holds nothing back; active: turned the last step, or is broken; infeasible: cannot be met together with the
 /// others and the bounds, as far as the learnt slopes tell.
 enum class LimitState { free, active, infeasible };
-std::string_view to_string(LimitState v) noexcept;
 
 /// value <= upper - margin, measured once per cycle. Excess is counted in units of `scale`.
 struct Limit {
@@ -39,6 +39,21 @@ struct Limit {
 
   bool operator==(const Limit&) const = default;
 };
+constexpr auto fields_of(const Limit&) {
+  using L = Limit;
+  return std::tuple{
+      field<&L::name>("name", "what is limited", DefaultForm::required),
+      field<&L::upper>("upper", "the limit", DefaultForm::required),
+      field<&L::margin>("margin", "kept free below the limit"),
+      field<&L::method>("method", "how J knows of the limit"),
+      field<&L::weight>("weight", "of penalty or barrier"),
+      field<&L::scale>("scale", "unit of the excess; 0: the limit itself"),
+      field<&L::lag, &ComponentLag::delay_cycles>("delay_cycles", "transport delay of the reading"),
+      field<&L::lag, &ComponentLag::lag_cycles>("lag_cycles", "time constant of its lag"),
+      field<&L::margin_sd>("margin_sd", "margin in standard deviations of the reading"),
+      field<&L::delay_uncertainty>("delay_uncertainty", "cycles that the delay may be off to either side"),
+  };
+}
 void validate(const std::vector<Limit>& limits);
 /// Their lags, for planes that look back `memory` cycles, and longer behind a lag, where a slope takes longer to show.
 /// Refuses a limit's own mistakes before its lag sizes anything.

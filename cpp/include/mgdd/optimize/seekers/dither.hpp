@@ -3,10 +3,13 @@
 // (Ghaffari, Krstic and Nesic 2012). Each component of J may come through its own delay and lag.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -19,11 +22,25 @@ struct ComponentLag {
   bool operator==(const ComponentLag&) const = default;
 };
 
+constexpr auto fields_of(const ComponentLag&) {
+  return std::array{field<&ComponentLag::delay_cycles>("delay_cycles", "transport delay in cycles"),
+                    field<&ComponentLag::lag_cycles>("lag_cycles", "time constant of the lag in cycles")};
+}
+
 struct DitherSettings {
   Inputs amplitude = scalar_input(1.0);  ///< per input, in its unit, > 0
   int period = 10;                       ///< M, cycles of the common window, >= 4
   std::vector<int> harmonics{1};         ///< n_i, one per input
 };
+
+template <auto place>
+constexpr auto dither_fields() {
+  using D = DitherSettings;
+  return std::tuple{
+      field<place, &D::amplitude>("amplitude", "of the dither, per input"),
+      field<place, &D::period>("period", "cycles of the common window"),
+      field<place, &D::harmonics>("harmonics", "oscillations per window, one per input", DefaultForm::none)};
+}
 
 /// ParameterError for a period below 4, or for harmonics that mix: n_i = n_j, 2 n_j or n_j +- n_k, or 2 n_i >= M. A
 /// `hessian` also needs sums and differences of two harmonics to be distinct.

@@ -8,8 +8,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
@@ -19,8 +22,6 @@
 namespace mgdd::optimize {
 
 enum class MeanRemoval { batch, moving_average, washout };
-std::string_view to_string(MeanRemoval v) noexcept;
-MeanRemoval parse_mean_removal(std::string_view name);
 
 struct ExtremumSeekingSettings {
   SearchSpace space;
@@ -45,6 +46,27 @@ struct ExtremumSeekingSettings {
   /// What averaging theory says against these settings, in sentences; empty if nothing (or J'' is not known).
   std::vector<std::string> advice() const;
 };
+inline auto fields_of(const ExtremumSeekingSettings&) {
+  using S = ExtremumSeekingSettings;
+  return std::tuple{
+      space_fields<&S::space>(),
+      field<&S::form>("form", "how the mean of J is removed"),
+      dither_fields<&S::dither>(),
+      field<&S::gain>("gain", "adaptation gain, per input"),
+      field<&S::rate>("rate", "largest change of the estimate per cycle, per input"),
+      field<&S::recovery_rate>("recovery_rate", "largest change on the way back below a limit, per input"),
+      field<&S::washout_pole>("washout_pole", "pole of the high-pass"),
+      field<&S::low_pass>("low_pass", "share of the new value after demodulation"),
+      field<&S::components>("components", "delay and lag of each component of J", DefaultForm::none),
+      field<&S::hold_cycles>("hold_cycles", "cycles that the estimate is held at the start"),
+      field<&S::amplitude_floor>("amplitude_floor", "share of the dither that is left where J is flat"),
+      field<&S::full_gradient>("full_gradient", "slope of J at which the dither is full"),
+      field<&S::limit_amplitude>("limit_amplitude", "share of the dither while a limit holds the estimate back"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+      field<&S::curvature>("curvature", "J'' where it is known"),
+  };
+}
 
 class ExtremumSeeking {
  public:

@@ -5,8 +5,10 @@
 #pragma once
 
 #include <array>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -22,6 +24,18 @@ struct GoldenSectionSettings {
   bool maximize = true;
   std::vector<Limit> limits;
 };
+inline auto fields_of(const GoldenSectionSettings&) {
+  using S = GoldenSectionSettings;
+  return std::tuple{
+      space_fields<&S::space, DefaultForm::required>(),
+      field<&S::noise_sd>("noise_sd", "of one measurement of J"),
+      field<&S::significance>("significance", "standard errors that decide a comparison"),
+      field<&S::samples_max>("samples_max", "measurements of each inner point"),
+      field<&S::tolerance>("tolerance", "width of the bracket at which an exact search ends"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+  };
+}
 
 class GoldenSection {
  public:

@@ -6,8 +6,10 @@
 
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
@@ -29,6 +31,20 @@ struct GradientDescentSettings {
 
   std::vector<std::string> advice() const;
 };
+inline auto fields_of(const GradientDescentSettings&) {
+  using S = GradientDescentSettings;
+  return std::tuple{
+      space_fields<&S::space>(),
+      field<&S::step_size>("step_size", "of the step"),
+      field<&S::difference>("difference", "of the input"),
+      field<&S::rate>("rate", "largest change per step, per input"),
+      field<&S::tolerance>("tolerance", "converged once every entry of a step is below"),
+      field<&S::iterations>("iterations", "steps after which a search that has not converged says so"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+      field<&S::curvature>("curvature", "J'' where it is known"),
+  };
+}
 
 class GradientDescent {
  public:

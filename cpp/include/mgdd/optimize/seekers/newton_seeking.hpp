@@ -7,8 +7,10 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
@@ -35,6 +37,25 @@ struct NewtonSeekingSettings {
 
   std::vector<std::string> advice() const;
 };
+inline auto fields_of(const NewtonSeekingSettings&) {
+  using S = NewtonSeekingSettings;
+  return std::tuple{
+      space_fields<&S::space>(),
+      dither_fields<&S::dither>(),
+      field<&S::time_constant_cycles>("time_constant_cycles", "of the approach"),
+      field<&S::hessian_rate>("hessian_rate", "low-pass of the Hessian per cycle"),
+      field<&S::riccati_rate>("riccati_rate", "rate of the Riccati filter per cycle"),
+      field<&S::initial_hessian>("initial_hessian", "diagonal to begin with"),
+      field<&S::initial_inverse>("initial_inverse", "diagonal of the inverse to begin with"),
+      field<&S::largest_inverse>("largest_inverse", "bound of its norm"),
+      field<&S::hold_cycles>("hold_cycles", "cycles that the estimate is held at the start"),
+      field<&S::rate>("rate", "largest change of the estimate per cycle, per input"),
+      field<&S::components>("components", "delay and lag of each component of J", DefaultForm::none),
+      field<&S::limit_amplitude>("limit_amplitude", "share of the dither while a limit holds the estimate back"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+  };
+}
 
 class NewtonSeeking {
  public:

@@ -8,8 +8,10 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <tuple>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/failure_watch.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
@@ -24,6 +26,15 @@ struct SearchSpace {
 
   Eigen::Index size() const noexcept { return start.size(); }
 };
+
+/// Start and bounds, first in the table of every seeker: what comes per input is counted by them.
+template <auto place, DefaultForm bounds = DefaultForm::value>
+constexpr auto space_fields() {
+  using S = SearchSpace;
+  return std::tuple{field<place, &S::start>("start", "first estimate, per input", DefaultForm::required),
+                    field<place, &S::lower>("lower", "least applied input, per input", bounds),
+                    field<place, &S::upper>("upper", "largest applied input, per input", bounds)};
+}
 
 /// ParameterError or ShapeError naming the entry; `reach` is how far a seeker goes to either side of its estimate,
 /// which must fit between the bounds, around the start too.

@@ -8,8 +8,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
@@ -19,13 +22,9 @@
 namespace mgdd::optimize {
 
 enum class SpsaForm { first_order, second_order, one_measurement };
-std::string_view to_string(SpsaForm v) noexcept;
-SpsaForm parse_spsa_form(std::string_view name);
 
 /// decreasing: a_k = a/(k + 1 + A)^alpha, c_k = c/(k + 1)^gamma; constant: a_k = a, c_k = c, which goes on tracking.
 enum class GainSchedule { decreasing, constant };
-std::string_view to_string(GainSchedule v) noexcept;
-GainSchedule parse_gain_schedule(std::string_view name);
 
 struct SpsaSettings {
   SearchSpace space;
@@ -53,6 +52,30 @@ struct SpsaSettings {
 
   std::vector<std::string> advice() const;
 };
+inline auto fields_of(const SpsaSettings&) {
+  using S = SpsaSettings;
+  return std::tuple{
+      space_fields<&S::space>(),
+      field<&S::form>("form", "order of the step"),
+      field<&S::schedule>("schedule", "how gain and perturbation change"),
+      field<&S::gain>("gain", "of the step"),
+      field<&S::stability>("stability", "iterations that the first gains count for"),
+      field<&S::gain_exponent>("gain_exponent", "decay of the gain"),
+      field<&S::perturbation>("perturbation", "of the input"),
+      field<&S::perturbation_exponent>("perturbation_exponent", "decay of the perturbation"),
+      field<&S::step_max>("step_max", "largest change per iteration and input"),
+      field<&S::averaging>("averaging", "gradients per iteration"),
+      field<&S::blocking>("blocking", "refuse steps that lose"),
+      field<&S::noise_sd>("noise_sd", "of one measurement of J"),
+      field<&S::initial_hessian>("initial_hessian", "curvature to begin with"),
+      field<&S::hessian_prior>("hessian_prior", "iterations that it counts for"),
+      field<&S::limit_amplitude>("limit_amplitude", "share of the dither while a limit holds the estimate back"),
+      field<&S::seed>("seed", "of the random signs"),
+      field<&S::maximize>("maximize", "False to minimise J"),
+      field<&S::limits>("limits", "measured quantities to keep"),
+      field<&S::curvature>("curvature", "J'' where it is known"),
+  };
+}
 
 class Spsa {
  public:

@@ -20,8 +20,6 @@
 namespace mgdd::optimize {
 
 enum class TunedMethod { batch, moving_average, spsa };
-std::string_view to_string(TunedMethod v) noexcept;
-TunedMethod parse_tuned_method(std::string_view name);
 
 struct TuningSpec {
   TunedMethod method = TunedMethod::batch;

@@ -7,8 +7,9 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <tuple>
 
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/throttle/demand/bore.hpp"
 #include "mgdd/throttle/demand/intake.hpp"
@@ -40,8 +41,11 @@ struct DemandChain {
 };
 
 /// All numbers but the table of the pedal, in the order in which Python shows them.
-inline constexpr std::size_t n_demand_fields = 28;
-std::span<const Field<DemandChain>, n_demand_fields> demand_fields() noexcept;
+std::span<const Field<DemandChain>> demand_fields() noexcept;
+inline auto fields_of(const DemandChain&) {
+  return std::tuple{demand_fields(), field<&DemandChain::pedal_map>(
+                                         "pedal_map", "torque that the pedal wants over the speed", DefaultForm::none)};
+}
 
 /// ParameterError naming field, value and bound.
 void validate(const DemandChain& chain);

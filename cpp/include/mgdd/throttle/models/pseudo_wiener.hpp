@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
+#include "mgdd/common/record.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/throttle/models/pw_p.hpp"
 #include "mgdd/throttle/models/pw_r.hpp"
@@ -24,9 +24,6 @@
 namespace mgdd::throttle {
 
 enum class PseudoWienerKind { pw_r, pw_w, pw_p };
-Names<PseudoWienerKind> pseudo_wiener_names() noexcept;
-Names<Switching> switching_names() noexcept;
-Names<LagStart> lag_start_names() noexcept;
 /// The forms that PW-R has: "set_valued" and "tanh".
 Names<Friction> dry_friction_names() noexcept;
 

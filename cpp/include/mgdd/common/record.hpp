@@ -1,21 +1,33 @@
-// What a parameter is: name, unit, domain and meaning. A table of fields stands once per record and gives its check,
-// its dict and file form, its help text and the bounds of a search.
+// One table of fields per parameter record: name, unit, domain and meaning of every member. It gives the check of the
+// record, its keywords, dict and file form, its help text and the bounds of a search. A table is a range of fields of
+// one type, a field, or a tuple of tables; `fields_of(const Record&)` beside the record gives its own.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <ranges>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 #include "mgdd/common/bounds.hpp"
 
 namespace mgdd {
+
+/// How Python's keyword shows its default.
+enum class DefaultForm {
+  value,     ///< as it is
+  none,      ///< None: what the record has by itself
+  required,  ///< not at all: it must be given
+};
 
 struct FieldInfo {
   std::string_view name;
   std::string_view unit;  ///< "-" for none
   Domain domain;
   std::string_view meaning;
+  DefaultForm form = DefaultForm::value;
 };
 
 /// ParameterError where the value lies outside the domain of its field.
@@ -52,6 +64,12 @@ constexpr auto field(const FieldInfo& info) {
   return Field<Owner, T>{info, [](Owner& owner) noexcept -> T& { return ((owner.*First).*....*Rest); }};
 }
 
+/// A member that is no number with a domain: a choice, a switch, a list, a record.
+template <auto First, auto... Rest>
+constexpr auto field(std::string_view name, std::string_view meaning, DefaultForm form = DefaultForm::value) {
+  return field<First, Rest...>(FieldInfo{name, "-", {}, meaning, form});
+}
+
 /// One table after the other.
 template <class F, std::size_t... Sizes>
 constexpr auto joined(const std::array<F, Sizes>&... tables) {
@@ -65,11 +83,32 @@ constexpr auto joined(const std::array<F, Sizes>&... tables) {
   return all;
 }
 
-/// ParameterError naming the first field of the table outside its domain.
+template <class Owner, class T, class Visit>
+void for_each_field(const Field<Owner, T>& one, Visit& visit) {
+  visit(one);
+}
+template <class... Tables, class Visit>
+void for_each_field(const std::tuple<Tables...>& tables, Visit& visit) {
+  std::apply([&](const Tables&... each) { (for_each_field(each, visit), ...); }, tables);
+}
+template <std::ranges::range Table, class Visit>
+void for_each_field(const Table& table, Visit& visit) {
+  for (const auto& each : table)
+    visit(each);
+}
+
+/// ParameterError naming the first number of the table outside its domain; a number that is left open passes.
 template <class Table, class Owner>
 void require_fields(const Table& table, const Owner& owner) {
-  for (const auto& f : table)
-    require_in(f.info, f.in(owner));
+  const auto check = [&owner]<class T>(const Field<Owner, T>& each) {
+    const T& member = each.in(owner);
+    if constexpr (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) {
+      require_in(each.info, static_cast<double>(member));
+    } else if constexpr (requires { static_cast<double>(*member); }) {
+      if (member) require_in(each.info, static_cast<double>(*member));
+    }
+  };
+  for_each_field(table, check);
 }
 
 /// The field of that name, or the end of the table.

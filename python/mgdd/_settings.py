@@ -1,0 +1,61 @@
+"""Keywords of a class that hands them on to the core: signature and documentation from the core's table of fields.
+
+No public part of the package.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from textwrap import wrap
+from typing import Any, TypeVar
+
+__all__ = ["takes_settings_of"]
+
+_MARK = "    **settings\n        As `fields` lists them.\n"
+Class = TypeVar("Class", bound=type)
+
+
+def takes_settings_of(core: Any, *, without: tuple[str, ...] = ()) -> Callable[[Class], Class]:
+    """Show the settings of `core` in place of the ``**settings`` of a class.
+
+    Parameters
+    ----------
+    core : type
+        Class of the core with ``fields``, whose keywords they are.
+    without : tuple of str
+        Keywords of the core that the class makes of its own arguments.
+
+    Returns
+    -------
+    callable
+        A decorator of the class; it leaves the behaviour alone.
+    """
+
+    def decorate(cls: Class) -> Class:
+        own = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+        named = [each for each in own.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        fields = {name: each for name, each in core.fields().items() if name not in own and name not in without}
+        given = inspect.signature(core).parameters
+        cls.__init__.__signature__ = inspect.Signature([*named, *(given[name] for name in fields)])  # type: ignore[misc]
+        if cls.__doc__:
+            entries = "".join(line for name, each in fields.items() for line in _entry(name, each, given[name].default))
+            cls.__doc__ = cls.__doc__.replace(_MARK, entries)
+        return cls
+
+    return decorate
+
+
+def _entry(name: str, field: dict[str, Any], default: Any) -> Iterator[str]:
+    standard = field["default"]
+    kind = "{" + ", ".join(f'"{each}"' for each in field["choices"]) + "}" if "choices" in field else ""
+    optional = ", optional" if default is None else ""
+    yield f"    {name} : {kind or type(standard).__name__}{optional}\n"
+    text = field["meaning"][:1].upper() + field["meaning"][1:]
+    if field["unit"] != "-":
+        text += f" [{field['unit']}]"
+    if "lower" in field and field["lower"] > -1e300 and field["upper"] < 1e300:
+        text += f", in {'(' if field['lower_open'] else '['}{field['lower']:g}, {field['upper']:g}]"
+    if default is not None:
+        text += f"; {standard!r} if left out"
+    yield from (f"        {line}\n" for line in wrap(text + ".", 108))
