@@ -88,6 +88,17 @@ def test_the_multisine_has_its_odd_lines_and_nothing_else() -> None:
     assert signal.attrs["crest_factor"] < 2.0
     with pytest.raises(ParameterError, match=r"harmonics = 41: must be in \[1, 40\]"):
         signals.multisine(offset=0.0, amplitude=0.2, harmonics=41)
+    alone = signals.multisine(10.0, offset=0.0, amplitude=0.2, harmonics=1)
+    time_s = alone["time_s"].to_numpy()
+    np.testing.assert_allclose(duty(alone), 0.2 * np.cos(2.0 * np.pi * 0.1 * time_s), atol=1e-12)
+    with pytest.raises(ParameterError, match=r"harmonics = 0: must be in \[1, 40\]"):
+        signals.multisine(offset=0.0, amplitude=0.2, harmonics=0)
+
+
+@pytest.mark.parametrize("name", ["chirp", "multisine"])
+def test_a_signal_has_a_thousand_samples_in_a_second(name: str) -> None:
+    time_s = SIGNALS[name](offset=0.0, amplitude=0.2)["time_s"].to_numpy()
+    np.testing.assert_allclose(np.diff(time_s), 1e-3, rtol=1e-9)
     with pytest.raises(ParameterError, match="one period"):
         signals.multisine(5.0, offset=0.0, amplitude=0.2)
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
