@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 __all__ = ["takes_settings_of"]
 
-_MARK = "    **settings\n        As `fields` lists them.\n"
+_MARK = "**settings\n    As `fields` lists them.\n"
 Class = TypeVar("Class", bound=type)
 
 
@@ -40,7 +40,8 @@ def takes_settings_of(core: Any, *, without: tuple[str, ...] = ()) -> Callable[[
         cls.__init__.__signature__ = inspect.Signature([*named, *(given[name] for name in fields)])  # type: ignore[misc]
         if cls.__doc__:
             entries = "".join(line for name, each in fields.items() for line in _entry(name, each, given[name].default))
-            cls.__doc__ = cls.__doc__.replace(_MARK, entries)
+            # From 3.13 on a docstring comes without its indentation.
+            cls.__doc__ = inspect.cleandoc(cls.__doc__).replace(_MARK, entries)
         return cls
 
     return decorate
@@ -50,7 +51,7 @@ def _entry(name: str, field: dict[str, Any], default: Any) -> Iterator[str]:
     standard = field["default"]
     kind = "{" + ", ".join(f'"{each}"' for each in field["choices"]) + "}" if "choices" in field else ""
     optional = ", optional" if default is None else ""
-    yield f"    {name} : {kind or type(standard).__name__}{optional}\n"
+    yield f"{name} : {kind or type(standard).__name__}{optional}\n"
     text = field["meaning"][:1].upper() + field["meaning"][1:]
     if field["unit"] != "-":
         text += f" [{field['unit']}]"
@@ -58,4 +59,4 @@ def _entry(name: str, field: dict[str, Any], default: Any) -> Iterator[str]:
         text += f", in {'(' if field['lower_open'] else '['}{field['lower']:g}, {field['upper']:g}]"
     if default is not None:
         text += f"; {standard!r} if left out"
-    yield from (f"        {line}\n" for line in wrap(text + ".", 108))
+    yield from (f"    {line}\n" for line in wrap(text + ".", 112))

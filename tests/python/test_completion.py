@@ -47,5 +47,5 @@ def test_a_class_of_the_core_shows_names_and_defaults_and_describes_them() -> No
     bench = inspect.signature(EngineBench).parameters
     assert bench["pressure_noise_bar"].default == 0.0
     assert set(EngineBench.fields()) - set(bench) == {"cylinder"}
-    assert "pressure_noise_bar : float" in str(EngineBench.__doc__)
+    assert "\npressure_noise_bar : float\n    Noise of each sample" in str(EngineBench.__doc__)
     assert "**settings" not in str(EngineBench.__doc__)

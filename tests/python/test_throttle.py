@@ -293,7 +293,7 @@ def test_bad_input_is_refused_by_one_and_many(options, error, message):
 
 
 def test_bad_cases_of_many_are_refused():
-    with pytest.raises(ParameterError, match="there is no case: give at least one"):
+    with pytest.raises(ParameterError, match="start_deg are empty: give at least one"):
         simulate([], 0.1)
     with pytest.raises(ShapeError, match="start_deg has 3 entries, there are 2 throttles"):
         simulate([P1, P1], 0.1, start_deg=[1.0, 2.0, 3.0])

@@ -120,7 +120,7 @@ def _fits(x: NDArray[np.float64], y: NDArray[np.float64], fit: _Parabola, noise:
     if richer is None:
         return True
     more = fit.freedom - richer[1]
-    # Rounding of exact readings is no noise.
+    # Rounding of exact readings is not noise.
     if more < 1 or fit.variance <= (1e-9 * float(np.abs(y).max())) ** 2:
         return True
     residual = y - richer[0]

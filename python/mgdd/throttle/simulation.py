@@ -116,7 +116,7 @@ def simulate(
         starts = np.empty(0) if given is None else np.atleast_1d(given)
         cases = [body] * starts.size if isinstance(body, Throttle) else body
         if not cases:
-            raise ParameterError("throttle, start_deg: there is no case: give at least one")
+            raise ParameterError("throttle, start_deg are empty: give at least one")
         if given is None:
             starts = np.array([one.limp_home_deg for one in cases])
         elif starts.size == 1:
