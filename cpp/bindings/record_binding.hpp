@@ -116,31 +116,33 @@ Member member_of(const Field<Record, T>& field, const Record& standard) {
   py::object shown = none ? py::object(py::none()) : initial;
   constexpr bool per_input = requires { W::shown(field.in(standard)); };
   if constexpr (per_input) shown = W::shown(field.in(standard));
-  return {field.info,
-          kind_text<Argument>() + (none ? " | None" : ""),
-          shown,
-          initial,
-          per_input,
-          choices,
-          std::is_arithmetic_v<T> && !std::is_same_v<T, bool>,
-          [field](const void* record) { return as_python(W::get(field.in(*static_cast<const Record*>(record)))); },
-          [field, none](void* record, const py::handle& value) {
-            auto& owner = *static_cast<Record*>(record);
-            if (none && value.is_none()) {
-              field.in(owner) = field.in(Record{});
-              return true;
-            }
-            if (std::is_arithmetic_v<T> && !std::is_same_v<T, bool> && py::isinstance<py::bool_>(value)) {
-              refuse(std::string(field.info.name), value, "one number");  // 1.0 to pybind11
-            }
-            py::detail::make_caster<Argument> caster;
-            if (!caster.load(value, true)) return false;
-            W::put(field.in(owner), py::detail::cast_op<Argument>(std::move(caster)), field.info, inputs_in(owner));
-            if constexpr (std::is_arithmetic_v<T>) {
-              if (none) require_in(field.info, static_cast<double>(field.in(owner)));
-            }
-            return true;
-          }};
+  return {
+      field.info,
+      kind_text<Argument>() + (none ? " | None" : ""),
+      shown,
+      initial,
+      per_input,
+      choices,
+      std::is_arithmetic_v<T> && !std::is_same_v<T, bool>,
+      [field](const void* record) { return as_python(W::get(field.in(*static_cast<const Record*>(record)))); },
+      [field, none](void* record, const py::handle& value) {
+        auto& owner = *static_cast<Record*>(record);
+        if (none && value.is_none()) {
+          field.in(owner) = field.in(Record{});
+          return true;
+        }
+        constexpr bool left_open = requires(const T& member) { static_cast<double>(*member); };
+        if ((left_open || (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>)) && py::isinstance<py::bool_>(value)) {
+          refuse(std::string(field.info.name), value, "one number");  // 1.0 to pybind11
+        }
+        py::detail::make_caster<Argument> caster;
+        if (!caster.load(value, true)) return false;
+        W::put(field.in(owner), py::detail::cast_op<Argument>(std::move(caster)), field.info, inputs_in(owner));
+        if constexpr (std::is_arithmetic_v<T>) {
+          if (none) require_in(field.info, static_cast<double>(field.in(owner)));
+        }
+        return true;
+      }};
 }
 
 /// The table of a record for Python, of which the first `places` may be given by place; it lives as long as the module.

@@ -83,6 +83,9 @@ def test_unknown_fields_suggest_the_nearest():
         POINT.replace(fuel=10.0)
     with pytest.raises(ParameterError, match="bore_mm = True: must be one number"):
         CYLINDER.replace(bore_mm=True)
+    for make in (OperatingPoint, POINT.replace):
+        with pytest.raises(ParameterError, match="burn_duration_cad = True: must be one number"):
+            make(burn_duration_cad=True)
     with pytest.raises(ParameterError, match="burn_shape = 3: must be a name"):
         CYLINDER.replace(burn_shape=3)
 
