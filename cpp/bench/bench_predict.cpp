@@ -1,12 +1,11 @@
 // What a predictive controller asks once per period: 20 samples of 2 ms under three moves with exact slopes, on PW-R
-// and on the first-principle groups with electrical lag, in double and float; more slopes; one step of an observer.
+// and on the first-principle groups with electrical lag, in double and float.
 // Before timing, the slopes must agree with differences to 1e-4.
 #include <benchmark/benchmark.h>
 
 #include <array>
 #include <cmath>
 
-#include "mgdd/dynamics/observer.hpp"
 #include "mgdd/dynamics/predict.hpp"
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
@@ -97,32 +96,5 @@ BENCHMARK(pw_r_double);
 BENCHMARK(pw_r_float);
 BENCHMARK(groups_double);
 BENCHMARK(groups_float);
-
-void groups_with_state_slopes(benchmark::State& state) {
-  const auto model = groups<double>();
-  const auto start = model.at_rest(20.0);
-  std::array<double, 3> moves{0.4, 0.2, 0.25};
-  std::array<double, samples> angle{};
-  std::array<std::array<double, 7>, samples> slope{};
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(moves);
-    dynamics::predict<3, dynamics::Slopes{4, 0}>(model, start, moves, lengths, angle, slope);
-    benchmark::DoNotOptimize(slope);
-  }
-}
-BENCHMARK(groups_with_state_slopes);
-
-void kalman_step(benchmark::State& state) {
-  const auto model = pw_r<double>();
-  dynamics::KalmanObserver<PwRModel> observer(
-      model, {.process = {1e-6, 1.0, 1e-8}, .start = {0.01, 1.0, 1e-3}, .measurement = 9e-4});
-  observer.start(model.at_rest(20.0));
-  double angle = 20.0;
-  for (auto _ : state) {
-    angle = 60.0 - angle;
-    benchmark::DoNotOptimize(observer.update(0.3, angle));
-  }
-}
-BENCHMARK(kalman_step);
 
 }  // namespace

@@ -2,6 +2,8 @@
 // fractional delays, saved and restored states.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <span>
 #include <type_traits>
@@ -15,6 +17,7 @@
 #include "mgdd/throttle/models/smooth.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "support/no_alloc.hpp"
+#include "support/respond.hpp"
 #include "support/throttle_records.hpp"
 #include "systems/drive_axis.hpp"
 #include "systems/two_tanks.hpp"
@@ -123,6 +126,14 @@ TEST(ModelContract, ThrottleModelsOnEveryScalar) {
   expect_one_law(from_family(Rk4<SmoothPlant>{}, smooth_plant_example, std::array{0.3, 0.0, 0.0}, 1e-3), u, 1e-2);
 }
 
+template <class T>
+throttle::PlantCoefficients<T> coefficients_over(const throttle::PlantCoefficients<double>& coefficients) {
+  constexpr std::size_t n = throttle::n_plant_coefficients;
+  std::array<T, n> columns{};
+  std::ranges::transform(std::bit_cast<std::array<double, n>>(coefficients), columns.begin(), [](double x) { return T(x); });
+  return std::bit_cast<throttle::PlantCoefficients<T>>(columns);
+}
+
 TEST(ModelContract, ThePlantOnEveryScalarWithEveryOption) {
   using namespace throttle;
   const auto u = inputs(0.15, 0.4);
@@ -160,9 +171,7 @@ TEST(ModelContract, BenchmarkSystemsOnEveryScalar) {
   expect_one_law(make, u, 1e-4);
   // The same signal as the whole record through the filters at once.
   const WienerHammersteinModel<double> model(circuit, x);
-  auto state = model.at_rest(0.0);
-  std::vector<double> y(u.size());
-  respond(model, state, std::span<const double>(u), std::span<double>(y));
+  const auto y = test_support::respond(model, model.at_rest(0.0), u);
   const Eigen::VectorXd whole = circuit.simulate(x, Eigen::Map<const Eigen::VectorXd>(u.data(), samples));
   for (std::size_t k = 0; k < samples; ++k)
     ASSERT_NEAR(y[k], whole[static_cast<Eigen::Index>(k)], 1e-13);

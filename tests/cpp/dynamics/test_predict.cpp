@@ -1,4 +1,4 @@
-// A horizon under moves: slopes to moves, state numbers, bias and parameters against differences, nothing allocated.
+// A horizon under moves: its slopes against differences, nothing allocated.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "mgdd/dynamics/predict.hpp"
-#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "support/no_alloc.hpp"
+#include "support/respond.hpp"
 
 namespace mgdd::dynamics {
 namespace {
@@ -23,46 +23,31 @@ const std::array<double, 3> moves{0.42, 0.21, 0.3};
 const std::array<int, 3> lengths{4, 6, 10};
 
 template <class M>
-std::array<double, horizon> angles(const M& model, typename M::State state, const std::array<double, 3>& u) {
-  std::array<double, horizon> out{};
-  std::size_t k = 0;
-  for (std::size_t m = 0; m < 3; ++m) {
-    for (int i = 0; i < lengths[m]; ++i, ++k) {
-      model.step(state, input_of(model, u[m]));
-      out[k] = model.output(state);
-    }
-  }
-  return out;
+std::vector<double> angles(const M& model, const typename M::State& state, const std::array<double, 3>& u) {
+  std::vector<double> held;
+  for (std::size_t m = 0; m < 3; ++m)
+    held.insert(held.end(), static_cast<std::size_t>(lengths[m]), u[m]);
+  return test_support::respond(model, state, held);
 }
 
-template <int n_states, class M>
+template <class M>
 void expect_exact(const M& model, const typename M::State& state) {
-  constexpr Slopes slopes{n_states, 0};
   std::array<double, horizon> y{};
-  std::array<std::array<double, 3 + n_states>, horizon> slope{};
+  std::array<std::array<double, 3>, horizon> slope{};
   const test_support::AllocationCounter counter;
-  predict<3, slopes>(model, state, moves, lengths, y, slope);
+  predict<3>(model, state, moves, lengths, y, slope);
   EXPECT_EQ(counter.count(), 0U);
-  static_assert(noexcept(predict<3, slopes>(model, state, moves, lengths, y, slope)));
+  static_assert(noexcept(predict<3>(model, state, moves, lengths, y, slope)));
   const auto plain = angles(model, state, moves);
   for (std::size_t k = 0; k < horizon; ++k)
     ASSERT_NEAR(y[k], plain[k], 1e-10);
-  for (std::size_t d = 0; d < 3 + n_states; ++d) {
+  for (std::size_t d = 0; d < 3; ++d) {
     auto up = moves, down = moves;
-    auto above = state, below = state;
-    double h = 1e-6;
-    if (d < 3) {
-      up[d] += h;
-      down[d] -= h;
-    } else {
-      h = 1e-6 * (1.0 + std::abs(*M::numbers(above)[d - 3]));
-      *M::numbers(above)[d - 3] += h;
-      *M::numbers(below)[d - 3] -= h;
-    }
-    const auto high = angles(model, above, up);
-    const auto low = angles(model, below, down);
+    up[d] += 1e-6;
+    down[d] -= 1e-6;
+    const auto high = angles(model, state, up), low = angles(model, state, down);
     for (std::size_t k = 0; k < horizon; ++k) {
-      const double expected = (high[k] - low[k]) / (2.0 * h);
+      const double expected = (high[k] - low[k]) / 2e-6;
       ASSERT_NEAR(slope[k][d], expected, 1e-5 * (1.0 + std::abs(expected))) << d << " at " << k;
     }
   }
@@ -81,20 +66,20 @@ typename M::State moving(const M& model) {
   return state;
 }
 
-TEST(Predict, SlopesToMovesStateAndBiasAreExact) {
+TEST(Predict, SlopesToMovesAreExact) {
   for (const double delay : {0.0, 1.5}) {
     PwR p;
     p.frame.sample_s = 2e-3;
     p.frame.delay_samples = delay;
     const throttle::PwRModel pw_r(p);
-    expect_exact<3>(pw_r, moving(pw_r));  // position, speed, bias
+    expect_exact(pw_r, moving(pw_r));
     auto groups = throttle::first_principle_of(throttle::Throttle{});
     groups[12] = delay;
     const auto model = FirstPrinciple{}.prepare<double>(groups, 2e-3);
-    expect_exact<4>(model, moving(model));  // angle, speed, torque, bias
+    expect_exact(model, moving(model));
   }
   const Repeated<throttle::ThrottlePlant> plant{throttle::ThrottlePlant{throttle::Throttle{}}, 20};
-  expect_exact<2>(plant, moving(plant));
+  expect_exact(plant, moving(plant));
 }
 
 TEST(Predict, SlopesToEverySampleAreExact) {
@@ -105,12 +90,7 @@ TEST(Predict, SlopesToEverySampleAreExact) {
   const auto state = moving(model);
   std::vector<double> input{0.42, 0.21, 0.3, 0.47, 0.19, 0.33, 0.4, 0.26, 0.38};  // not a multiple of the lanes
   const std::size_t n = input.size();
-  const auto run = [&](const std::vector<double>& u) {
-    std::vector<double> out(n);
-    auto s = state;
-    respond(model, s, std::span<const double>(u), std::span<double>(out));
-    return out;
-  };
+  const auto run = [&](const std::vector<double>& u) { return test_support::respond(model, state, u); };
   std::vector<double> output(n), slopes(n * n, 1e9);
   const test_support::AllocationCounter counter;
   predict_every_sample(model, state, input, output,
@@ -127,31 +107,6 @@ TEST(Predict, SlopesToEverySampleAreExact) {
       EXPECT_NEAR(slopes[k * n + i], expected, 1e-5 * (1.0 + std::abs(expected))) << i << " at " << k;
       if (k >= i) continue;
       EXPECT_EQ(slopes[k * n + i], 0.0) << "no input acts before its time";
-    }
-  }
-}
-
-TEST(Predict, SlopesToParametersAreExact) {
-  constexpr Slopes slopes{1, 2};
-  const auto values = throttle::first_principle_of(throttle::Throttle{});
-  const FirstPrinciple family;
-  const std::array<std::size_t, 2> free{1, 8};  // gain and electrical time
-  const auto model = family.prepare(seeded_parameters<3, slopes>(values, free), 2e-3);
-  const auto plain = family.prepare(values, 2e-3);
-  const auto state = moving(plain);
-  std::array<double, horizon> y{};
-  std::array<std::array<double, 6>, horizon> slope{};
-  predict<3, slopes>(model, state, moves, lengths, y, slope);
-  for (std::size_t j = 0; j < 2; ++j) {
-    auto up = values, down = values;
-    const double h = 1e-6 * values[free[j]];
-    up[free[j]] += h;
-    down[free[j]] -= h;
-    const auto high = angles(family.prepare(up, 2e-3), state, moves);
-    const auto low = angles(family.prepare(down, 2e-3), state, moves);
-    for (std::size_t k = 0; k < horizon; ++k) {
-      const double expected = (high[k] - low[k]) / (2.0 * h);
-      ASSERT_NEAR(slope[k][4 + j], expected, 1e-5 * (std::abs(expected) + 1e-3)) << j << " at " << k;
     }
   }
 }

@@ -31,14 +31,4 @@ void simulate(const M& model, typename M::State& state, std::span<const U> input
       });
 }
 
-/// The outputs ahead of `state`: entry j is the output after input[0..j] have acted.
-template <DiscreteModel M, class U>
-void respond(const M& model, typename M::State& state, std::span<const U> input,
-             std::span<typename M::Scalar> output) noexcept {
-  for (std::size_t k = 0; k < input.size(); ++k) {
-    model.step(state, input_of(model, input[k]));
-    output[k] = model.output(state);
-  }
-}
-
 }  // namespace mgdd::dynamics

@@ -93,11 +93,6 @@ MGDD_INLINE double lane_log(double x) noexcept {
   return k * ln2 + 2.0 * (s + s * z * (a + z2 * b + z4 * (c + z2 * d + z4 * e)));
 }
 
-/// x^exponent to 4e-16 for each unit of its logarithm.
-MGDD_INLINE double lane_power(double x, double exponent) noexcept {
-  return lane_exp(exponent * lane_log(x));
-}
-
 /// Elementwise; one instruction where the vector is as wide as the processor's.
 template <int N>
 MGDD_INLINE Lanes<N> sqrt(const Lanes<N>& a) noexcept {

@@ -2,8 +2,6 @@
 // scalar. Offline code, but for the numbers themselves.
 #pragma once
 
-#include <array>
-#include <bit>
 #include <cstddef>
 
 #include "mgdd/dynamics/dry_friction.hpp"
@@ -38,16 +36,5 @@ struct PlantCoefficients {
 inline constexpr std::size_t n_plant_coefficients = sizeof(PlantCoefficients<double>) / sizeof(double);
 
 PlantCoefficients<double> plant_coefficients(const Throttle& throttle, double step_s) noexcept;
-
-/// The same coefficients on another scalar.
-template <class C>
-PlantCoefficients<C> coefficients_over(const PlantCoefficients<double>& coefficients) noexcept {
-  static_assert(sizeof(PlantCoefficients<C>) == n_plant_coefficients * sizeof(C));
-  const auto flat = std::bit_cast<std::array<double, n_plant_coefficients>>(coefficients);
-  std::array<C, n_plant_coefficients> columns{};
-  for (std::size_t i = 0; i < flat.size(); ++i)
-    columns[i] = C(flat[i]);
-  return std::bit_cast<PlantCoefficients<C>>(columns);
-}
 
 }  // namespace mgdd::throttle
