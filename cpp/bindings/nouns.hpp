@@ -40,6 +40,5 @@ void bind_loop(pybind11::module_& m);
 void bind_virtual_throttle(pybind11::module_& m);
 void bind_throttle_loop(pybind11::module_& m);
 void bind_mgdd1(pybind11::module_& m);
-void bind_receding_horizon(pybind11::module_& m);
 
 }  // namespace mgdd::bindings

@@ -10,7 +10,7 @@ from pathlib import Path
 import mgdd
 
 # Beyond this nobody finds anything: unexport a helper or a result before a name is added. 200: controllers of the
-# throttle, their loop, tuner and supervisor, faults, the demand chain; receding horizon; the rig over a bus; maps,
+# throttle, their loop, tuner and supervisor, faults, the demand chain; the rig over a bus; maps,
 # sweeps and executors with their error, designs and models of a response.
 FEWEST, MOST = 105, 200
 

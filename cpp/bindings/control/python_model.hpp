@@ -2,7 +2,9 @@
 // is kept, and every call after it gives NaN without asking; `raise_if_failed` hands it on once the step has returned.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <exception>
 #include <memory>
 #include <string>
@@ -10,12 +12,13 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/dynamics/linear_model.hpp"
 #include "mgdd/throttle/models/pseudo_wiener_frame.hpp"
 
 namespace mgdd::bindings {
 
-using dynamics::RunTimeState;
+/// The numbers of an object fill the front of its state.
+inline constexpr std::size_t most_states = 32;
+using RunTimeState = std::array<double, most_states>;
 
 /// An object, the number of its states, and what went wrong in it.
 class PythonCalls {
@@ -81,50 +84,6 @@ class PythonCalls {
   std::exception_ptr failed_;
 };
 
-/// What a horizon asks: `step(state, input)`, `output(state)`, `slopes(state, input)`, `output_slope(state)`.
-class PythonModel {
- public:
-  using Scalar = double;
-  using State = RunTimeState;
-  using Input = double;
-  static constexpr int n_observed = static_cast<int>(dynamics::most_states);
-
-  PythonModel(const py::object& object, Eigen::Index order, double sample_s)
-      : calls_(std::make_shared<PythonCalls>(object, order, false)), sample_s_(sample_s) {}
-
-  void step(State& x, double input) const noexcept { calls_->step(x, input); }
-  double output(const State& x) const noexcept { return calls_->output(x); }
-  double sample_s() const noexcept { return sample_s_; }
-  Eigen::Index order() const noexcept { return calls_->order(); }
-  void linearise(const State& x, double input, Eigen::MatrixXd& a, Eigen::VectorXd& b) const noexcept {
-    calls_->call([&](py::object& o) {
-      const py::object given = o.attr("slopes")(calls_->column(x), input);
-      const auto both = given.cast<std::pair<py::object, py::object>>();
-      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(order(), order());
-      calls_->take(both.first, "slopes", rows.data(), order() * order());
-      calls_->take(both.second, "slopes", b.data(), order());
-      a = rows;
-    });
-  }
-  void output_slope(const State& x, Eigen::VectorXd& c) const noexcept {
-    calls_->call([&](py::object& o) {
-      calls_->take(o.attr("output_slope")(calls_->column(x)), "output_slope", c.data(), order());
-    });
-  }
-  void correct(State& x, double measured, const RunTimeState& gain) const noexcept {
-    dynamics::pull_toward(x, measured - output(x), gain);
-  }
-  void raise_if_failed() const { calls_->raise_if_failed(); }
-  template <class S>
-  static auto numbers(S& x) noexcept {
-    return dynamics::places_of(x);
-  }
-
- private:
-  std::shared_ptr<PythonCalls> calls_;
-  double sample_s_;
-};
-
 /// What Mgdd1 asks: `at_rest(angle_deg)`, `step(state, duty)`, `output(state)`, and `correct(state, angle_deg)` where
 /// there is one. Every number must be finite.
 class PythonGuide {
@@ -132,7 +91,7 @@ class PythonGuide {
   using Scalar = double;
   using State = RunTimeState;
   using Input = double;
-  static constexpr int n_observed = static_cast<int>(dynamics::most_states);
+  static constexpr int n_observed = static_cast<int>(most_states);
 
   PythonGuide(const py::object& object, Eigen::Index order, double sample_s)
       : calls_(std::make_shared<PythonCalls>(object, order, true)),
@@ -159,7 +118,10 @@ class PythonGuide {
   void raise_if_failed() const { calls_->raise_if_failed(); }
   template <class S>
   static auto numbers(S& x) noexcept {
-    return dynamics::places_of(x);
+    std::array<decltype(x.data()), most_states> places{};
+    for (std::size_t i = 0; i < most_states; ++i)
+      places[i] = &x[i];
+    return places;
   }
 
  private:

@@ -2,25 +2,20 @@
 
 A controller is told a reference and a measured angle and answers with a duty, one sample at a time (``step``); it never
 holds a plant, so simulation, replay and the real throttle are the same loop. It never reads a clock: ``sample_s`` is a
-setting. ``state`` saves what a run needs to go on bit for bit. `RecedingHorizon` controls any other system of one input
-too, that of a `DiscreteModel`. `SupervisedController` watches one of them and opens the
+setting. ``state`` saves what a run needs to go on bit for bit. `SupervisedController` watches one of them and opens the
 bridge where it must.
 """
 
 from __future__ import annotations
 
 from mgdd._core.control import GuidedPredictive, Pid, SlidingMode, ThrottleSupervisor
-from mgdd.control.discrete_model import DiscreteModel
 from mgdd.control.mgdd1 import Mgdd1
-from mgdd.control.receding_horizon import RecedingHorizon
 from mgdd.control.supervised import SupervisedController
 
 __all__ = [
-    "DiscreteModel",
     "GuidedPredictive",
     "Mgdd1",
     "Pid",
-    "RecedingHorizon",
     "SlidingMode",
     "SupervisedController",
     "ThrottleSupervisor",

@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from mgdd import _core
-from mgdd.control.discrete_model import MOST_STATES
 from mgdd.errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 __all__ = ["Mgdd1"]
+
+_MOST_STATES = 32  # of an object that guides, as in the core
 
 
 class Guide(Protocol):
@@ -222,8 +223,8 @@ def _made(guide: Any | None, settings: dict[str, Any]) -> Any:
     if missing:
         raise ParameterError.of("guide", guide, f"a PseudoWiener model, or an object with {', '.join(missing)}")
     n_states, sample_s = getattr(guide, "n_states", None), getattr(guide, "sample_s", None)
-    if isinstance(n_states, bool) or not isinstance(n_states, int) or not 1 <= n_states <= MOST_STATES:
-        raise ParameterError.of("guide.n_states", n_states, f"a whole number in [1, {MOST_STATES}]")
+    if isinstance(n_states, bool) or not isinstance(n_states, int) or not 1 <= n_states <= _MOST_STATES:
+        raise ParameterError.of("guide.n_states", n_states, f"a whole number in [1, {_MOST_STATES}]")
     if not isinstance(sample_s, float) or not (math.isfinite(sample_s) and sample_s > 0.0):
         raise ParameterError.of("guide.sample_s", sample_s, "a number > 0 s")
     return _core.loop.ObjectGuidedMgdd1(guide, n_states=n_states, sample_s=sample_s, **settings)

@@ -11,7 +11,7 @@ import xarray as xr
 import mgdd
 from idle_loop import idle_loop
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
-from mgdd.control import DiscreteModel, Pid, RecedingHorizon
+from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
@@ -166,31 +166,6 @@ def pedals(pedal: Any, speed: Any, wanted: Any) -> Any:
     return throttle.PedalMap(pedal_percent=pedal, speed_rpm=speed, wanted_nm=rows).torque_nm(25.0, 2500.0)
 
 
-A, B, C, X = np.array([0.9, 0.1, -0.2, 0.8]), np.array([0.0, 0.5]), np.array([1.0, 0.3]), np.array([0.4, -0.7])
-
-
-def linear(a: Any, b: Any, c: Any) -> DiscreteModel:
-    return DiscreteModel.linear([a[:2], a[2:]], b, c, sample_s=0.01)
-
-
-SYSTEM = linear(A.tolist(), B, C)
-
-
-def swings(c: Any) -> DiscreteModel:
-    return DiscreteModel(lambda x, u: [x[1], 0.5 * u - x[0]], output=c, n_states=2, sample_s=0.01)
-
-
-def controlled(reference: Any, measurement: Any, start: Any = X) -> Any:
-    controller = RecedingHorizon(SYSTEM, horizon_samples=5)
-    controller.start(start, applied=0.1)
-    return controller.step(reference, measurement)
-
-
-def observing(gain: Any) -> Any:
-    controller = RecedingHorizon(SYSTEM, horizon_samples=5, observer_gain=gain)
-    return [controller.step(1.0, 0.2), controller.step(1.0, 0.4)]
-
-
 def exchanged(row: Any) -> Any:
     return RigRecord.from_columns(["misfire", "input.duty", "value.angle_deg"], [row, row]).to_columns()[1]
 
@@ -202,15 +177,6 @@ def queued(references: Any) -> Any:
 
 
 CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
-    "control.DiscreteModel.__init__": (lambda c: swings(c).output(X), (C,)),
-    "control.DiscreteModel.linear": (lambda a, b, c: linear(list(a), b, c).step(X, 0.5), (A, B, C)),
-    "control.DiscreteModel.step": (lambda x: SYSTEM.step(x, 0.5), (X,)),
-    "control.DiscreteModel.output": (SYSTEM.output, (X,)),
-    "control.DiscreteModel.slopes": (lambda x: np.vstack([part.T for part in SYSTEM.slopes(x, 0.5)]), (X,)),
-    "control.DiscreteModel.output_slope": (SYSTEM.output_slope, (X,)),
-    "control.RecedingHorizon.__init__": (observing, (np.array([0.5, 0.2]),)),
-    "control.RecedingHorizon.step": (controlled, (np.array([1.0, 1.5, 2.0]), X)),
-    "control.RecedingHorizon.start": (lambda x: controlled(1.0, X, x), (X,)),
     "engine.fit_nox_proxy": (lambda t, ppm: list(fit_nox_proxy(t, ppm).proxy.to_dict().values()), (KELVIN, PPM)),
     "engine.timing_sweep": (
         lambda soc: timing_sweep(Cylinder(), OperatingPoint(), soc_cad=soc)["imep_gross_bar"].to_numpy(), (SOC,),
