@@ -211,7 +211,7 @@ NUMBERS: Mapping[str, Callable[[], float]] = {
     "double_wiebe_imep_error_percent": _imep_error("double_wiebe", "constant"),
     "best_ca50_cad": lambda: engine.find_optimum(*single())["ca50_cad"],
     "efficiency_gross": lambda: float(simulate(*single(), soc_cad=-6.0)["efficiency_gross"]),
-    "seed_motored_work_j": lambda: integrators()["`seed`"][1],
+    "lagged_motored_work_j": lambda: integrators()["`tan2018_lagged`"][1],
     "step_error_imep_percent": lambda: (
         100.0 * float(np.abs(engine.convergence(*single())["error"].sel(indicator="imep_gross_bar")) / 9.627)
     ),

@@ -66,7 +66,7 @@ def integrators() -> Rows:
     cylinder, point = single()
     adiabatic, motored = cylinder.replace(wall_heat_scale=0.0), point.replace(fuel_mg=0.0)
     rows = {}
-    for name in ("seed", "euler", "trapezoid", "split"):
+    for name in ("tan2018_lagged", "euler", "trapezoid", "split"):
         cold = simulate(adiabatic, motored, integrator=name)
         fired = simulate(cylinder, point, soc_cad=-6.0, integrator=name)
         fine = simulate(cylinder, point, soc_cad=-6.0, integrator=name, step_cad=0.1)

@@ -59,7 +59,7 @@ BENCHMARK_CAPTURE(cycle, triangle, Variant{});
 BENCHMARK_CAPTURE(cycle, wiebe, Variant{.burn = BurnShape::wiebe});
 BENCHMARK_CAPTURE(cycle, double_wiebe, Variant{.burn = BurnShape::double_wiebe});
 BENCHMARK_CAPTURE(cycle, split, Variant{.integrator = Integrator::split});
-BENCHMARK_CAPTURE(cycle, seed, Variant{.integrator = Integrator::seed});
+BENCHMARK_CAPTURE(cycle, tan2018_lagged, Variant{.integrator = Integrator::tan2018_lagged});
 BENCHMARK_CAPTURE(cycle, euler, Variant{.integrator = Integrator::euler});
 BENCHMARK_CAPTURE(cycle, gamma_linear, Variant{.gamma = GammaModel::linear});
 BENCHMARK_CAPTURE(cycle, gamma_polynomial, Variant{.gamma = GammaModel::polynomial});

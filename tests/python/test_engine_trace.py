@@ -65,7 +65,8 @@ def test_another_gamma_shifts_the_heat(gamma, percent):
 
 
 @pytest.mark.parametrize(
-    ("integrator", "percent", "tolerance"), [("split", 9e-3, 1e-3), ("euler", -2.4, 0.05), ("seed", 2.6, 0.05)]
+    ("integrator", "percent", "tolerance"),
+    [("split", 9e-3, 1e-3), ("euler", -2.4, 0.05), ("tan2018_lagged", 2.6, 0.05)],
 )
 def test_another_integrator_shifts_the_heat(integrator, percent, tolerance):
     cycle = simulate(CYLINDER, POINT, integrator=integrator)

@@ -81,7 +81,8 @@ def test_the_delay_of_a_model_keeps_its_seconds(family: str) -> None:
     if family == "fit":
         model = SimpleNamespace(model=model)
     assert groups_of(model).delay_s == pytest.approx(4e-3)
-    assert (groups_of(model).closed_deg, groups_of(model).open_deg) == (2.0, 84.0)
+    plate = groups_of(model).plate
+    assert (plate.closed_deg, plate.open_deg) == (2.0, 84.0)
     for sample_s, delay in ((1e-3, 4), (2e-3, 2), (4e-3, 1)):
         for kind in ("guided", "mgdd1"):
             assert tuned_controller(kind, model, sample_s=sample_s).settings["delay_samples"] == delay
@@ -166,7 +167,7 @@ def test_every_kind_is_tuned_for_every_preset_and_follows(kind: str) -> None:
 
 def test_a_controller_is_made_from_a_throttle_or_from_pw_r_alike() -> None:
     throttle = Throttle().replace(limp_home_deg=11.0, preload_below_nm=0.5)
-    first, second = groups_of(throttle), groups_of(PseudoWiener.of_throttle(throttle))
+    first, second = groups_of(throttle).plate, groups_of(PseudoWiener.of_throttle(throttle)).plate
     assert second.preload_below == pytest.approx(first.preload_below)
     assert second.friction == pytest.approx(first.friction)
     assert second.gain_deg_per_s2 == pytest.approx(first.gain_deg_per_s2)

@@ -2,6 +2,7 @@
 
 #include "binding.hpp"
 #include "mgdd/control/pid.hpp"
+#include "mgdd/control/plate.hpp"
 #include "mgdd/control/sliding_mode.hpp"
 #include "record_binding.hpp"
 
@@ -9,6 +10,11 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace control;
+
+void bind_plate(py::module_& m) {
+  py::class_<Plate> cls(m, "Plate", "What a controller knows of a throttle plate; ``Plate.fields()`` lists it.");
+  bind_record(cls, "Plate");
+}
 
 void bind_pid(py::module_& m) {
   py::class_<Pid> cls(m, "Pid",
@@ -164,6 +170,7 @@ True
 }  // namespace
 
 void bind_controllers(py::module_& m) {
+  bind_plate(m);
   bind_pid(m);
   bind_sliding_mode(m);
 }

@@ -45,6 +45,7 @@ Throttle(stiction_nm=0.3, limp_home_deg=10.0, friction='stribeck')
                             "Stall torque per unit duty, g = K (V - V_drop)/R [N m].");
   cls.def_property_readonly("damping_nms_per_rad", &Throttle::damping_nms_per_rad,
                             "Viscous friction and braking by the shorted motor, b = K_v + K K_e/R [N m s/rad].");
+  cls.def_property_readonly("plate", &plate_of, "What a controller can know of it: gain, springs, friction in duty.");
 }
 
 // Columns that live as long as a run; an empty one stands for "not given".

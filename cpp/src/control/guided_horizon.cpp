@@ -37,8 +37,8 @@ bool gauss_newton_step(const PlateModel<T>& model, const GuidedPredictiveSetting
   Moves low, high;
   T room = T(s.duty_rate_per_s * s.sample_s);
   for (std::size_t i = 0; i < n; ++i) {
-    low[i] = std::max(T(s.lower), horizon.before - room) - moves[i];
-    high[i] = std::min(T(s.upper), horizon.before + room) - moves[i];
+    low[i] = std::max(T(s.duty.lower), horizon.before - room) - moves[i];
+    high[i] = std::min(T(s.duty.upper), horizon.before + room) - moves[i];
     room += T(s.duty_rate_per_s * s.prediction_step_s) * T(s.move_steps[i]);
   }
   const Moves change = qp.solve(low, high, T(1.001), T(1e-6));

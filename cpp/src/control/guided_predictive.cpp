@@ -10,18 +10,22 @@
 namespace mgdd::control {
 namespace {
 
-constexpr double dead_band_deg = 0.3;        // of the measured side of limp-home
-constexpr double end_deg = 0.5;              // a stop holds the plate there: nothing is learnt
-constexpr double slow_deg_per_s = 6.0;       // below it the plate may stick
-constexpr double slow_deviations = 2.5;      // or below so many standard deviations of what noise does to the speed
-constexpr double hold_rate_deg_per_s = 2.0;  // a faster reference is followed, not waited for
-constexpr double breakaway_margin = 0.015;   // duty beyond the friction level
-constexpr double hold_share = 0.3;           // of the friction band that a held duty may use
-constexpr double hold_duty_per_s = 2.0;      // how fast it goes there
-constexpr double release_duty_per_s = 20.0;  // and at a stop, where it only heats the motor
-constexpr double lead_s = 0.01;              // of the reference in the wanted direction
-constexpr double feed_forward_deg = 0.25;    // error at which a linear prediction feeds all friction forward
-constexpr double largest_bias = 0.4;         // of the form without learning
+constexpr double dead_band_deg = 0.3;         // of the measured side of limp-home
+constexpr double end_deg = 0.5;               // a stop holds the plate there: nothing is learnt
+constexpr double slow_deg_per_s = 6.0;        // below it the plate may stick
+constexpr double slow_deviations = 2.5;       // or below so many standard deviations of what noise does to the speed
+constexpr double hold_rate_deg_per_s = 2.0;   // a faster reference is followed, not waited for
+constexpr double hold_from_deviations = 2.0;  // of the noise: a smaller error is left as it is
+constexpr double hold_to_deviations = 4.3;    // until its mean is larger
+constexpr int rest_samples = 3;               // slow in a row: the plate is stuck
+constexpr std::int64_t mean_samples = 8;      // behind that mean
+constexpr double breakaway_margin = 0.015;    // duty beyond the friction level
+constexpr double hold_share = 0.3;            // of the friction band that a held duty may use
+constexpr double hold_duty_per_s = 2.0;       // how fast it goes there
+constexpr double release_duty_per_s = 20.0;   // and at a stop, where it only heats the motor
+constexpr double lead_s = 0.01;               // of the reference in the wanted direction
+constexpr double feed_forward_deg = 0.25;     // error at which a linear prediction feeds all friction forward
+constexpr double largest_bias = 0.4;          // of the form without learning
 
 PlateFriction friction_form(const GuidedPredictiveSettings& s) noexcept {
   if (s.prediction == Prediction::linear) return PlateFriction::none;
@@ -65,7 +69,7 @@ BasicGuidedPredictive<T>::BasicGuidedPredictive(const GuidedPredictiveSettings& 
       learner_(s.learner, s.plate, s.sample_s, s.noise_deg, angle_share_, speed_gain_),
       review_(s.review, s.sample_s, s.noise_deg),
       belief_(observed_.belief()),
-      reference_(s.reference_lag_s, s.sample_s, s.reference_jump_deg_per_s) {}
+      reference_(s.reference.lag_s, s.sample_s, s.reference.jump_deg_per_s) {}
 
 template <class T>
 void BasicGuidedPredictive<T>::start(T angle_deg, T duty) noexcept {
@@ -167,8 +171,8 @@ void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> 
   const T room = T(s.duty_rate_per_s * s.sample_s);
   horizon_.before = sent_.before[0];
   horizon_.acting = duty_;
-  horizon_.lowest = std::max(T(s.lower), sent_.before[0] - room);
-  horizon_.highest = std::min(T(s.upper), sent_.before[0] + room);
+  horizon_.lowest = std::max(T(s.duty.lower), sent_.before[0] - room);
+  horizon_.highest = std::min(T(s.duty.upper), sent_.before[0] + room);
   const T per_step = T(s.prediction_step_s / s.sample_s);
   T last = reference_.value();
   std::size_t read = 0;
@@ -200,14 +204,14 @@ bool BasicGuidedPredictive<T>::hold_still() noexcept {
   const T error = horizon_.aim - horizon_.ahead.angle_deg, rate = reference_.rate();
   const bool slow = std::abs(horizon_.ahead.speed_deg_per_s) < slow_;
   still_ = slow ? still_ + 1 : 0;
-  const bool rests = still_ >= 3;
-  mean_error_ = still_ <= 1 ? error : mean_error_ + (error - mean_error_) / T(std::min<std::int64_t>(still_, 8));
+  const bool rests = still_ >= rest_samples;
+  mean_error_ = still_ <= 1 ? error : mean_error_ + (error - mean_error_) / T(std::min(still_, mean_samples));
   if (std::abs(rate) >= T(hold_rate_deg_per_s)) {
     holds_ = false;
   } else if (holds_) {
-    holds_ = rests && std::abs(mean_error_) <= T(4.3 * s.noise_deg);
+    holds_ = rests && std::abs(mean_error_) <= T(hold_to_deviations * s.noise_deg);
   } else {
-    holds_ = rests && std::abs(error) < T(2.0 * s.noise_deg);
+    holds_ = rests && std::abs(error) < T(hold_from_deviations * s.noise_deg);
   }
   if (!holds_) return false;
   const T angle = horizon_.ahead.angle_deg;
@@ -244,8 +248,8 @@ T BasicGuidedPredictive<T>::feedback(T reference_deg, T measurement_deg, std::sp
   if (!started_) {
     if (!std::isfinite(measurement_deg) || !reference_.started()) return duty_;
     const T room = T(s.duty_rate_per_s * s.sample_s);
-    start(measurement_deg,
-          std::clamp(observed_.holding(measurement_deg), std::max(T(s.lower), -room), std::min(T(s.upper), room)));
+    start(measurement_deg, std::clamp(observed_.holding(measurement_deg), std::max(T(s.duty.lower), -room),
+                                      std::min(T(s.duty.upper), room)));
     prepared_ = false;
     return duty_;
   }
@@ -288,8 +292,7 @@ template <class T>
 T BasicGuidedPredictive<T>::send() noexcept {
   sent_.before[0] = moves_[0];
   const T room = T(settings_.duty_rate_per_s * settings_.sample_s);
-  duty_ = std::clamp(std::clamp(moves_[0] + trim_, T(settings_.lower), T(settings_.upper)), horizon_.acting - room,
-                     horizon_.acting + room);
+  duty_ = std::clamp(settings_.duty.clamp(moves_[0] + trim_), horizon_.acting - room, horizon_.acting + room);
   return duty_;
 }
 
@@ -317,7 +320,7 @@ template <class T>
 void BasicGuidedPredictive<T>::take_over(T measurement_deg, T duty) noexcept {
   if (!std::isfinite(measurement_deg) || !std::isfinite(duty)) return;
   reference_.start(measurement_deg);
-  start(measurement_deg, std::clamp(duty, T(settings_.lower), T(settings_.upper)));
+  start(measurement_deg, settings_.duty.clamp(duty));
 }
 
 template <class T>
@@ -331,12 +334,12 @@ void BasicGuidedPredictive<T>::set_belief(const PlateBelief<T>& belief) {
 
 template <class T>
 void BasicGuidedPredictive<T>::require_usable() const {
-  require_usable_duty(duty_, settings_.lower, settings_.upper);
+  require_usable_duty(duty_, settings_.duty);
   require_usable_belief(widened(belief_), settings_);
   require_usable_belief(widened(proven_.belief()), settings_, "certified_");
   if (!learner_.is_usable()) {
-    throw ParameterError("state column 'slope_level_variance'", "a covariance outside what these settings can reach",
-                         "must be the saved state of a controller with the same settings");
+    fail(ParameterError("state column 'slope_level_variance'", "a covariance outside what these settings can reach",
+                        "must be the saved state of a controller with the same settings"));
   }
 }
 

@@ -4,13 +4,11 @@
 #include <string>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/control/spring_fields.hpp"
 
 namespace mgdd::control {
 namespace {
 
 using Gp = GuidedPredictiveSettings;
-using P = PlateSettings;
 using L = FrictionLearnerSettings;
 using R = BeliefReviewSettings;
 
@@ -21,22 +19,16 @@ constexpr Domain angle = closed(-1e3, 1e3);
 constexpr auto guided_predictive_table = joined(
     std::array{
         field<&Gp::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&Gp::plate, &P::gain_deg_per_s2>(
-            {"gain_deg_per_s2", "degree/second²", above(0.0, 1e9), "acceleration per duty"}),
-        field<&Gp::plate, &P::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
-        field<&Gp::plate, &P::electrical_s>({"electrical_s", "s", closed(0.0, 1.0), "lag of the motor's torque"}),
     },
-    spring_fields<&Gp::plate, &P::spring>(),
+    plate_fields<&Gp::plate>(),
     std::array{
-        field<&Gp::plate, &P::friction>({"friction", "-", closed(0.0, 0.5), "duty against dry friction, at the start"}),
-        field<&Gp::plate, &P::closed_deg>({"closed_deg", "deg", angle, "lower end of the travel"}),
-        field<&Gp::plate, &P::open_deg>({"open_deg", "deg", angle, "upper end of the travel"}),
         field<&Gp::prediction_step_s>({"prediction_step_s", "s", above(0.0, 1.0), "step of the horizon"}),
         field<&Gp::error_weight>({"error_weight", "1/degree²", price, "of the squared error at each step"}),
         field<&Gp::speed_weight>({"speed_weight", "second²/degree²", price, "of the squared speed at each step"}),
         field<&Gp::duty_change_weight>({"duty_change_weight", "-", price, "of the squared change of each move"}),
-        field<&Gp::lower>({"lower", "-", lower_duty, "least duty"}),
-        field<&Gp::upper>({"upper", "-", upper_duty, "largest duty"}),
+    },
+    duty_fields<&Gp::duty>(),
+    std::array{
         field<&Gp::duty_rate_per_s>({"duty_rate_per_s", "1/second", above(0.0, 1e9), "largest change of the duty"}),
         field<&Gp::lowest_deg>({"lowest_deg", "deg", angle, "least angle of the prediction"}),
         field<&Gp::highest_deg>({"highest_deg", "deg", angle, "largest angle of the prediction"}),
@@ -67,10 +59,8 @@ constexpr auto guided_predictive_table = joined(
             {"bias_rate_per_deg_s", "1/(degree*second)", rate, "without learning: rate of the one bias"}),
         field<&Gp::trim_rate_per_deg_s>(
             {"trim_rate_per_deg_s", "1/(degree*second)", rate, "without learning: rate of the trim"}),
-        field<&Gp::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-        field<&Gp::reference_jump_deg_per_s>(
-            {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
-    });
+    },
+    reference_fields<&Gp::reference>());
 
 }  // namespace
 
@@ -80,13 +70,10 @@ std::span<const Field<Gp>> guided_predictive_fields() noexcept {
 
 void validate(const Gp& s) {
   require_fields(fields_of(s), s);
-  require_duty_range(s.lower, s.upper);
-  const P& p = s.plate;
-  if (!(p.closed_deg < p.open_deg)) {
-    throw ParameterError("open_deg", p.open_deg, "must be > closed_deg = " + text(p.closed_deg), "deg");
-  }
+  validate(s.duty);
+  require_travel(s.plate);
   if (!(s.lowest_deg < s.highest_deg)) {
-    throw ParameterError("highest_deg", s.highest_deg, "must be > lowest_deg = " + text(s.lowest_deg), "deg");
+    fail(ParameterError("highest_deg", s.highest_deg, "must be > lowest_deg = " + text(s.lowest_deg), "deg"));
   }
   int steps = 0;
   for (std::size_t i = 0; i < s.move_steps.size(); ++i) {
@@ -94,8 +81,8 @@ void validate(const Gp& s) {
     steps += s.move_steps[i];
   }
   if (steps > longest_guided_horizon) {
-    throw ParameterError("move_steps", static_cast<double>(steps),
-                         "must add up to at most " + std::to_string(longest_guided_horizon) + " steps");
+    fail(ParameterError("move_steps", static_cast<double>(steps),
+                        "must add up to at most " + std::to_string(longest_guided_horizon) + " steps"));
   }
 }
 

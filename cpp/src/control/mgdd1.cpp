@@ -8,19 +8,17 @@ namespace {
 using Mg = Mgdd1Settings;
 constexpr Domain mgdd1_weight = closed(0.0, 1e9);
 
-constexpr std::array mgdd1_table{
-    field<&Mg::adaptation_gain>({"adaptation_gain", "-", above(0.0, 1.0), "share of the Gauss-Newton step"}),
-    field<&Mg::difference>({"difference", "-", above(0.0, 0.5), "duty by which the model is asked for its slope"}),
-    field<&Mg::error_weight>({"error_weight", "1/degree²", mgdd1_weight, "of the squared error at each sample"}),
-    field<&Mg::duty_change_weight>({"duty_change_weight", "-", above(0.0, 1e9), "of the squared change of the duty"}),
-    field<&Mg::trim_rate_per_deg_s>(
-        {"trim_rate_per_deg_s", "1/(degree*second)", mgdd1_weight, "rate of the trim, which the model does not see"}),
-    field<&Mg::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-    field<&Mg::reference_jump_deg_per_s>(
-        {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
-    field<&Mg::lower>({"lower", "-", lower_duty, "least duty"}),
-    field<&Mg::upper>({"upper", "-", upper_duty, "largest duty"}),
-};
+constexpr auto mgdd1_table = joined(
+    std::array{
+        field<&Mg::adaptation_gain>({"adaptation_gain", "-", above(0.0, 1.0), "share of the Gauss-Newton step"}),
+        field<&Mg::difference>({"difference", "-", above(0.0, 0.5), "duty by which the model is asked for its slope"}),
+        field<&Mg::error_weight>({"error_weight", "1/degree²", mgdd1_weight, "of the squared error at each sample"}),
+        field<&Mg::duty_change_weight>(
+            {"duty_change_weight", "-", above(0.0, 1e9), "of the squared change of the duty"}),
+        field<&Mg::trim_rate_per_deg_s>({"trim_rate_per_deg_s", "1/(degree*second)", mgdd1_weight,
+                                         "rate of the trim, which the model does not see"}),
+    },
+    reference_fields<&Mg::reference>(), duty_fields<&Mg::duty>());
 
 }  // namespace
 
@@ -30,7 +28,7 @@ std::span<const Field<Mg>> mgdd1_fields() noexcept {
 
 void validate(const Mg& s) {
   require_fields(mgdd1_table, s);
-  require_duty_range(s.lower, s.upper);
+  validate(s.duty);
   require_within("horizon_samples", s.horizon_samples, 1, 1000);
   require_within("delay_samples", s.delay_samples, 0, longest_control_delay);
 }

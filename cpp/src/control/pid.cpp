@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/control/spring_fields.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -33,7 +32,7 @@ constexpr auto pid_table = joined(
             {"derivative_below_s_per_deg", "second/degree", pid_gain, "duty against speed below limp-home"}),
         field<&Pi::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
     },
-    spring_fields<&Pi::spring>("half width over which preload and gains change sides"),
+    spring_fields<&Pi::plate>("half width over which preload and gains change sides"),
     std::array{
         field<&Pi::kick>({"kick", "-", pid_share, "duty towards the reference against stiction"}),
         field<&Pi::kick_width_deg>({"kick_width_deg", "deg", pid_angle, "error at which the kick is full"}),
@@ -42,15 +41,12 @@ constexpr auto pid_table = joined(
             {"integral_window_deg", "deg", pid_angle, "only smaller errors are integrated"}),
         field<&Pi::integral_limit>({"integral_limit", "-", pid_share, "bound of the integral"}),
         field<&Pi::rate_s_per_deg>({"rate_s_per_deg", "second/degree", pid_gain, "duty per rate of the reference"}),
-        field<&Pi::friction>({"friction", "-", pid_share, "duty in the direction of that rate against dry friction"}),
+        field<&Pi::plate, &Plate::friction>(
+            {"friction", "-", pid_share, "duty in the direction of that rate against dry friction"}),
         field<&Pi::friction_rate_deg_per_s>(
             {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
-        field<&Pi::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-        field<&Pi::reference_jump_deg_per_s>(
-            {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
-        field<&Pi::lower>({"lower", "-", lower_duty, "least duty"}),
-        field<&Pi::upper>({"upper", "-", upper_duty, "largest duty"}),
-    });
+    },
+    reference_fields<&Pi::reference>(), duty_fields<&Pi::duty>());
 
 const PidSettings& checked(const PidSettings& settings) {
   validate(settings);
@@ -65,29 +61,29 @@ std::span<const Field<PidSettings>> pid_fields() noexcept {
 
 void validate(const PidSettings& s) {
   require_fields(pid_table, s);
-  require_duty_range(s.lower, s.upper);
+  validate(s.duty);
 }
 
 template <class T>
 BasicPid<T>::BasicPid(const PidSettings& settings)
     : settings_(checked(settings)),
-      reference_(settings.reference_lag_s, settings.sample_s, settings.reference_jump_deg_per_s),
+      reference_(settings.reference.lag_s, settings.sample_s, settings.reference.jump_deg_per_s),
       measurement_(settings.derivative_lag_s, settings.sample_s) {}
 
 template <class T>
 auto BasicPid<T>::without_integral() const noexcept -> Share {
   const PidSettings& s = settings_;
-  const T distance = measurement_.value() - T(s.spring.limp_home_deg);
-  const T upper_share = T(0.5) + T(0.5) * limited_share(distance, T(s.spring.ramp_deg));
+  const T distance = measurement_.value() - T(s.plate.spring.limp_home_deg);
+  const T upper_share = T(0.5) + T(0.5) * limited_share(distance, T(s.plate.spring.ramp_deg));
   const auto scheduled = [&](double PidGains::* gain_of) {
     return upper_share * T(s.above.*gain_of) + (T(1.0) - upper_share) * T(s.below.*gain_of);
   };
   const T error = reference_.value() - measurement_.value();
   const T counted = std::abs(error) > T(s.dead_band_deg) ? error : T(0.0);
-  const T duty = s.spring.at(reference_.value()) + scheduled(&PidGains::proportional_per_deg) * counted -
+  const T duty = s.plate.spring.at(reference_.value()) + scheduled(&PidGains::proportional_per_deg) * counted -
                  scheduled(&PidGains::derivative_s_per_deg) * measurement_.rate() +
                  T(s.kick) * limited_share(counted, T(s.kick_width_deg)) + T(s.rate_s_per_deg) * reference_.rate() +
-                 T(s.friction) * limited_share(reference_.rate(), T(s.friction_rate_deg_per_s));
+                 T(s.plate.friction) * limited_share(reference_.rate(), T(s.friction_rate_deg_per_s));
   return {duty, counted, scheduled(&PidGains::integral_per_deg_s)};
 }
 
@@ -97,7 +93,7 @@ T BasicPid<T>::step(T reference_deg, T measurement_deg) noexcept {
   measurement_.step(measurement_deg);
   if (!reference_.started() || !measurement_.started()) return duty_;
   const Share now = without_integral();
-  const T lower = T(settings_.lower), upper = T(settings_.upper), limit = T(settings_.integral_limit);
+  const T lower = T(settings_.duty.lower), upper = T(settings_.duty.upper), limit = T(settings_.integral_limit);
   // Conditional integration: not while a bound holds the duty back in the direction of the error.
   const T wanted = now.duty + integral_;
   const bool held_back = (wanted >= upper && now.error > T(0.0)) || (wanted <= lower && now.error < T(0.0));
@@ -122,7 +118,7 @@ void BasicPid<T>::reset(T reference_deg, T measurement_deg, T duty) noexcept {
   reference_.start(reference_deg);
   measurement_.start(measurement_deg);
   const T limit = T(settings_.integral_limit);
-  duty_ = std::clamp(duty, T(settings_.lower), T(settings_.upper));
+  duty_ = settings_.duty.clamp(duty);
   integral_ = std::clamp(duty_ - without_integral().duty, -limit, limit);
 }
 
@@ -131,7 +127,7 @@ void BasicPid<T>::require_usable() const {
   const T limit = T(settings_.integral_limit);
   require_within("state column 'integral'", static_cast<double>(integral_), static_cast<double>(-limit),
                  static_cast<double>(limit));
-  require_usable_duty(duty_, settings_.lower, settings_.upper);
+  require_usable_duty(duty_, settings_.duty);
 }
 
 template class BasicPid<double>;

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/control/spring_fields.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -18,12 +17,11 @@ constexpr Domain sliding_share = closed(0.0, 1.0);
 constexpr auto sliding_mode_table = joined(
     std::array{
         field<&Sm::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&Sm::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
-        field<&Sm::time_constant_s>({"time_constant_s", "s", above(0.0, 1e9), "time constant of the speed"}),
     },
-    spring_fields<&Sm::spring>(),
+    motion_fields<&Sm::plate>(), spring_fields<&Sm::plate>(),
     std::array{
-        field<&Sm::friction>({"friction", "-", sliding_share, "duty in the direction of the reference's rate"}),
+        field<&Sm::plate, &Plate::friction>(
+            {"friction", "-", sliding_share, "duty in the direction of the reference's rate"}),
         field<&Sm::friction_rate_deg_per_s>(
             {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
         field<&Sm::bandwidth_per_s>(
@@ -40,9 +38,8 @@ constexpr auto sliding_mode_table = joined(
         field<&Sm::root_per_root_deg_per_s>({"root_per_root_deg_per_s", "(second/degree)**0.5", closed(0.0, 1e3),
                                              "super-twisting: duty per root of |s|"}),
         field<&Sm::twist_per_s>({"twist_per_s", "1/second", closed(0.0, 1e6), "super-twisting: rate of its integral"}),
-        field<&Sm::lower>({"lower", "-", lower_duty, "least duty"}),
-        field<&Sm::upper>({"upper", "-", upper_duty, "largest duty"}),
-    });
+    },
+    duty_fields<&Sm::duty>());
 
 const SlidingModeSettings& checked(const SlidingModeSettings& settings) {
   validate(settings);
@@ -57,10 +54,10 @@ std::span<const Field<SlidingModeSettings>> sliding_mode_fields() noexcept {
 
 void validate(const SlidingModeSettings& s) {
   require_fields(sliding_mode_table, s);
-  require_duty_range(s.lower, s.upper);
+  validate(s.duty);
   if (s.reaching == ReachingLaw::boundary_layer && !(s.layer_deg > 0.0)) {
-    throw ParameterError("layer_deg", s.layer_deg, "must be > 0 for a boundary layer; without one take implicit",
-                         "deg");
+    fail(
+        ParameterError("layer_deg", s.layer_deg, "must be > 0 for a boundary layer; without one take implicit", "deg"));
   }
 }
 
@@ -75,7 +72,7 @@ template <class T>
 T BasicSlidingMode<T>::layer() const noexcept {
   const SlidingModeSettings& set = settings_;
   const double given = set.layer_deg * set.bandwidth_per_s;
-  const double carried = set.sample_s * set.gain_deg_per_s2 * set.switching;
+  const double carried = set.sample_s * set.plate.gain_deg_per_s2 * set.switching;
   return T(set.reaching == ReachingLaw::implicit ? given + carried : given);
 }
 
@@ -84,7 +81,7 @@ template <class T>
 auto BasicSlidingMode<T>::reach() const noexcept -> Reached {
   const SlidingModeSettings& set = settings_;
   const T s = surface_;
-  const T carried = T(set.sample_s * set.gain_deg_per_s2);  // by duty 1 in one sample
+  const T carried = T(set.sample_s * set.plate.gain_deg_per_s2);  // by duty 1 in one sample
   if (set.reaching != ReachingLaw::super_twisting) {
     const T thick = layer();
     return {thick > T(0.0) ? -T(set.switching) * limited_share(s, thick) : T(0.0), twist_};
@@ -120,12 +117,13 @@ T BasicSlidingMode<T>::step(T reference_deg, T measurement_deg) noexcept {
   const T error_rate = measurement_.rate() - reference_rate;
   surface_ = error_rate + bandwidth * (error + weight * integral_deg_s_);
   const Reached reached = reach();
-  const T on_surface = (reference_acceleration - bandwidth * (error_rate + weight * error)) / T(set.gain_deg_per_s2) +
-                       measurement_.rate() / T(set.gain_deg_per_s2 * set.time_constant_s) +
-                       set.spring.at(measurement_.value()) +
-                       T(set.friction) * limited_share(reference_rate, T(set.friction_rate_deg_per_s));
+  const T on_surface =
+      (reference_acceleration - bandwidth * (error_rate + weight * error)) / T(set.plate.gain_deg_per_s2) +
+      measurement_.rate() / T(set.plate.gain_deg_per_s2 * set.plate.time_constant_s) +
+      set.plate.spring.at(measurement_.value()) +
+      T(set.plate.friction) * limited_share(reference_rate, T(set.friction_rate_deg_per_s));
   const T wanted = on_surface + reached.duty;
-  duty_ = std::clamp(wanted, T(set.lower), T(set.upper));
+  duty_ = set.duty.clamp(wanted);
   // Neither integral grows while a bound holds the duty back.
   const bool held_back = (wanted > duty_ && error < T(0.0)) || (wanted < duty_ && error > T(0.0));
   if (!held_back && std::abs(surface_) < T(set.integral_layers) * layer()) {
@@ -144,7 +142,7 @@ void BasicSlidingMode<T>::reset() noexcept {
 
 template <class T>
 void BasicSlidingMode<T>::require_usable() const {
-  require_usable_duty(duty_, settings_.lower, settings_.upper);
+  require_usable_duty(duty_, settings_.duty);
 }
 
 template class BasicSlidingMode<double>;

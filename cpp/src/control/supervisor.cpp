@@ -24,8 +24,8 @@ const SupervisorSettings& checked(const SupervisorSettings& settings) {
 }  // namespace
 
 ThrottleSupervisor::State::State(const SupervisorSettings& s) noexcept
-    : reference_deg(s.spring.limp_home_deg),
-      angle_deg(s.spring.limp_home_deg),
+    : reference_deg(s.plate.spring.limp_home_deg),
+      angle_deg(s.plate.spring.limp_home_deg),
       silence_s(s.late_s),
       supply_v(s.nominal_supply_v) {}
 
@@ -56,8 +56,8 @@ bool ThrottleSupervisor::raise_after(Count which, bool failing, double after_s, 
 }
 
 double ThrottleSupervisor::usable_reference_deg() const noexcept {
-  const double upper = state_.restricted ? settings_.limited_open_deg : settings_.open_deg;
-  return std::clamp(state_.reference_deg, settings_.closed_deg, upper);
+  const double upper = state_.restricted ? settings_.limited_open_deg : settings_.plate.open_deg;
+  return std::clamp(state_.reference_deg, settings_.plate.closed_deg, upper);
 }
 
 void ThrottleSupervisor::look_at_reference(double reference_deg) noexcept {
@@ -65,7 +65,7 @@ void ThrottleSupervisor::look_at_reference(double reference_deg) noexcept {
   if (missing) {
     raise(Mode::holding, Reason::missing_reference);
   } else {
-    if (reference_deg < settings_.closed_deg || reference_deg > settings_.open_deg) {
+    if (reference_deg < settings_.plate.closed_deg || reference_deg > settings_.plate.open_deg) {
       raise(Mode::limited, Reason::reference_range);
     }
     state_.reference_deg = reference_deg;
@@ -85,7 +85,7 @@ void ThrottleSupervisor::look_at_angles(const SupervisorInputs& in) noexcept {
   if (lasted(s.silence_s / set.sample_s, set.sample_s, set.silence_s)) raise(Mode::limp_home, silent);
   if (!arrived || late) return;
 
-  const Domain range = closed(set.closed_deg - set.range_margin_deg, set.open_deg + set.range_margin_deg);
+  const Domain range = closed(set.plate.closed_deg - set.range_margin_deg, set.plate.open_deg + set.range_margin_deg);
   const PairCheck check = check_pair(in.angle_deg, range, in.angle_deg[0] - in.angle_deg[1], set.disagreement_deg);
   const bool disagree = check.all_in_range() && !check.agree;
   const Reason wrong = disagree ? Reason::sensor_disagreement : Reason::sensor_range;
@@ -123,8 +123,8 @@ void ThrottleSupervisor::follow_balance(double excess) noexcept {
   f[rate] = (f[angle_twice] - before_deg) / set.sample_s;
   f[quick_rate] += quick_share_ * ((s.angle_deg - s.last_deg) / set.sample_s - f[quick_rate]);
   s.last_deg = s.angle_deg;
-  const double inertia = (f[rate] - before) / (set.sample_s * set.gain_deg_per_s2);
-  const double braking = f[rate] / (set.time_constant_s * set.gain_deg_per_s2);
+  const double inertia = (f[rate] - before) / (set.sample_s * set.plate.gain_deg_per_s2);
+  const double braking = f[rate] / (set.plate.time_constant_s * set.plate.gain_deg_per_s2);
   s.imbalance = f[excess_twice] - braking - inertia;
   s.motion = std::abs(braking) + std::abs(inertia);
 }
@@ -147,7 +147,7 @@ bool ThrottleSupervisor::look_for_jam(double duty, double excess, double frictio
 void ThrottleSupervisor::look_for_spring(double known) noexcept {
   const SupervisorSettings& set = settings_;
   State& s = state_;
-  const double distance = s.angle_deg - set.spring.limp_home_deg;
+  const double distance = s.angle_deg - set.plate.spring.limp_home_deg;
   const double beyond = -std::copysign(1.0, distance) * s.imbalance - known - s.motion;
   const bool near = std::abs(distance) <= set.spring_band_deg;
   s.evidence_s = near ? 0.0 : std::max(0.0, s.evidence_s + set.sample_s * beyond);
@@ -165,8 +165,8 @@ void ThrottleSupervisor::look_at_motion() noexcept {
     return;
   }
   const double duty = s.order.duty * s.supply_v / set.nominal_supply_v;
-  const double held = set.spring.at(s.angle_deg), excess = duty - held;
-  const double friction = set.friction * (1.0 + set.uncertainty);
+  const double held = set.plate.spring.at(s.angle_deg), excess = duty - held;
+  const double friction = set.plate.friction * (1.0 + set.uncertainty);
   const double known = friction + set.uncertainty * std::abs(held);
   follow_balance(excess);
   if (look_for_jam(duty, excess, friction, known)) {
@@ -177,7 +177,8 @@ void ThrottleSupervisor::look_at_motion() noexcept {
   const double error = usable_reference_deg() - s.angle_deg;
   for (const auto& [side, beyond] : {std::pair{too_far_closed, error}, std::pair{too_far_open, -error}})
     (void)raise_after(side, beyond > set.tracking_error_deg, set.tracking_s, Mode::limp_home, Reason::tracking);
-  const bool away = s.angle_deg > set.closed_deg + set.jam_error_deg && s.angle_deg < set.open_deg - set.jam_error_deg;
+  const bool away =
+      s.angle_deg > set.plate.closed_deg + set.jam_error_deg && s.angle_deg < set.plate.open_deg - set.jam_error_deg;
   (void)raise_after(overload, away && std::abs(s.order.duty) > set.overload_duty, set.overload_s, Mode::limp_home,
                     Reason::overload);
 }
@@ -191,7 +192,7 @@ void ThrottleSupervisor::test_return() noexcept {
   }
   s.open += 1.0;
   const bool there =
-      s.trusted && std::abs(s.angle_deg - settings_.spring.limp_home_deg) <= settings_.limp_home_band_deg;
+      s.trusted && std::abs(s.angle_deg - settings_.plate.spring.limp_home_deg) <= settings_.limp_home_band_deg;
   const bool due = lasted(s.open, settings_.sample_s, settings_.return_s);
   s.test = there ? ReturnTest::passed : due && s.trusted ? ReturnTest::failed : ReturnTest::pending;
 }
@@ -215,7 +216,8 @@ SupervisorOrder ThrottleSupervisor::decide(double duty) noexcept {
   (void)raise_after(no_duty, invalid, settings_.silence_s, Mode::limp_home, Reason::invalid_duty);
   const bool holds = !s.trusted || invalid;
   s.order.bridge_open = s.latched == Mode::limp_home;
-  s.order.duty = s.order.bridge_open ? 0.0 : std::clamp(holds ? settings_.spring.at(s.angle_deg) : duty, -1.0, 1.0);
+  s.order.duty =
+      s.order.bridge_open ? 0.0 : std::clamp(holds ? settings_.plate.spring.at(s.angle_deg) : duty, -1.0, 1.0);
   return s.order;
 }
 

@@ -1,7 +1,6 @@
 #include <array>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/control/spring_fields.hpp"
 #include "mgdd/control/supervisor.hpp"
 
 namespace mgdd::control {
@@ -18,8 +17,9 @@ constexpr Domain volts = closed(0.0, 100.0);
 constexpr auto supervisor_table = joined(
     std::array{
         field<&Sv::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&Sv::closed_deg>({"closed_deg", "deg", degrees, "lower end of the travel"}),
-        field<&Sv::open_deg>({"open_deg", "deg", degrees, "upper end of the travel"}),
+    },
+    travel_fields<&Sv::plate>(),
+    std::array{
         field<&Sv::limited_open_deg>({"limited_open_deg", "deg", degrees, "largest reference while the supply is low"}),
         field<&Sv::late_s>({"late_s", "s", closed(0.0, 60.0), "age beyond which an angle is not used"}),
         field<&Sv::silence_s>({"silence_s", "s", time, "time without a usable reference, angle or duty: open"}),
@@ -32,11 +32,11 @@ constexpr auto supervisor_table = joined(
         field<&Sv::supply_lost_v>({"supply_lost_v", "V", volts, "a lower supply opens the bridge"}),
         field<&Sv::supply_s>({"supply_s", "s", time, "time that the supply must be low"}),
     },
-    spring_fields<&Sv::spring>(),
+    spring_fields<&Sv::plate>(),
+    std::array{field<&Sv::plate, &Plate::friction>(
+        {"friction", "-", supervisor_share, "duty against dry friction at breakaway"})},
+    motion_fields<&Sv::plate>(),
     std::array{
-        field<&Sv::friction>({"friction", "-", supervisor_share, "duty against dry friction at breakaway"}),
-        field<&Sv::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
-        field<&Sv::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
         field<&Sv::uncertainty>(
             {"uncertainty", "-", closed(0.0, 10.0), "share by which springs and friction may differ"}),
         field<&Sv::load>({"load", "-", supervisor_share, "duty that the air may add"}),
@@ -65,11 +65,9 @@ std::span<const Field<SupervisorSettings>> supervisor_fields() noexcept {
 
 void validate(const SupervisorSettings& s) {
   require_fields(supervisor_table, s);
-  if (!(s.open_deg > s.closed_deg)) {
-    throw ParameterError("open_deg", s.open_deg, "must be > closed_deg = " + text(s.closed_deg), "deg");
-  }
-  require_within("limited_open_deg", s.limited_open_deg, s.closed_deg, s.open_deg, "deg");
-  require_within("limp_home_deg", s.spring.limp_home_deg, s.closed_deg, s.open_deg, "deg");
+  require_travel(s.plate);
+  require_within("limited_open_deg", s.limited_open_deg, s.plate.closed_deg, s.plate.open_deg, "deg");
+  require_within("limp_home_deg", s.plate.spring.limp_home_deg, s.plate.closed_deg, s.plate.open_deg, "deg");
   require_within("supply_lost_v", s.supply_lost_v, 0.0, s.supply_low_v, "V");
   require_within("late_s", s.late_s, 0.0, s.silence_s, "s");
 }

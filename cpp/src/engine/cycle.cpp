@@ -75,7 +75,7 @@ T CycleModel<T>::volume_before(std::size_t k) const noexcept {
 }
 
 // First law over one step, dU = dQ - dW with U = p V / (gamma - 1), in the four forms of the work term dW:
-// trapezoid (p0 + p1)/2 dV; euler p0 dV; seed p0 (V0 - V_before), as printed in Tan 2018, eqs 2-11 to 2-15;
+// trapezoid (p0 + p1)/2 dV; euler p0 dV; tan2018_lagged p0 (V0 - V_before), as printed in Tan 2018, eqs 2-11 to 2-15;
 // split: half the heat at V0, adiabatic to V1, half the heat at V1 (Strang 1968).
 template <class T>
 typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& gamma, std::size_t k) const noexcept {
@@ -93,7 +93,7 @@ typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& ga
       const T adiabatic = pow(v0 / v1, gamma);
       return {adiabatic, 0.5 * inner * (adiabatic / v0 + 1.0 / v1)};
     }
-    case Integrator::seed:
+    case Integrator::tan2018_lagged:
       return {(v0 - inner * (v0 - volume_before(k))) / v1, inner / v1};
     case Integrator::euler:
       break;
@@ -217,7 +217,7 @@ T CycleModel<T>::booked_work_j(std::size_t k, const CycleWorkspace<T>& work) con
       const T heated = p0 * volume_[k] + 0.5 * inner * (work.heat_release_j[k] - work.heat_loss_j[k]);
       return heated * (1.0 - pow(volume_[k] / volume_[k + 1], inner)) / inner;
     }
-    case Integrator::seed:
+    case Integrator::tan2018_lagged:
       return p0 * (volume_[k] - volume_before(k));
     case Integrator::euler:
       break;

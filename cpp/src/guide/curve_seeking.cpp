@@ -45,8 +45,11 @@ constexpr double modest_share = 0.25;  // of the cheapest amplitude, less than t
 constexpr int most_uncertain = 20;  // cycles of delay
 
 constexpr int plain_period = 10;
-constexpr double plain_time_constant = 40.0;
+constexpr double plain_time_constant = 40.0;  // [cycles], and not below these of periods and of the delay
+constexpr double plain_periods = 4.0, plain_delays = 3.0;
 constexpr double plain_amplitude_share = 0.1;  // of prior_sd
+constexpr double plain_range_share = 0.05;     // of the range: the largest amplitude
+constexpr double plain_periods_per_lag = 2.4;  // a shorter dither would be damped away
 constexpr double curvature_share = 0.3;        // of prior_sd
 
 CurveSeekingSettings checked(CurveSeekingSettings s) {
@@ -118,11 +121,12 @@ bool side_of(std::int64_t block) noexcept {
 // About an origin that is set when it takes over; amplitude and gain follow from the guide's curvature.
 optimize::ExtremumSeekingSettings plain_settings(const CurveSeekingSettings& s) {
   const double width = s.space.upper[0] - s.space.lower[0];
-  const double amplitude = std::min(plain_amplitude_share * s.prior_sd, 0.05 * width);
+  const double amplitude = std::min(plain_amplitude_share * s.prior_sd, plain_range_share * width);
   optimize::ExtremumSeekingSettings out;
   const double late = s.sensor.delay_cycles + s.sensor.lag_cycles;
-  const int period = std::max(plain_period, static_cast<int>(std::ceil(2.4 * s.sensor.lag_cycles)));
-  const double tau = std::max({plain_time_constant, 4.0 * period * (late > 0.0 ? 1.0 : 0.0), 3.0 * late});
+  const int period = std::max(plain_period, static_cast<int>(std::ceil(plain_periods_per_lag * s.sensor.lag_cycles)));
+  const double tau =
+      std::max({plain_time_constant, plain_periods * period * (late > 0.0 ? 1.0 : 0.0), plain_delays * late});
   out.space = {scalar_input(0.0), scalar_input(-2.0 * width), scalar_input(2.0 * width)};
   out.dither.amplitude = scalar_input(amplitude);
   out.dither.period = period;

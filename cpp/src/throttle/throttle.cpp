@@ -103,6 +103,23 @@ void validate(const Throttle& t) {
   }
 }
 
+control::Plate plate_of(const Throttle& t) noexcept {
+  const double stall = t.stall_torque_nm();
+  const auto side = [stall](double preload_nm, double spring_nm_per_rad) -> control::SpringSideDuty {
+    return {preload_nm / stall, spring_nm_per_rad * units::rad_per_deg / stall};
+  };
+  return {.gain_deg_per_s2 = stall / t.inertia_kgm2 / units::rad_per_deg,
+          .time_constant_s = t.inertia_kgm2 / t.damping_nms_per_rad(),
+          .electrical_s = 1e-3 * t.inductance_mh / t.resistance_ohm,
+          .spring = {.limp_home_deg = t.limp_home_deg,
+                     .ramp_deg = control::Plate{}.spring.ramp_deg,
+                     .above = side(t.preload_above_nm, t.spring_above_nm_per_rad),
+                     .below = side(t.preload_below_nm, t.spring_below_nm_per_rad)},
+          .friction = t.coulomb_nm / stall,
+          .closed_deg = t.closed_deg,
+          .open_deg = t.open_deg};
+}
+
 AirflowPoint airflow_point(double angle_deg) noexcept {
   if (!(angle_deg > air_angle_deg.front() && angle_deg < air_angle_deg.back())) return {0.0, 0.0};
   std::size_t i = 1;

@@ -6,7 +6,109 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['GuidedPredictive', 'Pid', 'SlidingMode', 'ThrottleSupervisor']
+__all__: list[str] = ['GuidedPredictive', 'Pid', 'Plate', 'SlidingMode', 'ThrottleSupervisor']
+class Plate:
+    """
+    What a controller knows of a throttle plate; ``Plate.fields()`` lists it.
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0) -> None:
+        """
+        gain_deg_per_s2 : acceleration per duty [degree/second²]
+        time_constant_s : time constant of the speed [s]
+        electrical_s : lag of the motor's torque [s]
+        limp_home_deg : rest angle of the springs [deg]
+        ramp_deg : half width over which the preload changes sides [deg]
+        preload_above : duty against the preload above limp-home
+        spring_above_per_deg : duty against the spring above limp-home [1/degree]
+        preload_below : duty against the preload below limp-home
+        spring_below_per_deg : duty against the spring below limp-home [1/degree]
+        friction : duty against dry friction, at the start
+        closed_deg : lower end of the travel [deg]
+        open_deg : upper end of the travel [deg]
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def replace(self, **kwargs) -> Plate:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
+    @property
+    def closed_deg(self) -> float:
+        """
+        lower end of the travel [deg]
+        """
+    @property
+    def electrical_s(self) -> float:
+        """
+        lag of the motor's torque [s]
+        """
+    @property
+    def friction(self) -> float:
+        """
+        duty against dry friction, at the start [-]
+        """
+    @property
+    def gain_deg_per_s2(self) -> float:
+        """
+        acceleration per duty [degree/second²]
+        """
+    @property
+    def limp_home_deg(self) -> float:
+        """
+        rest angle of the springs [deg]
+        """
+    @property
+    def open_deg(self) -> float:
+        """
+        upper end of the travel [deg]
+        """
+    @property
+    def preload_above(self) -> float:
+        """
+        duty against the preload above limp-home [-]
+        """
+    @property
+    def preload_below(self) -> float:
+        """
+        duty against the preload below limp-home [-]
+        """
+    @property
+    def ramp_deg(self) -> float:
+        """
+        half width over which the preload changes sides [deg]
+        """
+    @property
+    def spring_above_per_deg(self) -> float:
+        """
+        duty against the spring above limp-home [1/degree]
+        """
+    @property
+    def spring_below_per_deg(self) -> float:
+        """
+        duty against the spring below limp-home [1/degree]
+        """
+    @property
+    def time_constant_s(self) -> float:
+        """
+        time constant of the speed [s]
+        """
 class Pid:
     """
     PID controller of a throttle plate, one sample at a time.
@@ -232,7 +334,7 @@ class SlidingMode:
     def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.076, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 136.0, integral_per_s: typing.SupportsFloat | typing.SupportsIndex = 3.03, integral_layers: typing.SupportsFloat | typing.SupportsIndex = 3.0, reference_pole_per_s: typing.SupportsFloat | typing.SupportsIndex = 170.0, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, switching: typing.SupportsFloat | typing.SupportsIndex = 0.793, layer_deg: typing.SupportsFloat | typing.SupportsIndex = 3.46, root_per_root_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.015, twist_per_s: typing.SupportsFloat | typing.SupportsIndex = 2.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, reaching: str = 'implicit') -> None:
         """
         sample_s : time between samples [s]
-        gain_deg_per_s2 : acceleration per duty [degree/second**2]
+        gain_deg_per_s2 : acceleration per duty [degree/second²]
         time_constant_s : time constant of the speed [s]
         limp_home_deg : rest angle of the springs [deg]
         ramp_deg : half width over which the preload changes sides [deg]
@@ -401,7 +503,7 @@ class GuidedPredictive:
         """
         sample_s : time between samples [s]
         gain_deg_per_s2 : acceleration per duty [degree/second²]
-        time_constant_s : of the speed [s]
+        time_constant_s : time constant of the speed [s]
         electrical_s : lag of the motor's torque [s]
         limp_home_deg : rest angle of the springs [deg]
         ramp_deg : half width over which the preload changes sides [deg]
@@ -632,8 +734,8 @@ class ThrottleSupervisor:
         preload_below : duty against the preload below limp-home
         spring_below_per_deg : duty against the spring below limp-home [1/degree]
         friction : duty against dry friction at breakaway
-        gain_deg_per_s2 : acceleration per duty [degree/second**2]
-        time_constant_s : of the speed [s]
+        gain_deg_per_s2 : acceleration per duty [degree/second²]
+        time_constant_s : time constant of the speed [s]
         uncertainty : share by which springs and friction may differ
         load : duty that the air may add
         jam_error_deg : a smaller error does not ask for a move [deg]

@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'RecedingHorizon', 'SensorDynamics', 'VirtualThrottle', 'loop_form', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
+__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualThrottle', 'loop_form', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
@@ -280,62 +280,6 @@ class ObjectGuidedMgdd1:
         ...
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
-class RecedingHorizon:
-    """
-    Receding-horizon control; use mgdd.control.RecedingHorizon.
-    """
-    @staticmethod
-    def fields() -> dict:
-        ...
-    @staticmethod
-    def of_first_principle(groups: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(19)"], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex, tanh_deg_per_s: typing.SupportsFloat | typing.SupportsIndex, horizon_samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, max_sweeps: typing.SupportsInt | typing.SupportsIndex, numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> RecedingHorizon:
-        ...
-    @staticmethod
-    def of_matrices(a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, observer_gain: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], horizon_samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, max_sweeps: typing.SupportsInt | typing.SupportsIndex, numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> RecedingHorizon:
-        ...
-    @staticmethod
-    def of_object(model: typing.Any, *, n_states: typing.SupportsInt | typing.SupportsIndex, sample_s: typing.SupportsFloat | typing.SupportsIndex, observer_gain: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], horizon_samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, max_sweeps: typing.SupportsInt | typing.SupportsIndex, numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> RecedingHorizon:
-        ...
-    @staticmethod
-    def of_pseudo_wiener(model: mgdd._core.throttle.PseudoWienerModel, *, horizon_samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, max_sweeps: typing.SupportsInt | typing.SupportsIndex, numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> RecedingHorizon:
-        ...
-    def applied(self, input: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def reset(self) -> None:
-        ...
-    def start(self, state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], applied: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def step(self, reference: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], measured: typing.SupportsFloat | typing.SupportsIndex) -> float:
-        ...
-    def step_from(self, reference: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> float:
-        ...
-    @property
-    def inputs(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def iterations(self) -> int:
-        ...
-    @property
-    def last_input(self) -> float:
-        ...
-    @property
-    def n_states(self) -> int:
-        ...
-    @property
-    def predicted(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def state(self) -> dict[str, list[float]]:
-        ...
-    @state.setter
-    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
-    @property
-    def status(self) -> str:
-        ...
-    @property
-    def sweeps(self) -> int:
         ...
 def loop_form(loops: typing.SupportsInt | typing.SupportsIndex) -> str:
     """

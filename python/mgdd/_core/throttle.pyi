@@ -3,6 +3,7 @@ Throttle body, its sensors, pseudo-Wiener models, demand chain.
 """
 from __future__ import annotations
 import collections.abc
+import mgdd._core.control
 import numpy
 import numpy.typing
 import typing
@@ -189,6 +190,11 @@ class Throttle:
     def open_deg(self) -> float:
         """
         upper end stop [deg]
+        """
+    @property
+    def plate(self) -> mgdd._core.control.Plate:
+        """
+        What a controller can know of it: gain, springs, friction in duty.
         """
     @property
     def plate_friction_share(self) -> float:

@@ -130,7 +130,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
 def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float | None) -> None:
     """Add integrator and crank step."""
     group = parser.add_argument_group("scheme")
-    group.add_argument("--integrator", choices=("trapezoid", "split", "seed", "euler"), default="trapezoid")
+    group.add_argument("--integrator", choices=("trapezoid", "split", "tan2018_lagged", "euler"), default="trapezoid")
     group.add_argument(
         "--step-cad",
         type=float,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mgdd._core.control import Plate
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import ParameterError
 from mgdd.presets.meant import throttle_model_of
@@ -21,34 +22,28 @@ _SIDES = ("above", "below")
 _CONVERTER_DEG = 0.01  # what 12 bits leave of a sensor without noise
 
 
-@dataclass(frozen=True, kw_only=True)
-class Groups:
-    """What duty and angle say about a throttle: all that a controller knows. Units deg, s, duty."""
+_SPRINGS = (
+    "limp_home_deg", "ramp_deg", "preload_above", "spring_above_per_deg", "preload_below", "spring_below_per_deg",
+)  # fmt: skip
+_MOTION = ("gain_deg_per_s2", "time_constant_s")
 
-    gain_deg_per_s2: float
-    time_constant_s: float
-    electrical_s: float
-    friction: float
-    limp_home_deg: float
-    preload_above: float
-    preload_below: float
-    spring_above_per_deg: float
-    spring_below_per_deg: float
-    closed_deg: float = 0.0
-    open_deg: float = 90.0
+
+@dataclass(frozen=True)
+class Groups:
+    """What duty and angle say about a throttle: all that a controller knows."""
+
+    plate: Plate
     delay_s: float | None = None  # None: the model says nothing about it
 
     @property
     def spring(self) -> dict[str, Any]:
         """Keywords of the springs that all controllers share."""
-        names = ["limp_home_deg"]
-        names += [f"preload_{side}" for side in _SIDES] + [f"spring_{side}_per_deg" for side in _SIDES]
-        return {name: getattr(self, name) for name in names} | {"ramp_deg": 0.5}
+        return {name: getattr(self.plate, name) for name in _SPRINGS}
 
     @property
     def motion(self) -> dict[str, Any]:
         """Keywords of gain and time constant."""
-        return {"gain_deg_per_s2": self.gain_deg_per_s2, "time_constant_s": self.time_constant_s}
+        return {name: getattr(self.plate, name) for name in _MOTION}
 
 
 def groups_of(model: Any) -> Groups:
@@ -58,7 +53,7 @@ def groups_of(model: Any) -> Groups:
     """
     model = throttle_model_of(model)
     if hasattr(model, "stall_torque_nm"):
-        return _of_throttle(model)
+        return Groups(model.plate)
     numbers = getattr(model, "parameters", None)
     if isinstance(numbers, Mapping):
         if "beta_above_duty" in numbers:
@@ -70,27 +65,8 @@ def groups_of(model: Any) -> Groups:
     )
 
 
-def _of_throttle(throttle: Any) -> Groups:
-    stall = throttle.stall_torque_nm
-    sides = {f"preload_{side}": getattr(throttle, f"preload_{side}_nm") / stall for side in _SIDES}
-    sides |= {
-        f"spring_{side}_per_deg": math.radians(getattr(throttle, f"spring_{side}_nm_per_rad")) / stall
-        for side in _SIDES
-    }
-    return Groups(
-        gain_deg_per_s2=math.degrees(stall / throttle.inertia_kgm2),
-        time_constant_s=throttle.inertia_kgm2 / throttle.damping_nms_per_rad,
-        electrical_s=1e-3 * throttle.inductance_mh / throttle.resistance_ohm,
-        friction=throttle.coulomb_nm / stall,
-        limp_home_deg=throttle.limp_home_deg,
-        closed_deg=throttle.closed_deg,
-        open_deg=throttle.open_deg,
-        **sides,
-    )
-
-
 def _of_groups(model: Any, numbers: Mapping[str, float]) -> Groups:
-    return Groups(
+    plate = Plate(
         gain_deg_per_s2=numbers["gain_deg_per_s2_per_duty"],
         time_constant_s=numbers["tau_s"],
         electrical_s=numbers["electrical_s"],
@@ -102,15 +78,15 @@ def _of_groups(model: Any, numbers: Mapping[str, float]) -> Groups:
         spring_below_per_deg=numbers["kappa_below_duty_per_deg"],
         closed_deg=model.closed_deg,
         open_deg=model.open_deg,
-        delay_s=numbers["delay_samples"] * model.sample_s,
     )
+    return Groups(plate, numbers["delay_samples"] * model.sample_s)
 
 
 def _of_pw_r(numbers: Mapping[str, float]) -> Groups:
     def mean(name: str) -> float:
         return math.sqrt(numbers[f"above_{name}"] * numbers[f"below_{name}"])
 
-    return Groups(
+    plate = Plate(
         gain_deg_per_s2=mean("gain_deg_per_s2_per_duty"),
         time_constant_s=mean("tau_s"),
         electrical_s=0.0,
@@ -122,21 +98,22 @@ def _of_pw_r(numbers: Mapping[str, float]) -> Groups:
         spring_below_per_deg=numbers["below_spring_duty_per_deg"],
         closed_deg=numbers["closed_deg"],
         open_deg=numbers["open_deg"],
-        delay_s=numbers["delay_samples"] * numbers["sample_s"],
     )
+    return Groups(plate, numbers["delay_samples"] * numbers["sample_s"])
 
 
 def pw_r_of(groups: Groups, sample_s: float) -> PseudoWiener:
     """PW-R of the groups as a guide: friction by tanh, the ramp of 0.5 deg that control uses, no delay of its own."""
     from mgdd.throttle.pseudo_wiener import PseudoWiener
 
-    numbers = {"limp_home_deg": groups.limp_home_deg, "closed_deg": groups.closed_deg, "open_deg": groups.open_deg}
+    plate = groups.plate
+    numbers = {"limp_home_deg": plate.limp_home_deg, "closed_deg": plate.closed_deg, "open_deg": plate.open_deg}
     for side in _SIDES:
-        numbers[f"{side}_tau_s"] = groups.time_constant_s
-        numbers[f"{side}_gain_deg_per_s2_per_duty"] = groups.gain_deg_per_s2
-        numbers[f"{side}_preload_duty"] = getattr(groups, f"preload_{side}")
-        numbers[f"{side}_spring_duty_per_deg"] = getattr(groups, f"spring_{side}_per_deg")
-        numbers[f"{side}_coulomb_duty"] = groups.friction
+        numbers[f"{side}_tau_s"] = plate.time_constant_s
+        numbers[f"{side}_gain_deg_per_s2_per_duty"] = plate.gain_deg_per_s2
+        numbers[f"{side}_preload_duty"] = getattr(plate, f"preload_{side}")
+        numbers[f"{side}_spring_duty_per_deg"] = getattr(plate, f"spring_{side}_per_deg")
+        numbers[f"{side}_coulomb_duty"] = plate.friction
     numbers |= {"sample_s": sample_s, "substeps": 1, "ramp_deg": 0.5, "tanh_deg_per_s": 40.0}
     return PseudoWiener("pw_r", numbers, friction="tanh")
 
@@ -186,19 +163,14 @@ def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) 
         if name in x:
             settings[name] = x[name]
     if "bias_rate_per_deg_s" in settings:
-        most = _MOST_BIAS / (groups.gain_deg_per_s2 * setup.sample_s**3)
+        most = _MOST_BIAS / (groups.plate.gain_deg_per_s2 * setup.sample_s**3)
         settings["bias_rate_per_deg_s"] = min(settings["bias_rate_per_deg_s"], most)
     return GuidedPredictive(
         sample_s=setup.sample_s,
         prediction_step_s=max(_PREDICTION_STEP_S, setup.sample_s),  # a move cannot be shorter than a sample
         delay_samples=setup.delay_samples,
         noise_deg=max(setup.noise_deg, _CONVERTER_DEG),
-        electrical_s=groups.electrical_s,
-        friction=groups.friction,
-        closed_deg=groups.closed_deg,
-        open_deg=groups.open_deg,
-        **groups.spring,
-        **groups.motion,
+        **groups.plate.to_dict(),
         **settings,
         **fixed,
     )
@@ -223,12 +195,12 @@ def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
         gains[f"derivative_{side}_s_per_deg"] = x["derivative_s"] / 90.0
     return Pid(
         sample_s=setup.sample_s,
-        kick=min(x["kick"] * groups.friction, 1.0),
+        kick=min(x["kick"] * groups.plate.friction, 1.0),
         kick_width_deg=x["kick_width_deg"],
         integral_window_deg=x["integral_window_deg"],
         dead_band_deg=x["dead_band_deg"],
-        rate_s_per_deg=x["rate"] / (groups.time_constant_s * groups.gain_deg_per_s2),
-        friction=min(x["friction"] * groups.friction, 1.0),
+        rate_s_per_deg=x["rate"] / (groups.plate.time_constant_s * groups.plate.gain_deg_per_s2),
+        friction=min(x["friction"] * groups.plate.friction, 1.0),
         **groups.spring,
         **gains,
     )
@@ -242,7 +214,7 @@ def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> Slidi
         integral_per_s=x["integral_per_s"],
         bandwidth_per_s=x["bandwidth_per_s"],
         reference_pole_per_s=x["reference_pole_per_s"],
-        friction=min(x["friction"] * groups.friction, 1.0),
+        friction=min(x["friction"] * groups.plate.friction, 1.0),
         integral_layers=x["integral_layers"],
         reaching="implicit",
         **groups.spring,

@@ -148,7 +148,7 @@ def family_of(kind: str) -> Family:
 
 def _distance(a: Groups, b: Groups) -> float:
     names = ("gain_deg_per_s2", "time_constant_s", "friction", "preload_above", "spring_above_per_deg")
-    pairs = [(getattr(a, name), getattr(b, name)) for name in names]
+    pairs = [(getattr(a.plate, name), getattr(b.plate, name)) for name in names]
     return sum(math.log(max(x, 1e-9) / max(y, 1e-9)) ** 2 for x, y in pairs)
 
 

@@ -56,18 +56,18 @@ def characteristics(throttle: ThrottleLike) -> xr.Dataset:
     """
     throttle = throttle_of(throttle)
     stall, damping, inertia = throttle.stall_torque_nm, throttle.damping_nms_per_rad, throttle.inertia_kgm2
-    tau = inertia / damping if damping > 0.0 else math.inf
+    plate = throttle.plate
     scalars = {
         "stall_torque_nm": (stall, "N m", "stall torque per unit duty"),
         "damping_nms_per_rad": (damping, "N m s/rad", "viscous friction and braking by the motor"),
-        "tau_s": (tau, "s", "time constant of the speed"),
-        "gain_deg_per_s2": (stall / inertia / _DEG, "deg/s²", "acceleration per unit duty"),
-        "preload_above": (throttle.preload_above_nm / stall, "-", "preload above limp-home, in duty"),
-        "preload_below": (throttle.preload_below_nm / stall, "-", "preload below limp-home, in duty"),
-        "coulomb": (throttle.coulomb_nm / stall, "-", "Coulomb friction, in duty"),
+        "tau_s": (plate.time_constant_s, "s", "time constant of the speed"),
+        "gain_deg_per_s2": (plate.gain_deg_per_s2, "deg/s²", "acceleration per unit duty"),
+        "preload_above": (plate.preload_above, "-", "preload above limp-home, in duty"),
+        "preload_below": (plate.preload_below, "-", "preload below limp-home, in duty"),
+        "coulomb": (plate.friction, "-", "Coulomb friction, in duty"),
         "stiction": (_breakaway_nm(throttle) / stall, "-", "breakaway friction, in duty"),
-        "spring_above_per_deg": (throttle.spring_above_nm_per_rad * _DEG / stall, "1/deg", "spring above, in duty"),
-        "spring_below_per_deg": (throttle.spring_below_nm_per_rad * _DEG / stall, "1/deg", "spring below, in duty"),
+        "spring_above_per_deg": (plate.spring_above_per_deg, "1/deg", "spring above, in duty"),
+        "spring_below_per_deg": (plate.spring_below_per_deg, "1/deg", "spring below, in duty"),
     }
     springs = np.array([throttle.spring_above_nm_per_rad, throttle.spring_below_nm_per_rad])
     poles = np.array([np.roots([inertia, damping, spring]) for spring in springs], dtype=np.complex128)

@@ -123,8 +123,8 @@ TEST(GuidedPredictive, ALinearPredictionIsSolvedInOneStep) {
 
 TEST(GuidedPredictive, DutyAndItsRateStayInsideTheirBounds) {
   GuidedPredictiveSettings s = asymmetric();
-  s.lower = -0.7;
-  s.upper = 0.55;
+  s.duty.lower = -0.7;
+  s.duty.upper = 0.55;
   s.duty_rate_per_s = 40.0;
   for (const bool learning : {true, false}) {
     s.friction_learning = learning;

@@ -27,9 +27,9 @@ PidSettings lively() {
   PidSettings s;
   s.above = {.proportional_per_deg = 0.05, .integral_per_deg_s = 0.9, .derivative_s_per_deg = 7e-4};
   s.below = {.proportional_per_deg = 0.03, .integral_per_deg_s = 0.5, .derivative_s_per_deg = 4e-4};
-  s.spring.limp_home_deg = 11.0;
-  s.spring.above = {.preload = 0.13, .per_deg = 6e-4};
-  s.spring.below = {.preload = 0.17, .per_deg = 9e-4};
+  s.plate.spring.limp_home_deg = 11.0;
+  s.plate.spring.above = {.preload = 0.13, .per_deg = 6e-4};
+  s.plate.spring.below = {.preload = 0.17, .per_deg = 9e-4};
   s.kick = 0.04;
   s.kick_width_deg = 0.3;
   s.dead_band_deg = 0.02;
@@ -41,8 +41,8 @@ PidSettings lively() {
 PidSettings bare(const PidGains& gains) {
   PidSettings s;
   s.above = s.below = gains;
-  s.spring.above = s.spring.below = {0.0, 0.0};
-  s.kick = s.dead_band_deg = s.rate_s_per_deg = s.friction = 0.0;
+  s.plate.spring.above = s.plate.spring.below = {0.0, 0.0};
+  s.kick = s.dead_band_deg = s.rate_s_per_deg = s.plate.friction = 0.0;
   s.integral_window_deg = 1e3;
   s.integral_limit = 1.0;
   return s;
@@ -80,7 +80,7 @@ TEST(Pid, EachTermIsItsOwn) {
   EXPECT_EQ(Pid(with_kick).step(20.0, 20.09), 0.0);
 
   PidSettings with_spring = bare({0.0, 0.0, 0.0});
-  with_spring.spring = lively().spring;
+  with_spring.plate.spring = lively().plate.spring;
   EXPECT_NEAR(Pid(with_spring).step(31.0, 50.0), 0.13 + 6e-4 * 20.0, 1e-15);
   EXPECT_NEAR(Pid(with_spring).step(3.0, 50.0), -0.17 - 9e-4 * 8.0, 1e-15);
   EXPECT_NEAR(Pid(with_spring).step(11.25, 50.0), 0.13 * 0.5 + 6e-4 * 0.25, 1e-15);
@@ -99,7 +99,7 @@ TEST(Pid, TheDerivativeSeesTheMeasurementAloneAndStartsWithoutAKick) {
 TEST(Pid, AReferenceThatMovesIsFollowedByItsRateAndOneThatStepsIsNot) {
   PidSettings s = bare({0.0, 0.0, 0.0});
   s.rate_s_per_deg = 1e-3;
-  s.friction = 0.06;
+  s.plate.friction = 0.06;
   s.friction_rate_deg_per_s = 20.0;
   Pid pid(s);
   double duty = 0.0;
@@ -111,7 +111,7 @@ TEST(Pid, AReferenceThatMovesIsFollowedByItsRateAndOneThatStepsIsNot) {
 
 TEST(Pid, GainsFollowTheSideOfTheMeasurement) {
   PidSettings s = bare({});
-  s.spring.limp_home_deg = 11.0;
+  s.plate.spring.limp_home_deg = 11.0;
   s.above = {0.02, 0.0, 0.0};
   s.below = {0.05, 0.0, 0.0};
   EXPECT_NEAR(Pid(s).step(4.0, 12.0), -0.02 * 8.0, 1e-15);
@@ -136,8 +136,8 @@ TEST(Pid, NoSteadyErrorUnderAConstantDisturbanceWithTheIntegralAndOneWithout) {
 
 TEST(Pid, AntiWindupTheIntegralStopsWhileABoundHoldsTheDutyAndLeavesAtOnce) {
   PidSettings s = bare({0.02, 0.5, 0.0});
-  s.upper = 0.4;
-  s.lower = -0.7;
+  s.duty.upper = 0.4;
+  s.duty.lower = -0.7;
   Pid pid(s);
   for (int k = 0; k < 3000; ++k)
     EXPECT_LE(pid.step(60.0, 20.0), 0.4);
@@ -153,8 +153,8 @@ TEST(Pid, AntiWindupTheIntegralStopsWhileABoundHoldsTheDutyAndLeavesAtOnce) {
 
 TEST(Pid, AntiWindupHoldsForSmallErrorsToo) {
   PidSettings s = bare({1.0, 0.5, 0.0});
-  s.upper = 0.4;
-  s.lower = -0.3;
+  s.duty.upper = 0.4;
+  s.duty.lower = -0.3;
   for (const double error : {0.5, -0.5}) {
     Pid pid(s);
     for (int k = 0; k < 100; ++k)
@@ -194,10 +194,10 @@ TEST(Pid, ATakeoverHasNoBumpAndAResetForgetsEverything) {
 
 TEST(Pid, AMirroredPlantIsDrivenByTheMirroredDuty) {
   PidSettings s = lively();
-  s.spring.limp_home_deg = 32.0;
+  s.plate.spring.limp_home_deg = 32.0;
   PidSettings mirrored = s;
   std::swap(mirrored.above, mirrored.below);
-  std::swap(mirrored.spring.above, mirrored.spring.below);
+  std::swap(mirrored.plate.spring.above, mirrored.plate.spring.below);
   Pid one(s), other(mirrored);
   for (int k = 0; k < 800; ++k) {
     const double r = 21.0 + reference_of(k), y = 21.0 + measurement_of(k);
@@ -291,11 +291,11 @@ TEST(Pid, ARefusedSettingNamesItself) {
   refused("sample_s", [](PidSettings& s) { s.sample_s = 0.0; });
   refused("proportional_above_per_deg", [](PidSettings& s) { s.above.proportional_per_deg = -0.1; });
   refused("integral_below_per_deg_s", [](PidSettings& s) { s.below.integral_per_deg_s = nan; });
-  refused("ramp_deg", [](PidSettings& s) { s.spring.ramp_deg = 0.0; });
+  refused("ramp_deg", [](PidSettings& s) { s.plate.spring.ramp_deg = 0.0; });
   refused("kick_width_deg", [](PidSettings& s) { s.kick_width_deg = 0.0; });
-  refused("preload_below", [](PidSettings& s) { s.spring.below.preload = 1.2; });
-  refused("lower", [](PidSettings& s) { s.lower = 0.1; });
-  refused("upper", [](PidSettings& s) { s.lower = s.upper = 0.0; });
+  refused("preload_below", [](PidSettings& s) { s.plate.spring.below.preload = 1.2; });
+  refused("lower", [](PidSettings& s) { s.duty.lower = 0.1; });
+  refused("upper", [](PidSettings& s) { s.duty.lower = s.duty.upper = 0.0; });
 }
 
 TEST(Pid, EveryNumberOfTheSettingsHasOneField) {
@@ -303,7 +303,8 @@ TEST(Pid, EveryNumberOfTheSettingsHasOneField) {
   double at = 0.5;
   for (const auto& field : pid_fields())
     field.in(s) = at += 1.0;
-  EXPECT_EQ(sizeof(PidSettings), pid_fields().size() * sizeof(double));
+  constexpr std::size_t unused = 5;  // gain, time constant, electrical lag and travel of the plate
+  EXPECT_EQ(sizeof(PidSettings), (pid_fields().size() + unused) * sizeof(double));
   std::vector<double> seen;
   for (const auto& field : pid_fields())
     seen.push_back(field.in(s));

@@ -1,6 +1,6 @@
 // The plate that a predictive controller believes: the contract of a model, an exact lag, friction bands of both
 // directions, slopes, and the box-constrained step over it.
-#include "mgdd/control/plate.hpp"
+#include "mgdd/control/plate_model.hpp"
 
 #include <array>
 #include <cmath>
@@ -21,8 +21,8 @@ namespace {
 static_assert(dynamics::DiscreteModel<PlateModel<double>> && dynamics::DiscreteModel<PlateModel<float>> &&
               dynamics::DiscreteModel<PlateModel<Dual<3>, double>> && dynamics::StartsAtRest<PlateModel<double>>);
 
-PlateSettings asymmetric() {
-  PlateSettings s;
+Plate asymmetric() {
+  Plate s;
   s.gain_deg_per_s2 = 60000.0;
   s.time_constant_s = 0.025;
   s.electrical_s = 1.3e-3;
@@ -66,7 +66,7 @@ TEST(Plate, LeavesRestAtTheLevelOfItsSideAndDirection) {
 }
 
 TEST(Plate, SlidesAtTheSpeedThatItsGainAndTimeConstantGive) {
-  PlateSettings s = asymmetric();
+  Plate s = asymmetric();
   s.spring.above = s.spring.below = {0.0, 0.0};
   s.open_deg = 1e6;
   PlateModel<double> model(s, 1e-3, PlateFriction::set_valued);

@@ -27,10 +27,10 @@ constexpr double gain = 20000.0;
 SlidingModeSettings frictionless(ReachingLaw law) {
   SlidingModeSettings s;
   s.reaching = law;
-  s.gain_deg_per_s2 = gain;
-  s.time_constant_s = 1e9;
-  s.spring.above = s.spring.below = {0.0, 0.0};
-  s.friction = 0.0;
+  s.plate.gain_deg_per_s2 = gain;
+  s.plate.time_constant_s = 1e9;
+  s.plate.spring.above = s.plate.spring.below = {0.0, 0.0};
+  s.plate.friction = 0.0;
   s.derivative_lag_s = 0.0;
   s.bandwidth_per_s = 40.0;
   s.integral_per_s = 0.0;
@@ -43,9 +43,9 @@ SlidingModeSettings frictionless(ReachingLaw law) {
 SlidingModeSettings lively(ReachingLaw law) {
   SlidingModeSettings s;
   s.reaching = law;
-  s.spring.limp_home_deg = 11.0;
-  s.spring.above = {.preload = 0.13, .per_deg = 6e-4};
-  s.spring.below = {.preload = 0.17, .per_deg = 9e-4};
+  s.plate.spring.limp_home_deg = 11.0;
+  s.plate.spring.above = {.preload = 0.13, .per_deg = 6e-4};
+  s.plate.spring.below = {.preload = 0.17, .per_deg = 9e-4};
   s.layer_deg = 2.5;
   return s;
 }
@@ -177,7 +177,7 @@ TEST(SlidingMode, StartsAtTheMeasurementWithoutAJumpOfTheFilteredReference) {
 TEST(SlidingMode, ABoundHoldsTheIntegrals) {
   for (const ReachingLaw law : {ReachingLaw::boundary_layer, ReachingLaw::super_twisting}) {
     SlidingModeSettings s = lively(law);
-    s.upper = 0.2;
+    s.duty.upper = 0.2;
     s.integral_layers = 1e6;
     SlidingMode controller(s);
     for (int k = 0; k < 4000; ++k)
@@ -192,9 +192,9 @@ class EveryLaw : public testing::TestWithParam<ReachingLaw> {};
 
 TEST_P(EveryLaw, AMirroredPlantIsDrivenByTheMirroredDuty) {
   SlidingModeSettings s = lively(GetParam());
-  s.spring.limp_home_deg = 32.0;
+  s.plate.spring.limp_home_deg = 32.0;
   SlidingModeSettings mirrored = s;
-  std::swap(mirrored.spring.above, mirrored.spring.below);
+  std::swap(mirrored.plate.spring.above, mirrored.plate.spring.below);
   SlidingMode one(s), other(mirrored);
   for (int k = 0; k < 800; ++k) {
     const double r = 21.0 + reference_of(k), y = 21.0 + measurement_of(k);
@@ -252,12 +252,12 @@ TEST(SlidingMode, ARefusedSettingNamesItself) {
       EXPECT_EQ(error.field, field);
     }
   };
-  refused("gain_deg_per_s2", [](SlidingModeSettings& s) { s.gain_deg_per_s2 = 0.0; });
+  refused("gain_deg_per_s2", [](SlidingModeSettings& s) { s.plate.gain_deg_per_s2 = 0.0; });
   refused("bandwidth_per_s", [](SlidingModeSettings& s) { s.bandwidth_per_s = nan; });
   refused("layer_deg", [](SlidingModeSettings& s) { s.layer_deg = 0.0; });
   refused("switching", [](SlidingModeSettings& s) { s.switching = 1.2; });
-  refused("spring_below_per_deg", [](SlidingModeSettings& s) { s.spring.below.per_deg = -1e-3; });
-  refused("upper", [](SlidingModeSettings& s) { s.lower = s.upper = 0.0; });
+  refused("spring_below_per_deg", [](SlidingModeSettings& s) { s.plate.spring.below.per_deg = -1e-3; });
+  refused("upper", [](SlidingModeSettings& s) { s.duty.lower = s.duty.upper = 0.0; });
   SlidingModeSettings implicit = lively(ReachingLaw::implicit);
   implicit.layer_deg = 0.0;
   EXPECT_NO_THROW((void)SlidingMode(implicit));

@@ -25,7 +25,7 @@ TEST(Supervisor, IsTransparentWhileAllIsWell) {
   for (int k = 0; k < 5000; ++k) {
     const double reference = 30.0 + 20.0 * std::sin(0.005 * k);
     angle = 30.0 + 20.0 * std::sin(0.005 * (k - 6));
-    const double duty = s.settings().spring.at(angle) + 0.1 * std::cos(0.005 * k);
+    const double duty = s.settings().plate.spring.at(angle) + 0.1 * std::cos(0.005 * k);
     const SupervisorView view = s.observe(at(angle, reference));
     ASSERT_EQ(view.reference_deg, reference);
     ASSERT_EQ(view.angle_deg, angle);
@@ -77,7 +77,7 @@ TEST(Supervisor, AShortGapIsHeldFirstByTheLastAngleThenByTheSpringsAndEndsByItse
     const SupervisorOrder order = s.decide(0.9);
     EXPECT_EQ(order.mode, Mode::holding);
     EXPECT_EQ(order.reason, Reason::missing_sample);
-    EXPECT_EQ(order.duty, k <= 3 ? 0.9 : s.settings().spring.at(30.0)) << k;
+    EXPECT_EQ(order.duty, k <= 3 ? 0.9 : s.settings().plate.spring.at(30.0)) << k;
   }
   SupervisorOrder order = hold(s, at(30.0));
   EXPECT_EQ(order.mode, Mode::normal);
@@ -113,7 +113,7 @@ TEST(Supervisor, SilenceOpensWhicheverWayItComes) {
 TEST(Supervisor, BeforeTheFirstAngleThePlateIsNotTrustedAndSilenceOpens) {
   ThrottleSupervisor s(lively());
   (void)s.observe(at(nan, 60.0));
-  EXPECT_EQ(s.decide(1.0).duty, s.settings().spring.at(11.0));
+  EXPECT_EQ(s.decide(1.0).duty, s.settings().plate.spring.at(11.0));
   EXPECT_GE(opens_after(s, at(nan, 60.0), Reason::missing_sample), 10);
 }
 
@@ -145,7 +145,7 @@ TEST(Supervisor, SensorsThatDisagreeAreBothNotUsedAndAGlitchPasses) {
   in.angle_deg = {36.0, 31.5};
   for (int k = 1; k < 20; ++k) {
     EXPECT_EQ(s.observe(in).angle_deg, 30.0);
-    EXPECT_EQ(s.decide(0.9).duty, s.settings().spring.at(30.0));
+    EXPECT_EQ(s.decide(0.9).duty, s.settings().plate.spring.at(30.0));
   }
   EXPECT_EQ(hold(s, at(30.0)).mode, Mode::normal);
   EXPECT_EQ(opens_after(s, in, Reason::sensor_disagreement), 20);
@@ -164,7 +164,7 @@ TEST(Supervisor, AControllerThatAnswersNanIsHeldByTheSpringsAndThenOff) {
   settle(s, 30.0);
   for (int k = 1; k < 20; ++k) {
     (void)s.observe(at(30.0));
-    EXPECT_EQ(s.decide(nan).duty, s.settings().spring.at(30.0));
+    EXPECT_EQ(s.decide(nan).duty, s.settings().plate.spring.at(30.0));
     EXPECT_EQ(s.order().mode, Mode::holding);
     EXPECT_EQ(s.order().reason, Reason::invalid_duty);
   }
@@ -314,9 +314,9 @@ TEST(Supervisor, EveryBadSettingIsNamedAndEveryNameHasAValue) {
       EXPECT_EQ(error.field, field);
     }
   };
-  refuses([](auto& s) { s.open_deg = 0.5; }, "open_deg");
+  refuses([](auto& s) { s.plate.open_deg = 0.5; }, "open_deg");
   refuses([](auto& s) { s.limited_open_deg = 85.0; }, "limited_open_deg");
-  refuses([](auto& s) { s.spring.limp_home_deg = 0.0; }, "limp_home_deg");
+  refuses([](auto& s) { s.plate.spring.limp_home_deg = 0.0; }, "limp_home_deg");
   refuses([](auto& s) { s.supply_lost_v = 9.5; }, "supply_lost_v");
   refuses([](auto& s) { s.late_s = 0.03; }, "late_s");
   EXPECT_EQ(names<SupervisorMode>().size(), 4u);

@@ -95,7 +95,7 @@ TEST(SupervisorOfThePlate, NoDutyAboveLimpHomeWithoutComingBackMeansThatTheSprin
     ThrottleSupervisor s(lively());
     for (int k = 0; k < 200; ++k) {
       (void)s.observe(at(angle_deg));
-      if (s.decide(k < 100 ? s.settings().spring.at(angle_deg) : duty).bridge_open) {
+      if (s.decide(k < 100 ? s.settings().plate.spring.at(angle_deg) : duty).bridge_open) {
         EXPECT_EQ(s.order().reason, Reason::spring_lost);
         return k - 100;
       }
@@ -123,10 +123,10 @@ TEST(SupervisorOfThePlate, TheImbalanceIsTheDutyThatModelAndMotionDoNotExplain) 
     if (k > 100) {
       ASSERT_NEAR(s.imbalance(), disturbance, 0.004) << k;
     }
-    duty = settings.spring.at(angle) + 0.12 * std::sin(0.02 * k) + disturbance;
+    duty = settings.plate.spring.at(angle) + 0.12 * std::sin(0.02 * k) + disturbance;
     (void)s.decide(duty);
-    const double net = duty - settings.spring.at(angle) - disturbance;
-    speed += h * (settings.gain_deg_per_s2 * net - speed / settings.time_constant_s);
+    const double net = duty - settings.plate.spring.at(angle) - disturbance;
+    speed += h * (settings.plate.gain_deg_per_s2 * net - speed / settings.plate.time_constant_s);
     angle += h * speed;
   }
 }

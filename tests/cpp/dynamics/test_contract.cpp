@@ -130,7 +130,8 @@ template <class T>
 throttle::PlantCoefficients<T> coefficients_over(const throttle::PlantCoefficients<double>& coefficients) {
   constexpr std::size_t n = throttle::n_plant_coefficients;
   std::array<T, n> columns{};
-  std::ranges::transform(std::bit_cast<std::array<double, n>>(coefficients), columns.begin(), [](double x) { return T(x); });
+  std::ranges::transform(std::bit_cast<std::array<double, n>>(coefficients), columns.begin(),
+                         [](double x) { return T(x); });
   return std::bit_cast<throttle::PlantCoefficients<T>>(columns);
 }
 

@@ -108,7 +108,7 @@ TEST(EngineCylinder, NamesGoBothWays) {
   for (const char* name : {"watson", "wolfer", "hardenberg_hase", "polynomial"}) {
     EXPECT_EQ(name_of(parse_name<IgnitionModel>("ignition_model", name)), name);
   }
-  for (const char* name : {"trapezoid", "split", "seed", "euler"}) {
+  for (const char* name : {"trapezoid", "split", "tan2018_lagged", "euler"}) {
     EXPECT_EQ(name_of(parse_name<Integrator>("integrator", name)), name);
   }
   const std::string message = refusal([] { parse_name<Integrator>("integrator", "rk4"); });

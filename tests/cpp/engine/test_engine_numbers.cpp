@@ -86,7 +86,7 @@ TEST(EngineNumbers, NamesOfTheOptions) {
                                      {IgnitionModel::polynomial, "polynomial"}});
   test::expect_names<Integrator>({{Integrator::trapezoid, "trapezoid"},
                                   {Integrator::split, "split"},
-                                  {Integrator::seed, "seed"},
+                                  {Integrator::tan2018_lagged, "tan2018_lagged"},
                                   {Integrator::euler, "euler"}});
   test::expect_names<Pegging>({{Pegging::none, "none"},
                                {Pegging::inlet, "inlet"},

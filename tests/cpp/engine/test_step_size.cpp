@@ -69,7 +69,7 @@ TEST(EngineStepSize, GridChangesEfficiencyLittleUnlessTheSchemeIsFirstOrder) {
   };
   EXPECT_LT(std::abs(change(Integrator::trapezoid)), 2e-4);
   EXPECT_LT(std::abs(change(Integrator::split)), 2e-4);
-  EXPECT_NEAR(change(Integrator::seed), 1.5e-2, 0.05e-2);
+  EXPECT_NEAR(change(Integrator::tan2018_lagged), 1.5e-2, 0.05e-2);
   EXPECT_NEAR(change(Integrator::euler), -7.9e-3, 0.1e-3);
 }
 

@@ -19,8 +19,8 @@ namespace {
 using control::GuidedPredictive;
 using control::GuidedPredictiveSettings;
 using test_support::drawn;
-using test_support::plate_of;
 using test_support::preset;
+using throttle::plate_of;
 
 GuidedPredictiveSettings learning(int number) {
   GuidedPredictiveSettings s;
@@ -168,8 +168,8 @@ TEST(GuidedThrottle, ATorqueStepBehindAMoveIsBroughtBackByTheLearningForm) {
 TEST(GuidedThrottle, FollowsASineFourTimesAsWellAsAnOrdinaryPid) {
   control::PidSettings pid;
   pid.above = pid.below = {4.0 / 90.0, 50.0 / 90.0, 0.05 / 90.0};
-  pid.spring = plate_of(preset(1)).spring;
-  pid.kick = pid.dead_band_deg = pid.rate_s_per_deg = pid.friction = 0.0;
+  pid.plate.spring = plate_of(preset(1)).spring;
+  pid.kick = pid.dead_band_deg = pid.rate_s_per_deg = pid.plate.friction = 0.0;
   pid.integral_window_deg = 1e3;
   for (const auto& [mean, amplitude] : {std::pair{40.0, 10.0}, std::pair{10.0, 8.0}}) {
     const ThrottleScenario s = sine_scenario(mean, amplitude);

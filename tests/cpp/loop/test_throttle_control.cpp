@@ -115,13 +115,13 @@ void expect_figures(const Controller& controller, const Throttle& t, const std::
 
 TEST_P(TunedThrottle, PidDoesWhatTheStudyFound) {
   const Throttle t = preset(GetParam().tuned.preset);
-  expect_figures(Pid(pid_of(Groups(t), GetParam().tuned.pid)), t, GetParam().pid_study, GetParam().pid_here);
+  expect_figures(Pid(pid_of(plate_of(t), GetParam().tuned.pid)), t, GetParam().pid_study, GetParam().pid_here);
 }
 
 TEST_P(TunedThrottle, SlidingModeDoesWhatTheStudyFound) {
   const Throttle t = preset(GetParam().tuned.preset);
   const auto with = [&](ReachingLaw law) {
-    return SlidingMode(sliding_mode_of(Groups(t), GetParam().tuned.sliding, law));
+    return SlidingMode(sliding_mode_of(plate_of(t), GetParam().tuned.sliding, law));
   };
   expect_figures(with(ReachingLaw::boundary_layer), t, GetParam().sliding_study, GetParam().sliding_here);
   const Figures implicit = stepped(with(ReachingLaw::implicit), t, 40.0, 42.0);
@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(ThrottleControl, TunedThrottle,
                                               {138.0, 81.6, 15.0, 0.044, 0.160}}));
 
 TEST(ThrottleControl, TheDefaultsAreTheTunedSetOfP1) {
-  const Groups g(preset(1));
+  const control::Plate g = plate_of(preset(1));
   const PidSettings tuned = pid_of(g, tuned_sets[0].pid);
   for (const auto& field : control::pid_fields())
     EXPECT_NEAR(field.in(PidSettings{}), field.in(tuned), 2e-3 * std::abs(field.in(tuned))) << field.info.name;

@@ -14,7 +14,7 @@ using control::SupervisorMode;
 
 template <class Look>
 void with_both_controllers(const TunedSet& tuned, Look look) {
-  const Groups known(preset(tuned.preset));
+  const control::Plate known = plate_of(preset(tuned.preset));
   look(Pid(pid_of(known, tuned.pid)));
   look(SlidingMode(sliding_mode_of(known, tuned.sliding, ReachingLaw::boundary_layer)));
 }

@@ -129,6 +129,23 @@ TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
   EXPECT_EQ(known.largest_bend(), 0.7);
 }
 
+// A plant that goes 0.7 of the way to one side: slope and bend are those between the inputs that it applied. What was
+// read before a restart is void.
+TEST(FirstReadings, AnUnevenPlantAndARestartLeaveTheBend) {
+  FirstReadings first(scalar_input(1.5), 0.4, true);
+  const auto cycle = [&first](double level) {
+    Inputs x = first.ask(scalar_input(2.0));
+    if (x[0] < 2.0) x[0] = 2.0 + 0.7 * (x[0] - 2.0);
+    first.learn(x, level + 0.3 * (x[0] - 2.0) - 0.4 * (x[0] - 2.0) * (x[0] - 2.0));
+  };
+  for (int k = 0; k < 3; ++k)
+    cycle(1e3);
+  first.restart();
+  while (first.open())
+    cycle(0.0);
+  EXPECT_NEAR(first.largest_bend(), 0.8, 1e-12);
+}
+
 // An input whose plant does not follow to one side shows the noise, and no slope of nothing.
 TEST(FirstReadings, APlantThatDoesNotFollowBendsNothing) {
   FirstReadings first({inputs({1.0, 2.0})}, 0.4, true);

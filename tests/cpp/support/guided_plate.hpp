@@ -29,7 +29,7 @@ inline GuidedPredictiveSettings plain() {
 /// A plate of the kind that the controller believes in, with steps of 0.1 ms and one sample of delay.
 class Plant {
  public:
-  Plant(const PlateSettings& settings, double angle_deg) : model_(settings, 1e-4, PlateFriction::set_valued) {
+  Plant(const Plate& settings, double angle_deg) : model_(settings, 1e-4, PlateFriction::set_valued) {
     state_ = model_.at_rest(angle_deg, model_.holding(angle_deg));
     acting_ = state_.torque;
   }

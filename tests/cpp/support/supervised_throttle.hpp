@@ -16,12 +16,9 @@
 namespace mgdd::test_support {
 
 inline control::SupervisorSettings supervisor_of(const Throttle& t) {
-  const Groups known(t);
   control::SupervisorSettings s;
-  s.spring = known.spring;
-  s.friction = t.stiction_nm / t.stall_torque_nm();
-  s.gain_deg_per_s2 = known.gain_deg_per_s2;
-  s.time_constant_s = known.time_constant_s;
+  s.plate = plate_of(t);
+  s.plate.friction = t.stiction_nm / t.stall_torque_nm();
   s.return_s = t.limp_home_deg > 10.0 ? 0.8 : 0.4;
   return s;
 }

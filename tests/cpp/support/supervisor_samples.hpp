@@ -16,12 +16,12 @@ inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// Both sides of limp-home different, odd thresholds.
 inline SupervisorSettings lively() {
   SupervisorSettings s;
-  s.closed_deg = 1.0;
-  s.open_deg = 84.0;
+  s.plate.closed_deg = 1.0;
+  s.plate.open_deg = 84.0;
   s.limited_open_deg = 35.0;
-  s.spring.limp_home_deg = 11.0;
-  s.spring.above = {.preload = 0.13, .per_deg = 6e-4};
-  s.spring.below = {.preload = 0.17, .per_deg = 9e-4};
+  s.plate.spring.limp_home_deg = 11.0;
+  s.plate.spring.above = {.preload = 0.13, .per_deg = 6e-4};
+  s.plate.spring.below = {.preload = 0.17, .per_deg = 9e-4};
   return s;
 }
 
@@ -35,7 +35,7 @@ inline SupervisorInputs at(double angle_deg) {
 /// One sample of a plate that is held where it is.
 inline SupervisorOrder hold(ThrottleSupervisor& s, const SupervisorInputs& in) {
   const SupervisorView view = s.observe(in);
-  return s.decide(s.settings().spring.at(view.angle_deg));
+  return s.decide(s.settings().plate.spring.at(view.angle_deg));
 }
 inline void settle(ThrottleSupervisor& s, double angle_deg, int samples = 100) {
   for (int k = 0; k < samples; ++k)

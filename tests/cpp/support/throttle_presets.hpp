@@ -6,7 +6,7 @@
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/units.hpp"
-#include "mgdd/control/plate.hpp"
+#include "mgdd/control/plate_model.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
 namespace mgdd::test_support {
@@ -51,20 +51,6 @@ inline throttle::Throttle drawn(throttle::Throttle t, double spread, std::uint64
   scale(t.preload_above_nm, t.preload_below_nm);
   scale(t.coulomb_nm, t.stiction_nm);
   return t;
-}
-
-inline control::PlateSettings plate_of(const throttle::Throttle& t) {
-  const double stall = t.stall_torque_nm();
-  control::PlateSettings p;
-  p.gain_deg_per_s2 = stall / t.inertia_kgm2 / units::rad_per_deg;
-  p.time_constant_s = t.inertia_kgm2 / t.damping_nms_per_rad();
-  p.electrical_s = 1e-3 * t.inductance_mh / t.resistance_ohm;
-  p.friction = t.coulomb_nm / stall;
-  p.spring = {.limp_home_deg = t.limp_home_deg,
-              .ramp_deg = 0.5,
-              .above = {t.preload_above_nm / stall, t.spring_above_nm_per_rad * units::rad_per_deg / stall},
-              .below = {t.preload_below_nm / stall, t.spring_below_nm_per_rad * units::rad_per_deg / stall}};
-  return p;
 }
 
 }  // namespace mgdd::test_support

@@ -16,51 +16,34 @@ using control::ReachingLaw;
 using control::SlidingModeSettings;
 using throttle::Throttle;
 
-/// What a controller knows of its plant.
-struct Groups {
-  double time_constant_s, gain_deg_per_s2, coulomb;
-  control::HoldingDuty spring;
-
-  explicit Groups(const Throttle& t)
-      : time_constant_s(t.inertia_kgm2 / t.damping_nms_per_rad()),
-        gain_deg_per_s2(t.stall_torque_nm() / t.inertia_kgm2 / units::rad_per_deg),
-        coulomb(t.coulomb_nm / t.stall_torque_nm()) {
-    const control::SpringSideDuty side{t.preload_above_nm / t.stall_torque_nm(),
-                                       t.spring_above_nm_per_rad * units::rad_per_deg / t.stall_torque_nm()};
-    spring = {.limp_home_deg = t.limp_home_deg, .ramp_deg = 0.5, .above = side, .below = side};
-  }
-};
-
 /// Kp, Ki, Kd in duty % per travel %, kick per Coulomb friction, its width, integral window, dead band, rate and
 /// friction feed-forward per their values in the model.
 using PidRow = std::array<double, 9>;
-inline PidSettings pid_of(const Groups& g, const PidRow& row) {
+inline PidSettings pid_of(const control::Plate& g, const PidRow& row) {
   PidSettings s;
   s.above = s.below = {row[0] / 90.0, row[1] / 90.0, row[2] / 90.0};
-  s.spring = g.spring;
-  s.kick = row[3] * g.coulomb;
+  s.plate = g;
+  s.kick = row[3] * g.friction;
   s.kick_width_deg = row[4];
   s.integral_window_deg = row[5];
   s.dead_band_deg = row[6];
   s.rate_s_per_deg = row[7] / (g.time_constant_s * g.gain_deg_per_s2);
-  s.friction = row[8] * g.coulomb;
+  s.plate.friction = row[8] * g.friction;
   return s;
 }
 
 /// Switching duty, layer [rad], integral, bandwidth, pole of the reference, friction feed-forward, integral layers.
 using SlidingRow = std::array<double, 7>;
-inline SlidingModeSettings sliding_mode_of(const Groups& g, const SlidingRow& row, ReachingLaw law) {
+inline SlidingModeSettings sliding_mode_of(const control::Plate& g, const SlidingRow& row, ReachingLaw law) {
   SlidingModeSettings s;
   s.reaching = law;
-  s.gain_deg_per_s2 = g.gain_deg_per_s2;
-  s.time_constant_s = g.time_constant_s;
-  s.spring = g.spring;
+  s.plate = g;
   s.switching = row[0];
   s.layer_deg = row[1] / units::rad_per_deg;
   s.integral_per_s = row[2];
   s.bandwidth_per_s = row[3];
   s.reference_pole_per_s = row[4];
-  s.friction = row[5] * g.coulomb;
+  s.plate.friction = row[5] * g.friction;
   s.integral_layers = row[6];
   return s;
 }

@@ -54,7 +54,7 @@ inline std::string requirement(const Domain& d) {
 
 /// ParameterError `name = value unit: requirement`.
 inline void require_in(const Domain& domain, std::string_view name, double value, std::string_view unit = "") {
-  if (!domain.contains(value)) throw ParameterError(name, value, requirement(domain), unit);
+  if (!domain.contains(value)) fail(ParameterError(name, value, requirement(domain), unit));
 }
 inline void require_within(std::string_view name, double value, double lower, double upper,
                            std::string_view unit = "") {

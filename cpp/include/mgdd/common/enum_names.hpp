@@ -77,7 +77,7 @@ Enum parse_name(std::string_view field, std::string_view given, Names<Enum> vali
     if (name == given) return key;
     list.append(list.empty() ? "" : ", ").append(name);
   }
-  throw ParameterError(field, given, "must be one of " + list);
+  fail(ParameterError(field, given, "must be one of " + list));
 }
 
 /// An enumerator among the columns of a saved state (common/state.hpp): its number, refused where it names nothing.

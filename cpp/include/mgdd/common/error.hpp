@@ -4,6 +4,8 @@
 #pragma once
 
 #include <concepts>
+#include <cstdio>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -82,6 +84,17 @@ struct ConvergenceError : Error {
 struct RigError : Error {
   using Error::Error;
 };
+
+/// Throws; where exceptions are off, as in firmware, the program ends with the message.
+template <std::derived_from<Error> E>
+[[noreturn]] void fail(const E& error) {
+#ifdef __cpp_exceptions
+  throw error;
+#else
+  std::fputs(error.what(), stderr);
+  std::abort();
+#endif
+}
 
 /// A refusal whose message has a form of its own, with the field it is about: `duty has 3 samples, angle_deg has 4`.
 template <std::derived_from<Error> E>

@@ -102,8 +102,8 @@ class StateReader {
   /// Call last: refuses columns that nobody asked for.
   void finish() const {
     if (used_ == columns_.size()) return;
-    throw ParameterError("state has " + std::to_string(columns_.size()) + " columns, " + std::to_string(used_) +
-                         " are known here: it belongs to another kind of object");
+    fail(ParameterError("state has " + std::to_string(columns_.size()) + " columns, " + std::to_string(used_) +
+                        " are known here: it belongs to another kind of object"));
   }
 
  private:
@@ -139,7 +139,7 @@ class StateReader {
   [[noreturn]] static void refuse(std::string_view name, const std::string& why) {
     ParameterError error("state column '" + std::string(name) + "' " + why);
     error.field = name;
-    throw error;
+    fail(error);
   }
 
   const StateColumns& columns_;

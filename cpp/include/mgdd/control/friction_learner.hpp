@@ -12,7 +12,7 @@
 #include <cstddef>
 
 #include "mgdd/control/filtered_rate.hpp"
-#include "mgdd/control/plate.hpp"
+#include "mgdd/control/plate_model.hpp"
 
 namespace mgdd::control {
 
@@ -45,7 +45,7 @@ template <class T>
 class FrictionLearner {
  public:
   /// `angle_share` and `speed_gain` of the observer's correction; `noise_deg` of the measured angle bounds a step.
-  FrictionLearner(const FrictionLearnerSettings& s, const PlateSettings& plate, double sample_s, double noise_deg,
+  FrictionLearner(const FrictionLearnerSettings& s, const Plate& plate, double sample_s, double noise_deg,
                   T angle_share, T speed_gain) noexcept
       : rate_(T(std::fmin(s.rate_per_s * sample_s, 1.0))),
         prior_{T(1.0), T(s.gain_weight), T(s.damping_weight)},

@@ -6,7 +6,7 @@
 #include <array>
 
 #include "mgdd/control/guided_predictive_settings.hpp"
-#include "mgdd/control/plate.hpp"
+#include "mgdd/control/plate_model.hpp"
 
 namespace mgdd::control {
 

@@ -12,7 +12,7 @@
 #include "mgdd/control/belief_review.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/friction_learner.hpp"
-#include "mgdd/control/plate.hpp"
+#include "mgdd/control/plate_model.hpp"
 #include "mgdd/control/sent_duties.hpp"
 
 namespace mgdd::control {
@@ -34,7 +34,7 @@ enum class SideSwitching {
 
 struct GuidedPredictiveSettings {
   double sample_s = 1e-3;
-  PlateSettings plate{};  ///< the guide
+  Plate plate{};          ///< the guide
   int delay_samples = 1;  ///< from a duty to its effect, beside the electrical lag: 0 to `longest_control_delay`
 
   // The horizon.
@@ -50,8 +50,7 @@ struct GuidedPredictiveSettings {
   double duty_change_weight = 4.0;  ///< per duty²
 
   // Constraints: hard for the duty and its rate; predicted angles beyond theirs cost `angle_limit_weight` per deg².
-  double lower = -1.0;
-  double upper = 1.0;
+  DutyRange duty{};
   double duty_rate_per_s = 1e4;
   double lowest_deg = -1e3;
   double highest_deg = 1e3;
@@ -68,8 +67,7 @@ struct GuidedPredictiveSettings {
   double trim_rate_per_deg_s = 0.3;  ///< without learning: invisible to the prediction
 
   // The reference.
-  double reference_lag_s = 4.5e-3;
-  double reference_jump_deg_per_s = 400.0;  ///< a faster reference steps: it has no rate
+  ReferenceRate reference{};
 
   int n_steps() const noexcept { return move_steps[0] + move_steps[1] + move_steps[2]; }
 

@@ -33,10 +33,8 @@ struct Mgdd1Settings {
   double error_weight = 1.0;         ///< per deg²
   double duty_change_weight = 20.0;  ///< per duty²
   double trim_rate_per_deg_s = 0.3;  ///< slow integral that the model does not see
-  double reference_lag_s = 4.5e-3;
-  double reference_jump_deg_per_s = 400.0;  ///< a faster reference steps: it has no rate
-  double lower = -1.0;
-  double upper = 1.0;
+  ReferenceRate reference{};
+  DutyRange duty{};
 
   bool operator==(const Mgdd1Settings&) const = default;
 };
@@ -62,7 +60,7 @@ class Mgdd1 {
   Mgdd1(const M& model, const Mgdd1Settings& settings, const Gains& gains = {})
       : settings_((validate(settings), settings)),
         observer_(model, gains),
-        reference_(settings.reference_lag_s, model.sample_s(), settings.reference_jump_deg_per_s) {}
+        reference_(settings.reference.lag_s, model.sample_s(), settings.reference.jump_deg_per_s) {}
 
   /// Duty of this sample. Inputs that are not finite repeat the last reference or correct nothing; before the first
   /// finite ones the duty is 0.
@@ -82,7 +80,7 @@ class Mgdd1 {
     adapt(ahead);
     sent_.push(move_);
     trim_ = trimmed(trim_, reference_.value() - measurement_deg, settings_.trim_rate_per_deg_s, model.sample_s());
-    duty_ = std::clamp(move_ + trim_, T(settings_.lower), T(settings_.upper));
+    duty_ = settings_.duty.clamp(move_ + trim_);
     return duty_;
   }
 
@@ -99,7 +97,7 @@ class Mgdd1 {
   T duty() const noexcept { return duty_; }
 
   /// ParameterError for a restored state that these settings do not allow.
-  void require_usable() const { require_usable_duty(duty_, settings_.lower, settings_.upper); }
+  void require_usable() const { require_usable_duty(duty_, settings_.duty); }
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
@@ -135,7 +133,7 @@ class Mgdd1 {
       curvature += T(settings_.error_weight) * slope * slope;
     }
     const T step = T(settings_.adaptation_gain) * gradient / (curvature + T(1e-9));
-    move_ = std::clamp(move_ - step, T(settings_.lower), T(settings_.upper));
+    move_ = settings_.duty.clamp(move_ - step);
   }
 
   Mgdd1Settings settings_;

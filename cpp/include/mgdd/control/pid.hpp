@@ -12,7 +12,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
-#include "mgdd/control/holding_duty.hpp"
+#include "mgdd/control/plate.hpp"
 
 namespace mgdd::control {
 
@@ -26,9 +26,9 @@ struct PidGains {
 
 struct PidSettings {
   double sample_s = 1e-3;
-  PidGains above{}, below{};  ///< of limp-home, blended over the ramp of `spring` by the measured angle
+  PidGains above{}, below{};  ///< of limp-home, blended over the ramp of the springs by the measured angle
   double derivative_lag_s = 3e-3;
-  HoldingDuty spring{};  ///< fed forward at the reference
+  Plate plate{.friction = 0.0603};  ///< springs fed forward at the reference, friction in the direction of its rate
 
   double kick = 0.1205;  ///< [-] added towards the reference, in full where the error exceeds `kick_width_deg`
   double kick_width_deg = 0.019;
@@ -37,14 +37,11 @@ struct PidSettings {
   double integral_window_deg = 2.0;  ///< only smaller errors are integrated
   double integral_limit = 0.3;       ///< [-]
 
-  double rate_s_per_deg = 3.46e-4;          ///< fed forward per rate of the reference
-  double friction = 0.0603;                 ///< [-] fed forward in the direction of that rate
-  double friction_rate_deg_per_s = 17.2;    ///< at which it is full
-  double reference_lag_s = 4.5e-3;          ///< of that rate
-  double reference_jump_deg_per_s = 400.0;  ///< a faster reference steps: it has no rate
+  double rate_s_per_deg = 3.46e-4;        ///< fed forward per rate of the reference
+  double friction_rate_deg_per_s = 17.2;  ///< at which the friction is full
+  ReferenceRate reference{};
 
-  double lower = -1.0;  ///< [-] of the duty
-  double upper = 1.0;
+  DutyRange duty{};
 
   bool operator==(const PidSettings&) const = default;
 };

@@ -1,24 +1,51 @@
-// A throttle plate as a predictive controller believes it: gain and time constant, springs in duty, an electrical lag,
-// and dry friction as two levels per side of limp-home, one for opening and one for closing. Fulfils
-// `dynamics::DiscreteModel`. Angles in deg, duty -1..1, time in s. Steps are noexcept and heap-free, on any scalar.
-// Scheme: the proximal step of dynamics/dry_friction.hpp (Moreau 1988); the lag is exact for a held duty.
+// What a controller and a supervisor believe of a throttle plate before it runs: gain and time constant, the limp-home
+// springs and dry friction in duty, the travel; and the rows of their settings that name and check it. Angles in deg,
+// duty -1..1, time in s.
 #pragma once
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cmath>
-#include <cstddef>
+#include <span>
 #include <string_view>
 
-#include "mgdd/control/holding_duty.hpp"
-#include "mgdd/dynamics/discrete_model.hpp"
-#include "mgdd/dynamics/dry_friction.hpp"
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/record.hpp"
+#include "mgdd/dynamics/limp_home_spring.hpp"
 
 namespace mgdd::control {
 
-/// What is known of a plate before it runs. Defaults: the throttle P1.
-struct PlateSettings {
+/// A value in widths, limited to -1..1.
+template <class T>
+T limited_share(const T& value, const T& width) noexcept {
+  return std::clamp(value / width, T(-1.0), T(1.0));
+}
+
+struct SpringSideDuty {
+  double preload = 0.1292;  ///< [-] P1: T_pt R/(K V)
+  double per_deg = 4.96e-4;
+
+  bool operator==(const SpringSideDuty&) const = default;
+};
+
+/// The springs as the duty that holds the plate against them.
+struct HoldingDuty {
+  double limp_home_deg = 8.0;
+  double ramp_deg = 0.5;  ///< half width over which the preload changes its sign
+  SpringSideDuty above{}, below{};
+
+  bool operator==(const HoldingDuty&) const = default;
+
+  template <class T>
+  T at(const T& angle_deg) const noexcept {
+    using Side = dynamics::SpringSide<T>;
+    const auto load = dynamics::limp_home_spring(angle_deg - T(limp_home_deg), Side{T(above.per_deg), T(above.preload)},
+                                                 Side{T(below.per_deg), T(below.preload)}, T(1.0 / ramp_deg));
+    return load.elastic + load.preload;
+  }
+};
+
+/// Defaults: the throttle P1.
+struct Plate {
   double gain_deg_per_s2 = 83597.0;  ///< acceleration per duty
   double time_constant_s = 0.0197;   ///< of the speed
   double electrical_s = 1e-3;        ///< lag of the motor's torque; 0 for none
@@ -27,165 +54,75 @@ struct PlateSettings {
   double closed_deg = 0.0;
   double open_deg = 90.0;
 
-  bool operator==(const PlateSettings&) const = default;
+  bool operator==(const Plate&) const = default;
 };
 
-/// Dry friction of one side of limp-home: the plate opens against `bias + friction`, closes against `bias - friction`.
-template <class C>
-struct FrictionBand {
-  C bias{0.0};
-  C friction{0.0};
-};
+// Rows of a `Plate` that stands at `Path` within the settings: `spring_fields<&PidSettings::plate>()`.
 
-/// What is learnt while a controller runs.
-template <class C>
-struct PlateBelief {
-  FrictionBand<C> above{}, below{};
-  C gain_factor{1.0};
-  C damping_factor{1.0};  ///< of the speed's decay, beside the gain's: back-EMF scales with both
-};
-
-/// How dry friction enters a prediction.
-enum class PlateFriction {
-  set_valued,  ///< sticks exactly; no gradient while the plate is stuck
-  creeping,    ///< tanh of the speed: a gradient everywhere
-  none,        ///< only its bias, and no stops: for a linear prediction
-};
-
-template <class T>
-struct PlateState {
-  T angle_deg{0.0};
-  T speed_deg_per_s{0.0};
-  T torque{0.0};  ///< of the motor over stall torque, as a duty
-};
-
-template <class T, class C = T>
-class PlateModel {
- public:
-  using Scalar = T;
-  using State = PlateState<T>;
-  using Input = T;
-  static constexpr int n_observed = 2;
-
-  PlateModel(const PlateSettings& s, double sample_s, PlateFriction form, double creep_deg_per_s = 40.0) noexcept
-      : sample_s_(sample_s), form_(form) {
-    const double lags = s.electrical_s > 0.0 ? sample_s / s.electrical_s : 1e9;
-    const double decay = std::exp(-lags);
-    c_ = {.limp_home = C(s.spring.limp_home_deg),
-          .over_ramp = C(1.0 / s.spring.ramp_deg),
-          .above_preload = C(s.spring.above.preload),
-          .above_slope = C(s.spring.above.per_deg),
-          .below_preload = C(s.spring.below.preload),
-          .below_slope = C(s.spring.below.per_deg),
-          .decay = C(decay),
-          .mean_share = C((1.0 - decay) / lags),
-          .step = C(sample_s),
-          .step_gain = C(sample_s * s.gain_deg_per_s2),
-          .decay_share = C(sample_s / s.time_constant_s),
-          .over_creep = C(1.0 / creep_deg_per_s),
-          .closed = C(s.closed_deg),
-          .open = C(s.open_deg)};
-    believe({{C(0.0), C(s.friction)}, {C(0.0), C(s.friction)}, C(1.0), C(1.0)});
-  }
-
-  void believe(const PlateBelief<C>& belief) noexcept {
-    belief_ = belief;
-    gain_ = c_.step_gain * belief.gain_factor;
-    damped_ = C(1.0) + c_.decay_share * belief.gain_factor * belief.damping_factor;
-  }
-  const PlateBelief<C>& belief() const noexcept { return belief_; }
-  /// What divides the momentum of a step beside the springs.
-  C damped() const noexcept { return damped_; }
-  /// From now on the spring of one side acts everywhere, without a ramp.
-  void freeze_side(bool above) noexcept { frozen_ = above ? 1 : -1; }
-
-  /// Mean of the lagged duty over a step under a held one.
-  MGDD_INLINE T mean_torque(const State& s, const T& duty) const noexcept {
-    return duty + c_.mean_share * (s.torque - duty);
-  }
-
-  MGDD_INLINE void step(State& s, const T& duty) const noexcept {
-    const T acting = mean_torque(s, duty);
-    s.torque = duty + c_.decay * (s.torque - duty);
-    const T x = s.angle_deg - T(c_.limp_home);
-    const bool up = frozen_ == 0 ? !(x < T(0.0)) : frozen_ > 0;
-    const FrictionBand<C>& band = up ? belief_.above : belief_.below;
-    const C slope = up ? c_.above_slope : c_.below_slope;
-    const C preload = up ? c_.above_preload : c_.below_preload;
-    const T ratio = x * T(c_.over_ramp);
-    const bool on_ramp = frozen_ == 0 && ratio < T(1.0) && T(-1.0) < ratio;
-    const C stiffness = on_ramp ? C(slope + preload * c_.over_ramp) : slope;
-    const T held = T(slope) * x + (on_ramp ? T(T(preload) * ratio) : T(up ? preload : C(-preload)));
-    const C divisor = damped_ + c_.step * gain_ * stiffness;
-    const T drive = s.speed_deg_per_s + T(gain_) * (acting - held - T(band.bias));
-    const C level = gain_ * band.friction;
-    T next(0.0);
-    switch (form_) {
-      case PlateFriction::set_valued:
-        next = dynamics::stick_or_slide(drive, level, level, divisor);
-        break;
-      case PlateFriction::creeping:
-        next = dynamics::creep(s.speed_deg_per_s, drive, level, c_.over_creep, divisor);
-        break;
-      case PlateFriction::none:
-        next = drive / T(divisor);
-        break;
-    }
-    const T moved = s.angle_deg + T(c_.step) * next;
-    if (form_ == PlateFriction::none) {  // linear, so without stops
-      s.speed_deg_per_s = next;
-      s.angle_deg = moved;
-    } else {
-      dynamics::stop_at_ends(s.angle_deg, s.speed_deg_per_s, moved, next, c_.closed, c_.open);
-    }
-  }
-  MGDD_INLINE T output(const State& s) const noexcept { return s.angle_deg; }
-  double sample_s() const noexcept { return sample_s_; }
-
-  State at_rest(const T& angle_deg, const T& duty = T(0.0)) const noexcept { return {angle_deg, T(0.0), duty}; }
-
-  /// Duty that balances the springs at an angle, without friction.
-  T holding(const T& angle_deg) const noexcept {
-    const T x = angle_deg - T(c_.limp_home);
-    const bool up = !(x < T(0.0));
-    const T share = larger(smaller(T(x * T(c_.over_ramp)), T(1.0)), T(-1.0));
-    return T(up ? c_.above_slope : c_.below_slope) * x + T(up ? c_.above_preload : c_.below_preload) * share;
-  }
-  const FrictionBand<C>& band_at(const T& angle_deg) const noexcept {
-    return angle_deg < T(c_.limp_home) ? belief_.below : belief_.above;
-  }
-  /// Held duty at which the plate would begin to move from an angle, were it at rest there.
-  dynamics::Breakaway<T> breakaway(const State& s) const noexcept {
-    const FrictionBand<C>& band = band_at(s.angle_deg);
-    const T balance = holding(s.angle_deg) + T(band.bias);
-    return {balance - T(band.friction), balance + T(band.friction)};
-  }
-
-  template <class U>
-  PlateModel<U, C> over() const noexcept {
-    return std::bit_cast<PlateModel<U, C>>(*this);
-  }
-  template <class S>
-  static auto numbers(S& s) noexcept {
-    return std::array{&s.angle_deg, &s.speed_deg_per_s, &s.torque};
-  }
-  static constexpr std::array<std::string_view, 3> number_names{"angle_deg", "speed_deg_per_s", "torque"};
-
- private:
-  struct Coefficients {
-    C limp_home, over_ramp, above_preload, above_slope, below_preload, below_slope;
-    C decay;       // of the lag in one step
-    C mean_share;  // of the old torque in the mean over the step
-    C step, step_gain, decay_share, over_creep, closed, open;
+template <auto... Path>
+constexpr auto motion_fields() {
+  return std::array{
+      field<Path..., &Plate::gain_deg_per_s2>(
+          {"gain_deg_per_s2", "degree/second²", above(0.0, 1e9), "acceleration per duty"}),
+      field<Path..., &Plate::time_constant_s>({"time_constant_s", "s", above(0.0, 1e9), "time constant of the speed"}),
   };
+}
 
-  double sample_s_;
-  PlateFriction form_;
-  int frozen_ = 0;
-  Coefficients c_{};
-  PlateBelief<C> belief_{};
-  C gain_{0.0};    // per step
-  C damped_{1.0};  // 1 + the share of the speed that a step takes
-};
+template <auto... Path>
+constexpr auto spring_fields(std::string_view ramp = "half width over which the preload changes sides") {
+  constexpr auto spring = &Plate::spring;
+  using H = HoldingDuty;
+  using Side = SpringSideDuty;
+  constexpr Domain share = closed(0.0, 1.0);
+  return std::array{
+      field<Path..., spring, &H::limp_home_deg>(
+          {"limp_home_deg", "deg", closed(-360.0, 360.0), "rest angle of the springs"}),
+      field<Path..., spring, &H::ramp_deg>({"ramp_deg", "deg", above(0.0, 1e3), ramp}),
+      field<Path..., spring, &H::above, &Side::preload>(
+          {"preload_above", "-", share, "duty against the preload above limp-home"}),
+      field<Path..., spring, &H::above, &Side::per_deg>(
+          {"spring_above_per_deg", "1/degree", share, "duty against the spring above limp-home"}),
+      field<Path..., spring, &H::below, &Side::preload>(
+          {"preload_below", "-", share, "duty against the preload below limp-home"}),
+      field<Path..., spring, &H::below, &Side::per_deg>(
+          {"spring_below_per_deg", "1/degree", share, "duty against the spring below limp-home"}),
+  };
+}
+
+template <auto... Path>
+constexpr auto travel_fields() {
+  constexpr Domain angle = closed(-1e3, 1e3);
+  return std::array{
+      field<Path..., &Plate::closed_deg>({"closed_deg", "deg", angle, "lower end of the travel"}),
+      field<Path..., &Plate::open_deg>({"open_deg", "deg", angle, "upper end of the travel"}),
+  };
+}
+
+/// All of it, as a predictive controller takes it.
+template <auto... Path>
+constexpr auto plate_fields() {
+  return joined(motion_fields<Path...>(),
+                std::array{field<Path..., &Plate::electrical_s>(
+                    {"electrical_s", "s", closed(0.0, 1.0), "lag of the motor's torque"})},
+                spring_fields<Path...>(),
+                std::array{field<Path..., &Plate::friction>(
+                    {"friction", "-", closed(0.0, 0.5), "duty against dry friction, at the start"})},
+                travel_fields<Path...>());
+}
+inline constexpr auto plate_table = plate_fields();
+inline auto fields_of(const Plate&) {
+  return std::span(plate_table);
+}
+
+/// ParameterError naming field, value and bound.
+inline void require_travel(const Plate& plate) {
+  if (!(plate.closed_deg < plate.open_deg)) {
+    fail(ParameterError("open_deg", plate.open_deg, "must be > closed_deg = " + text(plate.closed_deg), "deg"));
+  }
+}
+inline void validate(const Plate& plate) {
+  require_fields(plate_table, plate);
+  require_travel(plate);
+}
 
 }  // namespace mgdd::control

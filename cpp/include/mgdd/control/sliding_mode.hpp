@@ -15,7 +15,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
-#include "mgdd/control/holding_duty.hpp"
+#include "mgdd/control/plate.hpp"
 
 namespace mgdd::control {
 
@@ -31,11 +31,8 @@ struct SlidingModeSettings {
   ReachingLaw reaching = ReachingLaw::implicit;
 
   // The model.
-  double gain_deg_per_s2 = 83597.0;  ///< acceleration per duty
-  double time_constant_s = 0.0197;   ///< of the speed
-  HoldingDuty spring{};              ///< at the measured angle
-  double friction = 0.076;           ///< [-] in the direction of the reference's rate
-  double friction_rate_deg_per_s = 17.2;
+  Plate plate{.friction = 0.076};         ///< springs at the measured angle, friction along the reference's rate
+  double friction_rate_deg_per_s = 17.2;  ///< at which the friction is full
 
   // The surface.
   double bandwidth_per_s = 136.0;
@@ -50,8 +47,7 @@ struct SlidingModeSettings {
   double root_per_root_deg_per_s = 0.015;  ///< [sqrt(s/deg)] super-twisting: duty per sqrt(|s|)
   double twist_per_s = 2.0;                ///< super-twisting: rate of the duty that removes the disturbance
 
-  double lower = -1.0;  ///< [-] of the duty
-  double upper = 1.0;
+  DutyRange duty{};
 
   bool operator==(const SlidingModeSettings&) const = default;
 };

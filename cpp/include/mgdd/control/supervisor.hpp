@@ -16,7 +16,7 @@
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/control/holding_duty.hpp"
+#include "mgdd/control/plate.hpp"
 #include "mgdd/dynamics/lag.hpp"
 
 namespace mgdd::control {
@@ -56,8 +56,8 @@ enum class ReturnTest {
 
 struct SupervisorSettings {
   double sample_s = 1e-3;
-  double closed_deg = 0.0, open_deg = 90.0;  ///< travel
-  double limited_open_deg = 40.0;            ///< its upper end while the supply is low
+  Plate plate{.friction = 0.098};  ///< friction at breakaway: P1 with the stiction of controller tests
+  double limited_open_deg = 40.0;  ///< upper end of the travel while the supply is low
 
   // Readings.
   double late_s = 3e-3;            ///< an older angle is not used
@@ -71,12 +71,8 @@ struct SupervisorSettings {
   double supply_lost_v = 6.0;  ///< opens
   double supply_s = 0.02;
 
-  // The plate; defaults: P1 with the stiction of controller tests.
-  HoldingDuty spring{};
-  double friction = 0.098;  ///< [-] at breakaway
-  double gain_deg_per_s2 = 83597.0;
-  double time_constant_s = 0.0197;
-  double uncertainty = 0.3;  ///< [-] share by which spring and friction may differ from these
+  // Of the plate.
+  double uncertainty = 0.3;  ///< [-] share by which springs and friction may differ from `plate`
   double load = 0.04;        ///< [-] of the air
 
   double jam_error_deg = 2.0;

@@ -21,7 +21,7 @@ enum class GammaModel { constant, linear, polynomial };
 enum class BurnShape { triangle, wiebe, double_wiebe };
 enum class WallHeatModel { woschni, hohenberg };
 enum class IgnitionModel { watson, wolfer, hardenberg_hase, polynomial };
-enum class Integrator { trapezoid, split, seed, euler };
+enum class Integrator { trapezoid, split, tan2018_lagged, euler };
 
 /// Defaults everywhere are the plausible light-duty diesel of the preset `puma_single`.
 template <class T>

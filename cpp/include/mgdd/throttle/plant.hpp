@@ -11,9 +11,9 @@
 #include "mgdd/common/units.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/dry_friction.hpp"
+#include "mgdd/dynamics/limp_home_spring.hpp"
 #include "mgdd/dynamics/play.hpp"
 #include "mgdd/math/select.hpp"
-#include "mgdd/throttle/limp_home_spring.hpp"
 #include "mgdd/throttle/plant_coefficients.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
@@ -213,7 +213,7 @@ auto BasicThrottlePlant<T, C>::load(const T& angle, const Input& in) const noexc
   const T zero(0.0);
   const C h = C(step_s_);
   const T x = angle - c_.limp_home;
-  const SpringLoad<T, C> spring = limp_home_spring(x, c_.above, c_.below, c_.inverse_ramp);
+  const dynamics::SpringLoad<T, C> spring = dynamics::limp_home_spring(x, c_.above, c_.below, c_.inverse_ramp);
   const T below_stop = larger(c_.closed - angle, zero);
   const T beyond_stop = larger(angle - c_.open, zero);
   Load l{};

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "mgdd/dynamics/dry_friction.hpp"
-#include "mgdd/throttle/limp_home_spring.hpp"
+#include "mgdd/dynamics/limp_home_spring.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
 namespace mgdd::throttle {
@@ -26,7 +26,7 @@ struct PlantCoefficients {
   C torque_constant, back_emf, resistance, inverse_impedance, inductance_over_h;
   C drop, dead_band;
   C limp_home;
-  SpringSide<C> above, below;
+  dynamics::SpringSide<C> above, below;
   C inverse_ramp;
   C closed, open, stop, stop_implicit;
   C half_gap, gear, gear_damping, gear_implicit;

@@ -13,6 +13,7 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
+#include "mgdd/control/plate.hpp"
 #include "mgdd/dynamics/dry_friction.hpp"
 
 namespace mgdd::throttle {
@@ -104,6 +105,9 @@ inline auto fields_of(const Throttle&) {
 /// ParameterError naming field, value and bound: domains, limp-home inside the travel, stiction >= Coulomb, a plate
 /// lighter than the whole.
 void validate(const Throttle& throttle);
+
+/// What a controller can know of it: groups of its parameters in duty, what duty and angle identify.
+control::Plate plate_of(const Throttle& throttle) noexcept;
 
 /// Coefficient C_T of that torque over the opening [-]: none closed or wide open, largest near 75 deg.
 double airflow_coefficient(double angle_deg) noexcept;

@@ -46,14 +46,9 @@ std::vector<std::string> BoundedSeekingSettings::advice() const {
 }
 
 BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
-    : settings_(checked(std::move(settings))),
-      filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
-      clamp_(settings_.space.size()),
-      protocol_(settings_.space.size()),
+    : SeekerCore(checked(std::move(settings)), [](const BoundedSeekingSettings& s) { return 2.0 * s.dither.period; }),
       first_(settings_.dither.amplitude.cwiseProduct(omega_of(settings_.dither)), bounded_unseen_bend, !settings_.kappa,
              settings_.curvature),
-      applied_(settings_.space.start),
-      estimate_(applied_),
       omega_(omega_of(settings_.dither)),
       metric_(InputMatrix::Identity(applied_.size(), applied_.size())),
       window_(static_cast<std::size_t>(settings_.dither.period * applied_.size()), 0.0) {
@@ -73,17 +68,16 @@ const Inputs& BoundedSeeking::ask() noexcept {
 }
 
 TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-  protocol_.count(status);
-  if (status != TellStatus::accepted) return status;
-  Inputs told;
-  const Inputs& applied = protocol_.applied(reading, applied_, told);
+  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+}
+
+void BoundedSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
   filter_.record(applied, reading.limits);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);
     applied_ = estimate_;
-    return status;
+    return;
   }
   clamp_.record(applied_, applied, applied_);
   const Eigen::Index n = applied_.size();
@@ -109,7 +103,6 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   const Inputs none = Inputs::Zero(n);
   step = filter_.project(applied_, step, {settings_.space, none, none, largest, largest, metric_});
   move_within(applied_, step, settings_.space, none, clamp_, largest);
-  return status;
 }
 
 // The oscillation and the window behind the mean move along.

@@ -70,15 +70,11 @@ std::vector<std::string> ExtremumSeekingSettings::advice() const {
 }
 
 ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
-    : settings_(checked(std::move(settings))),
+    : SeekerCore(checked(std::move(settings)),
+                 [](const ExtremumSeekingSettings& s) { return limit_memory_windows * s.dither.period; }),
       dither_(settings_.dither, settings_.components, false),
-      filter_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
-      clamp_(settings_.space.size()),
-      protocol_(settings_.space.size()),
       first_(settings_.dither.amplitude, dither_unseen_bend, settings_.gain.size() == 0, settings_.curvature,
              settings_.components),
-      estimate_(settings_.space.start),
-      applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       held_(settings_.hold_cycles.value_or(0)),
       mean_(component_count(), 0.0),
@@ -109,10 +105,7 @@ const Inputs& ExtremumSeeking::ask() noexcept {
 }
 
 TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-  protocol_.count(status);
-  if (status == TellStatus::accepted) learn(reading);
-  return status;
+  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
 }
 
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.
@@ -154,9 +147,7 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
 }
 
-void ExtremumSeeking::learn(const Reading& reading) noexcept {
-  Inputs told;
-  const Inputs& applied = protocol_.applied(reading, applied_, told);
+void ExtremumSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
   filter_.record(applied, reading.limits);
   if (first_.open()) {
     double j = filter_.shaping(applied, reading.limits);
@@ -242,9 +233,7 @@ void ExtremumSeeking::restart() noexcept {
   response_.setOnes();
   limited_cycles_ = 0;
   first_.restart();
-  filter_.forget();
-  clamp_.forget();
-  protocol_.failures.forget();
+  forget();
 }
 
 }  // namespace mgdd::optimize

@@ -46,12 +46,7 @@ GoldenSectionSettings checked(GoldenSectionSettings s) {
 }  // namespace
 
 GoldenSection::GoldenSection(GoldenSectionSettings settings)
-    : settings_(checked(std::move(settings))),
-      filter_(settings_.limits, 1, 20.0),
-      clamp_(1),
-      protocol_(1),
-      estimate_(settings_.space.start),
-      applied_(estimate_),
+    : SeekerCore(checked(std::move(settings)), [](const GoldenSectionSettings&) { return 20.0; }),
       lower_(settings_.space.lower[0]),
       upper_(settings_.space.upper[0]),
       width_(upper_ - lower_),
@@ -75,11 +70,10 @@ const Inputs& GoldenSection::ask() noexcept {
 }
 
 TellStatus GoldenSection::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-  protocol_.count(status);
-  if (status != TellStatus::accepted) return status;
-  Inputs told;
-  const Inputs& applied = protocol_.applied(reading, applied_, told);
+  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+}
+
+void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
@@ -90,7 +84,7 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
     turn_ = (turn_ + 1) % 3;
     if (turn_ == 0) clamp_.close_window();
     if (turn_ == 0 && settings_.noise_sd > 0.0) refine();
-    return status;
+    return;
   }
   Point& point = points_[static_cast<std::size_t>(turn_)];
   point.count += 1.0;
@@ -99,7 +93,6 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   judge(point, reading);
   next_turn();
   decide();
-  return status;
 }
 
 // Limits that come late say something of a point only after it was measured for as long as they take.
@@ -259,9 +252,7 @@ void GoldenSection::restart() noexcept {
   draws_ = 0;
   samples_ = 0;
   refining_ = false;
-  filter_.forget();
-  clamp_.forget();
-  protocol_.failures.forget();
+  forget();
 }
 
 // A bracket that still covers the range stays: what the range holds does not move.

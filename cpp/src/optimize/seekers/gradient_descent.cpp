@@ -40,14 +40,10 @@ std::vector<std::string> GradientDescentSettings::advice() const {
 }
 
 GradientDescent::GradientDescent(GradientDescentSettings settings)
-    : settings_(checked(std::move(settings))),
-      filter_(settings_.limits, settings_.space.size(), 8.0 * static_cast<double>(settings_.space.size())),
-      clamp_(settings_.space.size()),
-      protocol_(settings_.space.size()),
+    : SeekerCore(checked(std::move(settings)),
+                 [](const GradientDescentSettings& s) { return 8.0 * static_cast<double>(s.space.size()); }),
       first_(Inputs::Constant(settings_.space.size(), settings_.difference), descent_unseen_bend, !settings_.step_size,
              settings_.curvature),
-      estimate_(settings_.space.start),
-      applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       metric_(InputMatrix::Identity(estimate_.size(), estimate_.size())) {}
 
@@ -64,17 +60,16 @@ const Inputs& GradientDescent::ask() noexcept {
 }
 
 TellStatus GradientDescent::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-  protocol_.count(status);
-  if (status != TellStatus::accepted) return status;
-  Inputs told;
-  const Inputs& applied = protocol_.applied(reading, applied_, told);
+  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+}
+
+void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexcept {
   filter_.record(applied, reading.limits);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);
     if (filter_.alarmed()) move(Inputs::Zero(applied.size()));
-    return status;
+    return;
   }
   clamp_.record(applied_, applied, estimate_);
   const Eigen::Index input = stage_ / 2;
@@ -87,7 +82,7 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
     const bool moved = distance > least_difference * settings_.difference;
     gradient_[input] = moved ? (above_ - j) / distance : 0.0;
   }
-  if (++stage_ < 2 * estimate_.size()) return status;
+  if (++stage_ < 2 * estimate_.size()) return;
   stage_ = 0;
   clamp_.close_window();
   const double moved = move(step_size().value_or(0.0) * gradient_);
@@ -95,7 +90,6 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   if (converged_at_ < 0 && iteration_ <= settings_.iterations && moved < settings_.tolerance) {
     converged_at_ = iteration_;
   }
-  return status;
 }
 
 // Gives the largest entry of the step that the limits leave.
@@ -111,9 +105,7 @@ void GradientDescent::restart() noexcept {
   iteration_ = 0;
   converged_at_ = -1;
   first_.restart();
-  filter_.forget();
-  clamp_.forget();
-  protocol_.failures.forget();
+  forget();
 }
 
 }  // namespace mgdd::optimize

@@ -66,15 +66,10 @@ std::vector<std::string> NewtonSeekingSettings::advice() const {
 }
 
 NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
-    : settings_(checked(std::move(settings))),
+    : SeekerCore(checked(std::move(settings)), [](const NewtonSeekingSettings& s) { return 2.0 * s.dither.period; }),
       dither_(settings_.dither, settings_.components, true),
-      filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
-      clamp_(settings_.space.size()),
-      protocol_(settings_.space.size()),
       first_(settings_.dither.amplitude, newton_unseen_bend, settings_.initial_hessian.size() == 0, {},
              settings_.components),
-      estimate_(settings_.space.start),
-      applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       slow_(gradient_),
       hessian_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
@@ -96,10 +91,7 @@ const Inputs& NewtonSeeking::ask() noexcept {
 }
 
 TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-  protocol_.count(status);
-  if (status == TellStatus::accepted) learn(reading);
-  return status;
+  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
 }
 
 double NewtonSeeking::largest_inverse() const noexcept {
@@ -119,9 +111,7 @@ void NewtonSeeking::update_inverse() noexcept {
   if (factor.info() == Eigen::Success && next.norm() <= largest) inverse_ = next;
 }
 
-void NewtonSeeking::learn(const Reading& reading) noexcept {
-  Inputs told;
-  const Inputs& applied = protocol_.applied(reading, applied_, told);
+void NewtonSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
   filter_.record(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits));
@@ -189,9 +179,7 @@ void NewtonSeeking::restart() noexcept {
   limited_cycles_ = 0;
   slow_.setZero();
   first_.restart();
-  filter_.forget();
-  clamp_.forget();
-  protocol_.failures.forget();
+  forget();
 }
 
 }  // namespace mgdd::optimize

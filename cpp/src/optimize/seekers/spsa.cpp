@@ -78,17 +78,12 @@ std::vector<std::string> SpsaSettings::advice() const {
 }
 
 Spsa::Spsa(SpsaSettings settings)
-    : settings_(checked(std::move(settings))),
-      filter_(settings_.limits, settings_.space.size(), 2.0 * memory),
-      clamp_(settings_.space.size()),
+    : SeekerCore(checked(std::move(settings)), [](const SpsaSettings&) { return 2.0 * memory; }),
       trend_(settings_.space.size(), memory),
-      protocol_(settings_.space.size()),
       first_(Inputs::Constant(settings_.space.size(), settings_.perturbation), spsa_unseen_bend,
              settings_.form == SpsaForm::second_order ? !settings_.initial_hessian : !settings_.gain,
              settings_.curvature),
-      estimate_(settings_.space.start),
       candidate_(estimate_),
-      applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       sum_(gradient_),
       hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian.value_or(0.0)),
@@ -153,26 +148,25 @@ const Inputs& Spsa::ask() noexcept {
 }
 
 TellStatus Spsa::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-  protocol_.count(status);
-  if (status != TellStatus::accepted) return status;
-  Inputs told;
-  const Inputs& applied = protocol_.applied(reading, applied_, told);
+  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+}
+
+void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);
     if (!first_.open() && !settings_.initial_hessian) hessian_.diagonal() = -first_.bend();
-    return status;
+    return;
   }
   const int gradients_end = per_gradient() * settings_.averaging;
   if (stage_ < gradients_end) {
     around_j_ += j;
     watch(applied);
     finish_gradient(j, applied);
-    if (++stage_ < gradients_end) return status;
+    if (++stage_ < gradients_end) return;
     finish_iteration();
-    if (settings_.blocking) return status;
+    if (settings_.blocking) return;
     estimate_ = candidate_;
   } else {  // the extra measurement of blocking, at the candidate
     // Measured anew in every iteration, so that a plant that has changed cannot block for ever.
@@ -185,7 +179,6 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   stage_ = 0;
   around_j_ = 0.0;
   ++iteration_;
-  return status;
 }
 
 // A window of the watch: whole iterations, as many as have measured to both sides.
@@ -284,9 +277,7 @@ void Spsa::restart() noexcept {
   watched_ = 0;
   trend_.forget();
   first_.restart();
-  filter_.forget();
-  clamp_.forget();
-  protocol_.failures.forget();
+  forget();
 }
 
 void Spsa::shift_estimate(const Inputs& by) noexcept {

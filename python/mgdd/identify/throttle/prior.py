@@ -93,19 +93,18 @@ def _of_throttle(throttle: Throttle) -> Prior:
         result = simulate(throttle, duty, time_s=time, start_deg=start)
         return _columns({name: result[name].to_numpy() for name in ("angle_deg", "current_a")}, time.size)
 
-    stall = throttle.stall_torque_nm
-    per_deg = math.radians(1.0) / stall
+    plate = throttle.plate
     sliding = max(throttle.coulomb_nm, 0.0 if throttle.friction in ("coulomb", "tanh") else throttle.stiction_nm)
     return Prior(
         simulate=run,
         limp_home_deg=throttle.limp_home_deg,
         stops_deg=(throttle.closed_deg, throttle.open_deg),
         groups=DutyGroups(
-            preload_above=throttle.preload_above_nm / stall,
-            preload_below=throttle.preload_below_nm / stall,
-            spring_above_per_deg=throttle.spring_above_nm_per_rad * per_deg,
-            spring_below_per_deg=throttle.spring_below_nm_per_rad * per_deg,
-            coulomb=sliding / stall,
+            preload_above=plate.preload_above,
+            preload_below=plate.preload_below,
+            spring_above_per_deg=plate.spring_above_per_deg,
+            spring_below_per_deg=plate.spring_below_per_deg,
+            coulomb=sliding / throttle.stall_torque_nm,
         ),
     )
 

@@ -11,11 +11,9 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
-#include "mgdd/optimize/seekers/clamp_watch.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
@@ -41,7 +39,7 @@ inline auto fields_of(const BoundedSeekingSettings&) {
   };
 }
 
-class BoundedSeeking {
+class BoundedSeeking : public SeekerCore<BoundedSeekingSettings> {
  public:
   explicit BoundedSeeking(BoundedSeekingSettings settings);
 
@@ -50,23 +48,12 @@ class BoundedSeeking {
   /// New operating point: forget the limits; the estimate goes on.
   void restart() noexcept {
     first_.restart();
-    filter_.forget();
-    clamp_.forget();
-    protocol_.failures.forget();
+    forget();
   }
 
   /// Mean of the applied input over the last window; the start before there is one.
-  const Inputs& estimate() const noexcept { return estimate_; }
   /// Phase per unit of J in use; none while the first readings are taken.
   std::optional<double> kappa() const noexcept;
-  const BoundedSeekingSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
-  const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return 1; }
-  /// What has been learnt of the limits.
-  const ConstraintFilter& filter() const noexcept { return filter_; }
-  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
   void shift_estimate(const Inputs& by) noexcept;
@@ -80,23 +67,16 @@ class BoundedSeeking {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    Protocol::visit(self.protocol_, v);
-    v("applied", self.applied_);
-    v("estimate", self.estimate_);
+    SeekerCore::visit_core(self, v);
     v("seen", self.seen_);
     v("window", self.window_);
-    ConstraintFilter::visit(self.filter_, v);
-    ClampWatch::visit(self.clamp_, v);
     FirstReadings::visit(self.first_, v);
   }
 
  private:
-  BoundedSeekingSettings settings_;
-  ConstraintFilter filter_;
-  ClampWatch clamp_;
-  Protocol protocol_;
+  void learn(const Reading& reading, const Inputs& applied) noexcept;
   FirstReadings first_;
-  Inputs applied_, estimate_, omega_;
+  Inputs omega_;
   InputMatrix metric_;
   std::int64_t seen_ = 0;
   std::vector<double> window_;  // last M applied inputs

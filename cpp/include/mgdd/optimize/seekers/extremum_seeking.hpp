@@ -13,11 +13,9 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
-#include "mgdd/optimize/seekers/clamp_watch.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
@@ -68,7 +66,7 @@ inline auto fields_of(const ExtremumSeekingSettings&) {
   };
 }
 
-class ExtremumSeeking {
+class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
  public:
   /// Throws ParameterError or ShapeError naming the field.
   explicit ExtremumSeeking(ExtremumSeekingSettings settings);
@@ -80,20 +78,11 @@ class ExtremumSeeking {
   /// The operating point has changed: forget window and limits, keep the estimate, hold it again.
   void restart() noexcept;
 
-  const Inputs& estimate() const noexcept { return estimate_; }
   /// Last estimate of dJ/dtheta of the maximised objective.
   const Inputs& gradient() const noexcept { return gradient_; }
   double amplitude_share() const noexcept { return share_; }
   /// g_r in use; empty while the first readings are taken.
   Inputs gain() const noexcept;
-  const ExtremumSeekingSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
-  const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return settings_.components.size(); }
-  /// What has been learnt of the limits.
-  const ConstraintFilter& filter() const noexcept { return filter_; }
-  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
   void shift_estimate(const Inputs& by) noexcept {
@@ -109,9 +98,7 @@ class ExtremumSeeking {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    Protocol::visit(self.protocol_, v);
-    v("estimate", self.estimate_);
-    v("applied", self.applied_);
+    SeekerCore::visit_core(self, v);
     v("gradient", self.gradient_);
     v("phase", self.phase_, self.settings_.dither.period);
     v("seen", self.seen_);
@@ -125,25 +112,19 @@ class ExtremumSeeking {
     v("response", self.response_);
     v("origin", self.origin_);
     v("limited_cycles", self.limited_cycles_);
-    ConstraintFilter::visit(self.filter_, v);
-    ClampWatch::visit(self.clamp_, v);
     FirstReadings::visit(self.first_, v);
   }
 
  private:
-  void learn(const Reading& reading) noexcept;
+  void learn(const Reading& reading, const Inputs& applied) noexcept;
   bool remove_mean(const Reading& reading, const Inputs& applied) noexcept;
   void move(Inputs step, const Inputs& rate) noexcept;
   void end_of_window() noexcept;
   double sign() const noexcept { return settings_.maximize ? 1.0 : -1.0; }
 
-  ExtremumSeekingSettings settings_;
   Dither dither_;
-  ConstraintFilter filter_;
-  ClampWatch clamp_;
-  Protocol protocol_;
   FirstReadings first_;
-  Inputs estimate_, applied_, gradient_;
+  Inputs gradient_;
   std::int64_t phase_ = 0;      // of the window
   std::int64_t seen_ = 0;       // cycles since the last restart
   std::int64_t held_ = 0;       // cycles that the estimate is still held

@@ -9,9 +9,7 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
-#include "mgdd/optimize/seekers/clamp_watch.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
@@ -37,7 +35,7 @@ inline auto fields_of(const GoldenSectionSettings&) {
   };
 }
 
-class GoldenSection {
+class GoldenSection : public SeekerCore<GoldenSectionSettings> {
  public:
   explicit GoldenSection(GoldenSectionSettings settings);
 
@@ -46,18 +44,9 @@ class GoldenSection {
   /// New operating point: back to the whole bracket, the estimate stays until the next decision.
   void restart() noexcept;
 
-  const Inputs& estimate() const noexcept { return estimate_; }
   double lower() const noexcept { return lower_; }  ///< of the bracket
   double upper() const noexcept { return upper_; }
   bool converged() const noexcept { return refining_; }
-  const GoldenSectionSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
-  const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return 1; }
-  /// What has been learnt of the limits.
-  const ConstraintFilter& filter() const noexcept { return filter_; }
-  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
   void shift_estimate(const Inputs& by) noexcept;
@@ -67,9 +56,7 @@ class GoldenSection {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    Protocol::visit(self.protocol_, v);
-    v("estimate", self.estimate_);
-    v("applied", self.applied_);
+    SeekerCore::visit_core(self, v);
     v("lower", self.lower_);
     v("upper", self.upper_);
     v("width", self.width_);
@@ -89,11 +76,10 @@ class GoldenSection {
       v(name + "_judged", self.points_[p].judged);
       v(name + "_missed", self.points_[p].missed);
     }
-    ConstraintFilter::visit(self.filter_, v);
-    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
+  void learn(const Reading& reading, const Inputs& applied) noexcept;
   struct Point {
     // Sums: of J, of the worst scaled excess over the limits in `judged` cycles, of the applied input less the asked
     // one.
@@ -111,11 +97,6 @@ class GoldenSection {
   void refine() noexcept;
   void centre_bracket(double width) noexcept;
 
-  GoldenSectionSettings settings_;
-  ConstraintFilter filter_;
-  ClampWatch clamp_;
-  Protocol protocol_;
-  Inputs estimate_, applied_;
   double lower_, upper_;
   double width_;           // of the bracket when the refinement began
   std::int64_t turn_ = 0;  // which inner point, or which of a triple, is measured now

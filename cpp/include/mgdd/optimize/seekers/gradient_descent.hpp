@@ -10,10 +10,8 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
-#include "mgdd/optimize/seekers/clamp_watch.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
@@ -46,7 +44,7 @@ inline auto fields_of(const GradientDescentSettings&) {
   };
 }
 
-class GradientDescent {
+class GradientDescent : public SeekerCore<GradientDescentSettings> {
  public:
   explicit GradientDescent(GradientDescentSettings settings);
 
@@ -54,21 +52,12 @@ class GradientDescent {
   TellStatus tell(const Reading& reading) noexcept;
   void restart() noexcept;
 
-  const Inputs& estimate() const noexcept { return estimate_; }
   const Inputs& gradient() const noexcept { return gradient_; }
   std::int64_t iteration() const noexcept { return iteration_; }
   /// lambda_c in use; none while the first readings are taken.
   std::optional<double> step_size() const noexcept;
   /// The step at which the tolerance was met first, counting that step; -1 before, and after `iterations` without.
   std::int64_t converged_at() const noexcept { return converged_at_; }
-  const GradientDescentSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
-  const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return 1; }
-  /// What has been learnt of the limits.
-  const ConstraintFilter& filter() const noexcept { return filter_; }
-  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
   void shift_estimate(const Inputs& by) noexcept {
@@ -83,29 +72,22 @@ class GradientDescent {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    Protocol::visit(self.protocol_, v);
-    v("estimate", self.estimate_);
-    v("applied", self.applied_);
+    SeekerCore::visit_core(self, v);
     v("gradient", self.gradient_);
     v("above", self.above_);
     v("above_missed", self.above_missed_);
     v("stage", self.stage_, 2 * self.estimate_.size());
     v("iteration", self.iteration_);
     v("converged_at", self.converged_at_);
-    ConstraintFilter::visit(self.filter_, v);
-    ClampWatch::visit(self.clamp_, v);
     FirstReadings::visit(self.first_, v);
   }
 
  private:
+  void learn(const Reading& reading, const Inputs& applied) noexcept;
   double move(Inputs step) noexcept;
 
-  GradientDescentSettings settings_;
-  ConstraintFilter filter_;
-  ClampWatch clamp_;
-  Protocol protocol_;
   FirstReadings first_;
-  Inputs estimate_, applied_, gradient_;
+  Inputs gradient_;
   InputMatrix metric_;
   double above_ = 0.0;         // J at theta + c of the input at work
   double above_missed_ = 0.0;  // how far the plant fell short of theta + c

@@ -11,11 +11,9 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
-#include "mgdd/optimize/seekers/clamp_watch.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
@@ -57,7 +55,7 @@ inline auto fields_of(const NewtonSeekingSettings&) {
   };
 }
 
-class NewtonSeeking {
+class NewtonSeeking : public SeekerCore<NewtonSeekingSettings> {
  public:
   explicit NewtonSeeking(NewtonSeekingSettings settings);
 
@@ -66,18 +64,9 @@ class NewtonSeeking {
   /// New operating point: clear the window and the limits, keep estimate and Hessian, hold for one window.
   void restart() noexcept;
 
-  const Inputs& estimate() const noexcept { return estimate_; }
   const Inputs& gradient() const noexcept { return gradient_; }
   const InputMatrix& hessian() const noexcept { return hessian_; }
   const InputMatrix& inverse_hessian() const noexcept { return inverse_; }
-  const NewtonSeekingSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
-  const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return settings_.components.size(); }
-  /// What has been learnt of the limits.
-  const ConstraintFilter& filter() const noexcept { return filter_; }
-  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
   void shift_estimate(const Inputs& by) noexcept {
@@ -93,9 +82,7 @@ class NewtonSeeking {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    Protocol::visit(self.protocol_, v);
-    v("estimate", self.estimate_);
-    v("applied", self.applied_);
+    SeekerCore::visit_core(self, v);
     v("gradient", self.gradient_);
     v("slow", self.slow_);
     v("hessian", self.hessian_);
@@ -106,23 +93,17 @@ class NewtonSeeking {
     v("share", self.share_);
     v("limited_cycles", self.limited_cycles_);
     v("window", self.window_);
-    ConstraintFilter::visit(self.filter_, v);
-    ClampWatch::visit(self.clamp_, v);
     FirstReadings::visit(self.first_, v);
   }
 
  private:
-  void learn(const Reading& reading) noexcept;
+  void learn(const Reading& reading, const Inputs& applied) noexcept;
   void update_inverse() noexcept;
   double largest_inverse() const noexcept;
 
-  NewtonSeekingSettings settings_;
   Dither dither_;
-  ConstraintFilter filter_;
-  ClampWatch clamp_;
-  Protocol protocol_;
   FirstReadings first_;
-  Inputs estimate_, applied_, gradient_;
+  Inputs gradient_;
   Inputs slow_;  // mean of the slope over about a window: what steps along a limit
   InputMatrix hessian_, inverse_;
   std::int64_t phase_ = 0, seen_ = 0, held_ = 0;

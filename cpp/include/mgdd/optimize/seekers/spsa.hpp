@@ -13,11 +13,9 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
-#include "mgdd/optimize/seekers/clamp_watch.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
@@ -77,7 +75,7 @@ inline auto fields_of(const SpsaSettings&) {
   };
 }
 
-class Spsa {
+class Spsa : public SeekerCore<SpsaSettings> {
  public:
   explicit Spsa(SpsaSettings settings);
 
@@ -89,7 +87,6 @@ class Spsa {
   /// Other random numbers from now on; a run of many seeds starts each from the same settings.
   void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
 
-  const Inputs& estimate() const noexcept { return estimate_; }
   const Inputs& gradient() const noexcept { return gradient_; }
   const InputMatrix& hessian() const noexcept { return hessian_; }
   std::int64_t iteration() const noexcept { return iteration_; }
@@ -97,14 +94,6 @@ class Spsa {
   std::optional<double> gain() const noexcept;
   std::int64_t blocked() const noexcept { return blocked_; }
   int measurements_per_iteration() const noexcept;
-  const SpsaSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
-  const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return 1; }
-  /// What has been learnt of the limits.
-  const ConstraintFilter& filter() const noexcept { return filter_; }
-  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
   void shift_estimate(const Inputs& by) noexcept;
@@ -119,10 +108,8 @@ class Spsa {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    Protocol::visit(self.protocol_, v);
-    v("estimate", self.estimate_);
+    SeekerCore::visit_core(self, v);
     v("candidate", self.candidate_);
-    v("applied", self.applied_);
     v("gradient", self.gradient_);
     v("sum", self.sum_);
     v("hessian", self.hessian_);
@@ -137,12 +124,11 @@ class Spsa {
     v("share", self.share_);
     v("around_j", self.around_j_);
     LocalModel::visit(self.trend_, v, "trend");
-    ConstraintFilter::visit(self.filter_, v);
-    ClampWatch::visit(self.clamp_, v);
     FirstReadings::visit(self.first_, v);
   }
 
  private:
+  void learn(const Reading& reading, const Inputs& applied) noexcept;
   double gain_now() const noexcept;
   double perturbation_now() const noexcept;
   int per_gradient() const noexcept;
@@ -153,13 +139,9 @@ class Spsa {
   void finish_iteration() noexcept;
   InputMatrix bent_down() noexcept;
 
-  SpsaSettings settings_;
-  ConstraintFilter filter_;
-  ClampWatch clamp_;
   LocalModel trend_;
-  Protocol protocol_;
   FirstReadings first_;
-  Inputs estimate_, candidate_, applied_, gradient_, sum_;
+  Inputs candidate_, gradient_, sum_;
   InputMatrix hessian_, hessian_sum_;
   InputMatrix metric_;            // inverse of the bend, or one
   InputMatrix missed_;            // applied less asked, per input and measurement of the gradient at work

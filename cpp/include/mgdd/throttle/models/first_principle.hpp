@@ -18,7 +18,7 @@
 
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/dry_friction.hpp"
-#include "mgdd/throttle/limp_home_spring.hpp"
+#include "mgdd/dynamics/limp_home_spring.hpp"
 #include "mgdd/throttle/models/pseudo_wiener_frame.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
@@ -160,7 +160,7 @@ class FirstPrincipleModel {
     const C half = C(0.5 * h_);
     for (int k = 0; k < options_.substeps; ++k) {
       const T middle = s.angle_deg + half * s.speed_deg_per_s;
-      const SpringLoad<T, C> spring = spring_at(middle);
+      const dynamics::SpringLoad<T, C> spring = spring_at(middle);
       const T driven = c_.kept_mean * s.torque + (C(1.0) - c_.kept_mean) * acting;
       const T push = c_.over * s.speed_deg_per_s + c_.slip * (driven - spring.preload - spring.elastic);
       const T next = yields_ ? stopped(s, middle, push) : rubbed(s, push, C(1.0));
@@ -209,7 +209,7 @@ class FirstPrincipleModel {
   }
   /// Held duty at which the plate would begin to move from the angle of a state, were it at rest there.
   dynamics::Breakaway<T> breakaway(const State& s) const noexcept {
-    const SpringLoad<T, C> spring = spring_at(s.angle_deg);
+    const dynamics::SpringLoad<T, C> spring = spring_at(s.angle_deg);
     const T balance = s.bias_duty + spring.preload + spring.elastic;
     const C level = options_.friction == Friction::tanh ? C(0.0) : c_.breakaway;
     return {balance - level, balance + level};
@@ -272,9 +272,9 @@ class FirstPrincipleModel {
     const T divisor = select(touches, T(C(1.0) + c_.stop_damping + c_.stop_implicit), T(1.0));
     return rubbed(s, T(push - select(touches, back, T(0.0))), divisor);
   }
-  MGDD_INLINE SpringLoad<T, C> spring_at(const T& motor_deg) const noexcept {
+  MGDD_INLINE dynamics::SpringLoad<T, C> spring_at(const T& motor_deg) const noexcept {
     const T x = motor_deg - c_.limp_home;
-    return limp_home_spring(gapes_ ? carried(x) : x, c_.above, c_.below, c_.over_ramp);
+    return dynamics::limp_home_spring(gapes_ ? carried(x) : x, c_.above, c_.below, c_.over_ramp);
   }
 
   MGDD_INLINE T delayed(DutyLine<T>& line, const T& duty) const noexcept {
@@ -317,7 +317,7 @@ class FirstPrincipleModel {
     C drop, over_stribeck;
     C breakaway;
     C over_ramp, over_tanh;
-    SpringSide<C> above, below;
+    dynamics::SpringSide<C> above, below;
     C half_gap;
     C closed, open;
     C braking;  // torque per speed

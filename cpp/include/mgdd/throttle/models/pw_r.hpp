@@ -11,7 +11,7 @@
 #include <type_traits>
 
 #include "mgdd/dynamics/dry_friction.hpp"
-#include "mgdd/throttle/limp_home_spring.hpp"
+#include "mgdd/dynamics/limp_home_spring.hpp"
 #include "mgdd/throttle/models/pseudo_wiener_frame.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
@@ -99,7 +99,7 @@ PwR pw_r_of(const Throttle& throttle) noexcept;
 /// What a step needs of one side.
 template <class C>
 struct PreparedSide {
-  SpringSide<C> spring;
+  dynamics::SpringSide<C> spring;
   C decay;      ///< 1 + h/tau
   C step_gain;  ///< h G
   C friction;   ///< h G delta
@@ -182,7 +182,7 @@ class BasicPwRModel {
   /// Held duty at which the plate would begin to move from the position of a state, were it at rest there.
   dynamics::Breakaway<T> breakaway(const State& s) const noexcept {
     const auto up = side_of(s);
-    const SpringLoad<T, C> load = spring(s, up);
+    const dynamics::SpringLoad<T, C> load = spring(s, up);
     const T balance = s.bias_duty + load.preload + load.elastic;
     const T level =
         T(p_.friction == Friction::tanh ? C(0.0) : select(up, p_.above.coulomb_duty, p_.below.coulomb_duty));
@@ -229,12 +229,13 @@ class BasicPwRModel {
     return p_.switching == Switching::predicted ? s.position_deg >= T(0.0) : s.above >= T(0.0);
   }
   template <class Mask>
-  MGDD_INLINE SpringLoad<T, C> spring(const State& s, const Mask& up) const noexcept {
+  MGDD_INLINE dynamics::SpringLoad<T, C> spring(const State& s, const Mask& up) const noexcept {
     if (p_.switching == Switching::predicted) {
-      return limp_home_spring(s.position_deg, above_.spring, below_.spring, C(over_ramp_));
+      return dynamics::limp_home_spring(s.position_deg, above_.spring, below_.spring, C(over_ramp_));
     }
-    return spring_of_side(s.position_deg, s.above, select(up, above_.spring.stiffness, below_.spring.stiffness),
-                          select(up, above_.spring.preload, below_.spring.preload), C(0.0));
+    return dynamics::spring_of_side(s.position_deg, s.above,
+                                    select(up, above_.spring.stiffness, below_.spring.stiffness),
+                                    select(up, above_.spring.preload, below_.spring.preload), C(0.0));
   }
   /// One proximal step with the duty that acts now.
   MGDD_INLINE void advance(State& s, const T& acting_duty) const noexcept {
@@ -247,7 +248,7 @@ class BasicPwRModel {
     const C gain = select(up, above_.step_gain, below_.step_gain);
     const C friction = select(up, above_.friction, below_.friction);
     const T ratio = x * T(over_ramp_);
-    const T clipped = linear_share(ratio);
+    const T clipped = dynamics::linear_share(ratio);
     const T share = follows ? clipped : s.above;
     const C slope = follows ? select(clipped == ratio, preload * C(over_ramp_), C(0.0)) : C(0.0);
     const C divisor = select(up, above_.decay, below_.decay) + C(h_) * gain * (stiffness + slope);

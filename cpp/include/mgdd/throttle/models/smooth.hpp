@@ -9,8 +9,8 @@
 #include <numbers>
 #include <string_view>
 
+#include "mgdd/dynamics/limp_home_spring.hpp"
 #include "mgdd/dynamics/rk4.hpp"
-#include "mgdd/throttle/limp_home_spring.hpp"
 
 namespace mgdd::throttle {
 
@@ -78,7 +78,7 @@ struct SmoothPlant {
   template <class T, class C>
   MGDD_INLINE static T acceleration(const SmoothCoefficients<C>& c, const T& speed, const T& current,
                                     const SmoothRatios<T>& r) noexcept {
-    const SmoothSpring<T> spring = smooth_spring(r.deflection, r.preload, c.spring, c.preload);
+    const dynamics::SmoothSpring<T> spring = dynamics::smooth_spring(r.deflection, r.preload, c.spring, c.preload);
     return ((c.torque * current - c.viscous * speed) - spring.elastic) - (c.coulomb * r.friction + spring.preload);
   }
   template <class T, class C, class D>

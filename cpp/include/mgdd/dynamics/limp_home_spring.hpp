@@ -5,7 +5,7 @@
 
 #include "mgdd/math/select.hpp"
 
-namespace mgdd::throttle {
+namespace mgdd::dynamics {
 
 template <class C>
 struct SpringSide {
@@ -57,4 +57,4 @@ MGDD_INLINE SmoothSpring<T> smooth_spring(const T& x, const T& tanh_ratio, const
   return {stiffness * x, preload * tanh_ratio};
 }
 
-}  // namespace mgdd::throttle
+}  // namespace mgdd::dynamics

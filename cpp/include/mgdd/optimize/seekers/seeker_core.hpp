@@ -1,0 +1,72 @@
+// What the seekers hold alike, and how each answers for it: settings, estimate, the input of the last ask, the count of
+// asks and tells, limits, and where the plant is clamped. `take` is noexcept and allocation-free.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+template <class S>
+class SeekerCore {
+ public:
+  const S& settings() const noexcept { return settings_; }
+  const Inputs& estimate() const noexcept { return estimate_; }
+  /// The input of the last ask; what the plant made of it stands in the reading.
+  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept {
+    if constexpr (requires(const S& s) { s.components; }) return settings_.components.size();
+    return 1;
+  }
+  /// What has been learnt of the limits.
+  const ConstraintFilter& filter() const noexcept { return filter_; }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+ protected:
+  /// `memory` gives how many measurements stand behind what is learnt of the limits.
+  SeekerCore(S checked, double (*memory)(const S&))
+      : settings_(std::move(checked)),
+        filter_(settings_.limits, settings_.space.size(), memory(settings_)),
+        clamp_(settings_.space.size()),
+        protocol_(settings_.space.size()),
+        estimate_(settings_.space.start),
+        applied_(estimate_) {}
+
+  /// Counts a reading; of an accepted one `learn(the input that the plant applied)`.
+  template <class Learn>
+  TellStatus take(const Reading& reading, Learn&& learn) noexcept {
+    const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
+    protocol_.count(status);
+    if (status != TellStatus::accepted) return status;
+    Inputs told;
+    learn(protocol_.applied(reading, applied_, told));
+    return status;
+  }
+  /// What a new operating point makes void.
+  void forget() noexcept {
+    filter_.forget();
+    clamp_.forget();
+    protocol_.failures.forget();
+  }
+  template <class Self, class V>
+  static void visit_core(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("applied", self.applied_);
+    ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
+  }
+
+  S settings_;
+  ConstraintFilter filter_;
+  ClampWatch clamp_;
+  Protocol protocol_;
+  Inputs estimate_, applied_;
+};
+
+}  // namespace mgdd::optimize
