@@ -18,27 +18,7 @@ _GREETINGS = 5
 
 
 def connected(interface: str, channel: str | int, options: Mapping[str, Any], name: str) -> Any:
-    """Open a bus of python-can.
-
-    Parameters
-    ----------
-    interface, channel : str or int
-        As `mgdd.rig.CanTransport` takes them.
-    options : mapping
-        Further keywords of the interface.
-    name : str
-        What messages call it.
-
-    Returns
-    -------
-    can.BusABC
-        Open.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        No such interface or channel, nobody listens there, a kernel without CAN; the message says what to do.
-    """
+    """Open a bus of python-can, which messages call `name`; RigError says what is wrong and what to do."""
     can: Any = import_extra("can", "can", "a CAN bus")
     options = dict(options)
     if interface == "socketcand":

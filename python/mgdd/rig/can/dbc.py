@@ -32,33 +32,15 @@ _PARTS_BYTES = 1785  # of a message in several frames, SAE J1939-21
 
 @dataclass(frozen=True, kw_only=True)
 class DbcSignal:
-    """A signal: its bits, its unit, and the names of its raw values.
-
-    Parameters
-    ----------
-    name : str
-        As in the DBC.
-    layout : SignalLayout
-        Bits, scale and bounds.
-    unit : str
-        As in the DBC, ``"-"`` if empty.
-    choices : mapping of str to int
-        Raw value by its name in the value table.
-    missing_raw : int, optional
-        Raw value that means that the value is missing.
-    branches : tuple of int
-        Values of the multiplexer that select it; empty: always there.
-    multiplexer : bool
-        Whether it selects others.
-    """
+    """A signal: its bits, its unit, and the names of its raw values."""
 
     name: str
     layout: SignalLayout
-    unit: str
-    choices: Mapping[str, int] = field(default_factory=dict)
-    missing_raw: int | None = None
-    branches: tuple[int, ...] = ()
-    multiplexer: bool = False
+    unit: str  # "-" if it has none
+    choices: Mapping[str, int] = field(default_factory=dict)  # raw value by its name in the value table
+    missing_raw: int | None = None  # raw value that means that the value is missing
+    branches: tuple[int, ...] = ()  # values of the multiplexer that select it; none: always there
+    multiplexer: bool = False  # whether it selects others
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -82,30 +64,14 @@ class DbcSignal:
 
 @dataclass(frozen=True, kw_only=True)
 class DbcMessage:
-    """A message: identifier, bytes, time between two frames, signals.
-
-    Parameters
-    ----------
-    name : str
-        As in the DBC.
-    frame_id : int
-        Identifier.
-    extended : bool
-        Of 29 bits.
-    size : int
-        Bytes.
-    cycle_s : float or None
-        Time between two frames [s]; None where it is sent on events.
-    signals : mapping of str to DbcSignal
-        By name; without those longer than 64 bits, and none of a message in several frames.
-    """
+    """A message: identifier, bytes, time between two frames, signals."""
 
     name: str
     frame_id: int
     extended: bool
     size: int
-    cycle_s: float | None
-    signals: Mapping[str, DbcSignal]
+    cycle_s: float | None  # None where it is sent on events
+    signals: Mapping[str, DbcSignal]  # without those beyond 64 bits, none of a message in several frames
 
     @property
     def multiplexer(self) -> DbcSignal | None:
@@ -115,17 +81,7 @@ class DbcMessage:
 
 @dataclass(frozen=True, kw_only=True)
 class DbcFile:
-    """A database of messages.
-
-    Parameters
-    ----------
-    file : pathlib.Path
-        Where it was read.
-    sha256 : str
-        Of its bytes.
-    messages : mapping of str to DbcMessage
-        By name.
-    """
+    """A database of messages."""
 
     file: Path
     sha256: str
@@ -133,15 +89,7 @@ class DbcFile:
 
     @classmethod
     def read(cls, path: Path) -> DbcFile:
-        """Read a file strictly.
-
-        Raises
-        ------
-        FileNotFoundError
-            No such file.
-        mgdd.errors.DataError
-            Not a DBC, overlapping signals, signals beyond their message, or a message beyond 1785 bytes.
-        """
+        """Read a file strictly; DataError where it is not a DBC, or its signals overlap or leave their message."""
         cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
         content = file.read_bytes()

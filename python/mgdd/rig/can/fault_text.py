@@ -11,33 +11,7 @@ __all__ = ["fault_of"]
 
 
 def fault_of(text: str, keys: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
-    """Read ``KIND:KEY=VALUE,...``.
-
-    Parameters
-    ----------
-    text : str
-        For example ``drop:p=0.01,id=0x121``.
-    keys : mapping of str to type
-        Keys that may stand there: int or float.
-
-    Returns
-    -------
-    kind : str
-        As it stands; the caller knows the kinds.
-    given : dict
-        The values by key.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        An unknown key, or a value that is not a number.
-
-    Examples
-    --------
-    >>> from mgdd.rig.can.fault_text import fault_of
-    >>> fault_of("drop:p=0.01,id=0x121", {"p": float, "id": int})
-    ('drop', {'p': 0.01, 'id': 289})
-    """
+    """Read ``KIND:KEY=VALUE,...``, as ``drop:p=0.01,id=0x121``: kind, for the caller to check, and values by key."""
     kind, _, rest = text.partition(":")
     given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):

@@ -17,25 +17,12 @@ _JUMPS = 3  # so many show another sender
 
 
 class Inbox:
-    """Checked frames, gathered until the trigger message ends their cycle.
-
-    Parameters
-    ----------
-    signal_map : SignalMap
-        Messages and names.
-
-    Attributes
-    ----------
-    skipped : int
-        Whole cycles that nobody read before the next command.
-    state : str
-        State that the node reported last; empty where it reports none.
-    """
+    """Checked frames, gathered until the trigger message ends their cycle."""
 
     def __init__(self, signal_map: SignalMap) -> None:
         self.map = signal_map
-        self.skipped = 0
-        self.state = ""
+        self.skipped = 0  # whole cycles that nobody read before the next command
+        self.state = ""  # that the node reported last
         self._receiver = Receiver(signal_map.measurements)
         self._cycles = 0
         self._whole: deque[tuple[int, Measurement]] = deque()  # with the arrival of its trigger [ns]
@@ -66,13 +53,7 @@ class Inbox:
         return self._receiver.counts
 
     def take(self, frame: Frame) -> None:
-        """Take a frame.
-
-        Parameters
-        ----------
-        frame : Frame
-            As it arrived.
-        """
+        """Take a frame."""
         taken = self._receiver.take(frame)
         if taken is None or not taken.usable:
             return
@@ -90,15 +71,7 @@ class Inbox:
         return bool(self._whole)
 
     def read(self) -> tuple[int, Measurement]:
-        """Give the oldest whole cycle that nobody has read.
-
-        Returns
-        -------
-        int
-            When it arrived, monotonic [ns].
-        mgdd.loop.Measurement
-            NaN for what never came, or longer ago than the time limit of its message.
-        """
+        """Give the oldest whole cycle that nobody has read, and when it arrived [ns]."""
         return self._whole.popleft()
 
     def skip(self) -> None:

@@ -12,21 +12,11 @@ __all__ = ["Receiver", "Sender", "Taken"]
 
 
 class Taken(NamedTuple):
-    """A frame that was checked.
-
-    Parameters
-    ----------
-    message : MappedMessage
-        Whose frame it is.
-    status : str
-        As `mgdd.rig.E2eCheck.push` says it; of an unprotected one ``ok`` or ``wrong_length``.
-    usable : bool
-        Whether its content may be used.
-    """
+    """A frame that was checked."""
 
     message: MappedMessage
-    status: str
-    usable: bool
+    status: str  # as `mgdd.rig.E2eCheck.push` says it; of an unprotected one ``ok`` or ``wrong_length``
+    usable: bool  # whether its content may be used
 
     @property
     def is_new(self) -> bool:
@@ -41,20 +31,7 @@ class Sender:
         self._counters: dict[str, int] = {}
 
     def frames(self, message: MappedMessage, payloads: Iterable[bytes]) -> list[Frame]:
-        """Make frames of payloads.
-
-        Parameters
-        ----------
-        message : MappedMessage
-            Whose identifier and protection they get.
-        payloads : iterable of bytes
-            Of the length of the message.
-
-        Returns
-        -------
-        list of Frame
-            In the same order.
-        """
+        """Make frames of payloads, in the same order."""
         out = []
         for payload in payloads:
             whole = payload
@@ -68,41 +45,17 @@ class Sender:
 
 
 class Receiver:
-    """Checks the frames of some messages; what does not belong to them is counted as foreign.
-
-    Parameters
-    ----------
-    messages : mapping of str to MappedMessage
-        What may come.
-
-    Attributes
-    ----------
-    stamps_ns : dict of str to int
-        Our stamp of the last usable frame of each message.
-    seen : dict of int to int
-        Frames by identifier, foreign ones too.
-    """
+    """Checks the frames of some messages; what does not belong to them is counted as foreign."""
 
     def __init__(self, messages: Mapping[str, MappedMessage]) -> None:
         self._by_key = {message.key: message for message in messages.values()}
         self._checks = {name: E2eCheck(m.e2e) for name, m in messages.items() if m.e2e is not None}
         self._short: dict[str, int] = {}
-        self.stamps_ns: dict[str, int] = {}
-        self.seen: dict[int, int] = {}
+        self.stamps_ns: dict[str, int] = {}  # of the last usable frame of each message
+        self.seen: dict[int, int] = {}  # frames by identifier, foreign ones too
 
     def take(self, frame: Frame) -> Taken | None:
-        """Check a frame.
-
-        Parameters
-        ----------
-        frame : Frame
-            As it arrived.
-
-        Returns
-        -------
-        Taken or None
-            Its message and what the check says; None for a foreign frame.
-        """
+        """Check a frame; None for a foreign one."""
         self.seen[frame.id] = self.seen.get(frame.id, 0) + 1
         message = self._by_key.get((frame.id, frame.extended))
         if message is None:

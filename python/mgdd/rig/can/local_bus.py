@@ -19,13 +19,6 @@ class LocalBus:
     """A plant behind a node in this process: every command frame brings one sample.
 
     The same checks, roundings and limits as over a real bus, faster than real time and always with the same bits.
-
-    Parameters
-    ----------
-    plant : mgdd.loop.Plant
-        What the node drives; a throttle must have ``bridge_open`` among its inputs.
-    signal_map : SignalMap
-        Messages of the node.
     """
 
     def __init__(self, plant: Plant, signal_map: SignalMap) -> None:

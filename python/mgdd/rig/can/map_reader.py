@@ -27,13 +27,7 @@ _TIMEOUT_CYCLES = 3
 
 
 class MapReader:
-    """Reads the messages of a mapping file; remembers which names and signals are taken.
-
-    Parameters
-    ----------
-    dbc : DbcFile
-        What the signals are looked up in.
-    """
+    """Reads the messages of a mapping file; remembers which names and signals are taken."""
 
     def __init__(self, *, dbc: DbcFile) -> None:
         self.dbc = dbc

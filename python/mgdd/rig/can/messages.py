@@ -26,27 +26,7 @@ def largest_identifier(*, extended: bool) -> int:
 
 
 def message_of(frame: Frame, *, timestamp_s: float = 0.0) -> can.Message:
-    """Return a frame as python-can has it.
-
-    Parameters
-    ----------
-    frame : mgdd.rig.Frame
-        Any frame.
-    timestamp_s : float
-        Stamp of the message [s]; in files since 1970.
-
-    Returns
-    -------
-    can.Message
-        With the same content. A remote frame keeps its length.
-
-    Examples
-    --------
-    >>> from mgdd.rig import Frame
-    >>> from mgdd.rig.can.messages import message_of
-    >>> message_of(Frame(id=0x120, data=bytes(2), received=True)).dlc
-    2
-    """
+    """Return a frame as python-can has it, with a stamp [s]; a remote frame keeps its length."""
     library: Any = import_extra("can", "can", "a CAN message")
     message: can.Message = library.Message(
         timestamp=timestamp_s,
@@ -65,36 +45,7 @@ def message_of(frame: Frame, *, timestamp_s: float = 0.0) -> can.Message:
 
 
 def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, received: bool | None = None) -> Frame:
-    """Return a message of python-can as a frame of the core.
-
-    Parameters
-    ----------
-    message : can.Message
-        As received, or as sent.
-    monotonic_ns : int
-        ``time.monotonic_ns()`` when it was received or handed to the bus [ns].
-    channel : int
-        Number of the bus, 0 to 255.
-    received : bool, optional
-        Whether it came from the bus; default what the message says.
-
-    Returns
-    -------
-    mgdd.rig.Frame
-        With the stamp of the message as ``bus_ns``.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        Not a frame: an identifier of too many bits, too many bytes, a stamp that is not a time.
-
-    Examples
-    --------
-    >>> import can
-    >>> from mgdd.rig.can.messages import frame_of
-    >>> frame_of(can.Message(arbitration_id=0x121, is_extended_id=False, data=[1, 2]), monotonic_ns=5).data.hex()
-    '0102'
-    """
+    """Return a message of python-can as a frame of the core, with our stamp; DataError where it is none."""
     largest = largest_identifier(extended=message.is_extended_id or message.is_error_frame)
     size = message.dlc if message.is_remote_frame else len(message.data)
     stamp_s = message.timestamp
@@ -119,17 +70,7 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
 
 
 class Echoes:
-    """Our own frames on a bus that hears itself and does not say so: each one that was sent comes back once at most.
-
-    Examples
-    --------
-    >>> import can
-    >>> from mgdd.rig.can.messages import Echoes
-    >>> echoes, message = Echoes(), can.Message(arbitration_id=0x120, data=[1])
-    >>> echoes.add(message)
-    >>> echoes.take(message), echoes.take(message)
-    (True, False)
-    """
+    """Our own frames on a bus that hears itself and does not say so: each one that was sent comes back once at most."""
 
     def __init__(self) -> None:
         self._sent: deque[tuple[float, tuple[Any, ...]]] = deque()  # appended and taken by one thread each

@@ -24,12 +24,6 @@ class RigMode(StrEnum):
     that leaves this machine it has to be armed as ``bench``.
     ``dry_run``: a real bus, of which everything is received and to which nothing is sent. ``replay``: recorded frames
     through the same checks. ``bench``: real hardware, which has to be armed.
-
-    Examples
-    --------
-    >>> from mgdd.rig.can.modes import RigMode
-    >>> RigMode("hil"), [mode.value for mode in RigMode]
-    (<RigMode.HIL: 'hil'>, ['simulate', 'hil', 'dry_run', 'replay', 'bench'])
     """
 
     SIMULATE = "simulate"
@@ -60,13 +54,7 @@ def may_be_real(mode: RigMode, bus: Bus) -> bool:
 def require_key(
     signal_map: SignalMap, bus: str, mode: RigMode, *, arm: bool, key_file: str | os.PathLike[str] | None
 ) -> None:
-    """Refuse to drive what may be real without a person who wants it.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        Not armed, no key, another key, or a person who did not confirm.
-    """
+    """Refuse with a RigError to drive what may be real without a person who wants it."""
     if arm is not True:
         how = f"{argument('arm', 'True')}, and a {argument('key_file')} or a confirmation"
         why = "drives real hardware" if mode is RigMode.BENCH else f"on {bus}, which leaves this machine, may, too"
@@ -91,13 +79,7 @@ def require_key(
 
 
 def bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
-    """Return the bus of a mode.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A bus or plant that does not go with the mode.
-    """
+    """Return the bus of a mode; ParameterError for a bus or plant that does not go with it."""
     if mode is RigMode.SIMULATE:
         if bus is not None:
             raise ParameterError.of(

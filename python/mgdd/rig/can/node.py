@@ -27,13 +27,7 @@ _FAULT_KEYS = {"from_s": float, "until_s": float, "size": float, "sensor": int}
 
 
 class TruthLog:
-    """What really happened, a line per sample: time, mode and reason of the gate, and all that the plant knows.
-
-    Parameters
-    ----------
-    file : path-like
-        CSV file, written line by line, so that a killed process loses none.
-    """
+    """What really happened: the gate and all that the plant knows, line by line, and a killed process loses none."""
 
     def __init__(self, file: str | os.PathLike[str]) -> None:
         self._file: IO[str] = Path(file).open("w", encoding="utf-8", newline="", buffering=1)  # noqa: SIM115 close()
@@ -41,15 +35,7 @@ class TruthLog:
         self._names: list[str] = []
 
     def write(self, core: NodeCore, now_ns: int) -> None:
-        """Write the last sample of a node.
-
-        Parameters
-        ----------
-        core : NodeCore
-            After its sample.
-        now_ns : int
-            Monotonic time [ns].
-        """
+        """Write the last sample of a node."""
         if core.last is None:
             return
         values = dict(core.last.values)
@@ -84,30 +70,7 @@ def node_of(
     seed: int = 0,
     sample_s: float | None = None,
 ) -> NodePlant:
-    """Make the virtual plant that belongs to the inputs of a map.
-
-    Parameters
-    ----------
-    signal_map : SignalMap
-        With the input ``duty`` it is a throttle, with ``soc_cad`` an engine bench.
-    faults : sequence of str
-        Of a throttle, as ``KIND:KEY=VALUE,...`` with the kinds of `mgdd.loop.ThrottleFault` and
-        `mgdd.throttle.SensorFault` and their keys.
-    seed : int
-        Of its noise.
-    sample_s : float, optional
-        Time between two samples of a throttle [s]; the cycle of the trigger message if left out.
-
-    Returns
-    -------
-    NodePlant
-        Throttle or engine.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Inputs of no virtual plant, or a fault that is not known.
-    """
+    """Make the virtual plant of the inputs of a map, a throttle for ``duty``, an engine for ``soc_cad``."""
     names = signal_map.input_names
     if "duty" in names:
         known = [_plant_fault(text) for text in faults]
@@ -137,27 +100,10 @@ def run_node(
     log: TruthLog | None = None,
     keep_on: Callable[[], bool] = lambda: True,
 ) -> None:
-    """Serve a bus until `keep_on` says no.
+    """Serve an open bus until `keep_on`, asked once per sample and every 0.1 s of waiting, says no.
 
-    Parameters
-    ----------
-    core : NodeCore
-        The node.
-    bus : Bus
-        Open.
-    step : bool
-        Every complete command brings one sample, and time stands still between; else the node has its own clock.
-    period_s : float, optional
-        Time between two samples [s]; the cycle of the trigger message if left out.
-    log : TruthLog, optional
-        Where every sample is written.
-    keep_on : callable
-        Asked once per sample, and every 0.1 s of waiting.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        A fault of the bus.
+    With `step` every complete command brings one sample, and time stands still between; else the node has its own
+    clock.
     """
     if step:
         _run_steps(core, bus, log, keep_on)

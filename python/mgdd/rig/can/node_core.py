@@ -30,20 +30,7 @@ _COUNTER_ERRORS = ("repeated", "lost", "wrong_counter")
 class NodeCore:
     """What a node does: judge commands, ask its safety gate, sample the plant, report.
 
-    Parameters
-    ----------
-    plant : NodePlant
-        What it drives.
-    signal_map : SignalMap
-        Its messages; the time limit of the commands is that of the map.
-    envelope : SafetyEnvelope, optional
-        Of its gate; the shipped ``etb_node`` if left out. Cycle and time limit come from plant and map.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Inputs of the plant that no command carries, or the other way round; modes of its gate that the state signal of
-        the map has no name for.
+    Cycle and time limit of the gate come from plant and map; ParameterError where these do not fit each other.
     """
 
     def __init__(self, plant: NodePlant, signal_map: SignalMap, envelope: SafetyEnvelope | None = None) -> None:
@@ -99,20 +86,9 @@ class NodeCore:
         return max(self._limit_s, envelope.missed_deadlines * envelope.cycle_s)
 
     def take(self, frame: Frame, now_ns: int | None = None) -> bool:
-        """Take a frame of the bus; what follows from it, the next sample shows.
+        """Take a frame; whether with it every cyclic command has come since the last sample, usable or not.
 
-        Parameters
-        ----------
-        frame : Frame
-            With the time of its arrival.
-        now_ns : int, optional
-            Monotonic time [ns], of a node with a clock: a frame that waited too long is left out.
-
-        Returns
-        -------
-        bool
-            Whether with it every cyclic command has come since the last sample, usable or not: the tick of a node that
-            runs step by step.
+        That is the tick of a node that runs step by step. One with a clock gives the time: late frames are left out.
         """
         if now_ns is not None and self._is_late(frame, now_ns):
             self.late += 1
@@ -132,13 +108,7 @@ class NodeCore:
         return taken.is_new and message.name in self._timeouts_s and self._fresh >= set(self._timeouts_s)
 
     def stood_still(self, since_ns: int, now_ns: int) -> None:
-        """Note that the node did not run: a fault of the next sample, and what waited meanwhile is left out.
-
-        Parameters
-        ----------
-        since_ns, now_ns : int
-            Monotonic times [ns].
-        """
+        """Note that the node did not run: a fault of the next sample, and what waited meanwhile is left out."""
         self._deaf_until_ns = now_ns
         self._missed = max(self._missed, int((now_ns - since_ns) * 1e-9 / self.gate.envelope.cycle_s))
         self._receiver.reset()
@@ -148,18 +118,7 @@ class NodeCore:
         self._is_asked_to_arm = False
 
     def sample(self, now_ns: int) -> list[Frame]:
-        """Run one sample of a node with a clock.
-
-        Parameters
-        ----------
-        now_ns : int
-            Monotonic time [ns].
-
-        Returns
-        -------
-        list of Frame
-            That report it, the trigger message last.
-        """
+        """Run one sample of a node with a clock; give the frames that report it, the trigger message last."""
         stamps = self._receiver.stamps_ns
         shares = [(now_ns - stamps.get(name, 0)) * 1e-9 / limit_s for name, limit_s in self._timeouts_s.items()]
         self.last = self.plant.sample(self._passed(max([0.0, *shares]) * self._limit_s))

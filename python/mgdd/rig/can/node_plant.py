@@ -91,23 +91,7 @@ class _Cyclic:
 
 
 def node_plant(plant: Plant) -> NodePlant:
-    """Put a plant of the loop behind a node.
-
-    Parameters
-    ----------
-    plant : mgdd.loop.Plant
-        A throttle must have ``bridge_open`` among its inputs.
-
-    Returns
-    -------
-    NodePlant
-        What a node drives.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A throttle whose bridge cannot be opened.
-    """
+    """Put a plant of the loop behind a node; a throttle must have ``bridge_open`` among its inputs."""
     if not isinstance(plant, VirtualThrottle):
         return _Cyclic(plant)
     if "bridge_open" not in plant.input_names:

@@ -14,22 +14,7 @@ _REMEDY = "call arm() or enter the rig again"
 
 
 class Punctual:
-    """Refuses commands and measurements that are too late: the node has let go, and a new handshake has to come first.
-
-    Parameters
-    ----------
-    signal_map : SignalMap
-        With the time limits of its commands.
-    bus : str
-        What messages call it.
-    timeout_s : float
-        Longest time to wait for a measurement [s].
-
-    Attributes
-    ----------
-    is_timed : bool
-        Whether the node has a clock; one that steps waits for every command.
-    """
+    """Refuses commands and measurements that come too late: the node has let go, and has to be armed again."""
 
     def __init__(self, signal_map: SignalMap, bus: str, timeout_s: float) -> None:
         limits = [m.timeout_s for m in signal_map.commands.values() if m.timeout_s is not None]
@@ -38,7 +23,7 @@ class Punctual:
         self._measured_s = max(timeout_s, self._command_s)
         self._bus = bus
         self._driven_ns: int | None = None
-        self.is_timed = False
+        self.is_timed = False  # a node without a clock steps, and waits for every command
 
     def commanded(self) -> None:
         """Note that a command of a driven node has left."""
@@ -49,13 +34,7 @@ class Punctual:
         self._driven_ns = None
 
     def require_command(self) -> None:
-        """Refuse a command after a time in which the node has let go.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Too late.
-        """
+        """Refuse a command after a time in which the node has let go."""
         if not self.is_timed or self._driven_ns is None:
             return
         late_s = (time.monotonic_ns() - self._driven_ns) * 1e-9
@@ -66,13 +45,7 @@ class Punctual:
             )
 
     def require_measurement(self, arrived_ns: int) -> None:
-        """Refuse a measurement that waited for longer than it may take.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Too old.
-        """
+        """Refuse a measurement that waited for longer than it may take."""
         age_s = (time.monotonic_ns() - arrived_ns) * 1e-9
         if self.is_timed and age_s > self._measured_s:
             raise RigError(

@@ -27,16 +27,6 @@ class Reception:
 
     The age of a frame counts from its arrival, also where this process was stopped meanwhile: from the stamp where the
     bus has the clock of this machine, else from the last look that found the bus empty.
-
-    Parameters
-    ----------
-    bus : can.BusABC
-        Open.
-
-    Attributes
-    ----------
-    counts : Counter of str
-        ``malformed`` and ``own``: what was left out.
     """
 
     def __init__(self, bus: can.BusABC) -> None:
@@ -45,7 +35,7 @@ class Reception:
         self._has_our_clock = _has_our_clock(bus, self._interface)
         self._echoes = Echoes() if self._interface == "udp_multicast" else None
         self._empty_ns = time.monotonic_ns()
-        self.counts: Counter[str] = Counter()
+        self.counts: Counter[str] = Counter()  # what was left out: ``malformed`` and ``own``
 
     def sending(self, message: can.Message) -> None:
         """Note a message that will be sent: a bus that hears itself brings it back."""
@@ -53,18 +43,7 @@ class Reception:
             self._echoes.add(message)
 
     def receive(self, timeout_s: float = POLL_S) -> Frame | None:
-        """Give the next frame; None where none came, or what came is left out.
-
-        Parameters
-        ----------
-        timeout_s : float
-            Longest time to wait [s].
-
-        Returns
-        -------
-        mgdd.rig.Frame or None
-            ``monotonic_ns`` is when it arrived.
-        """
+        """Give the next frame; None where none came, or what came is left out."""
         looked_ns = time.monotonic_ns()
         message = self._next(0.0)
         if message is None:

@@ -13,23 +13,11 @@ __all__ = ["RecordedBus"]
 
 
 class RecordedBus:
-    """Passes everything on to another bus, and appends every frame to a record.
-
-    Parameters
-    ----------
-    bus : Bus
-        The bus.
-    recorder : Recorder
-        The record; it stays open.
-
-    Attributes
-    ----------
-    sent_elsewhere : frozenset of (int, bool)
-        Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
-    """
+    """Passes everything on to another bus, and appends every frame to a record."""
 
     def __init__(self, bus: Bus, recorder: Recorder) -> None:
         self.bus, self.recorder = bus, recorder
+        # Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
         self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
 
     @property

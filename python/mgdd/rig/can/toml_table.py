@@ -14,17 +14,7 @@ __all__ = ["TomlTable"]
 
 
 class TomlTable:
-    """Keys of a table that are taken one by one.
-
-    Parameters
-    ----------
-    values : mapping
-        The table.
-    origin : str
-        The file.
-    path : str
-        Name of the table, as in ``commands.ETB_Cmd``; empty for the whole file.
-    """
+    """Keys of a table that are taken one by one."""
 
     def __init__(self, values: Mapping[str, Any], *, origin: str, path: str = "") -> None:
         self._left = dict(values)

@@ -37,31 +37,7 @@ def loop_rows(recorded: RecordedRun) -> list[dict[str, float]]:
 def replayed(
     checked: CheckedExperiment, plan: TrackPlan, rows: list[dict[str, float]], record: RunRecord
 ) -> tuple[Outcome, dict[str, Any]]:
-    """Compute every duty of a recorded loop again, and compare it bit for bit.
-
-    Parameters
-    ----------
-    checked : CheckedExperiment
-        With the envelope.
-    plan : TrackPlan
-        With the controller, which may be another one than that of the run.
-    rows : list of dict
-        Of `loop_rows`.
-    record : RunRecord
-        Takes the changes of mode.
-
-    Returns
-    -------
-    outcome : Outcome
-        With the duties that were computed and the angles that were recorded.
-    counters : dict
-        ``replay`` with the cycles that were driven, how many of them differ and by how much at most; ``gate``.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        The record has no driven cycle.
-    """
+    """Compute every duty of a recorded loop again, and compare it bit for bit."""
     controller, gate, sent = plan.controller(), SafetyGate(checked.envelope), True
     again: list[dict[str, float]] = []
     sizes: list[float] = []

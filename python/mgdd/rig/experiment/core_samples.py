@@ -28,23 +28,7 @@ _MAP_NAMES = {own: name for name, own in LOOP_NAMES.items()}
 
 
 class LoopSamples:
-    """Takes the samples of a loop: into a record, to a listener, and keeps what the result needs.
-
-    Parameters
-    ----------
-    recorder : Recorder or None
-        Takes each cycle into the table ``loop``, with all that a replay needs.
-    row : callable
-        Takes each exchange with the plant: the duty of a cycle, and what the next cycle had measured.
-    listener : callable
-        Takes the exchanges of the task as cycles.
-    value_names : sequence of str
-        Measured values of the map; those that a loop does not read are NaN.
-    samples : int
-        How many grid points the task has.
-    sample_s : float
-        Time between two of them [s].
-    """
+    """Takes the samples of a loop: into a record, to a listener, and keeps what the result needs."""
 
     def __init__(
         self,
@@ -78,13 +62,7 @@ class LoopSamples:
         return self._first is not None and not self._running
 
     def take(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Take samples.
-
-        Parameters
-        ----------
-        columns : mapping of str to ndarray
-            As `mgdd.rig.RealtimeLoop.sample_columns` gives them.
-        """
+        """Take samples, as `mgdd.rig.RealtimeLoop.sample_columns` gives them."""
         names = [name for name in columns if name != "deadline_ns"]
         rows = zip(columns["deadline_ns"].tolist(), *(columns[name].tolist() for name in names), strict=True)
         for deadline_ns, *values in rows:
@@ -135,20 +113,9 @@ class LoopSamples:
 
 
 def task_columns(rows: Sequence[Mapping[str, float]], samples: int) -> dict[str, NDArray[np.float64]]:
-    """Give the columns of a task from the rows of a loop.
+    """Give the duty that was asked, the one that the node reports and the angle that followed, a row per grid point.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        From the first cycle that was driven on.
-    samples : int
-        Grid points of the task, at most.
-
-    Returns
-    -------
-    dict of str to ndarray
-        ``asked_duty``, ``duty`` as the node reports it, and ``sensed_angle_deg``, which was measured after that duty. A
-        grid point that the loop missed has the numbers of the one before: what was sent last held.
+    The rows begin with the first driven cycle; a grid point that the loop missed has the numbers of the one before.
     """
     cycle = np.array([row["cycle"] for row in rows])
     done = 0 if len(rows) == 0 else min(int(cycle[-1] - cycle[0]), samples)

@@ -38,31 +38,6 @@ def track_on_core(
 
     The rig has looked at its bus and armed the node; while the loop runs the bus is the loop's. Every reference is
     queued for its grid point; where Python stood still for `LEAD_S` the loop aborts rather than follow a late one.
-
-    Parameters
-    ----------
-    checked : CheckedExperiment
-        With envelope and map.
-    plan : TrackPlan
-        Of it.
-    rig : CanRig
-        Open.
-    record : RunRecord
-        Takes samples and changes of mode; the frames are in the bus of the rig already.
-    listener : callable
-        Takes every cycle of the task.
-
-    Returns
-    -------
-    outcome : Outcome
-        Also of a run that Ctrl-C cut.
-    counters, timing : dict
-        What rig, frames and gate have counted, and the account of the loop.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        The gate took the drive away, the node does not follow, the bus has a fault.
     """
     import xarray  # noqa: F401 - before the phase of the loop is chosen
 

@@ -39,15 +39,7 @@ def engine_named(name: str, folder: Path) -> Preset:
 
 
 class SeekPlan:
-    """A seeker and what guides it, made and checked before anything moves.
-
-    Parameters
-    ----------
-    task : SeekTask
-        What is asked.
-    folder : pathlib.Path
-        Where files of the task are looked for.
-    """
+    """A seeker and what guides it, made and checked before anything moves."""
 
     def __init__(self, task: SeekTask, *, folder: Path) -> None:
         self.task = task

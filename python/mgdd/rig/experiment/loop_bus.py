@@ -28,20 +28,7 @@ _LAST_S = 0.5  # for the last commands of the loop to be heard
 
 
 class WatchedBus:
-    """The bus of a rig, with an eye on the state that the node reports.
-
-    Parameters
-    ----------
-    bus : Bus
-        Of the rig.
-    signal_map : SignalMap
-        Says where the node reports its state.
-
-    Attributes
-    ----------
-    state : str
-        What it reported last.
-    """
+    """The bus of a rig, with an eye on the state that the node reports."""
 
     def __init__(self, bus: Bus, signal_map: SignalMap) -> None:
         self.bus, self._map = bus, signal_map
@@ -74,18 +61,7 @@ class WatchedBus:
 
 
 class BridgedBus:
-    """The loop has a ring, and two threads of Python carry its frames to and from the bus of the rig.
-
-    Parameters
-    ----------
-    bus : WatchedBus
-        Open.
-
-    Attributes
-    ----------
-    transport : RingTransport
-        Of the loop.
-    """
+    """The loop has a ring, and two threads of Python carry its frames to and from the bus of the rig."""
 
     def __init__(self, bus: WatchedBus) -> None:
         self.transport = RingTransport()
@@ -124,24 +100,6 @@ class SocketBus:
 
     Commands that the rig hears are those of the loop: its claim to them rests. Another sender shows itself at the
     socket of the loop: that one never hears its own frames, and lets nothing pass but commands and what the loop reads.
-
-    Parameters
-    ----------
-    bus : WatchedBus
-        On the same interface of this host, open.
-    channel : str
-        The interface.
-    command, measurements : LoopMessage, sequence of LoopMessage
-        What the loop sends and reads.
-    transmits : bool
-        False in a dry run: commands are those of somebody else.
-
-    Attributes
-    ----------
-    transport : SocketCanTransport
-        Of the loop.
-    error : RigError or None
-        What ends the run.
     """
 
     def __init__(

@@ -17,43 +17,15 @@ _BUS_MODES = ("hil", "dry_run", "bench")
 
 
 class LoopChoice(NamedTuple):
-    """A loop and why it is that one.
-
-    Parameters
-    ----------
-    name : {"core", "python"}
-        Which.
-    reason : str
-        Why, and of that of the core how it reaches its bus: ``raw socket`` or ``bridge``.
-    channel : str, optional
-        Interface of SocketCAN on which the loop has a raw socket of its own; without one a bridge in Python serves it.
-    """
+    """A loop and why it is that one."""
 
     name: str
-    reason: str
-    channel: str | None = None
+    reason: str  # also how the loop of the core reaches its bus: by raw socket or bridge
+    channel: str | None = None  # of SocketCAN, where that loop has a raw socket of its own
 
 
 def chosen_loop(experiment: Experiment, signal_map: SignalMap | None) -> LoopChoice | None:
-    """Choose the loop of a task.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        With its key ``track.loop``.
-    signal_map : SignalMap or None
-        Of a mode with a bus.
-
-    Returns
-    -------
-    LoopChoice or None
-        None for a task without a controller.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        ``loop = "core"`` where that loop cannot serve.
-    """
+    """Choose the loop of a task; None without a controller, ParameterError where ``loop = "core"`` cannot serve."""
     settings = experiment.settings
     if not isinstance(settings, TrackTask):
         return None

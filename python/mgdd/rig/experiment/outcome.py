@@ -15,24 +15,10 @@ __all__ = ["Outcome"]
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a task came to.
+    """What a task came to."""
 
-    Parameters
-    ----------
-    figures : mapping of str to value
-        Numbers and short texts, as JSON holds them.
-    dataset : xarray.Dataset
-        Signals over time or cycle.
-    interrupted : bool
-        Whether Ctrl-C cut it.
-    files : mapping of str to str
-        Further texts by file name, for example a fitted model.
-    drawings : mapping of str to callable
-        Functions without arguments that draw a figure, by file name without ending.
-    """
-
-    figures: Mapping[str, Any]
+    figures: Mapping[str, Any]  # numbers and short texts, as JSON holds them
     dataset: xr.Dataset
-    interrupted: bool = False
-    files: Mapping[str, str] = field(default_factory=dict)
-    drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    interrupted: bool = False  # whether Ctrl-C cut it
+    files: Mapping[str, str] = field(default_factory=dict)  # further texts by file name, as a fitted model
+    drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # by file name without ending

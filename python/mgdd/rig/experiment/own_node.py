@@ -17,25 +17,7 @@ __all__ = ["own_node"]
 
 @contextmanager
 def own_node(checked: CheckedExperiment, *, truth: str | os.PathLike[str] | None = None) -> Iterator[str]:
-    """Start both processes, give what their bus is called, and end them.
-
-    Parameters
-    ----------
-    checked : CheckedExperiment
-        What is simulated, with which map and pace.
-    truth : path-like, optional
-        CSV file for what really happened, sample by sample.
-
-    Yields
-    ------
-    str
-        As `mgdd.rig.CanTransport.parse` reads it.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        They did not start.
-    """
+    """Start hub and node with the plant of the experiment, give what their bus is called, and end them."""
     if checked.signal_map is None:
         raise RigError("a node needs the map of a bus")
     with TemporaryDirectory(prefix="mgdd-node-") as folder:

@@ -31,18 +31,7 @@ _PACKAGES = ("numpy", "scipy", "xarray", "python-can", "cantools")
 
 
 class RunFolder:
-    """A new or empty folder that takes the files of one run.
-
-    Parameters
-    ----------
-    path : path-like
-        It is made where it is not there.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        It holds something already, or cannot be written.
-    """
+    """A new or empty folder that takes the files of one run."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)

@@ -17,24 +17,7 @@ _TABLE = "rig"  # where `RigRecord.read` looks for exchanges
 
 
 class RunRecord:
-    """Takes what happens in a run: to a file, if there is one, and to a list of events.
-
-    Parameters
-    ----------
-    file : pathlib.Path, optional
-        The record; without, only events are kept.
-    checked : CheckedExperiment
-        For the header.
-
-    Attributes
-    ----------
-    events : list of str
-        All that was said.
-    recorder : Recorder or None
-        Of the file.
-    began : bool
-        Whether anything had happened when the record was left: an exchange, a frame or an event.
-    """
+    """Takes what happens in a run: to a file, if there is one, and to a list of events."""
 
     def __init__(self, file: Path | None, checked: CheckedExperiment) -> None:
         self.events: list[str] = []

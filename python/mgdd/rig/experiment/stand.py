@@ -39,27 +39,13 @@ _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited
 
 @dataclass(frozen=True, kw_only=True)
 class Stand:
-    """A plant that is open and guarded.
-
-    Parameters
-    ----------
-    plant : mgdd.loop.Plant
-        What a task steers.
-    counters : callable
-        Gives what rig and guard have counted.
-    events : callable
-        Gives, once each, what guard or gate had to say.
-    start : callable
-        Brings the guard into service; gives the angle or timing there.
-    left : callable
-        Gives how many cycles there can be at most; None without an end.
-    """
+    """A plant that is open and guarded."""
 
     plant: Plant
     counters: Callable[[], dict[str, Any]]
-    events: Callable[[], list[str]]
-    start: Callable[[], float]
-    left: Callable[[], int | None]
+    events: Callable[[], list[str]]  # once each, what guard or gate had to say
+    start: Callable[[], float]  # brings the guard into service; gives the angle or timing there
+    left: Callable[[], int | None]  # how many cycles there can be at most; None without an end
 
 
 @contextmanager

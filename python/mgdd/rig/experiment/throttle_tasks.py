@@ -45,17 +45,7 @@ def throttle_named(name: str, folder: Path) -> Throttle:
 
 
 class TrackPlan:
-    """A controller along a reference, made and checked before anything moves.
-
-    Parameters
-    ----------
-    task : TrackTask
-        What is asked.
-    sample_s : float
-        Time between samples [s].
-    folder : pathlib.Path
-        Where files of the task are looked for.
-    """
+    """A controller along a reference, made and checked before anything moves."""
 
     def __init__(self, task: TrackTask, *, sample_s: float, folder: Path) -> None:
         self.task, self.sample_s = task, sample_s
@@ -132,19 +122,7 @@ class TrackPlan:
 
 
 class IdentifyPlan:
-    """An excitation that the prior model has been asked about, and the fit of what it shows.
-
-    Parameters
-    ----------
-    task : IdentifyTask
-        What is asked.
-    sample_s : float
-        Time between samples [s].
-    seed : int
-        Of the starts of the fit.
-    folder : pathlib.Path
-        Where files of the task are looked for.
-    """
+    """An excitation that the prior model has been asked about, and the fit of what it shows."""
 
     def __init__(self, task: IdentifyTask, *, sample_s: float, seed: int, folder: Path) -> None:
         self.task, self.sample_s, self.seed = task, sample_s, seed

@@ -12,37 +12,17 @@ __all__ = ["Cycle", "Watched"]
 
 
 class Cycle(NamedTuple):
-    """One cycle of a plant.
+    """One cycle of a plant."""
 
-    Parameters
-    ----------
-    number : int
-        From 0 on.
-    asked : mapping of str to float
-        Inputs by name.
-    measured : mgdd.loop.Measurement
-        What came back.
-    thinking_s, waiting_s : float
-        From the measurement before to these inputs, and from the inputs to this measurement [s].
-    """
-
-    number: int
+    number: int  # from 0 on
     asked: Mapping[str, float]
     measured: Measurement
-    thinking_s: float
-    waiting_s: float
+    thinking_s: float  # from the measurement before to these inputs
+    waiting_s: float  # from the inputs to this measurement
 
 
 class Watched:
-    """A plant whose cycles are told to a listener, with the time that they took.
-
-    Parameters
-    ----------
-    plant : mgdd.loop.Plant
-        Any.
-    listener : callable
-        Takes a `Cycle`; what it raises ends the run.
-    """
+    """A plant whose cycles are told to a listener, with the time that they took."""
 
     def __init__(self, plant: Plant, listener: Callable[[Cycle], None]) -> None:
         self.plant, self.listener = plant, listener
