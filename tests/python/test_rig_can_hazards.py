@@ -14,7 +14,7 @@ from mgdd.errors import RigError
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import CanRig, GatedThrottle, SafetyEnvelope, SafetyGate, VirtualNode
-from mgdd.rig.can.local_bus import LocalBus
+from mgdd.rig.can.node import LocalBus
 from rig_hazards import LIMP_HOME_DEG, NODE_HAZARDS, ONSET, OVER, SAMPLE_MS, NodeLoop
 
 

@@ -13,11 +13,9 @@ from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.frame import changed
-from mgdd.rig.can.inbox import Inbox
-from mgdd.rig.can.link import Sender
+from mgdd.rig.can.link import Inbox, Sender
 from mgdd.rig.can.node import node_of
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 
 
 class Host:

@@ -11,7 +11,7 @@ from mgdd.cli import main
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, SignalMap, VirtualNode
-from mgdd.rig.can.local_bus import LocalBus
+from mgdd.rig.can.node import LocalBus
 from own_bus import NAMES, write_own
 
 EXPERIMENT = """kind = "experiment"

@@ -29,8 +29,7 @@ from mgdd.rig import (
 )
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.experiment import core_track
 from mgdd.rig.experiment.loop_bus import WatchedBus
 from mgdd.rig.experiment.watched import Cycle

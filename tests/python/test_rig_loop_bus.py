@@ -12,7 +12,7 @@ import pytest
 from mgdd.errors import RigError
 from mgdd.rig import CanTransport, Frame, Recorder, SignalMap, read_record
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.recorded_bus import RecordedBus
+from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.experiment import loop_bus
 from mgdd.rig.experiment.loop_bus import SocketBus, WatchedBus
 from realtime_loops import becomes

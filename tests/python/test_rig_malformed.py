@@ -17,8 +17,8 @@ from mgdd.errors import DataError, RigError
 from mgdd.loop import EngineBench
 from mgdd.rig import BusBridge, CanRig, CanTransport, Frame, RingTransport
 from mgdd.rig.can.hub import Hub
-from mgdd.rig.can.messages import frame_of
 from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.python_can import frame_of
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")
 

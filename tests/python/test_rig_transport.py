@@ -18,7 +18,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.rig import CanTransport
 from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault, FaultInjector
-from mgdd.rig.can.reception import STILL_S, Reception
+from mgdd.rig.can.python_can import STILL_S, Reception
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")
 

@@ -15,8 +15,7 @@ from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import NodePlant, node_plant
+from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signals import noted_signals
 
 if TYPE_CHECKING:

@@ -18,14 +18,12 @@ from mgdd.rig.exchange import RecordingRig, RigRecord
 from mgdd.rig.experiment import Experiment, check_experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
-from mgdd.rig.loop_message import LoopMessage
-from mgdd.rig.protection import protect
+from mgdd.rig.loop_message import LoopMessage, protect
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
-from mgdd.rig.safety import SafetyGate
-from mgdd.rig.safety_envelope import SafetyEnvelope
+from mgdd.rig.safety import SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [

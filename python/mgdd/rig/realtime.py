@@ -15,8 +15,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.rig.gate_requests import GateRequests
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.loop_samples import samples_dataset, summary
-from mgdd.rig.safety import SafetyChange
-from mgdd.rig.safety_envelope import SafetyEnvelope
+from mgdd.rig.safety import SafetyChange, SafetyEnvelope
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,8 +13,7 @@ from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import Frame, SafetyEnvelope, SafetyGate, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.gated import facts_of
 from mgdd.throttle import SensorFault
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
-from mgdd.rig.can.messages import message_of
-from mgdd.rig.can.reception import POLL_S, Reception
+from mgdd.rig.can.python_can import POLL_S, Reception, message_of
 
 if TYPE_CHECKING:
     import can

@@ -15,11 +15,9 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
 from mgdd.rig.can.frame import Bus, changed
-from mgdd.rig.can.inbox import Inbox
-from mgdd.rig.can.link import Sender
+from mgdd.rig.can.link import Inbox, Punctual, Sender
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.modes import RigMode, bus_of, may_be_real, require_key
-from mgdd.rig.can.punctual import Punctual
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
 

@@ -15,8 +15,7 @@ from typing import cast
 
 from mgdd.errors import ParameterError, RigError, argument
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
-from mgdd.rig.can.messages import MOST_BYTES, largest_identifier
-from mgdd.rig.can.reception import STILL_S
+from mgdd.rig.can.python_can import MOST_BYTES, STILL_S, largest_identifier
 
 __all__ = ["Hub"]
 

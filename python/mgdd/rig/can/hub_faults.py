@@ -4,18 +4,35 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
-from mgdd.errors import ParameterError
-from mgdd.rig.can.fault_text import fault_of
+from mgdd.errors import ParameterError, did_you_mean
 
-__all__ = ["BusFault", "Delivery", "FaultInjector"]
+__all__ = ["BusFault", "Delivery", "FaultInjector", "fault_of"]
 
 KINDS = ("drop", "duplicate", "delay", "reorder", "corrupt", "error", "freeze")
 _KEYS = {"p": float, "id": int, "from_s": float, "until_s": float, "ms": float, "client": int, "class": int}
 _NEEDS = {"delay": "ms", "error": "class", "freeze": "client"}
+
+
+def fault_of(text: str, keys: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
+    """Read ``KIND:KEY=VALUE,...``, as ``drop:p=0.01,id=0x121``: kind, for the caller to check, and values by key."""
+    kind, _, rest = text.partition(":")
+    given: dict[str, Any] = {}
+    for part in filter(None, rest.split(",")):
+        key, _, value = part.partition("=")
+        if key not in keys:
+            guess = did_you_mean(key, keys)
+            raise ParameterError.of(
+                "fault", text, f"KIND:KEY=VALUE,... with keys {', '.join(keys)}{'; ' + guess if guess else ''}"
+            )
+        try:
+            given[key] = int(value, 0) if keys[key] is int else float(value)
+        except ValueError:
+            raise ParameterError.of(f"fault {kind}: {key}", value, "a number") from None
+    return kind, given
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from mgdd.errors import ParameterError, RigError, argument
 from mgdd.io.files import read_plain_text
 from mgdd.loop import Plant
 from mgdd.rig.can.frame import Bus
-from mgdd.rig.can.local_bus import LocalBus
+from mgdd.rig.can.node import LocalBus
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 

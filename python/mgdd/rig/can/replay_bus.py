@@ -1,20 +1,23 @@
-"""Recorded frames as a bus: the same checks see them again, in the order in which they came."""
+"""A bus whose frames go into a record, and recorded frames as a bus: the same checks see them again, in their order."""
 
 from __future__ import annotations
 
 import os
+import time
 from collections import deque
 from collections.abc import Iterable
-from typing import Self
+from typing import Any, Self
 
 from mgdd._core.rig import Frame
 from mgdd.errors import RigError
 from mgdd.io.files import existing_file
+from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.recorded import stamped_frames
+from mgdd.rig.recorder import Recorder
 
-__all__ = ["ReplayBus"]
+__all__ = ["RecordedBus", "ReplayBus"]
 
 
 class ReplayBus:
@@ -125,3 +128,60 @@ class ReplayBus:
         self._arrived: deque[Frame] = deque()
         self._commands = 0
         self.differences.clear()
+
+
+class RecordedBus:
+    """Passes everything on to another bus, and appends every frame to a record."""
+
+    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+        self.bus, self.recorder = bus, recorder
+        # Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
+        self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.bus.name
+
+    @property
+    def shared(self) -> bool:
+        """Whether others may be on it."""
+        return self.bus.shared
+
+    @property
+    def stays_here(self) -> bool:
+        """Whether it does not leave this machine, as far as one can tell."""
+        return bool(getattr(self.bus, "stays_here", False))
+
+    @property
+    def counters(self) -> dict[str, Any]:
+        """What the bus counts."""
+        return dict(getattr(self.bus, "counters", {}))
+
+    def open(self) -> None:
+        """Connect."""
+        self.bus.open()
+
+    def close(self) -> None:
+        """Disconnect."""
+        self.bus.close()
+
+    def claim(self, keys: set[tuple[int, bool]]) -> None:
+        """Say which identifiers only we send."""
+        self.bus.claim(keys)
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:
+        """Send a frame; what the bus did not take is not recorded."""
+        self.bus.send(frame, final=final)
+        self._append(frame, received=False)
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame."""
+        frame = self.bus.receive(timeout_s)
+        if frame is not None:
+            self._append(frame, received=(frame.id, frame.extended) not in self.sent_elsewhere)
+        return frame
+
+    def _append(self, frame: Frame, *, received: bool) -> None:
+        stamp_ns = frame.monotonic_ns or time.monotonic_ns()
+        self.recorder.frame(changed(frame, monotonic_ns=stamp_ns, received=received))

@@ -16,9 +16,7 @@ from urllib.parse import parse_qsl
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.io.extras import import_extra
-from mgdd.rig.can.connect import connected, error_code
-from mgdd.rig.can.messages import message_of
-from mgdd.rig.can.reception import THIS_HOST, Reception
+from mgdd.rig.can.python_can import THIS_HOST, Reception, connected, error_code, message_of
 
 __all__ = ["CanTransport", "two_senders"]
 

@@ -16,9 +16,8 @@ from mgdd.rig.can.signals import held_back
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.core_samples import LoopSamples
 from mgdd.rig.experiment.loop_bus import BridgedBus, SocketBus, WatchedBus
-from mgdd.rig.experiment.outcome import Outcome
-from mgdd.rig.experiment.run_record import RunRecord
-from mgdd.rig.experiment.throttle_tasks import TrackPlan
+from mgdd.rig.experiment.run_folder import RunRecord
+from mgdd.rig.experiment.tasks import Outcome, TrackPlan
 from mgdd.rig.experiment.watched import Cycle
 from mgdd.rig.gated import drive_taken
 from mgdd.rig.realtime import RealtimeLoop

@@ -13,7 +13,7 @@ from mgdd._core.rig import Frame, RingTransport, SocketCanTransport
 from mgdd.errors import RigError
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.frame import Bus, changed
-from mgdd.rig.can.recorded_bus import RecordedBus
+from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import held_back
 from mgdd.rig.can.transport import two_senders

@@ -15,17 +15,13 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import Result
-from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
-from mgdd.rig.experiment.core_replay import loop_rows, replayed
+from mgdd.rig.experiment.checked import CheckedExperiment, LoopChoice, check_experiment
+from mgdd.rig.experiment.core_samples import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
-from mgdd.rig.experiment.engine_task import SeekPlan
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.loop_choice import LoopChoice
-from mgdd.rig.experiment.outcome import Outcome
-from mgdd.rig.experiment.run_folder import RunFolder, versions
-from mgdd.rig.experiment.run_record import RunRecord
+from mgdd.rig.experiment.run_folder import RunFolder, RunRecord, versions
 from mgdd.rig.experiment.stand import Stand, opened, rig_of
-from mgdd.rig.experiment.throttle_tasks import TrackPlan
+from mgdd.rig.experiment.tasks import Outcome, SeekPlan, TrackPlan
 from mgdd.rig.experiment.watched import Cycle, Watched
 
 if TYPE_CHECKING:

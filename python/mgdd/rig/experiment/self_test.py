@@ -20,8 +20,8 @@ from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import NumbersResult
 from mgdd.rig.experiment.checked import check_experiment
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.own_node import own_node
-from mgdd.rig.experiment.throttle_tasks import throttle_named
+from mgdd.rig.experiment.stand import own_node
+from mgdd.rig.experiment.tasks import throttle_named
 
 __all__ = ["WAYS_OF", "WAYS_TO_DIE", "SelfTest", "run_self_test"]
 

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from mgdd.errors import RigError
 from mgdd.loop import EngineBench, Plant, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.optimize import Limit
 from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.frame import Bus
-from mgdd.rig.can.recorded_bus import RecordedBus
+from mgdd.rig.can.processes import VirtualNode
+from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment
-from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.own_node import own_node
-from mgdd.rig.experiment.run_record import RunRecord
+from mgdd.rig.experiment.run_folder import RunRecord
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
-from mgdd.rig.experiment.throttle_tasks import throttle_named
+from mgdd.rig.experiment.tasks import SeekPlan, engine_named, throttle_named
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
@@ -32,9 +35,27 @@ from mgdd.rig.simulated import SimulatedRig
 if TYPE_CHECKING:
     import os
 
-__all__ = ["Stand", "opened", "rig_of", "simulated_plant"]
+__all__ = ["Stand", "opened", "own_node", "rig_of", "simulated_plant"]
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
+
+
+@contextmanager
+def own_node(checked: CheckedExperiment, *, truth: str | os.PathLike[str] | None = None) -> Iterator[str]:
+    """Start hub and node with the plant of the experiment, give what their bus is called, and end them."""
+    if checked.signal_map is None:
+        raise RigError("a node needs the map of a bus")
+    with TemporaryDirectory(prefix="mgdd-node-") as folder:
+        file = Path(folder) / "experiment.toml"
+        file.write_text(checked.experiment.with_files(lambda path: str(path.resolve())).to_toml(), encoding="utf-8")
+        with VirtualNode(
+            checked.signal_map.file.resolve(),
+            step=checked.experiment.bus.pace == "step",
+            truth=truth,
+            sample_ms=None if checked.sample_s is None else checked.sample_s * 1e3,
+            experiment=file,
+        ) as node:
+            yield node.bus
 
 
 @dataclass(frozen=True, kw_only=True)
