@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import time
 import weakref
 from collections.abc import Sequence
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.rig import RingTransport, SocketCanTransport
 from mgdd.errors import ParameterError, RigError
-from mgdd.rig.gate_requests import GateRequests
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.loop_samples import samples_dataset, summary
 from mgdd.rig.safety import SafetyChange, SafetyEnvelope
@@ -23,8 +22,10 @@ if TYPE_CHECKING:
 
 __all__ = ["RealtimeLoop"]
 
+_PAUSE_S = 0.002
 
-class RealtimeLoop(GateRequests):
+
+class RealtimeLoop:
     """A throttle controller over a bus, in a thread of the core with absolute deadlines.
 
     Every period the loop takes the frames that arrived, judges them, steps the controller, passes its duty through a
@@ -150,7 +151,7 @@ class RealtimeLoop(GateRequests):
             sample_capacity=sample_capacity,
             queue_capacity=queue_capacity,
         )
-        super().__init__(self._core, self.envelope.cycle_s)
+        self._pause_s = max(_PAUSE_S, 2.0 * self.envelope.cycle_s)  # one request is heard per cycle
         self._origin_ns: int | None = None
         # Also at the end of the interpreter: a thread of the core must not outlive it.
         self._end = weakref.finalize(self, self._core.stop, self._core.patience_s)
@@ -211,10 +212,84 @@ class RealtimeLoop(GateRequests):
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
+
+    # --- the safety gate ----------------------------------------------------------------------------------
+
+    @property
+    def running(self) -> bool:
+        """Whether the thread runs."""
+        return bool(self._core.running)
+
+    @property
+    def mode(self) -> str:
+        """Mode of the safety gate: ``init``, ``armed``, ``run``, ``limp`` or ``fault``."""
+        return str(self._core.state)
+
+    @property
+    def reason(self) -> str:
+        """Why that mode was entered."""
+        return str(self._core.reason)
+
+    @property
+    def cause(self) -> str:
+        """What is wrong now; ``none`` where nothing is."""
+        return str(self._core.cause)
+
+    def arm(self, timeout_s: float = 2.0) -> None:
+        """Ask the gate for the mode ``armed``, until enough good frames have come.
+
+        Parameters
+        ----------
+        timeout_s : float
+            How long to ask [s]; the same of `drive`, `release` and `reset`.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            The gate refuses, with what is wrong; or the loop does not run. The same of the others.
+        """
+        self._ask("arm", "armed", timeout_s)
+
+    def drive(self, timeout_s: float = 2.0) -> None:
+        """Ask the gate for the mode ``run``: the actuator is driven from now on. Otherwise as `arm`."""
+        self._ask("run", "run", timeout_s)
+
+    def release(self, timeout_s: float = 2.0) -> None:
+        """Open the bridge, from ``run`` back to the mode ``armed``. Otherwise as `arm`."""
+        self._ask("stop", "armed", timeout_s)
+
+    def reset(self, timeout_s: float = 2.0) -> None:
+        """Leave ``limp`` for ``armed``, or ``fault`` for ``init``, once nothing is wrong. Otherwise as `arm`."""
+        self._ask("reset", "init" if self.mode == "fault" else "armed", timeout_s)
+
+    def abort(self) -> None:
+        """Open the bridge at the next cycle, whatever the mode; a reset leads out of it.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            The loop does not run.
+        """
+        self._require_running()
+        while not self._core.request("abort"):
+            time.sleep(_PAUSE_S)
+            self._require_running()
+
+    def _ask(self, request: str, wanted: str, timeout_s: float) -> None:
+        until = time.monotonic() + timeout_s
+        while self.mode != wanted:
+            self._require_running()
+            if time.monotonic() > until:
+                why = self.cause if self.cause != "none" else f"too few good frames, or the wrong mode, {self.mode}"
+                raise RigError(f"no {request!r} within {timeout_s:g} s: {why}")
+            self._core.request(request)
+            time.sleep(self._pause_s)
+
+    def _require_running(self) -> None:
+        if not self.running:
+            raise RigError("the loop does not run: start() it; one that was stopped is made anew")
 
     # --- references -------------------------------------------------------------------------------------------
 

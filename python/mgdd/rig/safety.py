@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from mgdd import _core
@@ -338,10 +337,8 @@ class SafetyGate:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
-        if error is not None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
             self.abort()
         elif self.mode in ("armed", "run"):
             self.disarm()

@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 import weakref
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 from mgdd._core.rig import Frame, RingTransport
@@ -100,9 +99,7 @@ class BusBridge:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _guarded(self, work: Any) -> None:

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Any, Self
 
 from mgdd._core.rig import Frame, RingTransport, SocketCanTransport
@@ -87,9 +86,7 @@ class BridgedBus:
         self._bridge = BusBridge(self._bus, self.transport)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bridge is not None:
             self._bridge.close()
         self._prompt.__exit__(None, None, None)
@@ -145,9 +142,7 @@ class SocketBus:
                 self._bus.bus.sent_elsewhere = frozenset({self._ours})
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         until = time.monotonic() + _LAST_S
         with held_back():
             while self._heard < self.transport.counts["sent"] and (left_s := until - time.monotonic()) > 0.0:

@@ -15,12 +15,13 @@ from mgdd.loop import EngineBench, Plant, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.optimize import Limit
 from mgdd.rig.actuator_guard import ActuatorGuard
+from mgdd.rig.base import SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
-from mgdd.rig.exchange import RecordingRig, RigRecord
+from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.run_folder import RunRecord
@@ -28,9 +29,7 @@ from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
 from mgdd.rig.experiment.tasks import SeekPlan, engine_named, throttle_named
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.replay import ReplayRig
 from mgdd.rig.safety import SafetyGate
-from mgdd.rig.simulated import SimulatedRig
 
 if TYPE_CHECKING:
     import os

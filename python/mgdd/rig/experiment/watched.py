@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from mgdd.loop import Measurement, Plant
+from mgdd.rig.base import AroundPlant
 
 __all__ = ["Cycle", "Watched"]
 
@@ -21,34 +22,15 @@ class Cycle(NamedTuple):
     waiting_s: float  # from the inputs to this measurement
 
 
-class Watched:
+class Watched(AroundPlant):
     """A plant whose cycles are told to a listener, with the time that they took."""
 
     def __init__(self, plant: Plant, listener: Callable[[Cycle], None]) -> None:
-        self.plant, self.listener = plant, listener
+        super().__init__(plant)
+        self._listener = listener
         self.cycles = 0
         self._asked: Mapping[str, float] = {}
         self._measured_s = self._applied_s = time.perf_counter()
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return self.plant.input_names
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limited quantities."""
-        return self.plant.limit_names
-
-    @property
-    def operating_point_changes(self) -> bool:
-        """Whether the next cycle brings a new operating point; False for a plant that announces none."""
-        return bool(getattr(self.plant, "operating_point_changes", False))
-
-    @property
-    def point(self) -> Any:
-        """Operating point of the next cycle; as absent as the plant's own."""
-        return getattr(self.plant, "point")  # noqa: B009 - the protocol of a plant does not have it
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Pass the inputs on."""
@@ -62,6 +44,6 @@ class Watched:
         now = time.perf_counter()
         cycle = Cycle(self.cycles, self._asked, measured, self._applied_s - self._measured_s, now - self._applied_s)
         self.cycles += 1
-        self.listener(cycle)
+        self._listener(cycle)
         self._measured_s = time.perf_counter()
         return measured
