@@ -159,12 +159,9 @@ class RealtimeLoop:
     # --- life -------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start the thread; returns at once. The gate is in the mode ``init``: commands say open bridge.
+        """Start the thread, once; returns at once. The gate is in the mode ``init``: commands say open bridge.
 
-        Raises
-        ------
-        mgdd.errors.RigError
-            It was started before.
+        RigError where it was started before.
         """
         import xarray  # noqa: F401 - an import while it runs would hold up the threads that feed the transport
 
@@ -173,15 +170,8 @@ class RealtimeLoop:
     def stop(self, timeout_s: float | None = None) -> None:
         """Send the last commands with an open bridge and end the thread; does nothing where it has ended.
 
-        Parameters
-        ----------
-        timeout_s : float, optional
-            How long to wait for the end [s]; ``stop_frames`` periods and 2 s if left out.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            It did not end in time: cut the supply of the motor.
+        Without a limit it waits ``stop_frames`` periods and 2 s [s]. RigError where it did not end in time: cut the
+        supply of the motor.
         """
         limit_s = self._core.patience_s if timeout_s is None else timeout_s
         if not self._core.stop(limit_s):
@@ -189,22 +179,10 @@ class RealtimeLoop:
         self._core.give_back(getattr(self.controller, "_core", self.controller))
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait for the end of the loop while other threads of Python run.
+        """Wait for the end of the loop, for so long [s] or without end, while other threads of Python run.
 
-        Parameters
-        ----------
-        timeout_s : float, optional
-            How long [s]; without end if left out.
-
-        Returns
-        -------
-        bool
-            Whether the loop has ended. One that was not started counts as ended.
-
-        Raises
-        ------
-        mgdd.errors.Interrupted
-            Ctrl-C; the loop goes on until `stop`.
+        Gives whether it has ended; one that was not started counts so. `mgdd.errors.Interrupted` for Ctrl-C: the loop
+        goes on until `stop`.
         """
         return bool(self._core.wait(timeout_s))
 
@@ -238,17 +216,10 @@ class RealtimeLoop:
         return str(self._core.cause)
 
     def arm(self, timeout_s: float = 2.0) -> None:
-        """Ask the gate for the mode ``armed``, until enough good frames have come.
+        """Ask the gate for the mode ``armed``, for so long [s], until enough good frames have come.
 
-        Parameters
-        ----------
-        timeout_s : float
-            How long to ask [s]; the same of `drive`, `release` and `reset`.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The gate refuses, with what is wrong; or the loop does not run. The same of the others.
+        RigError where the gate refuses, with what is wrong, or the loop does not run; the same of `drive`, `release`
+        and `reset`.
         """
         self._ask("arm", "armed", timeout_s)
 
@@ -267,10 +238,7 @@ class RealtimeLoop:
     def abort(self) -> None:
         """Open the bridge at the next cycle, whatever the mode; a reset leads out of it.
 
-        Raises
-        ------
-        mgdd.errors.RigError
-            The loop does not run.
+        RigError where the loop does not run.
         """
         self._require_running()
         while not self._core.request("abort"):
@@ -294,34 +262,17 @@ class RealtimeLoop:
     # --- references -------------------------------------------------------------------------------------------
 
     def set_reference(self, reference_deg: float) -> None:
-        """Set the reference from the next cycle on; the latest one wins.
+        """Set the wanted plate angle [deg] from the next cycle on; the latest one wins.
 
-        Parameters
-        ----------
-        reference_deg : float
-            Wanted plate angle [deg].
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            It is not finite.
+        ParameterError where it is not finite.
         """
         self._core.set_reference(reference_deg)
 
     def queue_references(self, reference_deg: ArrayLike) -> None:
-        """Hand over references in advance: one per grid point while the loop drives, then the last one holds.
+        """Hand over references [deg], shape (n,): one per grid point while the loop drives, then the last one holds.
 
-        Parameters
-        ----------
-        reference_deg : array_like, shape (n,)
-            Wanted plate angles [deg], behind those that wait already.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            One is not finite; none is queued.
-        mgdd.errors.RigError
-            They do not fit ``queue_capacity``; none is queued.
+        They stand behind those that wait already. None is queued where one is not finite, a ParameterError, or where
+        they do not fit ``queue_capacity``, a RigError.
         """
         self._core.queue_references(np.asarray(reference_deg, dtype=float))
 
@@ -355,22 +306,13 @@ class RealtimeLoop:
     def sample_columns(self) -> dict[str, NDArray[Any]]:
         """Take the same samples as plain columns, for a reader that comes every few milliseconds.
 
-        Returns
-        -------
-        dict of str to ndarray
-            As the core has them: ``deadline_ns``, times in us, ``state``, ``cause``, ``send_result``, ``bus_state`` and
-            ``request`` as numbers.
+        They are as the core has them: ``deadline_ns``, times in us, ``state``, ``cause``, ``send_result``,
+        ``bus_state`` and ``request`` as numbers.
         """
         return dict(self._core.samples())
 
     def events(self) -> list[SafetyChange]:
-        """Take the changes of mode since the last call.
-
-        Returns
-        -------
-        list of SafetyChange
-            In their order.
-        """
+        """Take the changes of mode since the last call, in their order."""
         return [SafetyChange(*event) for event in self._core.events()]
 
     def report(self) -> dict[str, Any]:
@@ -387,11 +329,5 @@ class RealtimeLoop:
         return dict(self._core.report())
 
     def summary(self) -> str:
-        """Say in a few lines how punctual the loop was.
-
-        Returns
-        -------
-        str
-            Deadlines, times and frames.
-        """
+        """Say in a few lines how punctual the loop was: deadlines, times and frames."""
         return summary(self.report(), self.envelope.cycle_s)

@@ -94,13 +94,7 @@ class Recorder:
             return self._writer.refused
 
     def frame(self, frame: Frame) -> None:
-        """Append a frame of a bus, sent or received.
-
-        Parameters
-        ----------
-        frame : mgdd.rig.Frame
-            With its stamps.
-        """
+        """Append a frame of a bus, sent or received, with its stamps."""
         with self._lock:
             self._writer.write(frame)
 
@@ -113,14 +107,9 @@ class Recorder:
             Which table; the first row makes it.
         values : mapping of str to float
             A number per name, NaN where there is none; a name ends in its unit, as ``angle_deg`` does. The first row
-            says the names for all.
+            says the names for all: others are a ParameterError, as is ``time_s``, which a reader adds.
         monotonic_ns : int, optional
             When it was taken; default now [ns].
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Other names than those of the first row; ``time_s``, which a reader adds; a value that is not a number.
         """
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:
@@ -130,16 +119,9 @@ class Recorder:
             self._writer.write_sample(number, now, _numbers(names, values))
 
     def event(self, category: str, text: str, *, monotonic_ns: int | None = None) -> None:
-        """Append an event.
+        """Append an event, by default of now.
 
-        Parameters
-        ----------
-        category : str
-            Kind of event: ``"state"``, ``"fault"``, ``"parameter"``, ``"note"`` or any other word.
-        text : str
-            What happened.
-        monotonic_ns : int, optional
-            When; default now [ns].
+        The category is ``"state"``, ``"fault"``, ``"parameter"``, ``"note"`` or any other word.
         """
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:

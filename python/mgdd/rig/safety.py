@@ -31,11 +31,6 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
             ``"etb"`` for the host of a throttle, ``"etb_node"`` for the node that drives its bridge, or the path of a
             file that `to_toml` wrote.
 
-        Returns
-        -------
-        SafetyEnvelope
-            Of that file.
-
         Raises
         ------
         FileNotFoundError
@@ -86,18 +81,7 @@ def _wanted() -> dict[str, Wanted]:
 
 
 class SafetyChange(NamedTuple):
-    """A change of state of a safety gate.
-
-    Parameters
-    ----------
-    cycle : int
-        Cycle of the gate, missed ones counted.
-    before, after : str
-        Its modes.
-    reason : str
-        Why.
-    times : int
-        How often this reason has led to one so far, this one included.
+    """A change of mode of a safety gate, with why, and how often this reason has led to one so far.
 
     Examples
     --------
@@ -281,17 +265,9 @@ class SafetyGate:
         )
 
     def command(self, duty: float) -> Drive:
-        """Give the drive that may leave in this cycle.
+        """Give the drive that may leave in this cycle for the duty that the controller asks for [-].
 
-        Parameters
-        ----------
-        duty : float
-            What the controller asks for [-]; NaN is a fault of the controller.
-
-        Returns
-        -------
-        Drive
-            Limited, or open. Without `observe` before it: open, and ``limp``.
+        It is limited, or open. NaN is a fault of the controller; without `observe` before it: open, and ``limp``.
         """
         return self._core.command(duty)
 
@@ -325,12 +301,9 @@ class SafetyGate:
             raise RigError(f"{name} refused in mode {self.mode!r}: {against}")
 
     def drain(self) -> list[SafetyChange]:
-        """Take the waiting changes of mode out of the audit list.
+        """Take the waiting changes of mode out of the audit list, oldest first.
 
-        Returns
-        -------
-        list of SafetyChange
-            Oldest first. The list holds 64; ``counts["dropped"]`` found no room.
+        The list holds 64; ``counts["dropped"]`` found no room.
         """
         return [SafetyChange(*entry) for entry in self._core.drain()]
 

@@ -136,11 +136,6 @@ class CanRig:
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Send the inputs, clamped to the bounds of the map; in ``dry_run`` and ``replay`` nothing is sent.
 
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            One number per name of `input_names`.
-
         Raises
         ------
         mgdd.errors.ParameterError
@@ -168,13 +163,7 @@ class CanRig:
             self._inbox.skip()
 
     def measure(self) -> Measurement:
-        """Wait for the next complete measurement after the inputs applied last.
-
-        Returns
-        -------
-        mgdd.loop.Measurement
-            ``values`` by the names of the map, NaN for what is missing or came too long ago; ``applied`` as the node
-            says it.
+        """Wait for the next complete measurement after the inputs applied last: NaN for what is missing or too old.
 
         Raises
         ------
@@ -197,13 +186,7 @@ class CanRig:
         return measured
 
     def arm(self) -> None:
-        """Send safe frames until the node is ready to be driven.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            No valid frame of the node, or one that stays in a failed state.
-        """
+        """Send safe frames until the node is ready to be driven; RigError where it is silent or stays in a failed state."""
         self._require_open()
         if self.mode is RigMode.REPLAY:
             return
@@ -241,10 +224,7 @@ class CanRig:
     def open(self) -> None:
         """Connect, look who is there, and arm the node; `close` undoes it.
 
-        Raises
-        ------
-        mgdd.errors.RigError
-            No such bus, no node on it, another node that sends our commands, ``bench`` without arming.
+        A RigError says: no such bus, no node on it, another node that sends our commands, ``bench`` without arming.
         """
         if self._is_open:
             raise RigError("the rig is open already")

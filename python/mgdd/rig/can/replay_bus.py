@@ -21,24 +21,11 @@ __all__ = ["RecordedBus", "ReplayBus"]
 
 
 class ReplayBus:
-    """Frames of a run, as `CanRig` saw them with ``on_frame``.
+    """Frames of a run, sent and received, as `CanRig` saw them with ``on_frame``.
 
     A command moves to the next recorded command that drives; what the node sent after it arrives then. A command whose
-    inputs are not the recorded ones is an error, or an entry of `differences`.
-
-    Parameters
-    ----------
-    frames : iterable of Frame
-        Sent and received ones, in their order.
-    signal_map : SignalMap
-        Messages.
-    strict : bool
-        Whether another command is an error.
-
-    Attributes
-    ----------
-    differences : list of (int, dict, dict)
-        Number of the command, from 0, its inputs and the recorded ones.
+    inputs are not the recorded ones is an error if `strict`, else an entry of `differences`: the number of the command,
+    from 0, its inputs and the recorded ones.
     """
 
     def __init__(self, frames: Iterable[Frame], signal_map: SignalMap, *, strict: bool = True) -> None:
@@ -50,22 +37,7 @@ class ReplayBus:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], signal_map: SignalMap, *, strict: bool = True) -> Self:
-        """Read the frames of a record file.
-
-        Parameters
-        ----------
-        path : path-like
-            File of a `mgdd.rig.Recorder` that was given every frame.
-        signal_map : SignalMap
-            Messages.
-        strict : bool
-            Whether another command is an error.
-
-        Returns
-        -------
-        ReplayBus
-            For a `mgdd.rig.CanRig` in the mode ``replay``.
-        """
+        """Read the frames of a `mgdd.rig.Recorder` that was given every one, for a `CanRig` in the mode ``replay``."""
         frames = [frame for _, frame in stamped_frames(existing_file(path))]
         return cls(frames, signal_map, strict=strict)
 
@@ -90,13 +62,7 @@ class ReplayBus:
         """Nobody sends here."""
 
     def send(self, frame: Frame, *, final: bool = False) -> None:  # noqa: ARG002 - nothing is sent
-        """Move to the next recorded command of this message, and compare its inputs.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The record is at its end, or its command had other inputs.
-        """
+        """Move to the next recorded command of this message, and compare its inputs; RigError behind the last one."""
         message = self._by_key[frame.id, frame.extended]
         while self._left:
             recorded = self._left.popleft()

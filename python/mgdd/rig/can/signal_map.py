@@ -76,13 +76,8 @@ class SignalMap:
 
         Parameters
         ----------
-        path : path-like
+        path : str or path-like
             A TOML file, or the name of a shipped one: ``etb``, ``engine``, ``surrogate``.
-
-        Returns
-        -------
-        SignalMap
-            Ready for a rig or a node.
 
         Raises
         ------
@@ -146,24 +141,9 @@ class SignalMap:
         limits: Mapping[str, float] | Sequence[Limit | str] | None = None,
         objective: Mapping[str, float] | None = None,
     ) -> Self:
-        """Give the same map with other limits and components of J.
+        """Give the same map with other limits and weights of the components of J; as they are where left out.
 
-        Parameters
-        ----------
-        limits : sequence of str, or limits by name or as Limit, optional
-            Measured values to report as limits; as they are if left out.
-        objective : mapping of str to float, optional
-            Weight of each measured value; as it is if left out.
-
-        Returns
-        -------
-        SignalMap
-            A new one.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A name that is not measured, a weight that is not finite.
+        ParameterError for a name that is not measured, or a weight that is not finite.
         """
         wanted = self.limits if limits is None else tuple(limit_names_of(limits))
         weights = dict(self.objective if objective is None else objective)

@@ -87,22 +87,7 @@ class CanTransport:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Make a transport of ``INTERFACE:CHANNEL?OPTION=VALUE&...``.
-
-        Parameters
-        ----------
-        text : str
-            For example ``socketcan:can0`` or ``socketcand:can0?host=127.0.0.1&port=29536``.
-
-        Returns
-        -------
-        CanTransport
-            Not yet open.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            No interface or channel.
+        """Make a transport, not yet open, of ``INTERFACE:CHANNEL?OPTION=VALUE&...``, as ``socketcan:can0``.
 
         Examples
         --------
@@ -144,12 +129,8 @@ class CanTransport:
     def open(self) -> None:
         """Connect and start to receive.
 
-        Raises
-        ------
-        mgdd.errors.RigError
-            No such interface or channel, nobody listens there, or it is open already.
-        ImportError
-            The extra ``can`` is not installed.
+        A RigError says: no such interface or channel, nobody listens there, or it is open already. ImportError: the
+        extra ``can`` is not installed.
         """
         if self._bus is not None:
             raise RigError(f"{self.name} is open already: close it first")
@@ -181,30 +162,15 @@ class CanTransport:
         self.close()
 
     def claim(self, keys: set[tuple[int, bool]]) -> None:
-        """Say which identifiers only we send: when one arrives, another node has it too.
-
-        Parameters
-        ----------
-        keys : set of (int, bool)
-            Identifier, and whether it has 29 bits.
-        """
+        """Say which identifiers, with whether they have 29 bits, only we send: one that arrives is of another node."""
         with self._arrived:
             self._claimed = frozenset(keys)
 
     def send(self, frame: Frame, *, final: bool = False) -> None:
         """Hand a frame to the driver; while its queue is full, for `send_timeout_s` at most, try again.
 
-        Parameters
-        ----------
-        frame : Frame
-            To be sent.
-        final : bool
-            Try it even after a fault, as the safe frames at the end do.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The driver does not take it, or the bus has a fault.
+        RigError where the driver does not take it, or the bus has a fault. With `final` it is tried even then, as the
+        safe frames at the end are.
         """
         bus = self._open_bus(final=final)
         can, message = import_extra("can", "can", "a CAN bus"), message_of(frame)
@@ -225,22 +191,9 @@ class CanTransport:
                 return
 
     def receive(self, timeout_s: float) -> Frame | None:
-        """Give the next frame that arrived.
+        """Give the next frame that arrived, waiting for so long [s] at most; None where none came.
 
-        Parameters
-        ----------
-        timeout_s : float
-            Longest time to wait [s]; 0 looks only.
-
-        Returns
-        -------
-        Frame or None
-            None where none came.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            A fault of bus or thread, or an identifier of ours that another node sends.
+        RigError for a fault of bus or thread, or an identifier of ours that another node sends.
         """
         self._open_bus()
         with self._arrived:

@@ -89,34 +89,16 @@ def _own_socket(connection: str | None) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedExperiment:
-    """An experiment with all that it names.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        As it was checked.
-    plan : IdentifyPlan, TrackPlan or SeekPlan
-        What will be done, made with its models.
-    sample_s : float or None
-        Time between samples of a throttle [s].
-    envelope : SafetyEnvelope or None
-        Of a throttle.
-    signal_map : SignalMap or None
-        Of a mode with a bus.
-    record, recorded : pathlib.Path and RecordedRun, or None
-        Of ``replay``: the file, and what was read from it.
-    loop : LoopChoice or None
-        Of a task with a controller: which loop steps it, and why.
-    """
+    """An experiment with all that it names."""
 
     experiment: Experiment
-    plan: IdentifyPlan | TrackPlan | SeekPlan
-    sample_s: float | None
-    envelope: SafetyEnvelope | None
-    signal_map: SignalMap | None
-    record: Path | None
+    plan: IdentifyPlan | TrackPlan | SeekPlan  # what will be done, made with its models
+    sample_s: float | None  # between samples of a throttle
+    envelope: SafetyEnvelope | None  # of a throttle
+    signal_map: SignalMap | None  # of a mode with a bus
+    record: Path | None  # of replay, with what was read from it
     recorded: RecordedRun | None = field(default=None, compare=False)
-    loop: LoopChoice | None = None
+    loop: LoopChoice | None = None  # of a task with a controller
 
     @property
     def bus_map(self) -> SignalMap:
@@ -126,13 +108,7 @@ class CheckedExperiment:
         return self.signal_map
 
     def to_dict(self) -> dict[str, Any]:
-        """Say what would run.
-
-        Returns
-        -------
-        dict
-            As JSON holds it.
-        """
+        """Say what would run, as JSON holds it."""
         experiment, known = self.experiment, self.signal_map
         out: dict[str, Any] = {"task": experiment.task, "mode": experiment.mode, "seed": experiment.seed}
         out |= {"samples": self.plan.samples, "sample_s": self.sample_s}

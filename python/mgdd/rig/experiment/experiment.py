@@ -96,17 +96,12 @@ class Experiment:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read an experiment file.
+        """Read an experiment file, checked as far as the file itself goes; `check_experiment` looks at what it names.
 
         Parameters
         ----------
         path : path-like
             TOML; the page Experiments lists the keys.
-
-        Returns
-        -------
-        Experiment
-            Checked as far as the file itself goes; `check_experiment` looks at what it names.
 
         Raises
         ------
@@ -166,7 +161,7 @@ class Experiment:
         connection: str | None = None,
         pace: str | None = None,
     ) -> Self:
-        """Give the same experiment in another mode.
+        """Give the same experiment in another mode; ParameterError where there is no such mode or pace.
 
         Parameters
         ----------
@@ -178,27 +173,6 @@ class Experiment:
             The bus, as ``socketcan:can0``; as it is if left out.
         pace : {"step", "real_time"}, optional
             Of the bus; as it is if left out.
-
-        Returns
-        -------
-        Experiment
-            A new one.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            No such mode or pace.
-
-        Examples
-        --------
-        >>> from mgdd.rig import Experiment
-        >>> experiment = Experiment.from_toml('''
-        ... kind = "experiment"
-        ... format = 1
-        ... task = "seek"
-        ... ''')
-        >>> experiment.with_mode("hil").mode
-        'hil'
         """
         for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
             if value not in among:
@@ -210,15 +184,7 @@ class Experiment:
     def with_files(self, put: Callable[[Path], str]) -> Self:
         """Give the same experiment with other names for the files that it finds beside it.
 
-        Parameters
-        ----------
-        put : callable
-            Takes the path of a file, gives what the experiment shall call it.
-
-        Returns
-        -------
-        Experiment
-            A new one; names of presets and of what is shipped stay.
+        `put` takes the path of a file and gives what the experiment shall call it; names of what is shipped stay.
         """
         changed: dict[str, Any] = {}
         for part, keys in _FILES.items():

@@ -33,37 +33,16 @@ __all__ = ["ExperimentResult", "run_experiment"]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ExperimentResult(Result):
-    """What an experiment came to.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        As it was run.
-    figures : dict
-        Numbers and short texts of the task.
-    dataset : xarray.Dataset
-        Signals over time or cycle.
-    timing : dict
-        Cycles, and percentiles of the time for thinking and for waiting [us]; of a controller ``loop``, and of that of
-        the core its account.
-    counters : dict
-        What rig and guard have counted.
-    events : tuple of str
-        What gate or guard had to say.
-    interrupted : bool
-        Whether Ctrl-C cut it.
-    folder : pathlib.Path or None
-        Where its files are.
-    """
+    """What an experiment came to."""
 
     experiment: Experiment
-    figures: dict[str, Any]
-    dataset: xr.Dataset
-    timing: dict[str, Any]
-    counters: dict[str, Any]
-    events: tuple[str, ...] = ()
-    interrupted: bool = False
-    folder: Path | None = None
+    figures: dict[str, Any]  # numbers and short texts of the task
+    dataset: xr.Dataset  # signals over time or cycle
+    timing: dict[str, Any]  # cycles, percentiles of thinking and waiting [us]; which loop, and its account
+    counters: dict[str, Any]  # of rig and guard
+    events: tuple[str, ...] = ()  # what gate or guard had to say
+    interrupted: bool = False  # whether Ctrl-C cut it
+    folder: Path | None = None  # where its files are
 
     def _rows(self) -> list[Row]:
         return rows_of({**self.figures, "folder": str(self.folder)})
@@ -78,13 +57,7 @@ class ExperimentResult(Result):
         return (throttle_track if "reference_deg" in self.dataset else throttle_run)(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give all but the signals.
-
-        Returns
-        -------
-        dict
-            As JSON holds it.
-        """
+        """Give all but the signals, as JSON holds it."""
         return {
             "task": self.experiment.task,
             "mode": self.experiment.mode,
