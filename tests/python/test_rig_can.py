@@ -19,7 +19,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, SignalMap
 from mgdd.rig.can.link import Punctual, Sender
-from mgdd.rig.can.modes import RigMode, key_line, may_be_real
+from mgdd.rig.can.modes import key_line, may_be_real
 
 
 @pytest.fixture(autouse=True)
@@ -66,7 +66,7 @@ def test_the_bench_needs_a_person_or_a_key(tmp_path: Path, monkeypatch: pytest.M
         with rig_on("bench", "bench", arm=True, key_file=key) as rig:
             rig.apply({"duty": 0.2})
             assert rig.measure().applied == {"duty": pytest.approx(0.2)}
-        assert rig.mode is RigMode.BENCH
+        assert rig.mode == "bench"
 
 
 @pytest.mark.parametrize(
@@ -85,8 +85,8 @@ def test_hil_on_a_bus_that_leaves_this_machine_is_armed_as_a_bench(bus: str, sta
     assert CanTransport.parse(bus).stays_here == stays
     rig = CanRig("etb", bus, mode="hil")
     assert may_be_real(rig.mode, rig.bus) != stays
-    assert may_be_real(RigMode.BENCH, rig.bus)
-    assert not may_be_real(RigMode.DRY_RUN, rig.bus)
+    assert may_be_real("bench", rig.bus)
+    assert not may_be_real("dry_run", rig.bus)
     if not stays:
         with pytest.raises(RigError, match=r"mode = 'hil' on .*, which leaves this machine, may, too: give arm=True"):
             rig.open()

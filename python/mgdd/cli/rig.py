@@ -154,7 +154,7 @@ def _plant_of(args: argparse.Namespace, signal_map: SignalMap, sample_s: float |
     if args.experiment is None:
         return node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s)
     from mgdd.rig.experiment import Experiment
-    from mgdd.rig.experiment.stand import simulated_plant
+    from mgdd.rig.experiment.checked import simulated_plant
 
     refuse_idle(args, "fault", why="--experiment says what the plant is")
     inputs = (*signal_map.input_names, "bridge_open")

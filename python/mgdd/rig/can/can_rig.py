@@ -16,7 +16,7 @@ from mgdd.loop.plant import checked_inputs
 from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.link import Inbox, Punctual, Sender
 from mgdd.rig.can.mapped import MappedMessage
-from mgdd.rig.can.modes import RigMode, bus_of, may_be_real, require_key
+from mgdd.rig.can.modes import bus_of, may_be_real, require_key
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
 
@@ -83,7 +83,7 @@ class CanRig:
         bus: Bus | str | None = None,
         *,
         plant: Plant | None = None,
-        mode: str = RigMode.SIMULATE,
+        mode: str = "simulate",
         limits: Sequence[str] | None = None,
         objective: Mapping[str, float] | None = None,
         timeout_s: float | None = None,
@@ -91,7 +91,7 @@ class CanRig:
         arm: bool = False,
         key_file: str | os.PathLike[str] | None = None,
     ) -> None:
-        self.mode = RigMode.of(mode)
+        self.mode = mode
         loaded = signal_map if isinstance(signal_map, SignalMap) else SignalMap.load(signal_map)
         self.map = loaded.with_goals(limits=limits, objective=objective)
         self.bus = bus_of(self.mode, self.map, bus, plant)
@@ -158,7 +158,7 @@ class CanRig:
         for message in self.map.commands.values():
             self._send(message, {name: clamped[name] for name in message.signals})
         self._punctual.commanded()
-        if self.mode is RigMode.REPLAY:  # what came before the recorded command is older than this one
+        if self.mode == "replay":  # what came before the recorded command is older than this one
             self._take_all()
             self._inbox.skip()
 
@@ -186,9 +186,9 @@ class CanRig:
         return measured
 
     def arm(self) -> None:
-        """Send safe frames until the node is ready to be driven; RigError where it is silent or stays in a failed state."""
+        """Send safe frames until the node is ready to be driven; RigError where it is silent or stays failed."""
         self._require_open()
-        if self.mode is RigMode.REPLAY:
+        if self.mode == "replay":
             return
         self._take_all()
         self._inbox.skip()  # what waited says nothing of now
@@ -275,7 +275,7 @@ class CanRig:
 
     @property
     def _sends(self) -> bool:
-        return self.mode not in (RigMode.DRY_RUN, RigMode.REPLAY)
+        return self.mode not in ("dry_run", "replay")
 
     def _require_open(self) -> None:
         if not self._is_open:
@@ -295,7 +295,7 @@ class CanRig:
 
     def _send(self, message: MappedMessage, values: Mapping[str, float]) -> None:
         payloads = message.payloads(values, message.driven)
-        if self.mode is RigMode.DRY_RUN:
+        if self.mode == "dry_run":
             return
         self._has_sent = self._sends
         for frame in self._sender.frames(message, payloads):

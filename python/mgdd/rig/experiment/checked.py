@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,9 +10,11 @@ from typing import Any, NamedTuple
 
 from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.io.files import existing_file
-from mgdd.loop import EngineBench, VirtualThrottle
+from mgdd.loop import EngineBench, Plant, VirtualThrottle
+from mgdd.loop.track import sensors_of
 from mgdd.results.describe import described
 from mgdd.rig.can.loop_map import loop_messages
+from mgdd.rig.can.modes import BUS_MODES
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.experiment import Experiment
@@ -23,16 +25,15 @@ from mgdd.rig.experiment.settings import (
     SafetySettings,
     SeekTask,
     TrackTask,
+    beside,
     scaled,
 )
 from mgdd.rig.experiment.tasks import IdentifyPlan, SeekPlan, TrackPlan, engine_named, throttle_named
 from mgdd.rig.recorded import RecordedRun, readable_record
 from mgdd.rig.safety import SafetyEnvelope
 
-__all__ = ["CheckedExperiment", "LoopChoice", "check_experiment", "chosen_loop"]
+__all__ = ["CheckedExperiment", "LoopChoice", "check_experiment", "chosen_loop", "simulated_plant"]
 
-_BUS_MODES = ("hil", "dry_run", "bench")
-_BUS_MODES = ("hil", "dry_run", "bench")
 _SIMULATED = ("simulate", "hil")
 
 
@@ -68,7 +69,7 @@ def chosen_loop(experiment: Experiment, signal_map: SignalMap | None) -> LoopCho
 
 def _against_core(experiment: Experiment, signal_map: SignalMap | None) -> str:
     """Say what stands against the loop of the core; empty where nothing does."""
-    if experiment.mode not in _BUS_MODES or signal_map is None:
+    if experiment.mode not in BUS_MODES or signal_map is None:
         return f"mode = {experiment.mode!r}: no bus"
     if experiment.bus.pace == "step":
         return "bus.pace = 'step': every command brings one sample, without a clock"
@@ -104,7 +105,7 @@ class CheckedExperiment:
     def bus_map(self) -> SignalMap:
         """Map of an experiment over a bus; RigError for one without."""
         if self.signal_map is None:
-            raise RigError(f"mode = {self.experiment.mode!r}: no bus; must be one of {', '.join(_BUS_MODES)}")
+            raise RigError(f"mode = {self.experiment.mode!r}: no bus; must be one of {', '.join(BUS_MODES)}")
         return self.signal_map
 
     def to_dict(self) -> dict[str, Any]:
@@ -113,7 +114,7 @@ class CheckedExperiment:
         out: dict[str, Any] = {"task": experiment.task, "mode": experiment.mode, "seed": experiment.seed}
         out |= {"samples": self.plan.samples, "sample_s": self.sample_s}
         out |= {"transmits": experiment.mode in ("hil", "bench")}
-        if experiment.mode in _BUS_MODES:
+        if experiment.mode in BUS_MODES:
             out["connection"] = experiment.bus.connection or "a hub and a node of its own"
             out["pace"] = experiment.bus.pace
         if self.loop is not None:
@@ -190,7 +191,7 @@ def _named(origin: str) -> Iterator[None]:
 def _checked(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
     _require_acting(experiment)
-    signal_map = _map_of(experiment) if mode in _BUS_MODES else None
+    signal_map = SignalMap.load(beside(experiment.folder, experiment.map_name)) if mode in BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
     recorded = None if record is None else readable_record(record)
@@ -201,10 +202,10 @@ def _checked(experiment: Experiment) -> CheckedExperiment:
         # Over a bus the DBC of the recorded run said the time between its samples.
         said = None if recorded is None else recorded.config.get("sample_s")
         sample_s = _sample_s(experiment, signal_map) if said is None else float(said)
-        envelope = _envelope(experiment, sample_s)
+        envelope = SafetyEnvelope.load(beside(experiment.folder, experiment.safety.envelope)).replace(cycle_s=sample_s)
         plan = _throttle_plan(settings, sample_s, experiment, envelope)
     if mode in _SIMULATED:
-        _require_plant(experiment, sample_s)
+        simulated_plant(experiment, sample_s=sample_s, inputs=("duty",))  # a wrong preset, scale or limit shows itself
     checked = CheckedExperiment(
         experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record,
         recorded=recorded,
@@ -219,16 +220,7 @@ def _record_of(experiment: Experiment) -> Path | None:
         return None
     if experiment.replay.record is None:
         raise ParameterError("mode = 'replay': needs [replay] record, the file of a run")
-    return existing_file(_beside(experiment, experiment.replay.record))
-
-
-def _beside(experiment: Experiment, name: str) -> str:
-    beside = experiment.folder / name
-    return str(beside) if beside.is_file() else name
-
-
-def _map_of(experiment: Experiment) -> SignalMap:
-    return SignalMap.load(_beside(experiment, experiment.map_name))
+    return existing_file(beside(experiment.folder, experiment.replay.record))
 
 
 def _require_acting(experiment: Experiment) -> None:
@@ -270,10 +262,6 @@ def _sample_s(experiment: Experiment, signal_map: SignalMap | None) -> float:
     return signal_map.cycle_s
 
 
-def _envelope(experiment: Experiment, sample_s: float) -> SafetyEnvelope:
-    return SafetyEnvelope.load(_beside(experiment, experiment.safety.envelope)).replace(cycle_s=sample_s)
-
-
 def _throttle_plan(
     settings: IdentifyTask | TrackTask, sample_s: float, experiment: Experiment, envelope: SafetyEnvelope
 ) -> IdentifyPlan | TrackPlan:
@@ -290,15 +278,20 @@ def _throttle_plan(
     return IdentifyPlan(settings, sample_s=sample_s, seed=experiment.seed, folder=experiment.folder)
 
 
-def _require_plant(experiment: Experiment, sample_s: float | None) -> None:
-    """Make what will be simulated once: a wrong preset, scale or limit shows itself."""
+def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: Sequence[str]) -> Plant:
+    """Make the plant of ``simulate``, or of a node of our own."""
     plant, folder = experiment.plant, experiment.folder
     if isinstance(plant, EnginePlant):
         engine = engine_named(plant.preset, folder)
-        EngineBench(scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names)
-    else:
-        throttle = scaled(throttle_named(plant.preset, folder), plant.scale, "plant")
-        VirtualThrottle(throttle, inputs=("duty",), sample_s=sample_s or SAMPLE_S)
+        return EngineBench(
+            scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
+            soc_scatter_cad=plant.soc_scatter_cad, efficiency_noise_percent=plant.efficiency_noise_percent,
+            seed=experiment.seed,
+        )  # fmt: skip
+    return VirtualThrottle(
+        scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
+        sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
+    )  # fmt: skip
 
 
 def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:

@@ -11,9 +11,9 @@ from typing import Any, Self
 from mgdd.errors import ParameterError
 from mgdd.io.files import parsed, read_plain_text
 from mgdd.results.describe import described
+from mgdd.rig.can.modes import MODES
 from mgdd.rig.can.toml_table import TomlTable
 from mgdd.rig.experiment.settings import (
-    MODES,
     PACES,
     TASKS,
     BusSettings,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import RigError
-from mgdd.loop import EngineBench, Plant, VirtualThrottle
-from mgdd.loop.track import sensors_of
+from mgdd.loop import Plant
 from mgdd.optimize import Limit
 from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import SimulatedRig
@@ -22,11 +21,9 @@ from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
-from mgdd.rig.experiment.checked import CheckedExperiment
-from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
 from mgdd.rig.experiment.run_folder import RunRecord
-from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
-from mgdd.rig.experiment.tasks import SeekPlan, engine_named, throttle_named
+from mgdd.rig.experiment.tasks import SeekPlan
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import SafetyGate
@@ -34,7 +31,7 @@ from mgdd.rig.safety import SafetyGate
 if TYPE_CHECKING:
     import os
 
-__all__ = ["Stand", "opened", "own_node", "rig_of", "simulated_plant"]
+__all__ = ["Stand", "opened", "own_node", "rig_of"]
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 
@@ -83,22 +80,6 @@ def opened(
     with ExitStack() as stack:
         rig = rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file)
         yield _guarded(checked, rig, stack.enter_context(RecordingRig(rig, record.row, keep=False)))
-
-
-def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: Sequence[str]) -> Plant:
-    """Make the plant of ``simulate``, or of a node of our own."""
-    plant, folder = experiment.plant, experiment.folder
-    if isinstance(plant, EnginePlant):
-        engine = engine_named(plant.preset, folder)
-        return EngineBench(
-            scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
-            soc_scatter_cad=plant.soc_scatter_cad, efficiency_noise_percent=plant.efficiency_noise_percent,
-            seed=experiment.seed,
-        )  # fmt: skip
-    return VirtualThrottle(
-        scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
-        sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
-    )  # fmt: skip
 
 
 def rig_of(

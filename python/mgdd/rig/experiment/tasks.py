@@ -25,7 +25,7 @@ from mgdd.optimize import ExtremumSeeking, FitOptions, Limit
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.rig.experiment.settings import IdentifyTask, SeekTask, TrackTask, scaled
+from mgdd.rig.experiment.settings import IdentifyTask, SeekTask, TrackTask, beside, scaled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,8 +59,7 @@ class Outcome:
 
 def throttle_named(name: str, folder: Path) -> Throttle:
     """Load the throttle of a preset or of a TOML file."""
-    beside = folder / name
-    return presets.load(beside if beside.is_file() else name, kind="throttle").throttle
+    return presets.load(beside(folder, name), kind="throttle").throttle
 
 
 class TrackPlan:
@@ -68,8 +67,7 @@ class TrackPlan:
 
     def __init__(self, task: TrackTask, *, sample_s: float, folder: Path) -> None:
         self.task, self.sample_s = task, sample_s
-        beside = folder / task.reference
-        self.reference = Reference.parse(str(beside) if beside.is_file() else task.reference, sample_s=sample_s)
+        self.reference = Reference.parse(str(beside(folder, task.reference)), sample_s=sample_s)
         if abs(self.reference.sample_s / sample_s - 1.0) > 1e-9:
             raise ParameterError.of(
                 f"reference {task.reference}: time between samples", self.reference.sample_s,
@@ -190,9 +188,8 @@ def _fewer(samples: int, most: int | None) -> int:
 
 
 def _model_named(name: str, folder: Path) -> Any:
-    beside = folder / name
     if name.endswith(".toml"):
-        return identify.load_throttle_model(beside if beside.is_file() else name)
+        return identify.load_throttle_model(beside(folder, name))
     return throttle_named(name, folder)
 
 
@@ -252,8 +249,7 @@ def _draw_fit(validation: Any) -> Figure:
 
 def engine_named(name: str, folder: Path) -> Preset:
     """Load the engine of a preset or of a TOML file."""
-    beside = folder / name
-    return presets.load(beside if beside.is_file() else name, kind="engine")
+    return presets.load(beside(folder, name), kind="engine")
 
 
 class SeekPlan:
