@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from typing import Any, NamedTuple, Self
 
@@ -12,7 +12,7 @@ from mgdd._core.rig import Drive
 from mgdd.errors import DataError, RigError, did_you_mean
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
 
-__all__ = ["SafetyChange", "SafetyEnvelope", "SafetyGate"]
+__all__ = ["SafetyChange", "SafetyEnvelope", "SafetyGate", "said_of"]
 
 _KIND = "safety_envelope"
 _CHOICE = "bus_fault_from"
@@ -315,6 +315,11 @@ class SafetyGate:
             self.abort()
         elif self.mode in ("armed", "run"):
             self.disarm()
+
+
+def said_of(changes: Iterable[SafetyChange]) -> list[str]:
+    """Say changes of mode as events of a run."""
+    return [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in changes]
 
 
 def _restored(envelope: SafetyEnvelope, state: Mapping[str, Sequence[float]]) -> SafetyGate:

@@ -17,11 +17,11 @@ from mgdd.rig.can.loop_map import LOOP_NAMES
 from mgdd.rig.exchange import Exchange, flat
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.run_folder import RunRecord
-from mgdd.rig.experiment.tasks import Outcome, TrackPlan
+from mgdd.rig.experiment.tasks import Outcome, TrackPlan, compared
 from mgdd.rig.experiment.watched import Cycle
 from mgdd.rig.recorded import RecordedRun
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.safety import SafetyGate
+from mgdd.rig.safety import SafetyGate, said_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -180,19 +180,12 @@ def replayed(
             sizes.append(max(0.0 if _same(*pair) else _distance(*pair) for pair in pairs))
         if driven or again:
             again.append({**row, "asked_duty": asked, "duty": drive.duty})
-        record.say(f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in gate.drain())
+        record.say(said_of(gate.drain()))
     if not again:
         raise DataError(f"{checked.record}: ends before the first cycle of the task")
-    different = [place for place, size in enumerate(sizes) if size > 0.0]
-    compared = {
-        "samples": len(sizes),
-        "recorded": len(sizes),
-        "different": len(different),
-        "first_different": different[0] if different else None,
-        "largest_difference": max(sizes),
-    }
+    different = [(place, size) for place, size in enumerate(sizes) if size > 0.0]
     outcome = plan.outcome(task_columns(again, plan.samples), interrupted=False)
-    return outcome, {"replay": compared, "gate": gate.counts}
+    return outcome, {"replay": compared(len(sizes), len(sizes), different), "gate": gate.counts}
 
 
 def _facts(row: Mapping[str, float], *, sent: bool) -> dict[str, Any]:

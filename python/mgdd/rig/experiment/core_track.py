@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from mgdd.rig.experiment.tasks import Outcome, TrackPlan
 from mgdd.rig.experiment.watched import Cycle
 from mgdd.rig.gated import drive_taken
 from mgdd.rig.realtime import RealtimeLoop
+from mgdd.rig.safety import said_of
 
 __all__ = ["LEAD_S", "track_on_core"]
 
@@ -83,7 +85,7 @@ class _CoreRun:
         self._record, self._lead = record, max(4, math.ceil(LEAD_S / sample_s))
         self._wanted, self._handed_over = wanted, 1
         self._patience_s = max(_PATIENCE_S, 20.0 * (checked.envelope.good_frames if checked.envelope else 0) * sample_s)
-        self.changes: dict[str, int] = {}
+        self.changes: Counter[str] = Counter()
         self.samples = LoopSamples(
             record.recorder,
             row=record.row,
@@ -181,11 +183,7 @@ class _CoreRun:
     def _take(self) -> None:
         with held_back():  # Ctrl-C between two rows would tear a hole into the record
             self.bus.look(self.loop.report)
-            self._record.say(self._said())
+            events = self.loop.events()
+            self.changes.update(change.reason for change in events)
+            self._record.say(said_of(events))
             self.samples.take(self.loop.sample_columns())
-
-    def _said(self) -> Sequence[str]:
-        events = self.loop.events()
-        for change in events:
-            self.changes[change.reason] = self.changes.get(change.reason, 0) + 1
-        return [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in events]

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd.errors import RigError
 from mgdd.loop import Plant
@@ -23,15 +23,12 @@ from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
 from mgdd.rig.experiment.run_folder import RunRecord
-from mgdd.rig.experiment.tasks import SeekPlan
+from mgdd.rig.experiment.tasks import SeekPlan, compared
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.safety import SafetyGate
+from mgdd.rig.safety import SafetyGate, said_of
 
-if TYPE_CHECKING:
-    import os
-
-__all__ = ["Stand", "opened", "own_node", "rig_of"]
+__all__ = ["Stand", "guarded", "opened_rig", "own_node"]
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 
@@ -66,55 +63,41 @@ class Stand:
 
 
 @contextmanager
-def opened(
-    checked: CheckedExperiment,
-    record: RunRecord,
-    *,
-    arm: bool = False,
-    key_file: str | os.PathLike[str] | None = None,
-) -> Iterator[Stand]:
-    """Open the plant of an experiment; it is left safe, in whatever way the block ends.
+def opened_rig(
+    checked: CheckedExperiment, recorder: Recorder | None, *, arm: bool, key_file: str | os.PathLike[str] | None
+) -> Iterator[Any]:
+    """Open the rig of an experiment in its mode, where need be with a node of our own; every frame goes to the record.
 
-    Every exchange with the rig itself, below the guard, and every frame of a bus go into the record.
+    It is left safe, in whatever way the block ends.
     """
-    with ExitStack() as stack:
-        rig = rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file)
-        yield _guarded(checked, rig, stack.enter_context(RecordingRig(rig, record.row, keep=False)))
-
-
-def rig_of(
-    checked: CheckedExperiment,
-    stack: ExitStack,
-    recorder: Recorder | None,
-    *,
-    arm: bool,
-    key_file: str | os.PathLike[str] | None,
-) -> Any:
-    """Make the rig of an experiment in its mode, to be entered; a node of our own ends with the stack."""
     experiment, mode = checked.experiment, checked.experiment.mode
-    if mode == "simulate":
-        return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
-    if checked.recorded is not None:
-        return ReplayRig(RigRecord.of_run(checked.recorded, f"{checked.record}"), strict=False)
-    connection = experiment.bus.connection
-    if connection is None:
-        connection = stack.enter_context(own_node(checked))
-    bus: Bus = CanTransport.parse(connection)
-    if recorder is not None:
-        bus = RecordedBus(bus, recorder)
-    given_ms = experiment.bus.timeout_ms
-    timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
-    return CanRig(
-        checked.bus_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
-        limits=experiment.limit_names or None,
-    )  # fmt: skip
+    with ExitStack() as stack:
+        if mode == "simulate":
+            rig: Any = SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
+        elif checked.recorded is not None:
+            rig = ReplayRig(RigRecord.of_run(checked.recorded, f"{checked.record}"), strict=False)
+        else:
+            bus: Bus = CanTransport.parse(experiment.bus.connection or stack.enter_context(own_node(checked)))
+            if recorder is not None:
+                bus = RecordedBus(bus, recorder)
+            given_ms = experiment.bus.timeout_ms
+            timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
+            rig = CanRig(
+                checked.bus_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
+                limits=experiment.limit_names or None,
+            )  # fmt: skip
+        yield stack.enter_context(rig)
 
 
-def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
+def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
+    """Put the guard of an experiment before its rig; every exchange below it goes into the record."""
+    recorded = RecordingRig(rig, record.row, keep=False)
+
     def counters() -> dict[str, Any]:
         told: dict[str, Any] = dict(getattr(rig, "counters", {}))
         if isinstance(rig, ReplayRig):
-            told["replay"] = _compared(rig)
+            sizes = [(found.sample, abs(found.asked - found.recorded)) for found in rig.differences]
+            told["replay"] = compared(rig.sample, len(rig.record), sizes)
         return told
 
     def left() -> int | None:
@@ -126,7 +109,7 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
         return Stand(
             plant=safe,
             counters=lambda: {**counters(), "gate": gate.counts},
-            events=lambda: [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in gate.drain()],
+            events=lambda: said_of(gate.drain()),
             start=safe.start,
             left=left,
         )
@@ -158,15 +141,3 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
         start=lambda: plan.start_cad,
         left=left,
     )
-
-
-def _compared(rig: ReplayRig) -> dict[str, Any]:
-    """Say how the inputs that were asked for agree with the recorded ones, bit for bit."""
-    sizes = [abs(found.asked - found.recorded) for found in rig.differences]
-    return {
-        "samples": rig.sample,
-        "recorded": len(rig.record),
-        "different": len(sizes),
-        "first_different": rig.differences[0].sample if sizes else None,
-        "largest_difference": max(sizes, default=0.0),
-    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from mgdd.presets import Preset
     from mgdd.throttle import Throttle
 
-__all__ = ["IdentifyPlan", "Outcome", "SeekPlan", "TrackPlan", "engine_named", "throttle_named"]
+__all__ = ["IdentifyPlan", "Outcome", "SeekPlan", "TrackPlan", "compared", "engine_named", "throttle_named"]
 
 _OF_THE_DUTY = "total_variation"  # the one figure that no angle enters
 _SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
@@ -55,6 +55,17 @@ class Outcome:
     interrupted: bool = False  # whether Ctrl-C cut it
     files: Mapping[str, str] = field(default_factory=dict)  # further texts by file name, as a fitted model
     drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # by file name without ending
+
+
+def compared(samples: int, recorded: int, differences: Sequence[tuple[int, float]]) -> dict[str, Any]:
+    """Say how what was asked for agrees with a record, bit for bit, from the samples and sizes of the differences."""
+    return {
+        "samples": samples,
+        "recorded": recorded,
+        "different": len(differences),
+        "first_different": differences[0][0] if differences else None,
+        "largest_difference": max((size for _, size in differences), default=0.0),
+    }
 
 
 def throttle_named(name: str, folder: Path) -> Throttle:
