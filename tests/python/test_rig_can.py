@@ -125,7 +125,7 @@ def test_a_dry_run_receives_and_sends_nothing() -> None:
             assert 5.0 < measured.values["sensed_angle_deg"] < 12.0
             assert measured.applied == {"duty": 0.0}
         assert commands(spy) == []
-        assert core.state == "init"
+        assert core.gate.mode == "init"
 
 
 # --- leaving ------------------------------------------------------------------------------------------------
@@ -156,9 +156,9 @@ def test_leaving_sends_five_safe_frames_and_then_nothing(way: str) -> None:
         assert all(map(is_safe, sent[:-9]))  # those that armed it
         assert len(sent) >= 3 + 4 + 5  # a slow answer is asked for again
         until = time.monotonic() + LONG_S
-        while core.state != "armed" and time.monotonic() < until:
+        while core.gate.mode != "armed" and time.monotonic() < until:
             time.sleep(0.005)
-        assert core.state == "armed"
+        assert core.gate.mode == "armed"
 
 
 def drive_until_killed(number: signal.Signals) -> None:

@@ -41,7 +41,7 @@ def test_the_node_opens_the_bridge_by_itself_and_only_safe_frames_bring_it_back(
     assert (loop.core.gate.mode, loop.core.gate.reason) == (hazard.mode, hazard.reason)
     assert loop.angle_deg == pytest.approx(LIMP_HOME_DEG, abs=1.0)
     loop.until(loop.ms + 30.0, safe=True)
-    assert loop.core.state == "armed"
+    assert loop.core.gate.mode == "armed"
     loop.step()
     assert loop.core.driven
 
@@ -50,7 +50,7 @@ def test_a_host_that_rests_may_fall_silent() -> None:
     loop = NodeLoop(NODE_HAZARDS["host dies"])
     loop.until(ONSET, safe=True)
     loop.until(OVER)  # nothing arrives
-    assert loop.core.state == "armed"
+    assert loop.core.gate.mode == "armed"
     assert loop.core.gate.cause == "none"
     loop.until(OVER + 25.0)  # the first one jumps in its counter, then three good ones
     assert loop.core.driven

@@ -58,16 +58,16 @@ def host() -> Host:
 
 def test_a_node_has_to_be_armed_before_it_is_driven(host: Host) -> None:
     host.send(0.5, 20)
-    assert host.core.state == "init"
+    assert host.core.gate.mode == "init"
     host.send(None, 2)
-    assert host.core.state == "init"
+    assert host.core.gate.mode == "init"
     host.send(0.5)
     host.send(None, 3)
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
     host.send(0.5)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
     host.send(None)
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
 
 
 def trouble(host: Host) -> set[str]:
@@ -84,18 +84,18 @@ def trouble(host: Host) -> set[str]:
 def running(host: Host) -> None:
     host.send(None, 5)
     host.send(0.5, 3)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
 
 
 def test_a_late_command_opens_the_bridge_and_only_arming_closes_it(host: Host) -> None:
     running(host)
     host.wait(0.014)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
     host.wait(0.007)  # 5 + 14 + 7 ms after the last one, with a limit of 20 ms
     assert host.decided == ("limp", "stale")
     assert trouble(host) == {"command_timeout"}
     host.send(0.5, 50)
-    assert host.core.state == "limp"
+    assert host.core.gate.mode == "limp"
     running(host)
 
 
@@ -113,15 +113,15 @@ def test_a_node_that_stood_still_trusts_nothing_that_waited(host: Host) -> None:
     assert host.decided == ("limp", "deadlines")
     assert host.core.late == len(waited)
     host.send(0.5, 50)
-    assert host.core.state == "limp"
+    assert host.core.gate.mode == "limp"
     running(host)
 
 
 def test_a_gap_is_a_fault_of_a_node_that_is_only_armed(host: Host) -> None:
     host.send(None, 6)
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
     host.wait(3.0)  # the host may be silent
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
     host.core.stood_still(host.now_ns, host.now_ns + 30_000_000)
     host.wait(0.03)
     assert host.decided == ("limp", "deadlines")
@@ -142,7 +142,7 @@ def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Hos
         bad = host.frame(0.9)
         host.core.take(changed(bad, data=bad.data[:-1] + bytes([bad.data[-1] ^ 0x10])))
         host.wait(0.001)
-        assert host.core.state == "run"
+        assert host.core.gate.mode == "run"
         assert host.core.last is not None
         assert host.core.last.applied == {"duty": 0.5}
     host.send(0.4)  # one good frame between
@@ -150,7 +150,7 @@ def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Hos
         bad = host.frame(0.9)
         host.core.take(changed(bad, data=bytes([bad.data[0] ^ 1]) + bad.data[1:]))
         host.wait(0.001)
-        assert host.core.state == ("limp" if k == 2 else "run")
+        assert host.core.gate.mode == ("limp" if k == 2 else "run")
     assert host.decided == ("limp", "bad_frames")
     assert trouble(host) == {"wrong_crc"}
 
@@ -177,7 +177,7 @@ def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host:
     for _ in range(10):
         host.core.take(in_mode("position"))
         host.wait(0.005)
-    assert host.core.state == "init"
+    assert host.core.gate.mode == "init"
     running(host)
     host.core.take(in_mode("calib"))
     host.wait(0.005)
@@ -208,7 +208,7 @@ def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
     assert not host.core.take(changed(good, extended=True))
     assert not host.core.take(changed(good, data=good.data[:7]))
     host.wait(0.005)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
 
 
 def test_in_steps_a_command_that_comes_twice_is_one_sample(host: Host) -> None:

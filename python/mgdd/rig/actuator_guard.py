@@ -25,17 +25,6 @@ _LAGS = 3.0  # so many time constants until a reading shows its input
 class GuardedAsk(NamedTuple):
     """An ask of an optimiser that was not applied as it was.
 
-    Parameters
-    ----------
-    cycle : int
-        Cycle of the guard, from 0 on.
-    reason : str
-        ``not_finite``, ``bounds``, ``limit`` (these apply the last good point) or ``rate``.
-    name : str
-        Input or limited quantity to blame.
-    asked, applied : mapping of str to float
-        Inputs by name.
-
     Examples
     --------
     >>> from mgdd.loop import EngineBench
@@ -46,9 +35,9 @@ class GuardedAsk(NamedTuple):
     [GuardedAsk(cycle=0, reason='bounds', name='soc_cad', asked={'soc_cad': -40.0}, applied={'soc_cad': 0.0})]
     """
 
-    cycle: int
-    reason: str
-    name: str
+    cycle: int  # of the guard, from 0 on
+    reason: str  # not_finite, bounds, limit (these apply the last good point) or rate
+    name: str  # input or limited quantity to blame
     asked: Mapping[str, float]
     applied: Mapping[str, float]
 

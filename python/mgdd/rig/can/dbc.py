@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -46,16 +47,10 @@ class DbcSignal:
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest physical value that can be sent."""
         layout = self.layout
-        if layout.raw_type in ("float32", "float64"):
-            low, high = -float("inf"), float("inf")
-        else:
-            signed = layout.raw_type == "signed"
-            raw = (
-                (-(1 << (layout.length - 1)), (1 << (layout.length - 1)) - 1)
-                if signed
-                else (0, (1 << layout.length) - 1)
-            )
-            low, high = sorted(value * layout.scale + layout.offset for value in raw)
+        low, high = -math.inf, math.inf
+        if layout.raw_type in ("signed", "unsigned"):
+            least = -(1 << (layout.length - 1)) if layout.raw_type == "signed" else 0
+            low, high = sorted(raw * layout.scale + layout.offset for raw in (least, least + (1 << layout.length) - 1))
         return (
             low if layout.minimum is None else max(low, layout.minimum),
             high if layout.maximum is None else min(high, layout.maximum),

@@ -32,21 +32,14 @@ class LocalBus:
     The same checks, roundings and limits as over a real bus, faster than real time and always with the same bits.
     """
 
+    name = "the node in this process"
+    shared = False  # nobody else is here, and time is virtual
+
     def __init__(self, plant: Plant, signal_map: SignalMap) -> None:
         self.core = NodeCore(node_plant(plant), signal_map)
         self._answers: deque[Frame] = deque()
         self._now_ns = 1
         self._is_open = False
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        return "the node in this process"
-
-    @property
-    def shared(self) -> bool:
-        """False: nobody else is here, and time is virtual."""
-        return False
 
     def open(self) -> None:
         """Connect."""

@@ -158,11 +158,6 @@ class NodeCore:
         self._missed = 0  # samples, of a time in which the node stood still
 
     @property
-    def state(self) -> str:
-        """Mode of the gate, as the state signal of the map names it."""
-        return self.gate.mode
-
-    @property
     def driven(self) -> bool:
         """Whether the plant is driven."""
         return self.gate.mode == "run"

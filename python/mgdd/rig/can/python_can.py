@@ -25,7 +25,6 @@ __all__ = [
     "POLL_S",
     "STILL_S",
     "THIS_HOST",
-    "Echoes",
     "Reception",
     "connected",
     "error_code",
@@ -95,29 +94,6 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
         monotonic_ns=monotonic_ns,
         bus_ns=round(stamp_s * 1e9),
     )
-
-
-class Echoes:
-    """Our own frames on a bus that hears itself and does not say so: each one that was sent comes back once at most."""
-
-    def __init__(self) -> None:
-        self._sent: deque[tuple[float, tuple[Any, ...]]] = deque()  # appended and taken by one thread each
-
-    def add(self, message: can.Message) -> None:
-        """Note a message, before it is sent."""
-        self._sent.append((time.monotonic(), _content(message)))
-
-    def take(self, message: can.Message) -> bool:
-        """Say whether a message that came is one of ours; what was sent before it will not come any more."""
-        oldest_s, content = time.monotonic() - _ECHO_S, _content(message)
-        while self._sent and self._sent[0][0] < oldest_s:
-            self._sent.popleft()
-        place = next((k for k, (_, sent) in enumerate(list(self._sent)) if sent == content), None)
-        if place is None:
-            return False
-        for _ in range(place + 1):
-            self._sent.popleft()
-        return True
 
 
 def _content(message: can.Message) -> tuple[Any, ...]:
@@ -196,14 +172,14 @@ class Reception:
         self._bus = bus
         self._interface = _interface_of(bus)
         self._has_our_clock = _has_our_clock(bus, self._interface)
-        self._echoes = Echoes() if self._interface == "udp_multicast" else None
+        self._sent: deque[tuple[float, tuple[Any, ...]]] = deque()  # appended and taken by one thread each
         self._empty_ns = time.monotonic_ns()
         self.counts: Counter[str] = Counter()  # what was left out: ``malformed`` and ``own``
 
     def sending(self, message: can.Message) -> None:
-        """Note a message that will be sent: a bus that hears itself brings it back."""
-        if self._echoes is not None:
-            self._echoes.add(message)
+        """Note a message that will be sent: a bus that hears itself and does not say so brings it back once at most."""
+        if self._interface == "udp_multicast":
+            self._sent.append((time.monotonic(), _content(message)))
 
     def receive(self, timeout_s: float = POLL_S) -> Frame | None:
         """Give the next frame; None where none came, or what came is left out."""
@@ -224,10 +200,20 @@ class Reception:
             return None
 
     def _is_own(self, message: can.Message) -> bool:
-        if self._echoes is not None and self._echoes.take(message):
+        if self._sent and self._is_echo(message):
             return True
         # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
         return not message.is_rx and self._interface != "socketcan"
+
+    def _is_echo(self, message: can.Message) -> bool:
+        """Whether it is one of ours; what was sent before it will not come any more."""
+        oldest_s, content = time.monotonic() - _ECHO_S, _content(message)
+        while self._sent and self._sent[0][0] < oldest_s:
+            self._sent.popleft()
+        place = next((k for k, (_, sent) in enumerate(list(self._sent)) if sent == content), None)
+        for _ in range(0 if place is None else place + 1):
+            self._sent.popleft()
+        return place is not None
 
     def _arrival_ns(self, stamp_s: float) -> int:
         now_ns = time.monotonic_ns()

@@ -28,6 +28,9 @@ class ReplayBus:
     from 0, its inputs and the recorded ones.
     """
 
+    name = "the record"
+    shared = False  # nobody is there
+
     def __init__(self, frames: Iterable[Frame], signal_map: SignalMap, *, strict: bool = True) -> None:
         self._map, self._strict = signal_map, strict
         self._frames = list(frames)
@@ -40,16 +43,6 @@ class ReplayBus:
         """Read the frames of a `mgdd.rig.Recorder` that was given every one, for a `CanRig` in the mode ``replay``."""
         frames = [frame for _, frame in stamped_frames(existing_file(path))]
         return cls(frames, signal_map, strict=strict)
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        return "the record"
-
-    @property
-    def shared(self) -> bool:
-        """False: nobody is there."""
-        return False
 
     def open(self) -> None:
         """Begin at the first frame."""

@@ -108,8 +108,8 @@ class SignalMap:
             raise table.error("format", version, f"{_FORMAT}: this version of mgdd reads no other")
         dbc = DbcFile.read(file.parent / table.take("dbc", "text"))
         reader = MapReader(dbc=dbc)
-        commands = {name: reader.command(name, inner) for name, inner in table.tables("commands")}
-        measurements = {name: reader.measurement(name, inner) for name, inner in table.tables("measurements")}
+        commands = {name: reader.command(name, inner) for name, inner in table.table("commands").tables()}
+        measurements = {name: reader.measurement(name, inner) for name, inner in table.table("measurements").tables()}
         reader.require_whole(table, commands, measurements)
         trigger = table.take("trigger", "text")
         if trigger not in measurements:

@@ -61,11 +61,7 @@ class TomlTable:
             raise self.error(name, value, f"a table [{self.key(name)}]")
         return TomlTable(value, origin=self.origin, path=self.key(name))
 
-    def tables(self, name: str) -> list[tuple[str, TomlTable]]:
-        """Take a table of tables: names and tables."""
-        return self.table(name).tables_here()
-
-    def tables_here(self) -> list[tuple[str, TomlTable]]:
+    def tables(self) -> list[tuple[str, TomlTable]]:
         """Take all that is left as tables: names and tables."""
         return [(name, self.table(name)) for name in list(self._left)]
 

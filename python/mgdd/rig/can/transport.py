@@ -58,6 +58,8 @@ class CanTransport:
     ('0x120', 1)
     """
 
+    shared = True  # others may be on the bus
+
     def __init__(
         self,
         interface: str,
@@ -114,11 +116,6 @@ class CanTransport:
             return str(self.channel).startswith("vcan")
         hub = str(self.options.get("host", "")).lower()
         return self.interface == "virtual" or (self.interface == "socketcand" and hub in THIS_HOST)
-
-    @property
-    def shared(self) -> bool:
-        """True: others may be on the bus."""
-        return True
 
     @property
     def counters(self) -> dict[str, int]:

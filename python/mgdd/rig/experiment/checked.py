@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -173,19 +172,12 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     >>> checked.plan.samples, checked.to_dict()["transmits"]
     (1500, False)
     """
-    with _named(experiment.origin):
-        return _checked(experiment)
-
-
-@contextmanager
-def _named(origin: str) -> Iterator[None]:
-    """Put the file of the experiment in front of what is refused."""
     try:
-        yield
+        return _checked(experiment)
     except Error as error:
-        raise error.reworded(f"{origin}: {error}") from error
+        raise error.reworded(f"{experiment.origin}: {error}") from error
     except FileNotFoundError as error:
-        raise FileNotFoundError(error.errno, f"{origin}: {error.strerror}", error.filename) from error
+        raise FileNotFoundError(error.errno, f"{experiment.origin}: {error.strerror}", error.filename) from error
 
 
 def _checked(experiment: Experiment) -> CheckedExperiment:

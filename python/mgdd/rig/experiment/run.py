@@ -137,7 +137,7 @@ def run_experiment(
         if run is not None:
             run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
             run.json("run.json", {**versions(), **checked.to_dict()})
-        with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
+        with RunRecord(None if run is None else run.path / "run.rec", checked) as record:
             outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
     except BaseException:
         if run is not None and (record is None or not record.began):

@@ -60,10 +60,6 @@ class RunFolder:
             with contextlib.suppress(OSError):  # another run has come into a folder above
                 folder.rmdir()
 
-    def file(self, name: str) -> Path:
-        """Give the path of a file of the run."""
-        return self.path / name
-
     def keep(self, path: Path) -> str:
         """Copy a file that a run reads, and give its name in the folder; bulk and maps stay where they are.
 
