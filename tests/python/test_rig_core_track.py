@@ -106,9 +106,9 @@ def test_the_loop_speaks_a_map_as_a_rig_does(which: str, tmp_path: Path) -> None
             node.take(changed(frame, monotonic_ns=now_ns))
             for answer in node.sample(now_ns):
                 ring.feed(changed(answer, monotonic_ns=time.monotonic_ns()))
-            frames.append((node.state, frame))
-            states.add(node.state)
-        return node.state == wanted
+            frames.append((node.gate.mode, frame))
+            states.add(node.gate.mode)
+        return node.gate.mode == wanted
 
     with loop:
         assert becomes(lambda: answered("armed"))

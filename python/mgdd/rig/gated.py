@@ -54,6 +54,8 @@ class GatedThrottle:
     ({'duty': 0.0, 'bridge_open': 1.0}, True)
     """
 
+    input_names = ("duty",)
+
     def __init__(self, plant: Plant, gate: SafetyGate | None = None, *, shadow: bool = False) -> None:
         if set(plant.input_names) not in ({"duty"}, {"duty", "bridge_open"}):
             raise ParameterError(f"plant takes {', '.join(plant.input_names)}: must take duty, or duty and bridge_open")
@@ -63,11 +65,6 @@ class GatedThrottle:
         self._opens = "bridge_open" in plant.input_names
         self._values: Mapping[str, float] | None = None
         self._applied: dict[str, float] | None = None
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """The duty."""
-        return ("duty",)
 
     @property
     def limit_names(self) -> tuple[str, ...]:

@@ -62,20 +62,16 @@ class LoopMessage:
     def to_core(self) -> tuple[Any, ...]:
         """Give what the core takes."""
         signals: list[tuple[Any, ...]] = [
-            (name, layout, 0.0, None, _bits(self.missing.get(name))) for name, layout in self.signals.items()
+            (name, layout, 0.0, None, None if (raw := self.missing.get(name)) is None else raw % 2**64)
+            for name, layout in self.signals.items()
         ]
         signals += [("fixed", layout, float(number), None, None) for layout, number in self.fixed]
         signals += [("fixed", layout, float(driven), float(open_), None) for layout, driven, open_ in self.switched]
         return (self.can_id, self.extended, self.size, self.protection, signals)
 
 
-def _bits(raw: int | None) -> int | None:
-    """Return a raw value as the core holds it: in two's complement of 64 bits."""
-    return None if raw is None else raw % 2**64
-
-
 def protect(settings: core.E2eSettings, counter: int, payload: bytes | bytearray | memoryview) -> bytes:
-    """Write alive counter and CRC into a payload.
+    """Give a payload with its alive counter and CRC.
 
     Parameters
     ----------
@@ -85,11 +81,6 @@ def protect(settings: core.E2eSettings, counter: int, payload: bytes | bytearray
         Alive counter of this frame, 0 to ``counter_modulus - 1``; ``settings.next_counter`` gives the one that follows.
     payload : bytes
         ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
-
-    Returns
-    -------
-    bytes
-        The protected payload.
 
     Raises
     ------

@@ -56,7 +56,11 @@ def _command(signal_map: SignalMap, message: MappedMessage) -> LoopMessage:
         can_id=message.message.frame_id,
         signals={"duty": _layout(duty, lower=duty.lower, upper=duty.upper)},
         switched=[
-            (_raw(message.message.signals[name].layout), message.driven.get(name, 0), message.safe.get(name, 0))
+            (
+                _like(message.message.signals[name].layout, scale=1.0, offset=0.0, minimum=None, maximum=None),
+                message.driven.get(name, 0),
+                message.safe.get(name, 0),
+            )
             for name in names
         ],
         extended=message.message.extended,
@@ -98,11 +102,6 @@ def _layout(entry: MappedSignal, lower: float = -math.inf, upper: float = math.i
         minimum=low if math.isfinite(low) else None,
         maximum=high if math.isfinite(high) else None,
     )
-
-
-def _raw(layout: SignalLayout) -> SignalLayout:
-    """Give the layout whose physical value is the raw one."""
-    return _like(layout, scale=1.0, offset=0.0, minimum=None, maximum=None)
 
 
 def _like(layout: SignalLayout, **fields: Any) -> SignalLayout:

@@ -173,7 +173,7 @@ class NodeCore:
 
         That is the tick of a node that runs step by step. One with a clock gives the time: late frames are left out.
         """
-        if now_ns is not None and self._is_late(frame, now_ns):
+        if now_ns is not None and frame.monotonic_ns < max(self._deaf_until_ns, now_ns - round(self.patience_s * 1e9)):
             self.late += 1
             return False
         taken = self._receiver.take(frame)
@@ -218,9 +218,6 @@ class NodeCore:
         if inputs is not None:
             self.last = self.plant.sample(inputs)
         return self._report(self.last or Sampled(values={}, applied={}))
-
-    def _is_late(self, frame: Frame, now_ns: int) -> bool:
-        return frame.monotonic_ns < max(self._deaf_until_ns, now_ns - round(self.patience_s * 1e9))
 
     def _use(self, message: MappedMessage, payload: bytes) -> bool:
         """Take the inputs; False where one is not finite. A duty that is not, the gate judges."""
@@ -289,7 +286,8 @@ class NodeCore:
         values = {**own, **sampled.values}
         frames: list[Frame] = []
         for message in self._order:
-            if self.samples % self._every(message):
+            every = round((message.message.cycle_s or self.map.cycle_s) / self.map.cycle_s)
+            if self.samples % max(1, every):
                 continue
             raws: dict[str, Any] = {}
             state = self.map.state
@@ -300,10 +298,6 @@ class NodeCore:
             frames += self._sender.frames(message, message.payloads(known, raws, applied))
         self.samples += 1
         return frames
-
-    def _every(self, message: MappedMessage) -> int:
-        """Return the number of samples between two frames of a message."""
-        return max(1, round((message.message.cycle_s or self.map.cycle_s) / self.map.cycle_s))
 
 
 def _carried(entries: Mapping[str, MappedSignal], values: Mapping[str, float]) -> dict[str, float]:

@@ -178,7 +178,8 @@ class CanTransport:
             try:
                 bus.send(message)
             except (can.CanError, OSError) as error:
-                if not _is_full(error) or time.monotonic() + pause > until:
+                full = error_code(error) in (errno.ENOBUFS, errno.EAGAIN) or "buffer" in str(error).lower()
+                if not full or time.monotonic() + pause > until:
                     raise RigError(f"{self.name}: frame {frame.id:#x} was not sent: {error}") from error
                 self._count("retries")
                 time.sleep(pause)
@@ -276,7 +277,3 @@ def _plain(text: str) -> Any:
         with contextlib.suppress(ValueError):
             return number(text)
     return text
-
-
-def _is_full(error: Exception) -> bool:
-    return error_code(error) in (errno.ENOBUFS, errno.EAGAIN) or "buffer" in str(error).lower()

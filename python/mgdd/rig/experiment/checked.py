@@ -183,7 +183,8 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
 def _checked(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
     _require_acting(experiment)
-    signal_map = SignalMap.load(beside(experiment.folder, experiment.map_name)) if mode in BUS_MODES else None
+    map_name = experiment.bus.map or ("engine" if experiment.task == "seek" else "etb")
+    signal_map = SignalMap.load(beside(experiment.folder, map_name)) if mode in BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
     recorded = None if record is None else readable_record(record)

@@ -74,7 +74,9 @@ class LoopSamples:
         names = [name for name in columns if name != "deadline_ns"]
         rows = zip(columns["deadline_ns"].tolist(), *(columns[name].tolist() for name in names), strict=True)
         for deadline_ns, *values in rows:
-            self._take(deadline_ns, _recorded(dict(zip(names, map(float, values), strict=True))))
+            row = dict(zip(names, map(float, values), strict=True))
+            row["sensed_angle_deg"], row["mode"] = row.pop("angle_deg"), row.pop("state")  # as other tables name them
+            self._take(deadline_ns, row)
 
     def tell(self) -> None:
         """Tell the listener of the cycles that it has not heard of; what it raises ends the run."""
@@ -143,13 +145,6 @@ def _applied(before: Mapping[str, float], after: Mapping[str, float]) -> float:
     return before["duty"] if math.isnan(said) else said
 
 
-def _recorded(row: dict[str, float]) -> dict[str, float]:
-    """Name the numbers of a sample as the other tables of a record do."""
-    row["sensed_angle_deg"] = row.pop("angle_deg")
-    row["mode"] = row.pop("state")
-    return row
-
-
 def loop_rows(recorded: RecordedRun) -> list[dict[str, float]]:
     """Give the rows of the loop in a record; none for the record of another loop."""
     table = recorded.samples.get(LOOP_TABLE)
@@ -177,7 +172,7 @@ def replayed(
         drive = gate.command(asked if gate.mode == "run" else 0.0)
         if driven:
             pairs = ((asked, row["asked_duty"]), (drive.duty, row["duty"]))
-            sizes.append(max(0.0 if _same(*pair) else _distance(*pair) for pair in pairs))
+            sizes.append(max(_distance(*pair) for pair in pairs))
         if driven or again:
             again.append({**row, "asked_duty": asked, "duty": drive.duty})
         record.say(said_of(gate.drain()))
@@ -203,9 +198,7 @@ def _facts(row: Mapping[str, float], *, sent: bool) -> dict[str, Any]:
     }
 
 
-def _same(one: float, other: float) -> bool:
-    return one == other or (math.isnan(one) and math.isnan(other))
-
-
 def _distance(one: float, other: float) -> float:
+    if one == other or (math.isnan(one) and math.isnan(other)):
+        return 0.0
     return abs(one - other) if math.isfinite(one - other) else math.inf

@@ -206,11 +206,6 @@ class Experiment:
         own = self.settings.limits if isinstance(self.settings, SeekTask) else {}
         return tuple(dict.fromkeys((*own, *self.safety.limits)))
 
-    @property
-    def map_name(self) -> str:
-        """Mapping file of the bus: that of the file, else the shipped one of the plant."""
-        return self.bus.map or ("engine" if self.task == "seek" else "etb")
-
 
 def _rows(experiment: Experiment) -> Mapping[str, Any]:
     own = {name: value for name, value in experiment.settings.to_dict().items() if not isinstance(value, Mapping)}

@@ -20,7 +20,7 @@ from mgdd.rig.experiment.core_track import track_on_core
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.run_folder import RunFolder, RunRecord, versions
 from mgdd.rig.experiment.stand import Stand, guarded, opened_rig
-from mgdd.rig.experiment.tasks import Outcome, SeekPlan, TrackPlan
+from mgdd.rig.experiment.tasks import Outcome, TrackPlan
 from mgdd.rig.experiment.watched import Cycle, Watched
 
 if TYPE_CHECKING:
@@ -207,8 +207,6 @@ def _run(
         plant, most = Watched(stand.plant, listen_here), stand.left()
         if most is not None and most < 1:
             raise DataError(f"{checked.record}: ends before the first cycle of the task")
-        if isinstance(checked.plan, SeekPlan):
-            return checked.plan.run(plant, most), stand.counters()
         return checked.plan.run(plant, first, most), stand.counters()
     finally:
         record.say(stand.events())

@@ -65,7 +65,8 @@ class RunFolder:
 
         A map reads its DBC beside it, a record may be large: both are named by their full path.
         """
-        if path.suffix == ".rec" or _is_map(path):
+        is_map = path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
+        if path.suffix == ".rec" or is_map:
             return str(path.resolve())
         inputs = self.path / _INPUTS
         inputs.mkdir(exist_ok=True)
@@ -101,10 +102,6 @@ class RunFolder:
             raise RigError(
                 f"{self.path / name}: {error.strerror or error}; free some space, or name a folder elsewhere"
             ) from error
-
-
-def _is_map(path: Path) -> bool:
-    return path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
 
 
 def versions() -> dict[str, Any]:

@@ -84,14 +84,10 @@ class TrackPlan:
                 f"reference {task.reference}: time between samples", self.reference.sample_s,
                 f"{sample_s:g} s, as that of the plant",
             )  # fmt: skip
+        self.samples = len(self.reference.angle_deg)
         self.model = _model_named(task.model, folder)
         require_known_delay(task.controller, sample_s, task.delay_samples or 0)
         _, self.doubts = self._made()
-
-    @property
-    def samples(self) -> int:
-        """How many samples it takes."""
-        return len(self.reference.angle_deg)
 
     def controller(self) -> AngleController:
         """Make the controller, at its beginning."""
@@ -155,17 +151,12 @@ class IdentifyPlan:
     def __init__(self, task: IdentifyTask, *, sample_s: float, seed: int, folder: Path) -> None:
         self.task, self.sample_s, self.seed = task, sample_s, seed
         self.prior = throttle_named(task.prior, folder)
-        signal, check = identify.design_excitation(
+        signal, _ = identify.design_excitation(
             task.excitation, self.prior, side=task.side, duration_s=task.duration_s, step_s=sample_s
         )
         settle = round(_SETTLE_S / sample_s)
         self.duty = np.r_[np.zeros(settle), signal["duty"].to_numpy()]
-        self.said = check.summary()
-
-    @property
-    def samples(self) -> int:
-        """How many samples it takes."""
-        return len(self.duty)
+        self.samples = len(self.duty)
 
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many samples, and fit."""
@@ -270,6 +261,7 @@ class SeekPlan:
         self.task = task
         if not task.lower_cad < task.upper_cad:
             raise ParameterError.of("seek.lower_cad", task.lower_cad, f"< upper_cad, {task.upper_cad:g}")
+        self.samples = task.cycles
         known = engine_named(task.model, folder)
         cylinder = scaled(known.cylinder, task.scale, "seek")
         self.point = known.point
@@ -296,11 +288,6 @@ class SeekPlan:
             )
         self.start_cad = start
 
-    @property
-    def samples(self) -> int:
-        """How many cycles it takes."""
-        return self.task.cycles
-
     def seeker(self) -> Seeker | GuidedEngine:
         """Make the seeker, at its beginning."""
         task = self.task
@@ -316,9 +303,9 @@ class SeekPlan:
         )
         return plain if task.guide == "none" else GuidedEngine(plain, self.model, self.point, keep_start=True)
 
-    def run(self, plant: Plant, most: int | None = None) -> Outcome:
+    def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many cycles."""
-        cycles = self.task.cycles if most is None else min(self.task.cycles, most)
+        cycles = _fewer(self.samples, most)
         criteria = LoopCriteria(arrival=_ARRIVAL_CAD, limits=dict(self.task.limits) or None)
         try:
             run = run_seeker(plant, self.seeker(), cycles, criteria=criteria)
