@@ -20,7 +20,7 @@ from mgdd.cli import main
 from mgdd.cli.rig_live import LiveView
 from mgdd.loop import Measurement
 from mgdd.rig import read_record
-from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.experiment.stand import Cycle
 
 TRACK = """
 kind = "experiment"

@@ -31,8 +31,8 @@ from mgdd.rig.can.frame import changed
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.experiment import core_track
-from mgdd.rig.experiment.loop_bus import WatchedBus
-from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.experiment.core_track import WatchedBus
+from mgdd.rig.experiment.stand import Cycle
 from patient_bench import patient_experiment
 from realtime_loops import becomes
 

@@ -22,8 +22,8 @@ from mgdd.identify import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
 from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, recorded, run_experiment
+from mgdd.rig.experiment.stand import Cycle
 from mgdd.rig.experiment.tasks import TrackPlan
-from mgdd.rig.experiment.watched import Cycle
 
 HEAD = 'kind = "experiment"\nformat = 1\nseed = 5\n'
 TRACK = HEAD + 'task = "track"\n[track]\nreference = "step:20:35"\ncontroller = "pid"\n'

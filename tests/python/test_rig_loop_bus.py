@@ -13,8 +13,8 @@ from mgdd.errors import RigError
 from mgdd.rig import CanTransport, Frame, Recorder, SignalMap, read_record
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.replay_bus import RecordedBus
-from mgdd.rig.experiment import loop_bus
-from mgdd.rig.experiment.loop_bus import SocketBus, WatchedBus
+from mgdd.rig.experiment import core_track
+from mgdd.rig.experiment.core_track import SocketBus, WatchedBus
 from realtime_loops import becomes
 
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
@@ -66,7 +66,7 @@ class Stand:
 
 @pytest.fixture
 def driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
-    monkeypatch.setattr(loop_bus, "SocketCanTransport", Socket)
+    monkeypatch.setattr(core_track, "SocketCanTransport", Socket)
     stand = Stand(tmp_path, transmits=True)
     with stand.rig.bus, stand.other:  # type: ignore[attr-defined]
         yield stand
@@ -74,7 +74,7 @@ def driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
 
 @pytest.fixture
 def watching(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
-    monkeypatch.setattr(loop_bus, "SocketCanTransport", Socket)
+    monkeypatch.setattr(core_track, "SocketCanTransport", Socket)
     stand = Stand(tmp_path, transmits=False)
     with stand.rig.bus, stand.other:  # type: ignore[attr-defined]
         yield stand

@@ -77,11 +77,8 @@ class RigRecord:
         """
         rows = [flat(exchange) for exchange in self._exchanges]
         names = list(dict.fromkeys(name for row in rows for name in row))
-        for name in reversed(
-            [*(f"input.{own}" for own in self.input_names), *(f"limit.{n}" for n in self.limit_names)]
-        ):
-            if name not in names:
-                names.insert(0, name)
+        own = [*(f"input.{name}" for name in self.input_names), *(f"limit.{name}" for name in self.limit_names)]
+        names = [*(name for name in own if name not in names), *names]
         table = np.array([[row.get(name, math.nan) for name in names] for row in rows], np.float64)
         return names, table.reshape(len(rows), len(names))
 

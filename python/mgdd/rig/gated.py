@@ -99,10 +99,7 @@ class GatedThrottle:
         self._send(drive)
 
     def measure(self) -> Measurement:
-        """Run one cycle; RigError before `apply`.
-
-        ``applied`` has the ``duty`` that left, and ``bridge_open`` where the plant takes it.
-        """
+        """Run one cycle; ``applied`` has what left: the ``duty``, and ``bridge_open`` where the plant takes it."""
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
         measured = self.plant.measure()

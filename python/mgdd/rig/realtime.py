@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.rig import RingTransport, SocketCanTransport
 from mgdd.errors import ParameterError, RigError
+from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.rig.loop_message import LoopMessage
-from mgdd.rig.loop_samples import samples_dataset, summary
 from mgdd.rig.safety import SafetyChange, SafetyEnvelope
 
 if TYPE_CHECKING:
@@ -23,6 +23,32 @@ if TYPE_CHECKING:
 __all__ = ["RealtimeLoop"]
 
 _PAUSE_S = 0.002
+_LABELS: Mapping[str, tuple[str, str]] = {
+    "cycle": ("-", "number of the grid point"),
+    "lateness_us": ("us", "beginning after the deadline"),
+    "compute_us": ("us", "time from waking until the command had left"),
+    "age_us": ("us", "age of the measurement"),
+    "missed": ("-", "deadlines missed since the cycle before"),
+    "first_v": ("V", "first position sensor"),
+    "second_v": ("V", "second position sensor"),
+    "applied_duty": ("-", "duty that the node reports"),
+    "asked_duty": ("-", "duty of the controller"),
+    "bridge_open": ("-", "open bridge"),
+    "fresh": ("-", "a new angle arrived"),
+    "mode": ("-", "mode of the safety gate"),
+    "cause": ("-", "what is wrong"),
+    "send_result": ("-", "what became of the command"),
+    "good_frames": ("-", "frames with a new angle"),
+    "bad_frames": ("-", "frames that were refused"),
+    "bus_state": ("-", "state of the bus"),
+    "request": ("-", "request to the safety gate"),
+}
+_MODES = tuple(_core.rig.safety_states)
+_REASONS = tuple(_core.rig.safety_reasons)
+_RESULTS = tuple(_core.rig.send_results)
+_BUS_STATES = tuple(_core.rig.bus_states)
+_REQUESTS = tuple(_core.rig.safety_requests)
+_TIMES = {"lateness_us": "lateness", "compute_us": "compute", "age_us": "age", "send_us": "send"}
 
 
 class RealtimeLoop:
@@ -135,22 +161,12 @@ class RealtimeLoop:
         self.controller = controller
         self.transport = transport
         self._core = _core.rig.RealtimeLoop(
-            controller=getattr(controller, "_core", controller),
-            transport=transport,
-            envelope=self.envelope,
-            command=command.to_core(),
-            received=[message.to_core() for message in measurements],
-            period_s=self.envelope.cycle_s,
-            initial_reference_deg=reference_deg,
-            reference_timeout_s=reference_timeout_s,
-            transmit=transmit,
-            stop_frames=stop_frames,
-            realtime=realtime,
-            priority=priority,
-            lock_memory=lock_memory,
-            sample_capacity=sample_capacity,
-            queue_capacity=queue_capacity,
-        )
+            controller=getattr(controller, "_core", controller), transport=transport, envelope=self.envelope,
+            command=command.to_core(), received=[message.to_core() for message in measurements],
+            period_s=self.envelope.cycle_s, initial_reference_deg=reference_deg,
+            reference_timeout_s=reference_timeout_s, transmit=transmit, stop_frames=stop_frames, realtime=realtime,
+            priority=priority, lock_memory=lock_memory, sample_capacity=sample_capacity, queue_capacity=queue_capacity,
+        )  # fmt: skip
         self._pause_s = max(_PAUSE_S, 2.0 * self.envelope.cycle_s)  # one request is heard per cycle
         self._origin_ns: int | None = None
         # Also at the end of the interpreter: a thread of the core must not outlive it.
@@ -159,10 +175,7 @@ class RealtimeLoop:
     # --- life -------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start the thread, once; returns at once. The gate is in the mode ``init``: commands say open bridge.
-
-        RigError where it was started before.
-        """
+        """Start the thread, once, and return: the gate is in the mode ``init``. RigError where it was started."""
         import xarray  # noqa: F401 - an import while it runs would hold up the threads that feed the transport
 
         self._core.start()
@@ -236,10 +249,7 @@ class RealtimeLoop:
         self._ask("reset", "init" if self.mode == "fault" else "armed", timeout_s)
 
     def abort(self) -> None:
-        """Open the bridge at the next cycle, whatever the mode; a reset leads out of it.
-
-        RigError where the loop does not run.
-        """
+        """Open the bridge at the next cycle, whatever the mode, until a reset; RigError where it does not run."""
         self._require_running()
         while not self._core.request("abort"):
             time.sleep(_PAUSE_S)
@@ -262,10 +272,7 @@ class RealtimeLoop:
     # --- references -------------------------------------------------------------------------------------------
 
     def set_reference(self, reference_deg: float) -> None:
-        """Set the wanted plate angle [deg] from the next cycle on; the latest one wins.
-
-        ParameterError where it is not finite.
-        """
+        """Set the wanted plate angle [deg], finite, from the next cycle on; the latest one wins."""
         self._core.set_reference(reference_deg)
 
     def queue_references(self, reference_deg: ArrayLike) -> None:
@@ -301,7 +308,7 @@ class RealtimeLoop:
         columns = self.sample_columns()
         if self._origin_ns is None and columns["deadline_ns"].size:
             self._origin_ns = int(columns["deadline_ns"][0])
-        return samples_dataset(columns, self._origin_ns or 0)
+        return _dataset(columns, self._origin_ns or 0)
 
     def sample_columns(self) -> dict[str, NDArray[Any]]:
         """Take the same samples as plain columns, for a reader that comes every few milliseconds.
@@ -330,4 +337,40 @@ class RealtimeLoop:
 
     def summary(self) -> str:
         """Say in a few lines how punctual the loop was: deadlines, times and frames."""
-        return summary(self.report(), self.envelope.cycle_s)
+        return _summary(self.report(), self.envelope.cycle_s)
+
+
+def _dataset(columns: Mapping[str, Any], origin_ns: int) -> xr.Dataset:
+    """Label the columns of the core along the time of the deadlines from an origin on the monotonic clock [ns]."""
+    values = dict(columns)
+    time_s = (values.pop("deadline_ns") - origin_ns) * 1e-9
+    values["sensed_angle_deg"] = values.pop("angle_deg")
+    values["mode"] = np.array(_MODES)[values.pop("state")]
+    values["cause"] = np.array(_REASONS)[values["cause"]]
+    values["send_result"] = np.array(_RESULTS)[values["send_result"]]
+    values["bus_state"] = np.array(_BUS_STATES)[values["bus_state"]]
+    values["request"] = np.array(_REQUESTS)[values["request"]]
+    variables: dict[str, Any] = {"time_s": ("time_s", time_s)}
+    for name, column in values.items():
+        variables[name] = ("time_s", column, *(_LABELS.get(name) or VARIABLES[name]))
+    return labelled_dataset(variables, attrs={"origin_monotonic_ns": str(origin_ns)})
+
+
+def _summary(report: Mapping[str, Any], period_s: float) -> str:
+    """Say in a few lines how punctual the loop of a report was."""
+    frames, bus, granted = report["frames"], report["bus"], report["schedule"]
+    cycles = f"{report['cycles']} cycles of {period_s * 1e3:g} ms, {report['missed']} deadlines missed"
+    lines = [f"{cycles} ({report['late']} of them too long, longest row {report['longest_row']})"]
+    lines.append(f"{'':14}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>12}")
+    for name, what in _TIMES.items():
+        times = report[name]
+        quantiles = "".join(f"{times[q]:10.1f}" for q in ("p50", "p99", "p99_9"))
+        lines.append(f"{what + ' [us]':14}{quantiles}{times['max']:12.1f}")
+    received = f"frames: {frames['good']} good, {frames['bad']} bad, {bus['lost']} lost"
+    lines.append(
+        f"{received}, {bus['sent']} sent, {bus['full'] + bus['failed']} not sent; samples dropped:"
+        f" {report['dropped_samples']}"
+    )
+    yes = {True: "yes", False: "no"}
+    lines.append(f"SCHED_FIFO: {yes[granted['realtime']]}, memory locked: {yes[granted['memory_locked']]}")
+    return "\n".join(lines)

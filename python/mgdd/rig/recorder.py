@@ -119,10 +119,7 @@ class Recorder:
             self._writer.write_sample(number, now, _numbers(names, values))
 
     def event(self, category: str, text: str, *, monotonic_ns: int | None = None) -> None:
-        """Append an event, by default of now.
-
-        The category is ``"state"``, ``"fault"``, ``"parameter"``, ``"note"`` or any other word.
-        """
+        """Append an event of a category, ``"state"``, ``"fault"``, ``"note"`` or any other word; default now [ns]."""
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:
             self._writer.write_event(now, category, text)

@@ -75,9 +75,7 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
 
 def _wanted() -> dict[str, Wanted]:
     fields = _core.rig.SafetyEnvelope.fields()
-    return {name: Wanted() if name != _CHOICE else Wanted(form="text") for name in fields} | {
-        name: Wanted(field["unit"]) for name, field in fields.items() if name != _CHOICE
-    }
+    return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
 
 
 class SafetyChange(NamedTuple):
@@ -253,16 +251,9 @@ class SafetyGate:
             A negative count, an unknown name.
         """
         self._core.observe(
-            good_frames=good_frames,
-            bad_frames=bad_frames,
-            age_s=age_s,
-            sensor_v=sensor_v,
-            angle_deg=angle_deg,
-            bus=bus,
-            sent=sent,
-            missed_deadlines=missed_deadlines,
-            request=request,
-        )
+            good_frames=good_frames, bad_frames=bad_frames, age_s=age_s, sensor_v=sensor_v, angle_deg=angle_deg,
+            bus=bus, sent=sent, missed_deadlines=missed_deadlines, request=request,
+        )  # fmt: skip
 
     def command(self, duty: float) -> Drive:
         """Give the drive that may leave in this cycle for the duty that the controller asks for [-].
@@ -301,10 +292,7 @@ class SafetyGate:
             raise RigError(f"{name} refused in mode {self.mode!r}: {against}")
 
     def drain(self) -> list[SafetyChange]:
-        """Take the waiting changes of mode out of the audit list, oldest first.
-
-        The list holds 64; ``counts["dropped"]`` found no room.
-        """
+        """Take the waiting changes of mode, oldest first; beyond 64 they are ``counts["dropped"]``."""
         return [SafetyChange(*entry) for entry in self._core.drain()]
 
     def __enter__(self) -> Self:

@@ -222,10 +222,7 @@ class CanRig:
         self._inbox.skip()
 
     def open(self) -> None:
-        """Connect, look who is there, and arm the node; `close` undoes it.
-
-        A RigError says: no such bus, no node on it, another node that sends our commands, ``bench`` without arming.
-        """
+        """Connect, look who is there, and arm the node, until `close`; a RigError says what stands against it."""
         if self._is_open:
             raise RigError("the rig is open already")
         if may_be_real(self.mode, self.bus):
@@ -298,14 +295,14 @@ class CanRig:
         if self.mode == "dry_run":
             return
         self._has_sent = self._sends
-        for frame in self._sender.frames(message, payloads):
-            self._hand_over(frame)
+        self._hand_over(self._sender.frames(message, payloads))
         self._commands += 1
 
-    def _hand_over(self, frame: Frame, *, final: bool = False) -> None:
-        self.bus.send(frame, final=final)
-        if self._on_frame is not None:
-            self._on_frame(changed(frame, monotonic_ns=time.monotonic_ns()))
+    def _hand_over(self, frames: Sequence[Frame], *, final: bool = False) -> None:
+        for frame in frames:
+            self.bus.send(frame, final=final)
+            if self._on_frame is not None:
+                self._on_frame(changed(frame, monotonic_ns=time.monotonic_ns()))
 
     def _receive(self, timeout_s: float) -> bool:
         """Take the next frame; False where none came."""
@@ -321,8 +318,7 @@ class CanRig:
         self._has_sent = True
         for message in self.map.commands.values():
             if message.safe:
-                for frame in self._sender.frames(message, message.payloads({}, message.safe)):
-                    self._hand_over(frame, final=final)
+                self._hand_over(self._sender.frames(message, message.payloads({}, message.safe)), final=final)
 
     def _heard(self, timeout_s: float) -> bool:
         """Wait for a whole cycle, then take all that came: the newest state counts, the oldest cycle is next."""

@@ -117,7 +117,9 @@ def node_of(
     """Make the virtual plant of the inputs of a map, a throttle for ``duty``, an engine for ``soc_cad``."""
     names = signal_map.input_names
     if "duty" in names:
-        known = [_plant_fault(text) for text in faults]
+        known: list[ThrottleFault | SensorFault] = []
+        for kind, given in (fault_of(text, _FAULT_KEYS) for text in faults):
+            known.append((SensorFault if "sensor" in given else ThrottleFault)(kind=kind, **given))
         plant = VirtualThrottle(
             inputs=(*names, "bridge_open"),
             faults=known,
@@ -196,8 +198,3 @@ def parent_watch() -> Callable[[], bool]:
     """Return a function that says whether the process that started this one still lives."""
     parent = os.getppid()
     return lambda: os.getppid() == parent
-
-
-def _plant_fault(text: str) -> ThrottleFault | SensorFault:
-    kind, given = fault_of(text, _FAULT_KEYS)
-    return SensorFault(kind=kind, **given) if "sensor" in given else ThrottleFault(kind=kind, **given)

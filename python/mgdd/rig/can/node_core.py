@@ -260,7 +260,10 @@ class NodeCore:
         )
         drive = self.gate.command(self._inputs.get("duty", 0.0))
         if was_driven and self.gate.mode == "limp":
-            self._note_trouble(is_late=age_s is None or age_s >= facts["age_s"])
+            if self.gate.reason == "stale" and (age_s is None or age_s >= facts["age_s"]):
+                self._troubles.add("command_timeout")
+            elif self.gate.reason == "bad_frames":
+                self._troubles.add("wrong_counter" if self._bad_status in _COUNTER_ERRORS else "wrong_crc")
         if drive.bridge_open:
             return None
         return self._inputs | ({"duty": drive.duty} if "duty" in self._inputs else {})
@@ -274,12 +277,6 @@ class NodeCore:
         if self.gate.mode == "run":
             return "none" if drives else "stop"  # at rest, or in a mode that this node does not have
         return "run" if drives else "none"
-
-    def _note_trouble(self, *, is_late: bool) -> None:
-        if self.gate.reason == "stale" and is_late:
-            self._troubles.add("command_timeout")
-        elif self.gate.reason == "bad_frames":
-            self._troubles.add("wrong_counter" if self._bad_status in _COUNTER_ERRORS else "wrong_crc")
 
     def _report(self, sampled: Sampled) -> list[Frame]:
         own = {name: float(name in self._troubles) for name in ("command_timeout", "wrong_crc", "wrong_counter")}

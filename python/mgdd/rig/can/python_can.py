@@ -100,6 +100,13 @@ def _content(message: can.Message) -> tuple[Any, ...]:
     return message.arbitration_id, message.is_extended_id, message.is_remote_frame, message.dlc, bytes(message.data)
 
 
+_HINTS = {
+    errno.EAFNOSUPPORT: "this kernel has no CAN: use socketcand and a hub (mgdd rig hub), or another machine",
+    errno.ENODEV: "`ip -brief link` lists the CAN interfaces",
+    errno.ENETDOWN: "`ip link set CHANNEL up type can bitrate 500000` starts it",
+}
+
+
 def connected(interface: str, channel: str | int, options: Mapping[str, Any], name: str) -> Any:
     """Open a bus of python-can, which messages call `name`; RigError says what is wrong and what to do."""
     can: Any = import_extra("can", "can", "a CAN bus")
@@ -121,7 +128,7 @@ def connected(interface: str, channel: str | int, options: Mapping[str, Any], na
                     raise  # the one that is tried again: a frame in one packet with the greeting
         raise can.CanError("the greeting of the hub was never read alone")
     except (can.CanError, OSError, ImportError, ValueError, TypeError) as error:
-        hint = _hint(error)
+        hint = _HINTS.get(error_code(error))
         raise RigError(
             f"{name}: channel {channel!r} of interface {interface} cannot be opened: {error}"
             + (f"; {hint}" if hint else "")
@@ -153,14 +160,6 @@ def _require_hub(name: str, options: Mapping[str, Any]) -> None:
         raise RigError(f"{name}: what answers there is not socketcand: it said {greeting!r}")
 
 
-def _hint(error: Exception) -> str:
-    return {
-        errno.EAFNOSUPPORT: "this kernel has no CAN: use socketcand and a hub (mgdd rig hub), or another machine",
-        errno.ENODEV: "`ip -brief link` lists the CAN interfaces",
-        errno.ENETDOWN: "`ip link set CHANNEL up type can bitrate 500000` starts it",
-    }.get(error_code(error), "")
-
-
 class Reception:
     """Receives from a bus of python-can.
 
@@ -170,7 +169,8 @@ class Reception:
 
     def __init__(self, bus: can.BusABC) -> None:
         self._bus = bus
-        self._interface = _interface_of(bus)
+        module = str(bus.__class__.__module__)  # of python-can, or of another one
+        self._interface = module.split(".")[2] if module.startswith("can.interfaces.") else ""
         self._has_our_clock = _has_our_clock(bus, self._interface)
         self._sent: deque[tuple[float, tuple[Any, ...]]] = deque()  # appended and taken by one thread each
         self._empty_ns = time.monotonic_ns()
@@ -232,12 +232,6 @@ class Reception:
             if hasattr(self._bus, _TEXT):  # python-can would parse it again, for ever
                 setattr(self._bus, _TEXT, "")
             return None
-
-
-def _interface_of(bus: Any) -> str:
-    """Name the interface of a bus by the module of python-can that it is from; empty for another one."""
-    module = str(bus.__class__.__module__)
-    return module.split(".")[2] if module.startswith("can.interfaces.") else ""
 
 
 def _has_our_clock(bus: Any, interface: str) -> bool:

@@ -121,15 +121,9 @@ class SignalMap:
         limits = tuple(table.take("limits", "texts", []))
         objective = {row.take("value", "text"): row.take("weight", "number") for row in table.rows("objective")}
         made = cls(
-            file=file,
-            dbc=dbc,
-            commands=commands,
-            measurements=measurements,
-            trigger=trigger,
-            cycle_s=cycle_s,
-            state=state,
-            objective={},
-        )
+            file=file, dbc=dbc, commands=commands, measurements=measurements, trigger=trigger, cycle_s=cycle_s,
+            state=state, objective={},
+        )  # fmt: skip
         try:
             return made.with_goals(limits=limits, objective=objective)
         except ParameterError as error:

@@ -124,11 +124,7 @@ class CanTransport:
             return dict(self._counts + (self._reception.counts if self._reception is not None else Counter()))
 
     def open(self) -> None:
-        """Connect and start to receive.
-
-        A RigError says: no such interface or channel, nobody listens there, or it is open already. ImportError: the
-        extra ``can`` is not installed.
-        """
+        """Connect and start to receive; RigError, or ImportError without the extra ``can``, says why it cannot."""
         if self._bus is not None:
             raise RigError(f"{self.name} is open already: close it first")
         self._bus = connected(self.interface, self.channel, self.options, self.name)

@@ -55,7 +55,9 @@ def chosen_loop(experiment: Experiment, signal_map: SignalMap | None) -> LoopCho
         return LoopChoice("python", "track.loop = 'python'")
     against = _against_core(experiment, signal_map)
     if not against:
-        channel = _own_socket(experiment.bus.connection)
+        # Options of a connection by SocketCAN would be those of python-can: then a bridge serves the loop.
+        bus = None if experiment.bus.connection is None else CanTransport.parse(experiment.bus.connection)
+        channel = str(bus.channel) if bus is not None and bus.interface == "socketcan" and not bus.options else None
         by = "bridge" if channel is None else "raw socket"
         return LoopChoice("core", f"a bus at real-time pace, by {by}", channel)
     if settings.loop == "core":
@@ -77,14 +79,6 @@ def _against_core(experiment: Experiment, signal_map: SignalMap | None) -> str:
     except ParameterError as error:
         return str(error)
     return ""
-
-
-def _own_socket(connection: str | None) -> str | None:
-    """Give the channel of a connection by SocketCAN without options: they would be those of python-can."""
-    if connection is None:
-        return None
-    bus = CanTransport.parse(connection)
-    return str(bus.channel) if bus.interface == "socketcan" and not bus.options else None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -182,10 +182,7 @@ class Experiment:
         return replace(self, mode=mode, replay=replay, bus=bus)
 
     def with_files(self, put: Callable[[Path], str]) -> Self:
-        """Give the same experiment with other names for the files that it finds beside it.
-
-        `put` takes the path of a file and gives what the experiment shall call it; names of what is shipped stay.
-        """
+        """Give the same experiment with the names that `put` gives to the files beside it, by their paths."""
         changed: dict[str, Any] = {}
         for part, keys in _FILES.items():
             record = getattr(self, part)

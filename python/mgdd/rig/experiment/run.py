@@ -19,9 +19,8 @@ from mgdd.rig.experiment.core_samples import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.run_folder import RunFolder, RunRecord, versions
-from mgdd.rig.experiment.stand import Stand, guarded, opened_rig
+from mgdd.rig.experiment.stand import Cycle, Stand, Watched, guarded, opened_rig
 from mgdd.rig.experiment.tasks import Outcome, TrackPlan
-from mgdd.rig.experiment.watched import Cycle, Watched
 
 if TYPE_CHECKING:
     import xarray as xr

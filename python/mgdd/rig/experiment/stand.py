@@ -1,20 +1,21 @@
-"""The plant of an experiment in its mode: in process, over a bus, or from a record, with its guard in front."""
+"""The plant of an experiment in its mode, with its guard in front, and who is told of its cycles."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 from mgdd.errors import RigError
-from mgdd.loop import Plant
+from mgdd.loop import Measurement, Plant
 from mgdd.optimize import Limit
 from mgdd.rig.actuator_guard import ActuatorGuard
-from mgdd.rig.base import SimulatedRig
+from mgdd.rig.base import AroundPlant, SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.processes import VirtualNode
@@ -28,9 +29,46 @@ from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import SafetyGate, said_of
 
-__all__ = ["Stand", "guarded", "opened_rig", "own_node"]
+__all__ = ["Cycle", "Stand", "Watched", "guarded", "opened_rig", "own_node"]
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
+
+
+class Cycle(NamedTuple):
+    """One cycle of a plant."""
+
+    number: int  # from 0 on
+    asked: Mapping[str, float]
+    measured: Measurement
+    thinking_s: float  # from the measurement before to these inputs
+    waiting_s: float  # from the inputs to this measurement
+
+
+class Watched(AroundPlant):
+    """A plant whose cycles are told to a listener, with the time that they took."""
+
+    def __init__(self, plant: Plant, listener: Callable[[Cycle], None]) -> None:
+        super().__init__(plant)
+        self._listener = listener
+        self.cycles = 0
+        self._asked: Mapping[str, float] = {}
+        self._measured_s = self._applied_s = time.perf_counter()
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Pass the inputs on."""
+        self._asked = dict(inputs)
+        self._applied_s = time.perf_counter()
+        self.plant.apply(inputs)
+
+    def measure(self) -> Measurement:
+        """Pass the measurement back, and tell the listener."""
+        measured = self.plant.measure()
+        now = time.perf_counter()
+        cycle = Cycle(self.cycles, self._asked, measured, self._applied_s - self._measured_s, now - self._applied_s)
+        self.cycles += 1
+        self._listener(cycle)
+        self._measured_s = time.perf_counter()
+        return measured
 
 
 @contextmanager
