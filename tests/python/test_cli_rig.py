@@ -60,6 +60,7 @@ def test_a_hub_says_its_bus_and_at_the_end_its_counts() -> None:
         (["node", "--bus", BUS, "--sample-ms", "nan"], "--sample-ms = nan: must be > 0"),
         (["node", "--bus", BUS, "--map", "surrogate"], "must be those of a virtual throttle"),
         (["node", "--bus", BUS, "--fault", "melted"], "kind = 'melted': must be one of"),
+        (["node", "--bus", BUS, "--envelope", "etb_nod"], "no shipped envelope 'etb_nod': did you mean 'etb_node'"),
         (["node", "--bus", BUS, "--truth", "truth.xls"], "the ending must be one of .csv"),
         (
             ["node", "--bus", "virtual:cli", "--map", "engine", "--period-ms", "0.01"],

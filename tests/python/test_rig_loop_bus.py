@@ -64,20 +64,21 @@ class Stand:
         )
 
 
-@pytest.fixture
-def driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
+def opened(folder: Path, monkeypatch: pytest.MonkeyPatch, *, transmits: bool) -> Iterator[Stand]:
     monkeypatch.setattr(core_track, "SocketCanTransport", Socket)
-    stand = Stand(tmp_path, transmits=True)
+    stand = Stand(folder, transmits=transmits)
     with stand.rig.bus, stand.other:  # type: ignore[attr-defined]
         yield stand
+
+
+@pytest.fixture
+def driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
+    yield from opened(tmp_path, monkeypatch, transmits=True)
 
 
 @pytest.fixture
 def watching(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
-    monkeypatch.setattr(core_track, "SocketCanTransport", Socket)
-    stand = Stand(tmp_path, transmits=False)
-    with stand.rig.bus, stand.other:  # type: ignore[attr-defined]
-        yield stand
+    yield from opened(tmp_path, monkeypatch, transmits=False)
 
 
 def test_the_socket_lets_pass_what_the_loop_reads_and_its_command_and_nothing_else(driving: Stand) -> None:
