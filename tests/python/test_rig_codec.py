@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from mgdd._core.rig import SignalLayout, check_message
 from mgdd.errors import ParameterError, ShapeError
 
-
 KNOWN = [  # by hand from the bit charts of the DBC convention; tests/cpp/rig/test_signal_codec.cpp holds the same list
     ({"start": 0, "length": 16, "scale": 0.01}, 81.92, "0020"),
     ({"start": 4, "length": 12}, 0xABC, "c0ab"),

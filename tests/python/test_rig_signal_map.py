@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from foreign_bus import FOREIGN, FOREIGN_MAP, write_foreign
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.rig import SignalMap
 from mgdd.rig.can.dbc import DbcFile
+from user_buses import FOREIGN, FOREIGN_MAP, write_foreign
 
 cantools = pytest.importorskip("cantools", reason="the extra `can` is not installed")
 
