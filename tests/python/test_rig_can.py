@@ -20,11 +20,9 @@ from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, Frame, SignalMap
 from mgdd.rig.can.link import Punctual, Sender
 from mgdd.rig.can.modes import key_line, may_be_real
+from user_buses import write_bus
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
-
-
-# --- modes --------------------------------------------------------------------------------------------------
 
 
 def test_nothing_is_sent_because_an_argument_was_forgotten() -> None:
@@ -117,9 +115,6 @@ def test_a_dry_run_receives_and_sends_nothing() -> None:
         assert core.gate.mode == "init"
 
 
-# --- leaving ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("way", ["end", "error", "nan", "exit"])
 def test_leaving_sends_five_safe_frames_and_then_nothing(way: str) -> None:
     with CanTransport("virtual", "leave") as spy, node("leave") as core:
@@ -184,36 +179,30 @@ def test_a_dead_bus_does_not_hide_why_it_was_left(monkeypatch: pytest.MonkeyPatc
         lose_the_bus()
 
 
-# --- who is there -------------------------------------------------------------------------------------------
-
-
-def test_a_bus_without_peers_is_named_and_left() -> None:
+@pytest.mark.parametrize(
+    ("other", "text"),
+    [
+        (None, r"virtual:there: within 1 s no frame ETB_Status \(0x121\) came; .*seen: none"),
+        (SignalMap.load("engine").file, r"no frame ETB_Status .*identifiers seen: 0x210, 0x211"),
+        ("0x999", r"frames ETB_Status \(0x121\) came, too few of them valid .*wrong_crc"),  # another data identifier
+    ],
+)
+def test_a_bus_without_its_node_is_named_by_what_came_and_left(
+    other: Path | str | None, text: str, tmp_path: Path
+) -> None:
     begin = time.monotonic()
-    rig = CanRig(ETB, "virtual:empty", mode="hil", timeout_s=0.05)
-    with pytest.raises(RigError, match=r"virtual:empty: within 1 s no frame ETB_Status \(0x121\) came; .*seen: none"):
-        rig.open()
+    with contextlib.ExitStack() as stack:
+        if isinstance(other, str):
+            changed = ETB.file.read_text(encoding="utf-8").replace("data_id = 0x121", f"data_id = {other}")
+            other = write_bus(tmp_path, "etb", ETB.dbc.file.read_text(encoding="utf-8"), changed)
+        if other is not None:
+            stack.enter_context(node("there", step=False, signal_map=SignalMap.load(other)))
+        rig = CanRig(ETB, "virtual:there", mode="hil", timeout_s=0.05)
+        with pytest.raises(RigError, match=text):
+            rig.open()
     assert time.monotonic() - begin < 30.0
     with pytest.raises(RigError, match="not open"):
         rig.apply({"duty": 0.0})
-
-
-def test_a_node_of_another_dbc_is_told_by_what_it_sends() -> None:
-    with node("other", step=False, signal_map=SignalMap.load("engine")):
-        rig = CanRig(ETB, "virtual:other", mode="hil", timeout_s=0.05)
-        with pytest.raises(RigError, match=r"no frame ETB_Status .*identifiers seen: 0x210, 0x211"):
-            rig.open()
-
-
-def test_a_node_with_another_data_identifier_has_no_valid_frame(tmp_path: Path) -> None:
-    (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
-    file = tmp_path / "etb.toml"
-    file.write_text(
-        ETB.file.read_text(encoding="utf-8").replace("data_id = 0x121", "data_id = 0x999"), encoding="utf-8"
-    )
-    with node("crc", step=False, signal_map=SignalMap.load(file)):
-        rig = CanRig(ETB, "virtual:crc", mode="hil", timeout_s=0.05)
-        with pytest.raises(RigError, match=r"frames ETB_Status \(0x121\) came, too few of them valid .*wrong_crc"):
-            rig.open()
 
 
 def test_a_node_that_stops_is_not_taken_for_another_one() -> None:
@@ -272,9 +261,6 @@ def test_another_host_is_found_before_anything_is_sent() -> None:
             rig.open()
         assert not any(map(is_safe, commands(spy)))
         assert rig.counters["commands"] == 0
-
-
-# --- too late -----------------------------------------------------------------------------------------------
 
 
 def test_a_host_that_is_late_before_a_node_with_a_clock_has_to_arm_again() -> None:

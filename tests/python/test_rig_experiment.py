@@ -128,21 +128,14 @@ def test_a_run_that_never_began_leaves_no_folder(tmp_path: Path) -> None:
 def test_modes_that_drive_or_listen_need_what_they_need() -> None:
     pytest.importorskip("cantools")
     known = experiment(TRACK)
-    with pytest.raises(ParameterError, match=r"mode = 'bench': needs \[bus\] connection"):
-        check_experiment(known.with_mode("bench"))
     wired = experiment(TRACK + '[bus]\nconnection = "virtual:none"\n')
     with pytest.raises(ParameterError, match=r"bus\.pace = 'step': must be 'real_time' with mode = 'bench'"):
         check_experiment(wired.with_mode("bench"))
-    with pytest.raises(ParameterError, match=r"mode = 'replay': needs \[replay\] record"):
-        check_experiment(known.with_mode("replay"))
     with pytest.raises(ParameterError, match="arm = True: must be left out with mode = 'simulate'"):
         run_experiment(known, arm=True)
     slow = experiment(TRACK + '[bus]\nconnection = "virtual:none"\npace = "real_time"\n[plant]\nsample_s = 0.001\n')
     with pytest.raises(ParameterError, match=r"sample_s = 0.001: must be 0.005 s, the cycle time of ETB_Status"):
         check_experiment(slow.with_mode("dry_run"))
-    real = experiment(TRACK + '[bus]\nconnection = "virtual:none"\npace = "real_time"\n')
-    with pytest.raises(RigError, match="drives real hardware: give arm=True"):
-        run_experiment(real.with_mode("bench"))
 
 
 def test_tracking_is_the_loop_of_the_library_behind_a_gate() -> None:
