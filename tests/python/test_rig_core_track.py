@@ -132,11 +132,6 @@ def test_a_map_that_the_loop_cannot_say_is_refused_with_its_place(tmp_path: Path
     (command,) = known.commands.values()
     with pytest.raises(ParameterError, match="safe of Cmd: must be given"):
         loop_messages(replace(known, commands={"Cmd": replace(command, safe={})}))
-
-
-def test_of_two_commands_a_loop_sends_none() -> None:
-    known = SignalMap.load("etb")
-    (command,) = known.commands.values()
     with pytest.raises(ParameterError, match="one message with the input duty"):
         loop_messages(replace(known, commands={"a": command, "b": command}))
 
