@@ -206,7 +206,7 @@ def test_a_run_over_the_bus_ends_at_home(node: NodeCore, slow_map: SignalMap) ->
     while not abs(angle_of(node) - HOME_DEG) < 1.0:
         assert time.monotonic() < until
         time.sleep(0.02)
-    assert node.state == "armed"  # five safe frames: an orderly end
+    assert node.gate.mode == "armed"  # five safe frames: an orderly end
 
 
 # --- the raw socket of the core -----------------------------------------------------------------------------
