@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,14 @@ def _signals_are_left_as_found() -> Iterator[None]:
     found = _signals()
     yield
     assert _signals() == found
+
+
+@pytest.fixture
+def no_thread_is_left() -> Iterator[None]:
+    """Of a test that has to end the threads that it began."""
+    before = set(threading.enumerate())
+    yield
+    assert set(threading.enumerate()) - before == set()
 
 
 @pytest.fixture(scope="session")

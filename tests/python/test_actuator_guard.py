@@ -27,8 +27,8 @@ class Engine:
     input_names = ("soc_cad", "rail_bar")
     limit_names = ("p_max_bar", "nox_ppm")
 
-    def __init__(self, *, delay: int = 0, offset: float = 0.0) -> None:
-        self.delay, self.offset = delay, offset
+    def __init__(self, *, delay: int = 0, offset: float = 0.0, answer: Measurement | None = None) -> None:
+        self.delay, self.offset, self.answer = delay, offset, answer
         self.applied: list[dict[str, float]] = []
 
     def pressure(self, inputs: Mapping[str, float]) -> float:
@@ -38,6 +38,8 @@ class Engine:
         self.applied.append(dict(inputs))
 
     def measure(self) -> Measurement:
+        if self.answer is not None:
+            return self.answer
         seen = self.applied[max(0, len(self.applied) - 1 - self.delay)]
         return Measurement(components=(1.0,), limits={"p_max_bar": self.pressure(seen), "nox_ppm": 300.0})
 
@@ -152,32 +154,20 @@ def test_of_two_proven_points_the_one_that_caused_a_late_excess_is_dropped():
 
 @pytest.mark.parametrize("limits", [{}, {"p_max_bar": math.nan}])
 def test_a_reading_that_is_missing_or_not_a_number_counts_as_exceeded(limits):
-    class Mute(Engine):
-        def measure(self) -> Measurement:
-            return Measurement(limits=limits)
-
-    guard = guard_of(Mute())
+    guard = guard_of(Engine(answer=Measurement(limits=limits)))
     cycle(guard, -5.0)
     assert cycle(guard, -6.0) == START
     assert guard.log[0].name == "p_max_bar"
 
 
 def test_a_misfire_proves_nothing():
-    class Misfiring(Engine):
-        def measure(self) -> Measurement:
-            return Measurement(misfire=True, limits={"p_max_bar": 40.0, "nox_ppm": 0.0})
-
-    guard = guard_of(Misfiring())
+    guard = guard_of(Engine(answer=Measurement(misfire=True, limits={"p_max_bar": 40.0, "nox_ppm": 0.0})))
     cycle(guard, -11.5)
     assert guard.good == START
 
 
 def test_what_the_plant_clamps_itself_comes_back_and_is_what_proved_good():
-    class Clamping(Engine):
-        def measure(self) -> Measurement:
-            return Measurement(limits={"p_max_bar": 100.0}, applied={"rail_bar": 500.0})
-
-    guard = guard_of(Clamping())
+    guard = guard_of(Engine(answer=Measurement(limits={"p_max_bar": 100.0}, applied={"rail_bar": 500.0})))
     assert cycle(guard, 1.0, 800.0) == {"soc_cad": 1.0, "rail_bar": 500.0}
     assert guard.good == {"soc_cad": 1.0, "rail_bar": 500.0}
 

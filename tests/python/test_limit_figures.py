@@ -189,4 +189,6 @@ def test_a_run_that_ends_before_its_first_cycle_is_interrupted_and_nothing_else(
 
     with pytest.raises(Interrupted) as stop:
         run_seeker(Stopping(p_max_bar=[]), seeker(p_max_bar=95.0), 5)
-    assert stop.value.partial.summary["judged_from"] == 0.0
+    run = stop.value.partial
+    assert (run.interrupted, run.dataset.sizes["cycle"], run.summary["judged_from"]) == (True, 0, 0.0)
+    assert np.isnan(run.summary["final_cad"])

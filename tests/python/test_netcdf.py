@@ -15,7 +15,6 @@ import pytest
 import xarray as xr
 
 import mgdd
-from idle_loop import idle_loop
 from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
@@ -28,10 +27,11 @@ from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, trac
 from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
-from mgdd.rig import SimulatedRig
+from mgdd.rig import RingTransport, SimulatedRig
 from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
+from realtime_loops import make_loop
 from study_cache import quick_study
 
 POINT = OperatingPoint()
@@ -130,7 +130,7 @@ def responses() -> Iterable[surrogate.ResponseModel]:
 
 
 def loop_samples() -> xr.Dataset:
-    with idle_loop() as loop:
+    with make_loop(RingTransport()) as loop:
         loop.wait(0.05)
     return loop.samples()
 

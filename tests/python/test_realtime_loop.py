@@ -15,7 +15,7 @@ from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import ParameterError, RigError
 from mgdd.results.labels import check_labels
 from mgdd.rig import LoopMessage, RingTransport
-from realtime_loops import becomes, go, make_loop
+from realtime_loops import becomes, driving, go, make_loop
 from throttle_node import ANGLE, PERIOD_S, SENSORS, STATUS, ThrottleNode, patient_envelope
 
 
@@ -48,13 +48,8 @@ def test_every_controller_runs(kind: str) -> None:
         "sliding": lambda: SlidingMode(sample_s=PERIOD_S),
         "mgdd1": Mgdd1,
     }
-    transport, period_s = RingTransport(), 0.001 if kind == "mgdd1" else PERIOD_S
-    envelope = patient_envelope(cycle_s=period_s)
-    with (
-        ThrottleNode.on(transport),
-        make_loop(transport, controllers[kind](), envelope=envelope, reference_deg=40.0) as loop,
-    ):
-        go(loop)
+    envelope = patient_envelope(cycle_s=0.001 if kind == "mgdd1" else PERIOD_S)
+    with driving(controllers[kind](), envelope=envelope, reference_deg=40.0) as (_, loop):
         assert becomes(lambda: loop.report()["fresh_cycles"] > 30)
         samples = loop.samples()
     driven = samples["asked_duty"].values[samples["mode"].values == "run"]
@@ -63,9 +58,7 @@ def test_every_controller_runs(kind: str) -> None:
 
 
 def test_samples_are_labelled_and_continue() -> None:
-    transport = RingTransport()
-    with ThrottleNode.on(transport), make_loop(transport, reference_deg=20.0) as loop:
-        go(loop)
+    with driving(reference_deg=20.0) as (_, loop):
         assert becomes(lambda: loop.report()["cycles"] > 50)
         first = loop.samples()
         assert becomes(lambda: loop.report()["cycles"] > 80)
@@ -112,19 +105,16 @@ def test_queued_references_are_followed_in_order() -> None:
 
 
 def test_what_a_controller_learnt_comes_back() -> None:
-    transport, pid = RingTransport(), Pid(sample_s=PERIOD_S)
+    pid = Pid(sample_s=PERIOD_S)
     before = dict(pid.state)
-    with ThrottleNode.on(transport), make_loop(transport, pid, reference_deg=40.0) as loop:
-        go(loop)
+    with driving(pid, reference_deg=40.0) as (_, loop):
         assert becomes(lambda: loop.report()["fresh_cycles"] > 50)
         assert dict(pid.state) == before
     assert dict(pid.state) != before
 
 
 def test_a_reference_that_is_not_renewed_aborts() -> None:
-    transport = RingTransport()
-    with ThrottleNode.on(transport), make_loop(transport, reference_timeout_s=0.3, reference_deg=30.0) as loop:
-        go(loop)
+    with driving(reference_timeout_s=0.3, reference_deg=30.0) as (_, loop):
         loop.set_reference(31.0)
         assert becomes(lambda: loop.mode == "limp")
         assert loop.reason == "aborted"

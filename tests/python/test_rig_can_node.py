@@ -13,11 +13,9 @@ from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.frame import changed
-from mgdd.rig.can.inbox import Inbox
-from mgdd.rig.can.link import Sender
+from mgdd.rig.can.link import Inbox, Sender
 from mgdd.rig.can.node import node_of
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 
 
 class Host:
@@ -60,16 +58,16 @@ def host() -> Host:
 
 def test_a_node_has_to_be_armed_before_it_is_driven(host: Host) -> None:
     host.send(0.5, 20)
-    assert host.core.state == "init"
+    assert host.core.gate.mode == "init"
     host.send(None, 2)
-    assert host.core.state == "init"
+    assert host.core.gate.mode == "init"
     host.send(0.5)
     host.send(None, 3)
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
     host.send(0.5)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
     host.send(None)
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
 
 
 def trouble(host: Host) -> set[str]:
@@ -86,18 +84,18 @@ def trouble(host: Host) -> set[str]:
 def running(host: Host) -> None:
     host.send(None, 5)
     host.send(0.5, 3)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
 
 
 def test_a_late_command_opens_the_bridge_and_only_arming_closes_it(host: Host) -> None:
     running(host)
     host.wait(0.014)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
     host.wait(0.007)  # 5 + 14 + 7 ms after the last one, with a limit of 20 ms
     assert host.decided == ("limp", "stale")
     assert trouble(host) == {"command_timeout"}
     host.send(0.5, 50)
-    assert host.core.state == "limp"
+    assert host.core.gate.mode == "limp"
     running(host)
 
 
@@ -115,15 +113,15 @@ def test_a_node_that_stood_still_trusts_nothing_that_waited(host: Host) -> None:
     assert host.decided == ("limp", "deadlines")
     assert host.core.late == len(waited)
     host.send(0.5, 50)
-    assert host.core.state == "limp"
+    assert host.core.gate.mode == "limp"
     running(host)
 
 
 def test_a_gap_is_a_fault_of_a_node_that_is_only_armed(host: Host) -> None:
     host.send(None, 6)
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
     host.wait(3.0)  # the host may be silent
-    assert host.core.state == "armed"
+    assert host.core.gate.mode == "armed"
     host.core.stood_still(host.now_ns, host.now_ns + 30_000_000)
     host.wait(0.03)
     assert host.decided == ("limp", "deadlines")
@@ -144,7 +142,7 @@ def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Hos
         bad = host.frame(0.9)
         host.core.take(changed(bad, data=bad.data[:-1] + bytes([bad.data[-1] ^ 0x10])))
         host.wait(0.001)
-        assert host.core.state == "run"
+        assert host.core.gate.mode == "run"
         assert host.core.last is not None
         assert host.core.last.applied == {"duty": 0.5}
     host.send(0.4)  # one good frame between
@@ -152,7 +150,7 @@ def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Hos
         bad = host.frame(0.9)
         host.core.take(changed(bad, data=bytes([bad.data[0] ^ 1]) + bad.data[1:]))
         host.wait(0.001)
-        assert host.core.state == ("limp" if k == 2 else "run")
+        assert host.core.gate.mode == ("limp" if k == 2 else "run")
     assert host.decided == ("limp", "bad_frames")
     assert trouble(host) == {"wrong_crc"}
 
@@ -179,7 +177,7 @@ def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host:
     for _ in range(10):
         host.core.take(in_mode("position"))
         host.wait(0.005)
-    assert host.core.state == "init"
+    assert host.core.gate.mode == "init"
     running(host)
     host.core.take(in_mode("calib"))
     host.wait(0.005)
@@ -210,7 +208,7 @@ def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
     assert not host.core.take(changed(good, extended=True))
     assert not host.core.take(changed(good, data=good.data[:7]))
     host.wait(0.005)
-    assert host.core.state == "run"
+    assert host.core.gate.mode == "run"
 
 
 def test_in_steps_a_command_that_comes_twice_is_one_sample(host: Host) -> None:
@@ -251,19 +249,6 @@ def test_in_steps_the_age_of_a_command_is_counted_in_samples() -> None:
     assert host.decided == ("limp", "stale")
 
 
-def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host) -> None:
-    running(host)
-    host.send(0.5, 80)
-    assert host.core.last is not None
-    assert host.core.last.values["angle_deg"] > 40.0
-    for _ in range(81):
-        host.wait(0.005)
-    assert host.core.last.values["angle_deg"] == pytest.approx(8.0, abs=1.0)
-    assert host.core.last.applied == {"duty": 0.0}
-    engine = node_plant(EngineBench())
-    assert engine.sample(None) == ({}, {})
-
-
 def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
     with pytest.raises(ParameterError, match="inputs of the map = 'soc_cad': must be those of the plant, duty"):
         NodeCore(node_of(ETB), SignalMap.load("engine"))
@@ -279,6 +264,10 @@ def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
         node_of(ETB, faults=["jammed:x=1"])
     with pytest.raises(ParameterError, match=r"fault offset: sensor = 'left': must be a number"):
         node_of(ETB, faults=["offset:sensor=left"])
+
+
+def test_without_drive_an_engine_stands() -> None:
+    assert node_plant(EngineBench()).sample(None) == ({}, {})
 
 
 def test_faults_of_the_plant_reach_the_host() -> None:

@@ -16,24 +16,24 @@ from mgdd.rig.can.frame import changed
 from mgdd.rig.can.replay_bus import ReplayBus
 
 
+def answers(rig: Rig, duties: list[float]) -> list[Measurement]:
+    out = []
+    for duty in duties:
+        rig.apply({"duty": duty})
+        out.append(rig.measure())
+    return out
+
+
 def recorded_run(duties: list[float]) -> tuple[list[Frame], list[Measurement]]:
     frames: list[Frame] = []
     with CanRig(ETB, plant=VirtualThrottle(inputs=["duty", "bridge_open"], seed=2), on_frame=frames.append) as rig:
-        measured = []
-        for duty in duties:
-            rig.apply({"duty": duty})
-            measured.append(rig.measure())
-    return frames, measured
+        return frames, answers(rig, duties)
 
 
 def replayed(frames: list[Frame], duties: list[float], *, strict: bool = True) -> tuple[list[Measurement], ReplayBus]:
     bus = ReplayBus(frames, ETB, strict=strict)
     with CanRig(ETB, bus, mode="replay") as rig:
-        out = []
-        for duty in duties:
-            rig.apply({"duty": duty})
-            out.append(rig.measure())
-    return out, bus
+        return answers(rig, duties), bus
 
 
 DUTIES = [0.1 * (k % 7) for k in range(30)]
@@ -73,18 +73,10 @@ def test_a_run_in_real_time_is_replayed_from_its_file(tmp_path: Path) -> None:
     with Recorder(file) as recorder, node("record", step=False, signal_map=SignalMap.load(patient)):
         live = rig_on("record", on_frame=recorder.frame)
         with RecordingRig(live, lambda row: recorder.sample("rig", row)) as rig:
-            for duty in DUTIES:
-                rig.apply({"duty": duty})
-                rig.measure()
-    measured = [exchange.measurement.values for exchange in map(rig.record.__getitem__, range(len(DUTIES)))]
+            measured = [dict(live.values) for live in answers(rig, DUTIES)]
     with CanRig(ETB, ReplayBus.read(file, ETB), mode="replay") as again:
-        np.testing.assert_equal([answer(again, duty) for duty in DUTIES], measured)
+        np.testing.assert_equal([dict(m.values) for m in answers(again, DUTIES)], measured)
     with ReplayRig(RigRecord.read(file)) as again:
-        np.testing.assert_equal([answer(again, duty) for duty in DUTIES], measured)
+        np.testing.assert_equal([dict(m.values) for m in answers(again, DUTIES)], measured)
     with pytest.raises(DataError, match="has no table 'bench': it has rig"):
         RigRecord.read(file, table="bench")
-
-
-def answer(rig: Rig, duty: float) -> dict[str, float]:
-    rig.apply({"duty": duty})
-    return dict(rig.measure().values)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 
 import numpy as np
 import pytest
@@ -116,18 +115,6 @@ def test_physical_values_are_coded_as_by_cantools(drawn: tuple[dict[str, object]
     assert ours.pack(bytes(size), value, "refuse") == theirs.encode({"S": value}, strict=False)
 
 
-@given(layouts(), st.floats(allow_nan=False, allow_infinity=False))
-def test_nothing_wraps(drawn: tuple[dict[str, object], int], value: float) -> None:
-    layout, size = drawn
-    assume("float" not in str(layout["raw_type"]))
-    ours = SignalLayout(**layout)
-    least, most = raw_bounds(layout)
-    exact = (value - ours.offset) / ours.scale
-    raw = ours.unpack_raw(ours.pack(bytes(size), value))
-    wanted = (most if exact > 0 else least) if math.isinf(exact) else min(max(round(exact), least), most)
-    assert raw == wanted
-
-
 def test_refused_values() -> None:
     duty = SignalLayout(start=0, length=12, raw_type="signed", scale=0.0005, minimum=-1.0, maximum=1.0)
     assert duty.unpack(duty.pack(bytes(8), 3.2)) == 1.0
@@ -149,12 +136,6 @@ def test_refused_values() -> None:
         duty.unpack_column(np.zeros((2, 1), np.uint8))
     with pytest.raises(ShapeError, match="1 dimensions"):
         duty.unpack_column(np.zeros(8, np.uint8))
-
-
-def test_floats_of_64_bits_keep_every_bit() -> None:
-    value = struct.unpack("<d", bytes(range(1, 9)))[0]
-    layout = SignalLayout(start=0, length=64, raw_type="float64")
-    assert layout.pack(bytes(8), value) == bytes(range(1, 9))
 
 
 def test_a_message_is_checked() -> None:

@@ -29,13 +29,13 @@ from mgdd.rig import (
 )
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.experiment import core_track
-from mgdd.rig.experiment.loop_bus import WatchedBus
-from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.experiment.core_track import WatchedBus
+from mgdd.rig.experiment.stand import Cycle
 from patient_bench import patient_experiment
 from realtime_loops import becomes
+from user_buses import dbc_of, write_bus
 
 pytestmark = pytest.mark.slow
 
@@ -43,25 +43,21 @@ pytest.importorskip("can", reason="python-can is not installed: pip install 'mgd
 pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
 
 # Another bus than the shipped one: Motorola, volts as they are, a duty of other sign and range, modes with gaps.
-DBC = """VERSION "1"
-NS_ :
-BS_:
-BU_: HOST ETB
-BO_ 2566848001 Cmd: 8 HOST
- SG_ Crc : 0|8@1+ (1,0) [0|255] "" ETB
- SG_ Alive : 8|4@1+ (1,0) [0|15] "" ETB
- SG_ Mode : 14|3@0+ (2,3) [0|0] "" ETB
- SG_ Duty : 23|16@0- (-0.01,5) [0|0] "%" ETB
-BO_ 513 Sens: 6 ETB
- SG_ Angle : 7|16@0+ (0.01,-5) [0|0] "deg" HOST
- SG_ A : 16|12@1+ (0.00125,0) [0|0] "V" HOST
- SG_ B : 28|12@1+ (0.00125,0) [0|0] "V" HOST
-BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
-BA_DEF_DEF_ "GenMsgCycleTime" 0;
-BA_ "GenMsgCycleTime" BO_ 2566848001 2;
-BA_ "GenMsgCycleTime" BO_ 513 2;
-VAL_ 513 A 4095 "invalid" ;
-"""
+DBC = dbc_of(
+    """\
+BO_ 2566848001 Cmd: 8 PC
+ SG_ Crc : 0|8@1+ (1,0) [0|255] "" BOX
+ SG_ Alive : 8|4@1+ (1,0) [0|15] "" BOX
+ SG_ Mode : 14|3@0+ (2,3) [0|0] "" BOX
+ SG_ Duty : 23|16@0- (-0.01,5) [0|0] "%" BOX
+BO_ 513 Sens: 6 BOX
+ SG_ Angle : 7|16@0+ (0.01,-5) [0|0] "deg" PC
+ SG_ A : 16|12@1+ (0.00125,0) [0|0] "V" PC
+ SG_ B : 28|12@1+ (0.00125,0) [0|0] "V" PC
+""",
+    {2566848001: 2, 513: 2},
+    'VAL_ 513 A 4095 "invalid" ;\n',
+)
 MAP = """kind = "signal_map"
 format = 1
 dbc = "own.dbc"
@@ -80,10 +76,8 @@ second_v = { signal = "B", unit = "V" }
 """
 
 
-def own_map(folder: Path, dbc: str = DBC, text: str = MAP) -> SignalMap:
-    (folder / "own.dbc").write_text(dbc)
-    (folder / "own.toml").write_text(text)
-    return SignalMap.load(folder / "own.toml")
+def own_map(folder: Path, text: str = MAP) -> SignalMap:
+    return SignalMap.load(write_bus(folder, "own", DBC, text))
 
 
 @pytest.mark.parametrize("which", ["shipped", "own"])
@@ -107,9 +101,9 @@ def test_the_loop_speaks_a_map_as_a_rig_does(which: str, tmp_path: Path) -> None
             node.take(changed(frame, monotonic_ns=now_ns))
             for answer in node.sample(now_ns):
                 ring.feed(changed(answer, monotonic_ns=time.monotonic_ns()))
-            frames.append((node.state, frame))
-            states.add(node.state)
-        return node.state == wanted
+            frames.append((node.gate.mode, frame))
+            states.add(node.gate.mode)
+        return node.gate.mode == wanted
 
     with loop:
         assert becomes(lambda: answered("armed"))
@@ -133,16 +127,11 @@ def test_the_loop_speaks_a_map_as_a_rig_does(which: str, tmp_path: Path) -> None
 
 def test_a_map_that_the_loop_cannot_say_is_refused_with_its_place(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="safe Duty of Cmd: must be 500, a duty of 0"):
-        loop_messages(own_map(tmp_path, text=MAP.replace("Duty = 0.0", "Duty = 11.0")))
+        loop_messages(own_map(tmp_path, MAP.replace("Duty = 0.0", "Duty = 11.0")))
     known = own_map(tmp_path)
     (command,) = known.commands.values()
     with pytest.raises(ParameterError, match="safe of Cmd: must be given"):
         loop_messages(replace(known, commands={"Cmd": replace(command, safe={})}))
-
-
-def test_of_two_commands_a_loop_sends_none() -> None:
-    known = SignalMap.load("etb")
-    (command,) = known.commands.values()
     with pytest.raises(ParameterError, match="one message with the input duty"):
         loop_messages(replace(known, commands={"a": command, "b": command}))
 

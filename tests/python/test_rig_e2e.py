@@ -33,11 +33,6 @@ def test_the_same_bytes_as_the_cpp_test() -> None:
     assert protect(ODD, 9, BODY) == bytes.fromhex("0000912233445554")
 
 
-@pytest.mark.parametrize(("name", "value"), [("sae_j1850", 0x4B), ("h2f", 0xDF), ((0x07, 0, 0), 0xF4)])
-def test_published_check_values(name: str, value: int) -> None:
-    assert crc8(b"123456789", name) == value
-
-
 def by_long_division(data: bytes, polynomial: int, start: int, final_xor: int) -> int:
     """The remainder of the message as one polynomial over GF(2): no table and no register."""
     message = int.from_bytes(bytes([data[0] ^ start]) + data[1:] + b"\0", "big")

@@ -22,8 +22,8 @@ from mgdd.identify import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
 from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, recorded, run_experiment
-from mgdd.rig.experiment.throttle_tasks import TrackPlan
-from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.experiment.stand import Cycle
+from mgdd.rig.experiment.tasks import TrackPlan
 
 HEAD = 'kind = "experiment"\nformat = 1\nseed = 5\n'
 TRACK = HEAD + 'task = "track"\n[track]\nreference = "step:20:35"\ncontroller = "pid"\n'
@@ -128,21 +128,14 @@ def test_a_run_that_never_began_leaves_no_folder(tmp_path: Path) -> None:
 def test_modes_that_drive_or_listen_need_what_they_need() -> None:
     pytest.importorskip("cantools")
     known = experiment(TRACK)
-    with pytest.raises(ParameterError, match=r"mode = 'bench': needs \[bus\] connection"):
-        check_experiment(known.with_mode("bench"))
     wired = experiment(TRACK + '[bus]\nconnection = "virtual:none"\n')
     with pytest.raises(ParameterError, match=r"bus\.pace = 'step': must be 'real_time' with mode = 'bench'"):
         check_experiment(wired.with_mode("bench"))
-    with pytest.raises(ParameterError, match=r"mode = 'replay': needs \[replay\] record"):
-        check_experiment(known.with_mode("replay"))
     with pytest.raises(ParameterError, match="arm = True: must be left out with mode = 'simulate'"):
         run_experiment(known, arm=True)
     slow = experiment(TRACK + '[bus]\nconnection = "virtual:none"\npace = "real_time"\n[plant]\nsample_s = 0.001\n')
     with pytest.raises(ParameterError, match=r"sample_s = 0.001: must be 0.005 s, the cycle time of ETB_Status"):
         check_experiment(slow.with_mode("dry_run"))
-    real = experiment(TRACK + '[bus]\nconnection = "virtual:none"\npace = "real_time"\n')
-    with pytest.raises(RigError, match="drives real hardware: give arm=True"):
-        run_experiment(real.with_mode("bench"))
 
 
 def test_tracking_is_the_loop_of_the_library_behind_a_gate() -> None:
@@ -197,8 +190,6 @@ def test_a_plant_that_differs_from_the_model_is_scaled_with_its_stiction() -> No
     weak = run_experiment(experiment(TRACK))
     sticky = run_experiment(experiment(TRACK + "[plant.scale]\ncoulomb_nm = 1.5\n"))
     assert sticky.figures["mse_deg2"] != weak.figures["mse_deg2"]
-    with pytest.raises(ParameterError, match="stroke_mm"):
-        run_experiment(experiment(TRACK + "[plant.scale]\nstroke_mm = 1.5\n"))
 
 
 def test_identification_finds_the_throttle_and_keeps_the_model(tmp_path: Path) -> None:

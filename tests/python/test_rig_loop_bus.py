@@ -12,9 +12,9 @@ import pytest
 from mgdd.errors import RigError
 from mgdd.rig import CanTransport, Frame, Recorder, SignalMap, read_record
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.recorded_bus import RecordedBus
-from mgdd.rig.experiment import loop_bus
-from mgdd.rig.experiment.loop_bus import SocketBus, WatchedBus
+from mgdd.rig.can.replay_bus import RecordedBus
+from mgdd.rig.experiment import core_track
+from mgdd.rig.experiment.core_track import SocketBus, WatchedBus
 from realtime_loops import becomes
 
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
@@ -64,20 +64,21 @@ class Stand:
         )
 
 
-@pytest.fixture
-def driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
-    monkeypatch.setattr(loop_bus, "SocketCanTransport", Socket)
-    stand = Stand(tmp_path, transmits=True)
+def opened(folder: Path, monkeypatch: pytest.MonkeyPatch, *, transmits: bool) -> Iterator[Stand]:
+    monkeypatch.setattr(core_track, "SocketCanTransport", Socket)
+    stand = Stand(folder, transmits=transmits)
     with stand.rig.bus, stand.other:  # type: ignore[attr-defined]
         yield stand
+
+
+@pytest.fixture
+def driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
+    yield from opened(tmp_path, monkeypatch, transmits=True)
 
 
 @pytest.fixture
 def watching(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stand]:
-    monkeypatch.setattr(loop_bus, "SocketCanTransport", Socket)
-    stand = Stand(tmp_path, transmits=False)
-    with stand.rig.bus, stand.other:  # type: ignore[attr-defined]
-        yield stand
+    yield from opened(tmp_path, monkeypatch, transmits=False)
 
 
 def test_the_socket_lets_pass_what_the_loop_reads_and_its_command_and_nothing_else(driving: Stand) -> None:

@@ -17,8 +17,9 @@ from mgdd.errors import DataError, RigError
 from mgdd.loop import EngineBench
 from mgdd.rig import BusBridge, CanRig, CanTransport, Frame, RingTransport
 from mgdd.rig.can.hub import Hub
-from mgdd.rig.can.messages import frame_of
 from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.python_can import frame_of
+from user_buses import dbc_of, write_bus
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")
 
@@ -193,9 +194,7 @@ def test_a_driver_that_gives_back_what_we_sent() -> None:
 
 def test_an_input_that_is_not_finite_is_a_broken_command(tmp_path: Path) -> None:
     """A float signal can carry NaN: the plant of the node never sees it."""
-    (tmp_path / "float.dbc").write_text(FLOAT_DBC, encoding="utf-8")
-    (tmp_path / "float.toml").write_text(FLOAT_MAP, encoding="utf-8")
-    with CanRig(tmp_path / "float.toml", plant=EngineBench(seed=1)) as rig:
+    with CanRig(write_bus(tmp_path, "float", FLOAT_DBC, FLOAT_MAP), plant=EngineBench(seed=1)) as rig:
         core = rig.bus.core  # type: ignore[attr-defined]
         assert isinstance(core, NodeCore)
         rig.apply({"soc_cad": -6.0})
@@ -209,25 +208,18 @@ def test_an_input_that_is_not_finite_is_a_broken_command(tmp_path: Path) -> None
         assert (core.gate.mode, core.gate.reason) == ("limp", "bad_frames")
 
 
-FLOAT_DBC = """VERSION ""
-NS_ :
-BS_:
-BU_: PC BOX
-
+FLOAT_DBC = dbc_of(
+    """\
 BO_ 512 Cmd: 8 PC
  SG_ Soc : 0|32@1- (1,0) [-90|90] "deg" BOX
  SG_ Go : 32|1@1+ (1,0) [0|1] "" BOX
 
 BO_ 513 Answer: 8 BOX
  SG_ Imep : 0|32@1- (1,0) [-100|100] "bar" PC
-
-BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
-BA_DEF_DEF_ "GenMsgCycleTime" 0;
-BA_ "GenMsgCycleTime" BO_ 512 80;
-BA_ "GenMsgCycleTime" BO_ 513 80;
-SIG_VALTYPE_ 512 Soc : 1;
-SIG_VALTYPE_ 513 Imep : 1;
-"""
+""",
+    {512: 80, 513: 80},
+    "SIG_VALTYPE_ 512 Soc : 1;\nSIG_VALTYPE_ 513 Imep : 1;\n",
+)
 FLOAT_MAP = """kind = "signal_map"
 format = 1
 dbc = "float.dbc"

@@ -32,6 +32,11 @@ def test_a_hazard_opens_the_bridge_in_time_and_only_the_operator_brings_it_back(
     first = loop.gate.drain()[0]
     assert (first.before, first.after, first.reason, first.times) == ("run", hazard.mode, hazard.reason, 1)
 
+    for _ in range(200):
+        loop.step()
+        if hazard.reason not in ("stall", "heat", "aborted"):  # these the open bridge clears
+            with pytest.raises(RigError, match=r"reset refused in mode '(limp|fault)': "):
+                loop.gate.reset()
     loop.until(opened + 400)
     if hazard.returns:
         assert loop.angle_deg == pytest.approx(LIMP_HOME_DEG, abs=1.0)
@@ -55,23 +60,8 @@ def test_a_hazard_opens_the_bridge_in_time_and_only_the_operator_brings_it_back(
     assert loop.angle_deg == pytest.approx(at(hazard.reference_deg, loop.k - ONSET), abs=0.7)
 
 
-@pytest.mark.parametrize("name", [name for name, hazard in HAZARDS.items() if hazard.reason != "aborted"])
-def test_a_reset_is_refused_while_the_cause_stands(name):
-    hazard = HAZARDS[name]
-    loop = Loop(hazard).started()
-    while loop.gate.mode == "run":
-        loop.step()
-    cleared_by_the_open_bridge = hazard.reason in ("stall", "heat")
-    for _ in range(200):
-        loop.step()
-        if not cleared_by_the_open_bridge:
-            with pytest.raises(RigError, match=r"reset refused in mode '(limp|fault)': "):
-                loop.gate.reset()
-    assert loop.gate.mode == hazard.mode
-
-
 def test_a_controller_beyond_the_limits_is_limited_and_counted():
-    wild = Hazard(mode="run", reason="requested", within=0, duty=lambda k: 5.0 if k // 40 % 2 else -5.0)
+    wild = Hazard("run", "requested", 0, duty=lambda k: 5.0 if k // 40 % 2 else -5.0)
     loop = Loop(wild).started()
     before, largest, fastest = loop.gate.drive.duty, 0.0, 0.0
     counted = loop.gate.counts["clamped"]
@@ -85,50 +75,6 @@ def test_a_controller_beyond_the_limits_is_limited_and_counted():
     assert fastest == pytest.approx(envelope.slew_per_s * envelope.cycle_s)
     assert loop.gate.counts["clamped"] == counted + 400
     assert loop.gate.counts["slewed"] > 50
-
-
-def test_a_short_gap_is_bridged_and_ends_by_itself():
-    gap = Hazard(
-        mode="run",
-        reason="requested",
-        within=0,
-        facts=lambda k: {"good_frames": 0, "age_s": None} if k % 10 < 4 else {},
-    )
-    loop = Loop(gap).started()
-    loop.until(OVER)
-    assert loop.gate.mode == "run"
-    assert loop.angle_deg == pytest.approx(40.0, abs=0.5)
-
-
-@pytest.mark.parametrize("way", ["host dies", "host hangs"])
-def test_the_gate_of_the_node_opens_within_its_time_when_the_host_is_gone(way):
-    """The node sees frames of the host where the host sees those of the sensors: its time-out is the same rule."""
-    gone = {"good_frames": 0, "age_s": None}
-    repeated = {"good_frames": 0, "bad_frames": 0}  # the same counter again and again: the last good one grows older
-    lost = Hazard(
-        mode="limp",
-        reason="stale",
-        within=50,
-        facts=lambda k: gone if way == "host dies" else {**repeated, "age_s": 1e-3 * (k + 1)},
-        duty=0.2,
-    )
-    loop = Loop(lost, node=True).started()
-    while loop.gate.mode == "run":
-        loop.step()
-    assert loop.k - ONSET <= 50
-    assert (loop.gate.mode, loop.gate.reason) == ("limp", "stale")
-    opened = loop.k
-    loop.until(opened + 350)
-    assert loop.angle_deg == pytest.approx(LIMP_HOME_DEG, abs=1.0)
-
-
-def test_both_shipped_envelopes_open_within_what_the_design_allows():
-    host, node = SafetyEnvelope.load("etb"), SafetyEnvelope.load("etb_node")
-    assert host == SafetyEnvelope()
-    assert (node.largest_age_cycles + node.held_cycles + 1.0) * node.cycle_s <= 0.05
-    assert (host.sensor_sum_tolerance_v, host.sensor_low_v, host.sensor_high_v) == (0.2, 0.2, 4.8)
-    assert host.stall_s == 0.2
-    assert (host.largest_age_cycles, host.held_cycles, host.bad_frames, host.missed_deadlines) == (3.0, 1.0, 3.0, 3.0)
 
 
 def lively_reference(k: int) -> float:

@@ -119,7 +119,7 @@ def check(gate: SafetyGate, before: str, duty_before: float, letter: int) -> Non
         assert gate.cause == "none"
     if not math.isfinite(asked):
         assert mode == "fault"
-    assert drive.send == ((facts or {}).get("bus") != "off" if facts is not None else drive.send)
+    assert facts is None or drive.send == (facts.get("bus") != "off")
 
 
 def step(gate: SafetyGate, letter: int) -> None:
@@ -133,21 +133,15 @@ def step(gate: SafetyGate, letter: int) -> None:
 
 @pytest.mark.slow
 @settings(max_examples=10_000)
-@given(letters=st.binary(min_size=1, max_size=60), runs=st.booleans(), cut=st.integers(0, 59))
-@example(letters=bytes(range(BLIND + 1)), runs=True, cut=7)
-def test_no_sequence_drives_outside_run_or_leaves_a_fault_by_itself_and_every_saved_state_replays(
-    letters: bytes, runs: bool, cut: int
-) -> None:
+@given(letters=st.binary(min_size=1, max_size=60), runs=st.booleans())
+@example(letters=bytes(range(BLIND + 1)), runs=True)
+def test_no_sequence_drives_outside_run_or_leaves_a_fault_by_itself(letters: bytes, runs: bool) -> None:
     gate = SafetyGate(ENVELOPE)
     if runs:
         gate.state = RUNNING
-    twin: SafetyGate | None = None
     silent = 0
-    for k, letter in enumerate(spelled(letters)):
+    for letter in spelled(letters):
         before, duty_before = gate.mode, gate.drive.duty
-        if k == cut:
-            twin = SafetyGate(ENVELOPE)
-            twin.state = gate.state
         step(gate, letter)
         check(gate, before, duty_before, letter)
         heard = letter != BLIND and LETTERS[letter][0].get("good_frames", 0) > 0
@@ -155,12 +149,6 @@ def test_no_sequence_drives_outside_run_or_leaves_a_fault_by_itself_and_every_sa
         assert gate.mode != "run" or silent <= ENVELOPE.largest_age_cycles + ENVELOPE.held_cycles
         seen[gate.mode] += 1
         seen[gate.reason] += 1
-        if twin is not None:
-            step(twin, letter)
-            assert twin.drive == gate.drive
-    if twin is not None:
-        assert twin.state == gate.state
-        assert twin.drain() == gate.drain()
 
 
 def test_the_sequences_reached_every_mode_and_every_reason() -> None:

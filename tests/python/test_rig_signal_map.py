@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from pathlib import Path
 
 import pytest
 
-from foreign_bus import FOREIGN, FOREIGN_MAP, write_foreign
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.rig import SignalMap
 from mgdd.rig.can.dbc import DbcFile
+from user_buses import FOREIGN, FOREIGN_MAP, write_foreign
 
 cantools = pytest.importorskip("cantools", reason="the extra `can` is not installed")
 
@@ -164,6 +163,8 @@ WRONG = [
     ('"signal_map"', '"engine"', ParameterError, "kind = 'engine': must be 'signal_map'"),
     ('dbc = "foreign.dbc"', "", DataError, "dbc is missing: it must be text"),
     ("[measurements.Done]", 'limits = ["p"]\n[measurements.Done]', ParameterError, "limits"),
+    ("[measurements.Done]\n", '[measurements.Done.values]\ncurrent_a = { signal = "Beat", unit = "-", scale = 0.1 }\n',
+     ParameterError, "'current_a' is mapped twice: Answer has it too; remove one"),
     ('scale = 0.01, lower', 'scale = 0.0, lower', ParameterError, "scale = 0: must be finite and not 0"),
 ]  # fmt: skip
 
@@ -175,13 +176,6 @@ def test_a_wrong_map_is_refused_by_name(foreign: Path, right: str, wrong: str, k
     with pytest.raises(kind, match=text) as refused:
         SignalMap.load(foreign)
     assert str(foreign) in str(refused.value)
-
-
-def test_a_measured_value_in_two_messages_is_refused(foreign: Path) -> None:
-    twice = '[measurements.Done.values]\ncurrent_a = { signal = "Beat", unit = "-", scale = 0.1 }\n'
-    foreign.write_text(FOREIGN_MAP.replace("[measurements.Done]\n", twice), encoding="utf-8")
-    with pytest.raises(ParameterError, match="'current_a' is mapped twice: Answer has it too; remove one"):
-        SignalMap.load(foreign)
 
 
 @pytest.mark.parametrize(
@@ -235,17 +229,3 @@ def test_packing_is_clamped_and_says_what_is_missing() -> None:
     side = SignalMap.load("engine").measurements["ENG_Status"].signals["misfire"]
     with pytest.raises(ParameterError):
         side.pack(bytes(8), math.nan)
-
-
-def test_no_two_quantities_of_a_shipped_map_share_a_bit() -> None:
-    for name in ("etb", "engine", "surrogate"):
-        made = SignalMap.load(name)
-        for message in (*made.commands.values(), *made.measurements.values()):
-            entries = [*message.signals.values(), *message.applied.values()]
-            places = [{*bits(entry.signal.layout)} for entry in entries]
-            for one, other in itertools.combinations(places, 2):
-                assert not one & other, (name, message.name)
-
-
-def bits(layout: object) -> range:
-    return range(layout.start, layout.start + layout.length)  # type: ignore[attr-defined]

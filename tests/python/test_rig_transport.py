@@ -17,17 +17,11 @@ from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig import CanTransport
 from mgdd.rig.can.hub import Hub
-from mgdd.rig.can.hub_faults import BusFault, FaultInjector
-from mgdd.rig.can.reception import STILL_S, Reception
+from mgdd.rig.can.hub_faults import BusFault
+from mgdd.rig.can.python_can import STILL_S, Reception
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")
-
-
-@pytest.fixture(autouse=True)
-def no_thread_is_left() -> Iterator[None]:
-    before = set(threading.enumerate())
-    yield
-    assert set(threading.enumerate()) - before == set()
+pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
 
 def frame(number: int = 0, identifier: int = 0x120, *, extended: bool = False) -> Frame:
@@ -366,9 +360,3 @@ def test_the_hub_reports_bus_errors_and_freezes_a_client() -> None:
 def test_a_fault_that_cannot_be_is_named(text: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         BusFault.parse(text)
-
-
-def test_an_injector_without_rules_changes_nothing() -> None:
-    (delivered,) = FaultInjector([]).deliver(0x120, b"abc", 0.0)
-    assert delivered[0] == 0x120
-    assert tuple(delivered[1]) == (b"abc", 0.0, 0)

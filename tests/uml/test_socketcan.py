@@ -16,8 +16,7 @@ from mgdd.errors import RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, Frame, SignalMap, SocketCanTransport
 from mgdd.rig.can.node import run_node
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 
 CHANNEL = "vcan0"
 BUS_OFF, CONTROLLER, RESTARTED = 0x40, 0x04, 0x100
@@ -207,7 +206,7 @@ def test_a_run_over_the_bus_ends_at_home(node: NodeCore, slow_map: SignalMap) ->
     while not abs(angle_of(node) - HOME_DEG) < 1.0:
         assert time.monotonic() < until
         time.sleep(0.02)
-    assert node.state == "armed"  # five safe frames: an orderly end
+    assert node.gate.mode == "armed"  # five safe frames: an orderly end
 
 
 # --- the raw socket of the core -----------------------------------------------------------------------------

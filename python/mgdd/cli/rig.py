@@ -15,8 +15,7 @@ from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import NodePlant, node_plant
+from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signals import noted_signals
 
 if TYPE_CHECKING:
@@ -155,7 +154,7 @@ def _plant_of(args: argparse.Namespace, signal_map: SignalMap, sample_s: float |
     if args.experiment is None:
         return node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s)
     from mgdd.rig.experiment import Experiment
-    from mgdd.rig.experiment.stand import simulated_plant
+    from mgdd.rig.experiment.checked import simulated_plant
 
     refuse_idle(args, "fault", why="--experiment says what the plant is")
     inputs = (*signal_map.input_names, "bridge_open")

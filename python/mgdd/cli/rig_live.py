@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
-    from mgdd.rig.experiment.watched import Cycle
+    from mgdd.rig.experiment.stand import Cycle
 
 __all__ = ["LiveView"]
 

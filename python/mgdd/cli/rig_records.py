@@ -55,7 +55,7 @@ def add(verbs: Any) -> None:
 
 def _record(args: argparse.Namespace) -> None:
     from mgdd.rig import CanTransport, Recorder
-    from mgdd.rig.can.recorded_bus import RecordedBus
+    from mgdd.rig.can.replay_bus import RecordedBus
 
     check_output(args)
     require_positive(args, "duration_s")

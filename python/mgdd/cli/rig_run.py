@@ -16,7 +16,7 @@ from mgdd.cli.output import Stopped, check_output, emit, is_terminal, lines, wro
 
 if TYPE_CHECKING:
     from mgdd.rig.experiment import CheckedExperiment, ExperimentResult
-    from mgdd.rig.experiment.watched import Cycle
+    from mgdd.rig.experiment.stand import Cycle
 
 __all__ = ["add"]
 

@@ -8,25 +8,21 @@ from __future__ import annotations
 
 from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport
 from mgdd.rig.actuator_guard import ActuatorGuard
-from mgdd.rig.base import Rig
+from mgdd.rig.base import Rig, SimulatedRig
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
-from mgdd.rig.exchange import RecordingRig, RigRecord
+from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment import Experiment, check_experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
-from mgdd.rig.loop_message import LoopMessage
-from mgdd.rig.protection import protect
+from mgdd.rig.loop_message import LoopMessage, protect
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.replay import ReplayRig
-from mgdd.rig.safety import SafetyGate
-from mgdd.rig.safety_envelope import SafetyEnvelope
-from mgdd.rig.simulated import SimulatedRig
+from mgdd.rig.safety import SafetyEnvelope, SafetyGate
 
 __all__ = [
     "ActuatorGuard",

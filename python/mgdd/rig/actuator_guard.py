@@ -13,6 +13,7 @@ from mgdd.errors import ParameterError, RigError, did_you_mean
 from mgdd.loop import Measurement, Plant
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import limits_of
+from mgdd.rig.base import AroundPlant
 
 __all__ = ["ActuatorGuard", "GuardedAsk"]
 
@@ -24,17 +25,6 @@ _LAGS = 3.0  # so many time constants until a reading shows its input
 class GuardedAsk(NamedTuple):
     """An ask of an optimiser that was not applied as it was.
 
-    Parameters
-    ----------
-    cycle : int
-        Cycle of the guard, from 0 on.
-    reason : str
-        ``not_finite``, ``bounds``, ``limit`` (these apply the last good point) or ``rate``.
-    name : str
-        Input or limited quantity to blame.
-    asked, applied : mapping of str to float
-        Inputs by name.
-
     Examples
     --------
     >>> from mgdd.loop import EngineBench
@@ -45,14 +35,14 @@ class GuardedAsk(NamedTuple):
     [GuardedAsk(cycle=0, reason='bounds', name='soc_cad', asked={'soc_cad': -40.0}, applied={'soc_cad': 0.0})]
     """
 
-    cycle: int
-    reason: str
-    name: str
+    cycle: int  # of the guard, from 0 on
+    reason: str  # not_finite, bounds, limit (these apply the last good point) or rate
+    name: str  # input or limited quantity to blame
     asked: Mapping[str, float]
     applied: Mapping[str, float]
 
 
-class ActuatorGuard:
+class ActuatorGuard(AroundPlant):
     """A plant that applies what an optimiser asks for only where it is safe; itself a plant of the loop.
 
     An ask that is not finite or outside the bounds of any input is rejected: the last good point is applied instead,
@@ -123,7 +113,7 @@ class ActuatorGuard:
                 raise ParameterError.of(f"rates[{name!r}]", rate, "> 0")
         if hold_cycles < 1:
             raise ParameterError.of("hold_cycles", hold_cycles, ">= 1")
-        self.plant = plant
+        super().__init__(plant)
         self.start = {name: float(start[name]) for name in names}
         self.bounds = {name: (float(bounds[name][0]), float(bounds[name][1])) for name in names}
         self.rates = {name: float(rate) for name, rate in rates.items()}
@@ -137,26 +127,6 @@ class ActuatorGuard:
         self._held, self._exceeded, self._cycle = 0, "", 0
         self._log: deque[GuardedAsk] = deque(maxlen=_LOGGED)
         self._counts: Counter[str] = Counter()
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return self.plant.input_names
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limited quantities that `measure` reports."""
-        return self.plant.limit_names
-
-    @property
-    def operating_point_changes(self) -> bool:
-        """Whether the next cycle brings a new operating point; False for a plant that announces none."""
-        return bool(getattr(self.plant, "operating_point_changes", False))
-
-    @property
-    def point(self) -> Any:
-        """Operating point of the next cycle, for a guide; as absent as the plant's own."""
-        return getattr(self.plant, "point")  # noqa: B009 - the protocol of a plant does not have it
 
     @property
     def good(self) -> dict[str, float]:
@@ -174,18 +144,7 @@ class ActuatorGuard:
         return {reason: self._counts[reason] for reason in ("not_finite", "bounds", "rate", "limit")}
 
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Set the inputs of the next cycle, as far as they are safe.
-
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            One number per name of `input_names`.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing or unknown input.
-        """
+        """Set the inputs of the next cycle, as far as they are safe; ParameterError for a missing or unknown one."""
         if set(inputs) != set(self.input_names):
             raise ParameterError(
                 f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be {', '.join(self.input_names)}"
@@ -203,18 +162,7 @@ class ActuatorGuard:
         self._applied = applied
 
     def measure(self) -> Measurement:
-        """Run one cycle and judge what was applied.
-
-        Returns
-        -------
-        mgdd.loop.Measurement
-            As the plant gives it, with what was applied.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
-        """
+        """Run one cycle and judge what was applied, which stands in the measurement; RigError before `apply`."""
         if self._applied is None:
             raise RigError("measure() before apply(): apply the inputs first")
         measured = self.plant.measure()

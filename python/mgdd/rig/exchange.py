@@ -1,4 +1,4 @@
-"""What went to a rig and what came back, sample by sample, as columns of numbers."""
+"""What went to a rig and what came back, sample by sample: recorded, as columns of numbers, and replayed."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import Measurement, Plant
-from mgdd.rig.base import Rig
+from mgdd.loop.plant import checked_inputs
+from mgdd.rig.base import AroundPlant, OpenOnce, Rig
 from mgdd.rig.recorded import RecordedRun, readable_record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Exchange", "RecordingRig", "RigRecord"]
+__all__ = ["Difference", "Exchange", "RecordingRig", "ReplayRig", "RigRecord"]
 
 _PARTS = ("input", "component", "limit", "value", "noise_free", "applied")
 
@@ -65,52 +66,25 @@ class RigRecord:
         return self._exchanges[place]
 
     def append(self, exchange: Exchange) -> None:
-        """Add an exchange at the end.
-
-        Parameters
-        ----------
-        exchange : Exchange
-            Inputs and measurement.
-        """
+        """Add an exchange at the end."""
         self._exchanges.append(exchange)
 
     def to_columns(self) -> tuple[list[str], NDArray[np.float64]]:
-        """Give names and a table with a row per exchange.
+        """Give names and a table with a row per exchange, NaN where it has no such number.
 
-        Returns
-        -------
-        names : list of str
-            ``misfire``, and ``input.NAME``, ``component.NUMBER``, ``limit.NAME``, ``value.NAME``, ``noise_free.NAME``,
-            ``applied.NAME``.
-        table : ndarray
-            NaN where an exchange has no such number, or has it as NaN.
+        The names are ``misfire``, and ``input.NAME``, ``component.NUMBER``, ``limit.NAME``, ``value.NAME``,
+        ``noise_free.NAME``, ``applied.NAME``.
         """
         rows = [flat(exchange) for exchange in self._exchanges]
         names = list(dict.fromkeys(name for row in rows for name in row))
-        for name in reversed(
-            [*(f"input.{own}" for own in self.input_names), *(f"limit.{n}" for n in self.limit_names)]
-        ):
-            if name not in names:
-                names.insert(0, name)
+        own = [*(f"input.{name}" for name in self.input_names), *(f"limit.{name}" for name in self.limit_names)]
+        names = [*(name for name in own if name not in names), *names]
         table = np.array([[row.get(name, math.nan) for name in names] for row in rows], np.float64)
         return names, table.reshape(len(rows), len(names))
 
     @classmethod
     def from_columns(cls, names: Sequence[str], table: ArrayLike) -> Self:
-        """Read what `to_columns` gave.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of the columns.
-        table : array_like
-            A row per exchange.
-
-        Returns
-        -------
-        RigRecord
-            Equal to what was written, pressure traces apart; numbers that were never there and were NaN are not told
-            from each other.
+        """Read what `to_columns` gave, pressure traces apart; what was never there and what was NaN are the same.
 
         Raises
         ------
@@ -151,24 +125,14 @@ class RigRecord:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], *, table: str = "rig") -> Self:
-        """Read the exchanges of a record file.
+        """Read the exchanges of a record file, as far as it can be read, with a warning where it ends before.
 
         Parameters
         ----------
         path : path-like
             File of a `Recorder` that was the sink of a `RecordingRig`.
         table : str
-            Name of their table.
-
-        Returns
-        -------
-        RigRecord
-            As far as the file can be read, with a warning where it ends before.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            Not a record, or one without that table.
+            Name of their table; DataError where the record has none of that name.
         """
         return cls.of_run(readable_record(path), f"{path}", table=table)
 
@@ -200,7 +164,7 @@ def flat(exchange: Exchange) -> dict[str, float]:
     return {**row, "misfire": float(measured.misfire)}
 
 
-class RecordingRig:
+class RecordingRig(AroundPlant):
     """A rig that remembers every exchange.
 
     Parameters
@@ -228,51 +192,20 @@ class RecordingRig:
     def __init__(
         self, rig: Rig | Plant, sink: Callable[[Mapping[str, float]], None] | None = None, *, keep: bool = True
     ) -> None:
+        super().__init__(rig)
         self.rig, self._keep = rig, keep
         self.record = RigRecord(rig.input_names, rig.limit_names)
         self._sink = sink
         self._inputs: dict[str, float] = {}
         self._names: tuple[str, ...] = ()
 
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return self.rig.input_names
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limited quantities that `measure` reports."""
-        return self.rig.limit_names
-
-    @property
-    def operating_point_changes(self) -> bool:
-        """Whether the next cycle brings a new operating point; False for a rig that announces none."""
-        return bool(getattr(self.rig, "operating_point_changes", False))
-
-    @property
-    def point(self) -> Any:
-        """Operating point of the next cycle, for a guide; as absent as the rig's own."""
-        return getattr(self.rig, "point")  # noqa: B009 - the protocol of a plant does not have it
-
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Apply the inputs.
-
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            As the rig takes them.
-        """
+        """Apply the inputs, as the rig takes them."""
         self.rig.apply(inputs)
         self._inputs = {name: float(inputs[name]) for name in self.rig.input_names}
 
     def measure(self) -> Measurement:
-        """Measure, and remember it with its inputs.
-
-        Returns
-        -------
-        mgdd.loop.Measurement
-            As the rig gives it.
-        """
+        """Measure, and remember it with its inputs."""
         measured = self.rig.measure()
         exchange = Exchange(dict(self._inputs), measured)
         if self._keep:
@@ -293,3 +226,100 @@ class RecordingRig:
     ) -> None:
         if isinstance(self.rig, Rig):
             self.rig.__exit__(kind, error, trace)
+
+
+class Difference(NamedTuple):
+    """An input that was asked for and is not the recorded one."""
+
+    sample: int
+    name: str
+    asked: float
+    recorded: float
+
+
+class ReplayRig(OpenOnce):
+    """A rig that gives back what was recorded.
+
+    A measurement belongs to the inputs it was recorded at: where others are asked for, the replay ends there, or with
+    ``strict=False`` goes on and lists them in `differences`.
+
+    Parameters
+    ----------
+    record : RigRecord
+        What `RecordingRig` remembered.
+    tolerance : float
+        Largest difference of an input that counts as none, in its unit.
+    strict : bool
+        Whether another input is an error.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A negative tolerance.
+
+    Examples
+    --------
+    >>> from mgdd.loop import VirtualThrottle
+    >>> from mgdd.rig import RecordingRig, ReplayRig, SimulatedRig
+    >>> with RecordingRig(SimulatedRig(VirtualThrottle(seed=1))) as rig:
+    ...     rig.apply({"duty": 0.6})
+    ...     live = rig.measure()
+    >>> with ReplayRig(rig.record) as again:
+    ...     again.apply({"duty": 0.6})
+    ...     replayed = again.measure()
+    >>> replayed == live
+    True
+    """
+
+    def __init__(self, record: RigRecord, *, tolerance: float = 0.0, strict: bool = True) -> None:
+        if not tolerance >= 0.0:
+            raise ParameterError.of("tolerance", tolerance, ">= 0")
+        self.record, self.tolerance, self.strict = record, tolerance, strict
+        self.differences: list[Difference] = []
+        self.sample = 0
+        self._asked: dict[str, float] | None = None
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.record.input_names
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the limited quantities that `measure` reports."""
+        return self.record.limit_names
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Ask for the inputs of the next sample, as `mgdd.loop.Plant.apply`; RigError where the rig is closed."""
+        self._require_open()
+        values = checked_inputs(inputs, self.input_names)
+        self._asked = dict(zip(self.input_names, values, strict=True))
+
+    def measure(self) -> Measurement:
+        """Give the next recorded measurement.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            Nothing was applied yet, the rig is closed, the record is at its end, or another input was asked for.
+        """
+        self._require_open()
+        if self._asked is None:
+            raise RigError("measure() before apply(): apply the inputs first")
+        if self.sample >= len(self.record):
+            raise RigError(f"the record ends after {len(self.record)} samples: ask for fewer")
+        recorded = self.record[self.sample]
+        found = [
+            Difference(self.sample, name, asked, recorded.inputs[name])
+            for name, asked in self._asked.items()
+            if not abs(asked - recorded.inputs[name]) <= self.tolerance
+        ]
+        if found and self.strict:
+            one = found[0]
+            raise RigError(
+                f"sample {one.sample}: {one.name} = {one.asked:g} was asked for, {one.recorded:g} is recorded; "
+                "strict=False goes on and lists the differences"
+            )
+        self.differences += found
+        self.sample += 1
+        return recorded.measurement

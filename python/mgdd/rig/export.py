@@ -19,7 +19,7 @@ from mgdd.io.binary_files import write_netcdf
 from mgdd.io.extras import import_extra
 from mgdd.io.files import existing_file
 from mgdd.results.labels import label_of
-from mgdd.rig.can.logs import LOG_WRITERS, write_log
+from mgdd.rig.can.python_can import LOG_WRITERS, write_log
 from mgdd.rig.recorded import RecordedRun, readable_record, stamped_frames
 
 if TYPE_CHECKING:

@@ -54,6 +54,8 @@ class GatedThrottle:
     ({'duty': 0.0, 'bridge_open': 1.0}, True)
     """
 
+    input_names = ("duty",)
+
     def __init__(self, plant: Plant, gate: SafetyGate | None = None, *, shadow: bool = False) -> None:
         if set(plant.input_names) not in ({"duty"}, {"duty", "bridge_open"}):
             raise ParameterError(f"plant takes {', '.join(plant.input_names)}: must take duty, or duty and bridge_open")
@@ -65,27 +67,14 @@ class GatedThrottle:
         self._applied: dict[str, float] | None = None
 
     @property
-    def input_names(self) -> tuple[str, ...]:
-        """The duty."""
-        return ("duty",)
-
-    @property
     def limit_names(self) -> tuple[str, ...]:
         """Names of the limited quantities of the plant."""
         return self.plant.limit_names
 
     def start(self) -> float:
-        """Measure without drive until the gate can be armed, then arm and run it.
+        """Measure without drive until the gate can be armed, then arm and run it; give the angle measured last [deg].
 
-        Returns
-        -------
-        float
-            Angle measured last [deg].
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Something still stands against it after twice the good frames that it needs.
+        RigError where something stands against it after twice the good frames that it needs.
         """
         angle_deg = math.nan
         for _ in range(2 * max(math.ceil(self.gate.envelope.good_frames), 1)):
@@ -99,17 +88,8 @@ class GatedThrottle:
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Pass the duty of the next cycle through the gate, with what was measured last.
 
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            ``duty`` [-]; NaN is a fault of the controller and opens the bridge.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing or unknown input.
-        mgdd.errors.RigError
-            The gate takes the drive away from a plant that cannot open its bridge; the message has the reason.
+        NaN is a fault of the controller and opens the bridge. Any input but ``duty`` is a ParameterError; a RigError
+        has the reason why the gate takes the drive away from a plant that cannot open its bridge.
         """
         if set(inputs) != {"duty"}:
             raise ParameterError(f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be duty")
@@ -119,18 +99,7 @@ class GatedThrottle:
         self._send(drive)
 
     def measure(self) -> Measurement:
-        """Run one cycle.
-
-        Returns
-        -------
-        mgdd.loop.Measurement
-            As the plant gives it; ``applied`` has the ``duty`` that left, and ``bridge_open`` where the plant takes it.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
-        """
+        """Run one cycle; ``applied`` has what left: the ``duty``, and ``bridge_open`` where the plant takes it."""
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
         measured = self.plant.measure()

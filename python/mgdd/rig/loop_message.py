@@ -1,4 +1,4 @@
-"""The messages that a real-time loop sends and receives."""
+"""The messages that a real-time loop sends and receives, and the protection of a payload."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from mgdd._core import rig as core
 from mgdd._core.rig import E2eSettings, SignalLayout
 
-__all__ = ["LoopMessage"]
+__all__ = ["LoopMessage", "protect"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,13 +62,37 @@ class LoopMessage:
     def to_core(self) -> tuple[Any, ...]:
         """Give what the core takes."""
         signals: list[tuple[Any, ...]] = [
-            (name, layout, 0.0, None, _bits(self.missing.get(name))) for name, layout in self.signals.items()
+            (name, layout, 0.0, None, None if (raw := self.missing.get(name)) is None else raw % 2**64)
+            for name, layout in self.signals.items()
         ]
         signals += [("fixed", layout, float(number), None, None) for layout, number in self.fixed]
         signals += [("fixed", layout, float(driven), float(open_), None) for layout, driven, open_ in self.switched]
         return (self.can_id, self.extended, self.size, self.protection, signals)
 
 
-def _bits(raw: int | None) -> int | None:
-    """Return a raw value as the core holds it: in two's complement of 64 bits."""
-    return None if raw is None else raw % 2**64
+def protect(settings: core.E2eSettings, counter: int, payload: bytes | bytearray | memoryview) -> bytes:
+    """Give a payload with its alive counter and CRC.
+
+    Parameters
+    ----------
+    settings : E2eSettings
+        Places, CRC and data identifier.
+    counter : int
+        Alive counter of this frame, 0 to ``counter_modulus - 1``; ``settings.next_counter`` gives the one that follows.
+    payload : bytes
+        ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A counter outside of the modulus.
+    mgdd.errors.ShapeError
+        A payload of another length.
+
+    Examples
+    --------
+    >>> from mgdd.rig import E2eSettings, protect
+    >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
+    '3a05112233445566'
+    """
+    return core.protect(settings, counter, payload)

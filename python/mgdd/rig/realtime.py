@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import time
 import weakref
-from collections.abc import Sequence
-from types import TracebackType
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,11 +12,9 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.rig import RingTransport, SocketCanTransport
 from mgdd.errors import ParameterError, RigError
-from mgdd.rig.gate_requests import GateRequests
+from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.rig.loop_message import LoopMessage
-from mgdd.rig.loop_samples import samples_dataset, summary
-from mgdd.rig.safety import SafetyChange
-from mgdd.rig.safety_envelope import SafetyEnvelope
+from mgdd.rig.safety import SafetyChange, SafetyEnvelope
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,8 +22,36 @@ if TYPE_CHECKING:
 
 __all__ = ["RealtimeLoop"]
 
+_PAUSE_S = 0.002
+_LABELS: Mapping[str, tuple[str, str]] = {
+    "cycle": ("-", "number of the grid point"),
+    "lateness_us": ("us", "beginning after the deadline"),
+    "compute_us": ("us", "time from waking until the command had left"),
+    "age_us": ("us", "age of the measurement"),
+    "missed": ("-", "deadlines missed since the cycle before"),
+    "first_v": ("V", "first position sensor"),
+    "second_v": ("V", "second position sensor"),
+    "applied_duty": ("-", "duty that the node reports"),
+    "asked_duty": ("-", "duty of the controller"),
+    "bridge_open": ("-", "open bridge"),
+    "fresh": ("-", "a new angle arrived"),
+    "mode": ("-", "mode of the safety gate"),
+    "cause": ("-", "what is wrong"),
+    "send_result": ("-", "what became of the command"),
+    "good_frames": ("-", "frames with a new angle"),
+    "bad_frames": ("-", "frames that were refused"),
+    "bus_state": ("-", "state of the bus"),
+    "request": ("-", "request to the safety gate"),
+}
+_MODES = tuple(_core.rig.safety_states)
+_REASONS = tuple(_core.rig.safety_reasons)
+_RESULTS = tuple(_core.rig.send_results)
+_BUS_STATES = tuple(_core.rig.bus_states)
+_REQUESTS = tuple(_core.rig.safety_requests)
+_TIMES = {"lateness_us": "lateness", "compute_us": "compute", "age_us": "age", "send_us": "send"}
 
-class RealtimeLoop(GateRequests):
+
+class RealtimeLoop:
     """A throttle controller over a bus, in a thread of the core with absolute deadlines.
 
     Every period the loop takes the frames that arrived, judges them, steps the controller, passes its duty through a
@@ -135,23 +161,13 @@ class RealtimeLoop(GateRequests):
         self.controller = controller
         self.transport = transport
         self._core = _core.rig.RealtimeLoop(
-            controller=getattr(controller, "_core", controller),
-            transport=transport,
-            envelope=self.envelope,
-            command=command.to_core(),
-            received=[message.to_core() for message in measurements],
-            period_s=self.envelope.cycle_s,
-            initial_reference_deg=reference_deg,
-            reference_timeout_s=reference_timeout_s,
-            transmit=transmit,
-            stop_frames=stop_frames,
-            realtime=realtime,
-            priority=priority,
-            lock_memory=lock_memory,
-            sample_capacity=sample_capacity,
-            queue_capacity=queue_capacity,
-        )
-        super().__init__(self._core, self.envelope.cycle_s)
+            controller=getattr(controller, "_core", controller), transport=transport, envelope=self.envelope,
+            command=command.to_core(), received=[message.to_core() for message in measurements],
+            period_s=self.envelope.cycle_s, initial_reference_deg=reference_deg,
+            reference_timeout_s=reference_timeout_s, transmit=transmit, stop_frames=stop_frames, realtime=realtime,
+            priority=priority, lock_memory=lock_memory, sample_capacity=sample_capacity, queue_capacity=queue_capacity,
+        )  # fmt: skip
+        self._pause_s = max(_PAUSE_S, 2.0 * self.envelope.cycle_s)  # one request is heard per cycle
         self._origin_ns: int | None = None
         # Also at the end of the interpreter: a thread of the core must not outlive it.
         self._end = weakref.finalize(self, self._core.stop, self._core.patience_s)
@@ -159,13 +175,7 @@ class RealtimeLoop(GateRequests):
     # --- life -------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start the thread; returns at once. The gate is in the mode ``init``: commands say open bridge.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            It was started before.
-        """
+        """Start the thread, once, and return: the gate is in the mode ``init``. RigError where it was started."""
         import xarray  # noqa: F401 - an import while it runs would hold up the threads that feed the transport
 
         self._core.start()
@@ -173,15 +183,8 @@ class RealtimeLoop(GateRequests):
     def stop(self, timeout_s: float | None = None) -> None:
         """Send the last commands with an open bridge and end the thread; does nothing where it has ended.
 
-        Parameters
-        ----------
-        timeout_s : float, optional
-            How long to wait for the end [s]; ``stop_frames`` periods and 2 s if left out.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            It did not end in time: cut the supply of the motor.
+        Without a limit it waits ``stop_frames`` periods and 2 s [s]. RigError where it did not end in time: cut the
+        supply of the motor.
         """
         limit_s = self._core.patience_s if timeout_s is None else timeout_s
         if not self._core.stop(limit_s):
@@ -189,22 +192,10 @@ class RealtimeLoop(GateRequests):
         self._core.give_back(getattr(self.controller, "_core", self.controller))
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait for the end of the loop while other threads of Python run.
+        """Wait for the end of the loop, for so long [s] or without end, while other threads of Python run.
 
-        Parameters
-        ----------
-        timeout_s : float, optional
-            How long [s]; without end if left out.
-
-        Returns
-        -------
-        bool
-            Whether the loop has ended. One that was not started counts as ended.
-
-        Raises
-        ------
-        mgdd.errors.Interrupted
-            Ctrl-C; the loop goes on until `stop`.
+        Gives whether it has ended; one that was not started counts so. `mgdd.errors.Interrupted` for Ctrl-C: the loop
+        goes on until `stop`.
         """
         return bool(self._core.wait(timeout_s))
 
@@ -212,42 +203,83 @@ class RealtimeLoop(GateRequests):
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
+
+    # --- the safety gate ----------------------------------------------------------------------------------
+
+    @property
+    def running(self) -> bool:
+        """Whether the thread runs."""
+        return bool(self._core.running)
+
+    @property
+    def mode(self) -> str:
+        """Mode of the safety gate: ``init``, ``armed``, ``run``, ``limp`` or ``fault``."""
+        return str(self._core.state)
+
+    @property
+    def reason(self) -> str:
+        """Why that mode was entered."""
+        return str(self._core.reason)
+
+    @property
+    def cause(self) -> str:
+        """What is wrong now; ``none`` where nothing is."""
+        return str(self._core.cause)
+
+    def arm(self, timeout_s: float = 2.0) -> None:
+        """Ask the gate for the mode ``armed``, for so long [s], until enough good frames have come.
+
+        RigError where the gate refuses, with what is wrong, or the loop does not run; the same of `drive`, `release`
+        and `reset`.
+        """
+        self._ask("arm", "armed", timeout_s)
+
+    def drive(self, timeout_s: float = 2.0) -> None:
+        """Ask the gate for the mode ``run``: the actuator is driven from now on. Otherwise as `arm`."""
+        self._ask("run", "run", timeout_s)
+
+    def release(self, timeout_s: float = 2.0) -> None:
+        """Open the bridge, from ``run`` back to the mode ``armed``. Otherwise as `arm`."""
+        self._ask("stop", "armed", timeout_s)
+
+    def reset(self, timeout_s: float = 2.0) -> None:
+        """Leave ``limp`` for ``armed``, or ``fault`` for ``init``, once nothing is wrong. Otherwise as `arm`."""
+        self._ask("reset", "init" if self.mode == "fault" else "armed", timeout_s)
+
+    def abort(self) -> None:
+        """Open the bridge at the next cycle, whatever the mode, until a reset; RigError where it does not run."""
+        self._require_running()
+        while not self._core.request("abort"):
+            time.sleep(_PAUSE_S)
+            self._require_running()
+
+    def _ask(self, request: str, wanted: str, timeout_s: float) -> None:
+        until = time.monotonic() + timeout_s
+        while self.mode != wanted:
+            self._require_running()
+            if time.monotonic() > until:
+                why = self.cause if self.cause != "none" else f"too few good frames, or the wrong mode, {self.mode}"
+                raise RigError(f"no {request!r} within {timeout_s:g} s: {why}")
+            self._core.request(request)
+            time.sleep(self._pause_s)
+
+    def _require_running(self) -> None:
+        if not self.running:
+            raise RigError("the loop does not run: start() it; one that was stopped is made anew")
 
     # --- references -------------------------------------------------------------------------------------------
 
     def set_reference(self, reference_deg: float) -> None:
-        """Set the reference from the next cycle on; the latest one wins.
-
-        Parameters
-        ----------
-        reference_deg : float
-            Wanted plate angle [deg].
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            It is not finite.
-        """
+        """Set the wanted plate angle [deg], finite, from the next cycle on; the latest one wins."""
         self._core.set_reference(reference_deg)
 
     def queue_references(self, reference_deg: ArrayLike) -> None:
-        """Hand over references in advance: one per grid point while the loop drives, then the last one holds.
+        """Hand over references [deg], shape (n,): one per grid point while the loop drives, then the last one holds.
 
-        Parameters
-        ----------
-        reference_deg : array_like, shape (n,)
-            Wanted plate angles [deg], behind those that wait already.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            One is not finite; none is queued.
-        mgdd.errors.RigError
-            They do not fit ``queue_capacity``; none is queued.
+        They stand behind those that wait already. None is queued where one is not finite, a ParameterError, or where
+        they do not fit ``queue_capacity``, a RigError.
         """
         self._core.queue_references(np.asarray(reference_deg, dtype=float))
 
@@ -276,27 +308,18 @@ class RealtimeLoop(GateRequests):
         columns = self.sample_columns()
         if self._origin_ns is None and columns["deadline_ns"].size:
             self._origin_ns = int(columns["deadline_ns"][0])
-        return samples_dataset(columns, self._origin_ns or 0)
+        return _dataset(columns, self._origin_ns or 0)
 
     def sample_columns(self) -> dict[str, NDArray[Any]]:
         """Take the same samples as plain columns, for a reader that comes every few milliseconds.
 
-        Returns
-        -------
-        dict of str to ndarray
-            As the core has them: ``deadline_ns``, times in us, ``state``, ``cause``, ``send_result``, ``bus_state`` and
-            ``request`` as numbers.
+        They are as the core has them: ``deadline_ns``, times in us, ``state``, ``cause``, ``send_result``,
+        ``bus_state`` and ``request`` as numbers.
         """
         return dict(self._core.samples())
 
     def events(self) -> list[SafetyChange]:
-        """Take the changes of mode since the last call.
-
-        Returns
-        -------
-        list of SafetyChange
-            In their order.
-        """
+        """Take the changes of mode since the last call, in their order."""
         return [SafetyChange(*event) for event in self._core.events()]
 
     def report(self) -> dict[str, Any]:
@@ -313,11 +336,41 @@ class RealtimeLoop(GateRequests):
         return dict(self._core.report())
 
     def summary(self) -> str:
-        """Say in a few lines how punctual the loop was.
+        """Say in a few lines how punctual the loop was: deadlines, times and frames."""
+        return _summary(self.report(), self.envelope.cycle_s)
 
-        Returns
-        -------
-        str
-            Deadlines, times and frames.
-        """
-        return summary(self.report(), self.envelope.cycle_s)
+
+def _dataset(columns: Mapping[str, Any], origin_ns: int) -> xr.Dataset:
+    """Label the columns of the core along the time of the deadlines from an origin on the monotonic clock [ns]."""
+    values = dict(columns)
+    time_s = (values.pop("deadline_ns") - origin_ns) * 1e-9
+    values["sensed_angle_deg"] = values.pop("angle_deg")
+    values["mode"] = np.array(_MODES)[values.pop("state")]
+    values["cause"] = np.array(_REASONS)[values["cause"]]
+    values["send_result"] = np.array(_RESULTS)[values["send_result"]]
+    values["bus_state"] = np.array(_BUS_STATES)[values["bus_state"]]
+    values["request"] = np.array(_REQUESTS)[values["request"]]
+    variables: dict[str, Any] = {"time_s": ("time_s", time_s)}
+    for name, column in values.items():
+        variables[name] = ("time_s", column, *(_LABELS.get(name) or VARIABLES[name]))
+    return labelled_dataset(variables, attrs={"origin_monotonic_ns": str(origin_ns)})
+
+
+def _summary(report: Mapping[str, Any], period_s: float) -> str:
+    """Say in a few lines how punctual the loop of a report was."""
+    frames, bus, granted = report["frames"], report["bus"], report["schedule"]
+    cycles = f"{report['cycles']} cycles of {period_s * 1e3:g} ms, {report['missed']} deadlines missed"
+    lines = [f"{cycles} ({report['late']} of them too long, longest row {report['longest_row']})"]
+    lines.append(f"{'':14}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>12}")
+    for name, what in _TIMES.items():
+        times = report[name]
+        quantiles = "".join(f"{times[q]:10.1f}" for q in ("p50", "p99", "p99_9"))
+        lines.append(f"{what + ' [us]':14}{quantiles}{times['max']:12.1f}")
+    received = f"frames: {frames['good']} good, {frames['bad']} bad, {bus['lost']} lost"
+    lines.append(
+        f"{received}, {bus['sent']} sent, {bus['full'] + bus['failed']} not sent; samples dropped:"
+        f" {report['dropped_samples']}"
+    )
+    yes = {True: "yes", False: "no"}
+    lines.append(f"SCHED_FIFO: {yes[granted['realtime']]}, memory locked: {yes[granted['memory_locked']]}")
+    return "\n".join(lines)

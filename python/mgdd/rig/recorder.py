@@ -10,7 +10,6 @@ import uuid
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -95,13 +94,7 @@ class Recorder:
             return self._writer.refused
 
     def frame(self, frame: Frame) -> None:
-        """Append a frame of a bus, sent or received.
-
-        Parameters
-        ----------
-        frame : mgdd.rig.Frame
-            With its stamps.
-        """
+        """Append a frame of a bus, sent or received, with its stamps."""
         with self._lock:
             self._writer.write(frame)
 
@@ -114,14 +107,9 @@ class Recorder:
             Which table; the first row makes it.
         values : mapping of str to float
             A number per name, NaN where there is none; a name ends in its unit, as ``angle_deg`` does. The first row
-            says the names for all.
+            says the names for all: others are a ParameterError, as is ``time_s``, which a reader adds.
         monotonic_ns : int, optional
             When it was taken; default now [ns].
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Other names than those of the first row; ``time_s``, which a reader adds; a value that is not a number.
         """
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:
@@ -131,17 +119,7 @@ class Recorder:
             self._writer.write_sample(number, now, _numbers(names, values))
 
     def event(self, category: str, text: str, *, monotonic_ns: int | None = None) -> None:
-        """Append an event.
-
-        Parameters
-        ----------
-        category : str
-            Kind of event: ``"state"``, ``"fault"``, ``"parameter"``, ``"note"`` or any other word.
-        text : str
-            What happened.
-        monotonic_ns : int, optional
-            When; default now [ns].
-        """
+        """Append an event of a category, ``"state"``, ``"fault"``, ``"note"`` or any other word; default now [ns]."""
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:
             self._writer.write_event(now, category, text)
@@ -159,9 +137,7 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         try:
             if kind is not None:
                 self.event("exception", f"{kind.__name__}: {error}")

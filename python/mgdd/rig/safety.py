@@ -1,32 +1,85 @@
-"""The safety gate below every controller."""
+"""The safety gate below every controller, and its envelope as a file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from types import TracebackType
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
 from typing import Any, NamedTuple, Self
 
 from mgdd import _core
 from mgdd._core.rig import Drive
-from mgdd.errors import RigError
-from mgdd.rig.safety_envelope import SafetyEnvelope
+from mgdd.errors import DataError, RigError, did_you_mean
+from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
 
-__all__ = ["SafetyChange", "SafetyGate"]
+__all__ = ["SafetyChange", "SafetyEnvelope", "SafetyGate", "said_of"]
+
+_KIND = "safety_envelope"
+_CHOICE = "bus_fault_from"
+
+
+class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the core's text
+    __doc__ = _core.rig.SafetyEnvelope.__doc__
+
+    @classmethod
+    def load(cls, name: str | os.PathLike[str]) -> SafetyEnvelope:
+        """Read an envelope: a shipped one by its name, or a file.
+
+        Parameters
+        ----------
+        name : str or path
+            ``"etb"`` for the host of a throttle, ``"etb_node"`` for the node that drives its bridge, or the path of a
+            file that `to_toml` wrote.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        mgdd.errors.DataError
+            Neither a shipped name nor a file of this kind, a missing key.
+        mgdd.errors.ParameterError
+            An unknown key, another unit, a value outside its domain.
+
+        Examples
+        --------
+        >>> from mgdd.rig import SafetyEnvelope
+        >>> SafetyEnvelope.load("etb") == SafetyEnvelope()
+        True
+        """
+        text = os.fspath(name)
+        if "." in text or os.sep in text:
+            return cls.of_file(ParameterFile.read(text))
+        folder = resources.files("mgdd.rig").joinpath("envelopes")
+        shipped = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir())
+        if text not in shipped:
+            hint = did_you_mean(text, shipped) or f"shipped are {', '.join(shipped)}"
+            raise DataError(f"no shipped envelope {text!r}: {hint}; the path of a file ends in .toml")
+        shipped_text = folder.joinpath(f"{text}.toml").read_text(encoding="utf-8")
+        return cls.from_toml(shipped_text, origin=f"envelope {text!r}")
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all fields, as `to_toml` writes them."""
+        units = {name: wanted.unit for name, wanted in _wanted().items()}
+        return ParameterFile(kind=_KIND, tables={"parameters": entries(self.to_dict(), units)})
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> SafetyEnvelope:
+        """Make the envelope of a file that `to_toml` wrote."""
+        file.expect(kinds=(_KIND,), tables=("parameters",), notes=("name", "title", "source"))
+        return cls(**file.values("parameters", _wanted()))
+
+    def replace(self, **changes: Any) -> SafetyEnvelope:
+        """Give a validated copy with some fields changed; an unknown name is a ParameterError."""
+        return type(self)(**super().replace(**changes).to_dict())
+
+
+def _wanted() -> dict[str, Wanted]:
+    fields = _core.rig.SafetyEnvelope.fields()
+    return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
 
 
 class SafetyChange(NamedTuple):
-    """A change of state of a safety gate.
-
-    Parameters
-    ----------
-    cycle : int
-        Cycle of the gate, missed ones counted.
-    before, after : str
-        Its modes.
-    reason : str
-        Why.
-    times : int
-        How often this reason has led to one so far, this one included.
+    """A change of mode of a safety gate, with why, and how often this reason has led to one so far.
 
     Examples
     --------
@@ -198,29 +251,14 @@ class SafetyGate:
             A negative count, an unknown name.
         """
         self._core.observe(
-            good_frames=good_frames,
-            bad_frames=bad_frames,
-            age_s=age_s,
-            sensor_v=sensor_v,
-            angle_deg=angle_deg,
-            bus=bus,
-            sent=sent,
-            missed_deadlines=missed_deadlines,
-            request=request,
-        )
+            good_frames=good_frames, bad_frames=bad_frames, age_s=age_s, sensor_v=sensor_v, angle_deg=angle_deg,
+            bus=bus, sent=sent, missed_deadlines=missed_deadlines, request=request,
+        )  # fmt: skip
 
     def command(self, duty: float) -> Drive:
-        """Give the drive that may leave in this cycle.
+        """Give the drive that may leave in this cycle for the duty that the controller asks for [-].
 
-        Parameters
-        ----------
-        duty : float
-            What the controller asks for [-]; NaN is a fault of the controller.
-
-        Returns
-        -------
-        Drive
-            Limited, or open. Without `observe` before it: open, and ``limp``.
+        It is limited, or open. NaN is a fault of the controller; without `observe` before it: open, and ``limp``.
         """
         return self._core.command(duty)
 
@@ -254,25 +292,22 @@ class SafetyGate:
             raise RigError(f"{name} refused in mode {self.mode!r}: {against}")
 
     def drain(self) -> list[SafetyChange]:
-        """Take the waiting changes of mode out of the audit list.
-
-        Returns
-        -------
-        list of SafetyChange
-            Oldest first. The list holds 64; ``counts["dropped"]`` found no room.
-        """
+        """Take the waiting changes of mode, oldest first; beyond 64 they are ``counts["dropped"]``."""
         return [SafetyChange(*entry) for entry in self._core.drain()]
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
-        if error is not None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
             self.abort()
         elif self.mode in ("armed", "run"):
             self.disarm()
+
+
+def said_of(changes: Iterable[SafetyChange]) -> list[str]:
+    """Say changes of mode as events of a run."""
+    return [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in changes]
 
 
 def _restored(envelope: SafetyEnvelope, state: Mapping[str, Sequence[float]]) -> SafetyGate:

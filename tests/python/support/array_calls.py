@@ -9,18 +9,18 @@ import numpy as np
 import xarray as xr
 
 import mgdd
-from idle_loop import idle_loop
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
-from mgdd.rig import RigRecord
+from mgdd.rig import RigRecord, RingTransport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
+from realtime_loops import make_loop
 
 Array = np.ndarray[Any, Any]
 Call = Callable[..., Any]
@@ -171,7 +171,7 @@ def exchanged(row: Any) -> Any:
 
 
 def queued(references: Any) -> Any:
-    loop = idle_loop()
+    loop = make_loop(RingTransport())
     loop.queue_references(references)
     return loop.queued_references
 

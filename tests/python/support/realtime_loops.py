@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from mgdd.control import Pid
 from mgdd.rig import RealtimeLoop, RingTransport
-from throttle_node import COMMAND, MEASUREMENTS, PERIOD_S, patient_envelope
+from throttle_node import COMMAND, MEASUREMENTS, PERIOD_S, ThrottleNode, patient_envelope
 
 
 def make_loop(transport: RingTransport, controller: Any = None, **changes: Any) -> RealtimeLoop:
@@ -34,3 +35,12 @@ def becomes(condition: Callable[[], bool], within_s: float = 20.0) -> bool:
 def go(loop: RealtimeLoop) -> None:
     loop.arm(20.0)
     loop.drive(20.0)
+
+
+@contextmanager
+def driving(controller: Any = None, **changes: Any) -> Iterator[tuple[ThrottleNode, RealtimeLoop]]:
+    """A throttle, and a loop that drives it."""
+    transport = RingTransport()
+    with ThrottleNode.on(transport) as node, make_loop(transport, controller, **changes) as loop:
+        go(loop)
+        yield node, loop

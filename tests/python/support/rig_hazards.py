@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from mgdd.control import Pid
@@ -13,8 +13,7 @@ from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import Frame, SafetyEnvelope, SafetyGate, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import node_plant
+from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.gated import facts_of
 from mgdd.throttle import SensorFault
 
@@ -29,7 +28,7 @@ def at(value: Any, k: int) -> Any:
     return value(k) if callable(value) else value
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Hazard:
     """What goes wrong from ONSET to OVER, and the gate's answer."""
 
@@ -53,59 +52,46 @@ def of_sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[SensorFault]:
 
 
 HAZARDS = {
-    "lost measurement": Hazard(mode="limp", reason="stale", within=6, faults=lasting("missing_sample")),
-    "late measurement": Hazard(mode="limp", reason="stale", within=6, faults=lasting("stale_sample")),
-    "frozen sender": Hazard(mode="limp", reason="stale", within=5, facts=GONE),
-    "corrupted frames": Hazard(mode="limp", reason="bad_frames", within=3, facts={**GONE, "bad_frames": 1}),
-    "foreign frames between good ones": Hazard(mode="limp", reason="bad_frames", within=1, facts={"bad_frames": 3}),
-    "sensors disagree": Hazard(
-        mode="fault", reason="sensor_disagreement", within=6, faults=of_sensor("offset", 2, 0.3)
-    ),
-    "sensor wire open": Hazard(mode="fault", reason="sensor_range", within=6, faults=of_sensor("open_wire", 1)),
-    "sensor shorted to supply": Hazard(
-        mode="fault", reason="sensor_range", within=7, faults=of_sensor("short_to_supply", 2)
-    ),
-    "measurement not a number": Hazard(mode="fault", reason="sensor_range", within=5, faults=lasting("nan_sample")),
+    "lost measurement": Hazard("limp", "stale", 6, faults=lasting("missing_sample")),
+    "late measurement": Hazard("limp", "stale", 6, faults=lasting("stale_sample")),
+    "frozen sender": Hazard("limp", "stale", 5, facts=GONE),
+    "corrupted frames": Hazard("limp", "bad_frames", 3, facts={**GONE, "bad_frames": 1}),
+    "foreign frames between good ones": Hazard("limp", "bad_frames", 1, facts={"bad_frames": 3}),
+    "sensors disagree": Hazard("fault", "sensor_disagreement", 6, faults=of_sensor("offset", 2, 0.3)),
+    "sensor wire open": Hazard("fault", "sensor_range", 6, faults=of_sensor("open_wire", 1)),
+    "sensor shorted to supply": Hazard("fault", "sensor_range", 7, faults=of_sensor("short_to_supply", 2)),
+    "measurement not a number": Hazard("fault", "sensor_range", 5, faults=lasting("nan_sample")),
     "sensors jump": Hazard(
-        mode="fault",
-        reason="sensor_slope",
-        within=4,
-        facts=lambda k: {"sensor_v": (4.5, 0.5) if k % 2 else (0.5, 4.5), "angle_deg": 40.0},
+        "fault", "sensor_slope", 4, facts=lambda k: {"sensor_v": (4.5, 0.5) if k % 2 else (0.5, 4.5), "angle_deg": 40.0}
     ),
-    "plate beyond its travel": Hazard(mode="fault", reason="travel", within=4, facts={"angle_deg": 97.0}),
-    "controller gives NaN": Hazard(mode="fault", reason="invalid_duty", within=1, duty=math.nan),
-    "controller gives infinity": Hazard(mode="fault", reason="invalid_duty", within=1, duty=-math.inf),
+    "plate beyond its travel": Hazard("fault", "travel", 4, facts={"angle_deg": 97.0}),
+    "controller gives NaN": Hazard("fault", "invalid_duty", 1, duty=math.nan),
+    "controller gives infinity": Hazard("fault", "invalid_duty", 1, duty=-math.inf),
     "actuator overload, plate jammed": Hazard(
-        mode="limp",
-        reason="stall",
-        within=700,
-        faults=lasting("jammed"),
-        reference_deg=lambda k: 40.0 if k < 0 else 85.0,
-        returns=False,
+        "limp", "stall", 700, faults=lasting("jammed"), reference_deg=lambda k: 40.0 if k < 0 else 85.0, returns=False
     ),
     "actuator overload, duty too high for too long": Hazard(
-        mode="limp",
-        reason="heat",
-        within=600,
+        "limp",
+        "heat",
+        600,
         duty=lambda k: 0.75 if k // 30 % 2 else -0.75,
         changes={"heat_time_constant_s": 0.5, "slew_per_s": 1e4},
     ),
-    "bus error passive": Hazard(mode="limp", reason="bus_fault", within=1, facts={"bus": "passive"}),
-    "bus off": Hazard(mode="limp", reason="bus_fault", within=1, facts={**GONE, "bus": "off", "sent": False}),
-    "commands do not leave": Hazard(mode="limp", reason="not_sent", within=3, facts={"sent": False}),
-    "deadlines missed": Hazard(mode="limp", reason="deadlines", within=3, facts={"missed_deadlines": 1}),
-    "host hung for a while": Hazard(mode="limp", reason="deadlines", within=1, facts={"missed_deadlines": 50}),
-    "exception or signal in the host": Hazard(mode="limp", reason="aborted", within=1, facts={"request": "abort"}),
+    "bus error passive": Hazard("limp", "bus_fault", 1, facts={"bus": "passive"}),
+    "bus off": Hazard("limp", "bus_fault", 1, facts={**GONE, "bus": "off", "sent": False}),
+    "commands do not leave": Hazard("limp", "not_sent", 3, facts={"sent": False}),
+    "deadlines missed": Hazard("limp", "deadlines", 3, facts={"missed_deadlines": 1}),
+    "host hung for a while": Hazard("limp", "deadlines", 1, facts={"missed_deadlines": 50}),
+    "exception or signal in the host": Hazard("limp", "aborted", 1, facts={"request": "abort"}),
 }
 
 
 class Loop:
     """Controller, gate and throttle, sample by sample."""
 
-    def __init__(self, hazard: Hazard, *, node: bool = False) -> None:
+    def __init__(self, hazard: Hazard) -> None:
         self.hazard = hazard
-        name = "etb_node" if node else "etb"
-        self.gate = SafetyGate(SafetyEnvelope.load(name).replace(cycle_s=1e-3, **hazard.changes))
+        self.gate = SafetyGate(SafetyEnvelope.load("etb").replace(cycle_s=1e-3, **hazard.changes))
         self.plant = VirtualThrottle(inputs=("duty", "bridge_open"), faults=hazard.faults, seed=5)
         self.controller = Pid()
         self.values: Mapping[str, float] | None = None
@@ -152,7 +138,7 @@ LAST = round(ONSET / SAMPLE_MS) - 1  # number of the last command before the ons
 Frames = Callable[[Frame, list[Frame]], list[Frame]]  # of the command of a sample and those before it: what arrives
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class NodeHazard:
     """What goes wrong behind the bus from ONSET to OVER [ms], and the answer of the node."""
 
@@ -174,22 +160,18 @@ def broken(frame: Frame, _: list[Frame]) -> list[Frame]:
 def of_table(name: str, within_ms: float, **changes: Any) -> NodeHazard:
     """The same fault of the plate or its sensors as for the host."""
     known = HAZARDS[name]
-    made = NodeHazard(mode=known.mode, reason=known.reason, within_ms=within_ms, faults=known.faults)
-    return replace(made, returns=known.returns, **changes)
+    return NodeHazard(known.mode, known.reason, within_ms, known.faults, returns=known.returns, **changes)
 
 
 NODE_HAZARDS = {
-    "host dies": NodeHazard(mode="limp", reason="stale", within_ms=30.0, arrives=lambda *_: []),
+    "host dies": NodeHazard("limp", "stale", 30.0, arrives=lambda *_: []),
     "host hangs, its adapter repeats": NodeHazard(
-        mode="limp", reason="bad_frames", within_ms=20.0, arrives=lambda _, before: before[LAST : LAST + 1]
+        "limp", "bad_frames", 20.0, arrives=lambda _, before: before[LAST : LAST + 1]
     ),
     "commands come late": NodeHazard(
-        mode="limp",
-        reason="stale",
-        within_ms=30.0,
-        arrives=lambda frame, before: [frame] if len(before) % 8 == 0 else [],
+        "limp", "stale", 30.0, arrives=lambda frame, before: [frame] if len(before) % 8 == 0 else []
     ),
-    "commands corrupted": NodeHazard(mode="limp", reason="bad_frames", within_ms=20.0, arrives=broken),
+    "commands corrupted": NodeHazard("limp", "bad_frames", 20.0, arrives=broken),
     "lost measurement": of_table("lost measurement", 30.0),
     "late measurement": of_table("late measurement", 30.0),
     "sensors disagree": of_table("sensors disagree", 40.0),
@@ -197,9 +179,9 @@ NODE_HAZARDS = {
     "sensor shorted to supply": of_table("sensor shorted to supply", 40.0),
     "actuator overload, plate jammed": of_table("actuator overload, plate jammed", 900.0, reference_deg=85.0),
     "actuator overload, duty too high for too long": NodeHazard(
-        mode="limp",
-        reason="heat",
-        within_ms=650.0,
+        "limp",
+        "heat",
+        650.0,
         duty=lambda ms: 0.75 if int(ms) // 30 % 2 else -0.75,
         changes={"heat_time_constant_s": 0.5},
     ),

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foreign_bus import FOREIGN_MAP, write_foreign
 from map_cases import timing_table
 from mgdd import io, presets
 from mgdd.design import design_points
@@ -36,6 +35,7 @@ from mgdd.rig.can.dbc import DbcFile
 from mgdd.surrogate import EngineSurrogate, ResponseModel, fit_response, fit_surrogate, random_step_records
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair
 from recorded_rig import write as write_record
+from user_buses import FOREIGN_MAP, write_foreign
 
 CONDITIONS = (
     "file,speed_rpm,soi_cad,fuel_mg,bmep_bar,intake_pressure_kpa\n"

@@ -6,13 +6,12 @@ import logging
 import threading
 import time
 import weakref
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
-from mgdd.rig.can.messages import message_of
-from mgdd.rig.can.reception import POLL_S, Reception
+from mgdd.rig.can.frame import FrameBus
+from mgdd.rig.can.python_can import POLL_S, Reception, message_of
 
 if TYPE_CHECKING:
     import can
@@ -22,18 +21,6 @@ __all__ = ["BusBridge"]
 _log = logging.getLogger(__name__)
 _LOOK_S = 0.05  # how often a waiting thread looks whether it shall end
 _SEND_ERRORS = 3  # in a row, until the bus counts as gone
-
-
-class FrameBus(Protocol):
-    """What a bridge needs of a bus: a `mgdd.rig.CanTransport`, for example."""
-
-    def receive(self, timeout_s: float) -> Frame | None:
-        """Give the next frame that arrived, or None after the time."""
-        ...
-
-    def send(self, frame: Frame) -> None:
-        """Hand a frame to the bus."""
-        ...
 
 
 class BusBridge:
@@ -101,9 +88,7 @@ class BusBridge:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _guarded(self, work: Any) -> None:

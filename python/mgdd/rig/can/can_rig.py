@@ -7,7 +7,6 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 from typing import Any, Self
 
 from mgdd._core.rig import Frame
@@ -15,11 +14,9 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
 from mgdd.rig.can.frame import Bus, changed
-from mgdd.rig.can.inbox import Inbox
-from mgdd.rig.can.link import Sender
+from mgdd.rig.can.link import Inbox, Punctual, Sender
 from mgdd.rig.can.mapped import MappedMessage
-from mgdd.rig.can.modes import RigMode, bus_of, may_be_real, require_key
-from mgdd.rig.can.punctual import Punctual
+from mgdd.rig.can.modes import bus_of, may_be_real, require_key
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
 
@@ -86,7 +83,7 @@ class CanRig:
         bus: Bus | str | None = None,
         *,
         plant: Plant | None = None,
-        mode: str = RigMode.SIMULATE,
+        mode: str = "simulate",
         limits: Sequence[str] | None = None,
         objective: Mapping[str, float] | None = None,
         timeout_s: float | None = None,
@@ -94,7 +91,7 @@ class CanRig:
         arm: bool = False,
         key_file: str | os.PathLike[str] | None = None,
     ) -> None:
-        self.mode = RigMode.of(mode)
+        self.mode = mode
         loaded = signal_map if isinstance(signal_map, SignalMap) else SignalMap.load(signal_map)
         self.map = loaded.with_goals(limits=limits, objective=objective)
         self.bus = bus_of(self.mode, self.map, bus, plant)
@@ -139,11 +136,6 @@ class CanRig:
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Send the inputs, clamped to the bounds of the map; in ``dry_run`` and ``replay`` nothing is sent.
 
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            One number per name of `input_names`.
-
         Raises
         ------
         mgdd.errors.ParameterError
@@ -166,18 +158,12 @@ class CanRig:
         for message in self.map.commands.values():
             self._send(message, {name: clamped[name] for name in message.signals})
         self._punctual.commanded()
-        if self.mode is RigMode.REPLAY:  # what came before the recorded command is older than this one
+        if self.mode == "replay":  # what came before the recorded command is older than this one
             self._take_all()
             self._inbox.skip()
 
     def measure(self) -> Measurement:
-        """Wait for the next complete measurement after the inputs applied last.
-
-        Returns
-        -------
-        mgdd.loop.Measurement
-            ``values`` by the names of the map, NaN for what is missing or came too long ago; ``applied`` as the node
-            says it.
+        """Wait for the next complete measurement after the inputs applied last: NaN for what is missing or too old.
 
         Raises
         ------
@@ -200,15 +186,9 @@ class CanRig:
         return measured
 
     def arm(self) -> None:
-        """Send safe frames until the node is ready to be driven.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            No valid frame of the node, or one that stays in a failed state.
-        """
+        """Send safe frames until the node is ready to be driven; RigError where it is silent or stays failed."""
         self._require_open()
-        if self.mode is RigMode.REPLAY:
+        if self.mode == "replay":
             return
         self._take_all()
         self._inbox.skip()  # what waited says nothing of now
@@ -242,13 +222,7 @@ class CanRig:
         self._inbox.skip()
 
     def open(self) -> None:
-        """Connect, look who is there, and arm the node; `close` undoes it.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            No such bus, no node on it, another node that sends our commands, ``bench`` without arming.
-        """
+        """Connect, look who is there, and arm the node, until `close`; a RigError says what stands against it."""
         if self._is_open:
             raise RigError("the rig is open already")
         if may_be_real(self.mode, self.bus):
@@ -293,14 +267,12 @@ class CanRig:
         self.open()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
     def _sends(self) -> bool:
-        return self.mode not in (RigMode.DRY_RUN, RigMode.REPLAY)
+        return self.mode not in ("dry_run", "replay")
 
     def _require_open(self) -> None:
         if not self._is_open:
@@ -320,17 +292,17 @@ class CanRig:
 
     def _send(self, message: MappedMessage, values: Mapping[str, float]) -> None:
         payloads = message.payloads(values, message.driven)
-        if self.mode is RigMode.DRY_RUN:
+        if self.mode == "dry_run":
             return
         self._has_sent = self._sends
-        for frame in self._sender.frames(message, payloads):
-            self._hand_over(frame)
+        self._hand_over(self._sender.frames(message, payloads))
         self._commands += 1
 
-    def _hand_over(self, frame: Frame, *, final: bool = False) -> None:
-        self.bus.send(frame, final=final)
-        if self._on_frame is not None:
-            self._on_frame(changed(frame, monotonic_ns=time.monotonic_ns()))
+    def _hand_over(self, frames: Sequence[Frame], *, final: bool = False) -> None:
+        for frame in frames:
+            self.bus.send(frame, final=final)
+            if self._on_frame is not None:
+                self._on_frame(changed(frame, monotonic_ns=time.monotonic_ns()))
 
     def _receive(self, timeout_s: float) -> bool:
         """Take the next frame; False where none came."""
@@ -346,8 +318,7 @@ class CanRig:
         self._has_sent = True
         for message in self.map.commands.values():
             if message.safe:
-                for frame in self._sender.frames(message, message.payloads({}, message.safe)):
-                    self._hand_over(frame, final=final)
+                self._hand_over(self._sender.frames(message, message.payloads({}, message.safe)), final=final)
 
     def _heard(self, timeout_s: float) -> bool:
         """Wait for a whole cycle, then take all that came: the newest state counts, the oldest cycle is next."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,48 +33,24 @@ _PARTS_BYTES = 1785  # of a message in several frames, SAE J1939-21
 
 @dataclass(frozen=True, kw_only=True)
 class DbcSignal:
-    """A signal: its bits, its unit, and the names of its raw values.
-
-    Parameters
-    ----------
-    name : str
-        As in the DBC.
-    layout : SignalLayout
-        Bits, scale and bounds.
-    unit : str
-        As in the DBC, ``"-"`` if empty.
-    choices : mapping of str to int
-        Raw value by its name in the value table.
-    missing_raw : int, optional
-        Raw value that means that the value is missing.
-    branches : tuple of int
-        Values of the multiplexer that select it; empty: always there.
-    multiplexer : bool
-        Whether it selects others.
-    """
+    """A signal: its bits, its unit, and the names of its raw values."""
 
     name: str
     layout: SignalLayout
-    unit: str
-    choices: Mapping[str, int] = field(default_factory=dict)
-    missing_raw: int | None = None
-    branches: tuple[int, ...] = ()
-    multiplexer: bool = False
+    unit: str  # "-" if it has none
+    choices: Mapping[str, int] = field(default_factory=dict)  # raw value by its name in the value table
+    missing_raw: int | None = None  # raw value that means that the value is missing
+    branches: tuple[int, ...] = ()  # values of the multiplexer that select it; none: always there
+    multiplexer: bool = False  # whether it selects others
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest physical value that can be sent."""
         layout = self.layout
-        if layout.raw_type in ("float32", "float64"):
-            low, high = -float("inf"), float("inf")
-        else:
-            signed = layout.raw_type == "signed"
-            raw = (
-                (-(1 << (layout.length - 1)), (1 << (layout.length - 1)) - 1)
-                if signed
-                else (0, (1 << layout.length) - 1)
-            )
-            low, high = sorted(value * layout.scale + layout.offset for value in raw)
+        low, high = -math.inf, math.inf
+        if layout.raw_type in ("signed", "unsigned"):
+            least = -(1 << (layout.length - 1)) if layout.raw_type == "signed" else 0
+            low, high = sorted(raw * layout.scale + layout.offset for raw in (least, least + (1 << layout.length) - 1))
         return (
             low if layout.minimum is None else max(low, layout.minimum),
             high if layout.maximum is None else min(high, layout.maximum),
@@ -82,30 +59,14 @@ class DbcSignal:
 
 @dataclass(frozen=True, kw_only=True)
 class DbcMessage:
-    """A message: identifier, bytes, time between two frames, signals.
-
-    Parameters
-    ----------
-    name : str
-        As in the DBC.
-    frame_id : int
-        Identifier.
-    extended : bool
-        Of 29 bits.
-    size : int
-        Bytes.
-    cycle_s : float or None
-        Time between two frames [s]; None where it is sent on events.
-    signals : mapping of str to DbcSignal
-        By name; without those longer than 64 bits, and none of a message in several frames.
-    """
+    """A message: identifier, bytes, time between two frames, signals."""
 
     name: str
     frame_id: int
     extended: bool
     size: int
-    cycle_s: float | None
-    signals: Mapping[str, DbcSignal]
+    cycle_s: float | None  # None where it is sent on events
+    signals: Mapping[str, DbcSignal]  # without those beyond 64 bits, none of a message in several frames
 
     @property
     def multiplexer(self) -> DbcSignal | None:
@@ -115,17 +76,7 @@ class DbcMessage:
 
 @dataclass(frozen=True, kw_only=True)
 class DbcFile:
-    """A database of messages.
-
-    Parameters
-    ----------
-    file : pathlib.Path
-        Where it was read.
-    sha256 : str
-        Of its bytes.
-    messages : mapping of str to DbcMessage
-        By name.
-    """
+    """A database of messages."""
 
     file: Path
     sha256: str
@@ -133,15 +84,7 @@ class DbcFile:
 
     @classmethod
     def read(cls, path: Path) -> DbcFile:
-        """Read a file strictly.
-
-        Raises
-        ------
-        FileNotFoundError
-            No such file.
-        mgdd.errors.DataError
-            Not a DBC, overlapping signals, signals beyond their message, or a message beyond 1785 bytes.
-        """
+        """Read a file strictly; DataError where it is not a DBC, or its signals overlap or leave their message."""
         cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
         content = file.read_bytes()

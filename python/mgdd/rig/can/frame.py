@@ -6,10 +6,22 @@ from typing import Any, Protocol
 
 from mgdd._core.rig import Frame
 
-__all__ = ["Bus", "changed"]
+__all__ = ["Bus", "FrameBus", "changed"]
 
 
-class Bus(Protocol):
+class FrameBus(Protocol):
+    """What a bridge needs of a bus: a `mgdd.rig.CanTransport`, for example."""
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame that arrived, or None after the time; RigError for a fault of the bus."""
+        ...
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame to the bus; RigError where it does not take it."""
+        ...
+
+
+class Bus(FrameBus, Protocol):
     """What every bus offers: a `CanTransport`, or a node in the same process."""
 
     @property
@@ -35,11 +47,7 @@ class Bus(Protocol):
         ...
 
     def send(self, frame: Frame, *, final: bool = False) -> None:
-        """Hand a frame to the bus, with `final` even after a fault; RigError where it does not take it."""
-        ...
-
-    def receive(self, timeout_s: float) -> Frame | None:
-        """Give the next frame that arrived, or None after the time; RigError for a fault of the bus."""
+        """Hand a frame to the bus, with `final` even after a fault."""
         ...
 
 

@@ -15,8 +15,7 @@ from typing import cast
 
 from mgdd.errors import ParameterError, RigError, argument
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
-from mgdd.rig.can.messages import MOST_BYTES, largest_identifier
-from mgdd.rig.can.reception import STILL_S
+from mgdd.rig.can.python_can import MOST_BYTES, STILL_S, largest_identifier
 
 __all__ = ["Hub"]
 
@@ -91,27 +90,9 @@ class _Client(asyncio.Protocol):
 
 
 class Hub:
-    """A hub for processes of this machine.
+    """A hub for processes of this machine; port 0 takes a free one, `bit_rate` is that of the simulated bus [bit/s].
 
     A frame is stamped with its arrival: what waited while the hub was stopped is as old as that.
-
-    Parameters
-    ----------
-    host : str
-        Address to listen at.
-    port : int
-        Port; 0 takes a free one.
-    faults : sequence of BusFault
-        What goes wrong.
-    bit_rate : float, optional
-        Bits per second of the simulated bus; without limit if left out.
-    seed : int
-        Of the noise of the faults.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A port or bit rate outside its domain.
     """
 
     def __init__(
@@ -138,20 +119,7 @@ class Hub:
         self._ticked_s = self._looked_s = time.monotonic()
 
     async def run(self, on_ready: Callable[[Hub], None], stop: asyncio.Event) -> None:
-        """Serve until `stop` is set.
-
-        Parameters
-        ----------
-        on_ready : callable
-            Called once with the hub, when it listens and knows its port.
-        stop : asyncio.Event
-            Ends it.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The port is taken.
-        """
+        """Serve until `stop` is set; `on_ready` is called once, when the hub listens and knows its port."""
         self._start_s = self._ticked_s = self._looked_s = time.monotonic()
         loop = asyncio.get_running_loop()
         try:

@@ -4,56 +4,53 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
-from mgdd.errors import ParameterError
-from mgdd.rig.can.fault_text import fault_of
+from mgdd.errors import ParameterError, did_you_mean
 
-__all__ = ["BusFault", "Delivery", "FaultInjector"]
+__all__ = ["BusFault", "Delivery", "FaultInjector", "fault_of"]
 
 KINDS = ("drop", "duplicate", "delay", "reorder", "corrupt", "error", "freeze")
 _KEYS = {"p": float, "id": int, "from_s": float, "until_s": float, "ms": float, "client": int, "class": int}
 _NEEDS = {"delay": "ms", "error": "class", "freeze": "client"}
 
 
+def fault_of(text: str, keys: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
+    """Read ``KIND:KEY=VALUE,...``, as ``drop:p=0.01,id=0x121``: kind, for the caller to check, and values by key."""
+    kind, _, rest = text.partition(":")
+    given: dict[str, Any] = {}
+    for part in filter(None, rest.split(",")):
+        key, _, value = part.partition("=")
+        if key not in keys:
+            guess = did_you_mean(key, keys)
+            raise ParameterError.of(
+                "fault", text, f"KIND:KEY=VALUE,... with keys {', '.join(keys)}{'; ' + guess if guess else ''}"
+            )
+        try:
+            given[key] = int(value, 0) if keys[key] is int else float(value)
+        except ValueError:
+            raise ParameterError.of(f"fault {kind}: {key}", value, "a number") from None
+    return kind, given
+
+
 @dataclass(frozen=True, kw_only=True)
 class BusFault:
-    """A fault of the bus.
+    """A fault of the bus, for each frame with a probability, and for a time after the start of the hub.
 
-    Parameters
-    ----------
-    kind : {"drop", "duplicate", "delay", "reorder", "corrupt", "error", "freeze"}
-        A frame is lost, comes twice, comes late, comes after the next one, comes with one byte changed; every client
-        gets an error frame instead of it; nothing goes to or comes from one client.
-    p : float
-        Probability for each frame it concerns, in [0, 1].
-    id : int, optional
-        Identifier that it concerns; all if left out.
-    from_s, until_s : float
-        When, after the start of the hub [s].
-    ms : float
-        Of ``delay``: how late [ms].
-    client : int
-        Of ``freeze``: number of the client, from 1 in the order in which they came.
-    error_class : int
-        Of ``error``: class bits of the error frame, for example 0x40 for bus-off.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        An unknown kind, or a value outside its domain.
+    A frame is lost, comes twice, comes late, comes after the next one, comes with one byte changed; every client gets
+    an error frame instead of it; nothing goes to or comes from one client.
     """
 
     kind: str
-    p: float = 1.0
-    id: int | None = None
+    p: float = 1.0  # in [0, 1]
+    id: int | None = None  # all if left out
     from_s: float = 0.0
     until_s: float = math.inf
-    ms: float = 0.0
-    client: int = 0
-    error_class: int = 0
+    ms: float = 0.0  # of delay: how late
+    client: int = 0  # of freeze: its number, from 1 in the order in which they came
+    error_class: int = 0  # of error: bits of the error frame, for example 0x40 for bus-off
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
@@ -66,30 +63,7 @@ class BusFault:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Read ``KIND:KEY=VALUE,...``.
-
-        Parameters
-        ----------
-        text : str
-            For example ``drop:p=0.01``, ``delay:ms=5,id=0x121``, ``error:class=0x40,p=0.001`` or
-            ``freeze:client=1,from_s=2,until_s=3``.
-
-        Returns
-        -------
-        BusFault
-            The rule.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown kind or key, or a value that is not a number.
-
-        Examples
-        --------
-        >>> from mgdd.rig.can.hub_faults import BusFault
-        >>> BusFault.parse("delay:ms=5,id=0x121").id
-        289
-        """
+        """Read ``KIND:KEY=VALUE,...``, as ``delay:ms=5,id=0x121`` or ``freeze:client=1,from_s=2,until_s=3``."""
         kind, given = fault_of(text, _KEYS)
         needed = _NEEDS.get(kind)
         if needed is not None and needed not in given:
@@ -108,15 +82,7 @@ class Delivery(NamedTuple):
 
 
 class FaultInjector:
-    """Applies rules, with noise of its own.
-
-    Parameters
-    ----------
-    faults : sequence of BusFault
-        In the order in which they act.
-    seed : int
-        Of their noise.
-    """
+    """Applies rules in their order, with noise of its own."""
 
     def __init__(self, faults: Sequence[BusFault], seed: int = 0) -> None:
         self._faults = tuple(faults)
@@ -132,22 +98,7 @@ class FaultInjector:
         )
 
     def deliver(self, identifier: int, data: bytes, now_s: float) -> list[tuple[int, Delivery]]:
-        """Say what becomes of a frame.
-
-        Parameters
-        ----------
-        identifier : int
-            Of the frame.
-        data : bytes
-            Its payload.
-        now_s : float
-            Since the start of the hub [s].
-
-        Returns
-        -------
-        list of (int, Delivery)
-            Identifier and delivery of what leaves now: nothing where it was lost or is held back until the next one.
-        """
+        """Say what leaves now for a frame: nothing where it was lost or is held back until the next one."""
         out = [Delivery(data)]
         hold = False
         for fault in self._faults:

@@ -29,32 +29,8 @@ _EXACT = 2**53  # largest integer that a float64 holds with all smaller ones
 def loop_messages(signal_map: SignalMap) -> tuple[LoopMessage, list[LoopMessage]]:
     """Give the command and the measurements of a map as a `mgdd.rig.RealtimeLoop` takes them.
 
-    With an open bridge the loop sends the safe frame of the map, so it arms a node as `mgdd.rig.CanRig` does.
-
-    Parameters
-    ----------
-    signal_map : SignalMap
-        Of a throttle: the input ``duty``.
-
-    Returns
-    -------
-    command : LoopMessage
-        What the loop sends.
-    measurements : list of LoopMessage
-        What it reads; values of the map that a loop has no place for are left out.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A map that a loop cannot serve; the message says why.
-
-    Examples
-    --------
-    >>> from mgdd.rig import SignalMap
-    >>> from mgdd.rig.can.loop_map import loop_messages
-    >>> command, measurements = loop_messages(SignalMap.load("etb"))
-    >>> command.can_id, [sorted(message.signals) for message in measurements]
-    (288, [['angle_deg', 'applied_duty', 'speed_deg_per_s'], ['current_a', 'first_v', 'second_v', 'supply_v']])
+    With an open bridge the loop sends the safe frame of the map, so it arms a node as `mgdd.rig.CanRig` does. Values
+    that a loop has no place for are left out; a ParameterError says why it cannot serve a map.
     """
     if len(signal_map.commands) != 1 or signal_map.input_names != ("duty",):
         names = ", ".join(signal_map.commands)
@@ -80,7 +56,11 @@ def _command(signal_map: SignalMap, message: MappedMessage) -> LoopMessage:
         can_id=message.message.frame_id,
         signals={"duty": _layout(duty, lower=duty.lower, upper=duty.upper)},
         switched=[
-            (_raw(message.message.signals[name].layout), message.driven.get(name, 0), message.safe.get(name, 0))
+            (
+                _like(message.message.signals[name].layout, scale=1.0, offset=0.0, minimum=None, maximum=None),
+                message.driven.get(name, 0),
+                message.safe.get(name, 0),
+            )
             for name in names
         ],
         extended=message.message.extended,
@@ -122,11 +102,6 @@ def _layout(entry: MappedSignal, lower: float = -math.inf, upper: float = math.i
         minimum=low if math.isfinite(low) else None,
         maximum=high if math.isfinite(high) else None,
     )
-
-
-def _raw(layout: SignalLayout) -> SignalLayout:
-    """Give the layout whose physical value is the raw one."""
-    return _like(layout, scale=1.0, offset=0.0, minimum=None, maximum=None)
 
 
 def _like(layout: SignalLayout, **fields: Any) -> SignalLayout:

@@ -10,7 +10,7 @@ from mgdd._core.rig import E2eSettings
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import attribute_units, unit_of
-from mgdd.rig.can.dbc import DbcFile, DbcMessage, DbcSignal
+from mgdd.rig.can.dbc import DbcFile, DbcMessage, DbcSignal, near
 from mgdd.rig.can.mapped import GATE_MODES, MappedMessage, MappedSignal, Raw, StateSignal
 from mgdd.rig.can.toml_table import TomlTable
 
@@ -27,13 +27,7 @@ _TIMEOUT_CYCLES = 3
 
 
 class MapReader:
-    """Reads the messages of a mapping file; remembers which names and signals are taken.
-
-    Parameters
-    ----------
-    dbc : DbcFile
-        What the signals are looked up in.
-    """
+    """Reads the messages of a mapping file; remembers which names and signals are taken."""
 
     def __init__(self, *, dbc: DbcFile) -> None:
         self.dbc = dbc
@@ -138,8 +132,7 @@ class MapReader:
 
     def _signal(self, message: DbcMessage, name: str, table: TomlTable, key: str) -> DbcSignal:
         if name not in message.signals:
-            guess = did_you_mean(name, message.signals)
-            known = guess or f"it has {', '.join(message.signals)}"
+            known = near(name, message.signals)
             raise table.error(key, name, f"a signal of {message.name} in {self.dbc.file.name}: {known}")
         return message.signals[name]
 
@@ -157,7 +150,7 @@ class MapReader:
     def _entries(
         self, what: str, message: DbcMessage, table: TomlTable, *, bounded: bool = False
     ) -> dict[str, MappedSignal]:
-        return {name: self._entry(what, message, name, inner, bounded) for name, inner in table.tables_here()}
+        return {name: self._entry(what, message, name, inner, bounded) for name, inner in table.tables()}
 
     def _entry(self, what: str, message: DbcMessage, name: str, table: TomlTable, bounded: bool) -> MappedSignal:
         table.only((*_ENTRY, "lower", "upper") if bounded else _ENTRY)

@@ -21,25 +21,13 @@ Raw = int | float  # an integer; of a float signal the float
 
 @dataclass(frozen=True, kw_only=True)
 class MappedSignal:
-    """A named quantity and the signal that carries it: quantity = scale * signal + offset.
-
-    Parameters
-    ----------
-    name : str
-        Of the input or measured value.
-    signal : DbcSignal
-        Of its message.
-    scale, offset : float
-        From the unit of the signal to that of the name.
-    lower, upper : float
-        Of an input, in its unit.
-    """
+    """A named quantity and the signal that carries it: quantity = scale * signal + offset."""
 
     name: str
     signal: DbcSignal
-    scale: float = 1.0
+    scale: float = 1.0  # from the unit of the signal to that of the name
     offset: float = 0.0
-    lower: float = -math.inf
+    lower: float = -math.inf  # of an input, in its unit
     upper: float = math.inf
 
     @property
@@ -49,13 +37,7 @@ class MappedSignal:
         return low, high
 
     def pack(self, payload: bytes, value: float) -> bytes:
-        """Write a value, clamped to its range; NaN as the raw value that says so.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            NaN for a signal that has no such raw value.
-        """
+        """Write a value, clamped to its range; NaN as the raw value that says so, or a ParameterError."""
         if math.isnan(value) and self.signal.missing_raw is not None:
             return self.signal.layout.pack_raw(payload, self.signal.missing_raw)
         physical = value if self.scale == 1.0 and self.offset == 0.0 else (value - self.offset) / self.scale
@@ -74,32 +56,15 @@ class MappedSignal:
 
 @dataclass(frozen=True, kw_only=True)
 class MappedMessage:
-    """A message that the host sends or receives, with the quantities in it.
-
-    Parameters
-    ----------
-    message : DbcMessage
-        As in the DBC.
-    timeout_s : float or None
-        After so long without one its receiver takes the sender for gone [s]; None for a message sent on events.
-    e2e : E2eSettings or None
-        Alive counter and CRC.
-    signals : mapping of str to MappedSignal
-        Inputs of a command, measured values otherwise.
-    applied : mapping of str to MappedSignal
-        Inputs that the node says it applied.
-    driven, safe : mapping of str to number
-        Of a command, raw values of further signals while it drives, and of all signals of a safe frame; a message
-        without safe values is not sent at the end.
-    """
+    """A message that the host sends or receives, with the quantities in it."""
 
     message: DbcMessage
-    timeout_s: float | None
+    timeout_s: float | None  # without one for so long the sender is gone; None: sent on events
     e2e: E2eSettings | None
-    signals: Mapping[str, MappedSignal]
-    applied: Mapping[str, MappedSignal] = field(default_factory=dict)
-    driven: Mapping[str, Raw] = field(default_factory=dict)
-    safe: Mapping[str, Raw] = field(default_factory=dict)
+    signals: Mapping[str, MappedSignal]  # inputs of a command, measured values otherwise
+    applied: Mapping[str, MappedSignal] = field(default_factory=dict)  # inputs that the node says it applied
+    driven: Mapping[str, Raw] = field(default_factory=dict)  # of a command, further signals while it drives
+    safe: Mapping[str, Raw] = field(default_factory=dict)  # of a safe frame, all signals; none: not sent at the end
 
     @property
     def name(self) -> str:
@@ -114,13 +79,7 @@ class MappedMessage:
     def payloads(
         self, values: Mapping[str, float], raws: Mapping[str, Raw], applied: Mapping[str, float] = MappingProxyType({})
     ) -> list[bytes]:
-        """Pack named values and raw numbers: one payload, or one per branch of the multiplexer that is used.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A value that is not finite.
-        """
+        """Pack named values and raw numbers: one payload, or one per branch of the multiplexer that is used."""
         return [self._packed(branch, values, raws, applied) for branch in self._branches()]
 
     def read(self, payload: bytes) -> dict[str, float]:
@@ -181,24 +140,12 @@ class MappedMessage:
 
 @dataclass(frozen=True, kw_only=True)
 class StateSignal:
-    """Where the node says in which state it is.
-
-    Parameters
-    ----------
-    message : str
-        Message of the measurements.
-    signal : DbcSignal
-        With a value table: names of the states.
-    failed : tuple of str
-        States in which the node does not follow its commands until it is armed again.
-    names : mapping of str to str
-        Name of the state by mode of a safety gate, as far as the value table has one.
-    """
+    """Where the node says in which state it is."""
 
     message: str
     signal: DbcSignal
-    failed: tuple[str, ...]
-    names: Mapping[str, str] = field(default_factory=dict)
+    failed: tuple[str, ...]  # in these the node does not follow its commands until it is armed again
+    names: Mapping[str, str] = field(default_factory=dict)  # by mode of a safety gate, where it has one
 
     @property
     def unarmed(self) -> str | None:
@@ -207,13 +154,7 @@ class StateSignal:
         return None if name == self.names.get("armed") else name
 
     def codes(self) -> dict[str, int]:
-        """Give the raw value by mode of a safety gate, for a node that reports them.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Modes without a state.
-        """
+        """Give the raw value by mode of a safety gate; ParameterError where a mode has no state."""
         if missing := [mode for mode in GATE_MODES if mode not in self.names]:
             known = ", ".join(self.signal.choices) or "none"
             raise ParameterError.of(

@@ -4,47 +4,22 @@ from __future__ import annotations
 
 import os
 import sys
-from enum import StrEnum
 
 from mgdd.errors import ParameterError, RigError, argument
 from mgdd.io.files import read_plain_text
 from mgdd.loop import Plant
 from mgdd.rig.can.frame import Bus
-from mgdd.rig.can.local_bus import LocalBus
+from mgdd.rig.can.node import LocalBus
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 
-__all__ = ["RigMode", "bus_of", "key_line", "may_be_real", "require_key"]
+__all__ = ["BUS_MODES", "MODES", "bus_of", "key_line", "may_be_real", "require_key"]
 
 
-class RigMode(StrEnum):
-    """Mode of an experiment over a bus.
-
-    ``simulate``: a node in this process and a virtual clock. ``hil``: a node in another process, real time; on a bus
-    that leaves this machine it has to be armed as ``bench``.
-    ``dry_run``: a real bus, of which everything is received and to which nothing is sent. ``replay``: recorded frames
-    through the same checks. ``bench``: real hardware, which has to be armed.
-
-    Examples
-    --------
-    >>> from mgdd.rig.can.modes import RigMode
-    >>> RigMode("hil"), [mode.value for mode in RigMode]
-    (<RigMode.HIL: 'hil'>, ['simulate', 'hil', 'dry_run', 'replay', 'bench'])
-    """
-
-    SIMULATE = "simulate"
-    HIL = "hil"
-    DRY_RUN = "dry_run"
-    REPLAY = "replay"
-    BENCH = "bench"
-
-    @classmethod
-    def of(cls, name: str) -> RigMode:
-        """Return the mode of a name; ParameterError lists them."""
-        try:
-            return cls(name)
-        except ValueError:
-            raise ParameterError.of("mode", name, f"one of {', '.join(cls)}") from None
+# `simulate`: a node in this process and a virtual clock; `hil`: a node in another process, real time; `dry_run`: a real
+# bus, to which nothing is sent; `replay`: recorded frames through the same checks; `bench`: real hardware, armed.
+MODES = ("simulate", "hil", "dry_run", "replay", "bench")
+BUS_MODES = ("hil", "dry_run", "bench")
 
 
 def key_line(signal_map: SignalMap) -> str:
@@ -52,25 +27,19 @@ def key_line(signal_map: SignalMap) -> str:
     return f"arm {signal_map.dbc.file.name} {signal_map.dbc.sha256[:12]}"
 
 
-def may_be_real(mode: RigMode, bus: Bus) -> bool:
+def may_be_real(mode: str, bus: Bus) -> bool:
     """Whether what answers may be an actuator: on a bench, and in ``hil`` on a bus that leaves this machine."""
-    return mode is RigMode.BENCH or (mode is RigMode.HIL and bus.shared and not getattr(bus, "stays_here", False))
+    return mode == "bench" or (mode == "hil" and bus.shared and not getattr(bus, "stays_here", False))
 
 
 def require_key(
-    signal_map: SignalMap, bus: str, mode: RigMode, *, arm: bool, key_file: str | os.PathLike[str] | None
+    signal_map: SignalMap, bus: str, mode: str, *, arm: bool, key_file: str | os.PathLike[str] | None
 ) -> None:
-    """Refuse to drive what may be real without a person who wants it.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        Not armed, no key, another key, or a person who did not confirm.
-    """
+    """Refuse with a RigError to drive what may be real without a person who wants it."""
     if arm is not True:
         how = f"{argument('arm', 'True')}, and a {argument('key_file')} or a confirmation"
-        why = "drives real hardware" if mode is RigMode.BENCH else f"on {bus}, which leaves this machine, may, too"
-        raise RigError(f"mode = {mode.value!r} {why}: give {how}")
+        why = "drives real hardware" if mode == "bench" else f"on {bus}, which leaves this machine, may, too"
+        raise RigError(f"mode = {mode!r} {why}: give {how}")
     line = key_line(signal_map)
     if key_file is not None:
         try:
@@ -83,31 +52,27 @@ def require_key(
             raise RigError(f"{key_file}: holds no key of this DBC: it must have the line {line!r}")
         return
     if not sys.stdin.isatty():
-        raise RigError(f"mode = {mode.value!r} without a terminal to confirm in: give a {argument('key_file')}")
+        raise RigError(f"mode = {mode!r} without a terminal to confirm in: give a {argument('key_file')}")
     sys.stderr.write(f"{bus} will be driven with {signal_map.file.name}. Emergency stop at hand? Type ARM: ")
     sys.stderr.flush()
     if sys.stdin.readline().strip() != "ARM":
         raise RigError("not confirmed: nothing was sent")
 
 
-def bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
-    """Return the bus of a mode.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A bus or plant that does not go with the mode.
-    """
-    if mode is RigMode.SIMULATE:
+def bus_of(mode: str, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
+    """Return the bus of a mode; ParameterError for an unknown one, or a bus or plant that does not go with it."""
+    if mode not in MODES:
+        raise ParameterError.of("mode", mode, f"one of {', '.join(MODES)}")
+    if mode == "simulate":
         if bus is not None:
             raise ParameterError.of(
                 "mode",
-                mode.value,
+                mode,
                 "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead",
             )
         if plant is None:
             raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
         return LocalBus(plant, signal_map)
     if plant is not None or bus is None:
-        raise ParameterError(f"mode = {mode.value!r}: must have a bus, and no plant: that is in the node")
+        raise ParameterError(f"mode = {mode!r}: must have a bus, and no plant: that is in the node")
     return CanTransport.parse(bus) if isinstance(bus, str) else bus

@@ -1,39 +1,79 @@
-"""A node as a process: a virtual plant behind a bus, with its own clock or step by step, and a log of the truth."""
+"""A node as a bus of this process, or as a process: with its own clock or step by step, and a log of the truth."""
 
 from __future__ import annotations
 
 import csv
 import os
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any, Self
 
-from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, ThrottleFault, VirtualThrottle
-from mgdd.rig.can.fault_text import fault_of
-from mgdd.rig.can.frame import Bus
-from mgdd.rig.can.node_core import NodeCore
-from mgdd.rig.can.node_plant import NodePlant, node_plant
+from mgdd._core.rig import Frame
+from mgdd.errors import ParameterError, RigError
+from mgdd.loop import EngineBench, Plant, ThrottleFault, VirtualThrottle
+from mgdd.rig.can.frame import Bus, changed
+from mgdd.rig.can.hub_faults import fault_of
+from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.throttle import SensorFault
 
-__all__ = ["TruthLog", "node_of", "parent_watch", "run_node"]
+__all__ = ["LocalBus", "TruthLog", "node_of", "parent_watch", "run_node"]
 
 _STEP_POLL_S = 0.1  # how often a waiting node looks for its parent
 _MOST_BEHIND_S = 1.0
 _FAULT_KEYS = {"from_s": float, "until_s": float, "size": float, "sensor": int}
 
 
-class TruthLog:
-    """What really happened, a line per sample: time, mode and reason of the gate, and all that the plant knows.
+class LocalBus:
+    """A plant behind a node in this process: every command frame brings one sample.
 
-    Parameters
-    ----------
-    file : path-like
-        CSV file, written line by line, so that a killed process loses none.
+    The same checks, roundings and limits as over a real bus, faster than real time and always with the same bits.
     """
+
+    name = "the node in this process"
+    shared = False  # nobody else is here, and time is virtual
+
+    def __init__(self, plant: Plant, signal_map: SignalMap) -> None:
+        self.core = NodeCore(node_plant(plant), signal_map)
+        self._answers: deque[Frame] = deque()
+        self._now_ns = 1
+        self._is_open = False
+
+    def open(self) -> None:
+        """Connect."""
+        self._is_open = True
+
+    def close(self) -> None:
+        """Disconnect."""
+        self._is_open = False
+        self._answers.clear()
+
+    def claim(self, keys: set[tuple[int, bool]]) -> None:
+        """Nobody else sends here."""
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:  # noqa: ARG002 - there are no faults to pass
+        """Give a frame to the node."""
+        self._require_open()
+        if self.core.take(changed(frame, monotonic_ns=self._now_ns, received=True)):
+            self._now_ns += round(self.core.map.cycle_s * 1e9)
+            self._answers += [
+                changed(answer, monotonic_ns=self._now_ns, received=True) for answer in self.core.answer()
+            ]
+
+    def receive(self, timeout_s: float) -> Frame | None:  # noqa: ARG002 - time stands still
+        """Give the next frame of the node; None where it has none."""
+        self._require_open()
+        return self._answers.popleft() if self._answers else None
+
+    def _require_open(self) -> None:
+        if not self._is_open:
+            raise RigError(f"{self.name} is not open: use the rig in a with block")
+
+
+class TruthLog:
+    """What really happened: the gate and all that the plant knows, line by line, and a killed process loses none."""
 
     def __init__(self, file: str | os.PathLike[str]) -> None:
         self._file: IO[str] = Path(file).open("w", encoding="utf-8", newline="", buffering=1)  # noqa: SIM115 close()
@@ -41,15 +81,7 @@ class TruthLog:
         self._names: list[str] = []
 
     def write(self, core: NodeCore, now_ns: int) -> None:
-        """Write the last sample of a node.
-
-        Parameters
-        ----------
-        core : NodeCore
-            After its sample.
-        now_ns : int
-            Monotonic time [ns].
-        """
+        """Write the last sample of a node."""
         if core.last is None:
             return
         values = dict(core.last.values)
@@ -71,9 +103,7 @@ class TruthLog:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -84,33 +114,12 @@ def node_of(
     seed: int = 0,
     sample_s: float | None = None,
 ) -> NodePlant:
-    """Make the virtual plant that belongs to the inputs of a map.
-
-    Parameters
-    ----------
-    signal_map : SignalMap
-        With the input ``duty`` it is a throttle, with ``soc_cad`` an engine bench.
-    faults : sequence of str
-        Of a throttle, as ``KIND:KEY=VALUE,...`` with the kinds of `mgdd.loop.ThrottleFault` and
-        `mgdd.throttle.SensorFault` and their keys.
-    seed : int
-        Of its noise.
-    sample_s : float, optional
-        Time between two samples of a throttle [s]; the cycle of the trigger message if left out.
-
-    Returns
-    -------
-    NodePlant
-        Throttle or engine.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Inputs of no virtual plant, or a fault that is not known.
-    """
+    """Make the virtual plant of the inputs of a map, a throttle for ``duty``, an engine for ``soc_cad``."""
     names = signal_map.input_names
     if "duty" in names:
-        known = [_plant_fault(text) for text in faults]
+        known: list[ThrottleFault | SensorFault] = []
+        for kind, given in (fault_of(text, _FAULT_KEYS) for text in faults):
+            known.append((SensorFault if "sensor" in given else ThrottleFault)(kind=kind, **given))
         plant = VirtualThrottle(
             inputs=(*names, "bridge_open"),
             faults=known,
@@ -137,27 +146,10 @@ def run_node(
     log: TruthLog | None = None,
     keep_on: Callable[[], bool] = lambda: True,
 ) -> None:
-    """Serve a bus until `keep_on` says no.
+    """Serve an open bus until `keep_on`, asked once per sample and every 0.1 s of waiting, says no.
 
-    Parameters
-    ----------
-    core : NodeCore
-        The node.
-    bus : Bus
-        Open.
-    step : bool
-        Every complete command brings one sample, and time stands still between; else the node has its own clock.
-    period_s : float, optional
-        Time between two samples [s]; the cycle of the trigger message if left out.
-    log : TruthLog, optional
-        Where every sample is written.
-    keep_on : callable
-        Asked once per sample, and every 0.1 s of waiting.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        A fault of the bus.
+    With `step` every complete command brings one sample, and time stands still between; else the node has its own
+    clock.
     """
     if step:
         _run_steps(core, bus, log, keep_on)
@@ -206,8 +198,3 @@ def parent_watch() -> Callable[[], bool]:
     """Return a function that says whether the process that started this one still lives."""
     parent = os.getppid()
     return lambda: os.getppid() == parent
-
-
-def _plant_fault(text: str) -> ThrottleFault | SensorFault:
-    kind, given = fault_of(text, _FAULT_KEYS)
-    return SensorFault(kind=kind, **given) if "sensor" in given else ThrottleFault(kind=kind, **given)

@@ -10,40 +10,115 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
+from mgdd.loop import Plant, VirtualThrottle
 from mgdd.rig.can.link import Receiver, Sender
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal
-from mgdd.rig.can.node_plant import NodePlant, Sampled
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.safety import SafetyGate
-from mgdd.rig.safety_envelope import SafetyEnvelope
+from mgdd.rig.gated import facts_of
+from mgdd.rig.safety import SafetyEnvelope, SafetyGate
 
-__all__ = ["NodeCore"]
+__all__ = ["NodeCore", "NodePlant", "Sampled", "node_plant"]
 
 _ARMING_FRAMES = 3  # safe commands in a row that arm it
 _COUNTER_ERRORS = ("repeated", "lost", "wrong_counter")
 
 
+class Sampled(NamedTuple):
+    """One sample of a plant behind a bus."""
+
+    values: Mapping[str, float]
+    applied: Mapping[str, float]
+
+
+class NodePlant(Protocol):
+    """A plant that can be driven or left alone."""
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Inputs that commands may carry."""
+        ...
+
+    @property
+    def sample_s(self) -> float | None:
+        """Time in the plant per sample [s]; None: that of the map."""
+        ...
+
+    def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
+        """Tell a gate what the sensors say, as `mgdd.rig.SafetyGate.observe` takes it; no time passes."""
+        ...
+
+    def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
+        """Run one sample; None: without drive."""
+        ...
+
+
+class _Throttle:
+    """A throttle: without drive the bridge is open, and the springs move the plate to limp-home."""
+
+    def __init__(self, plant: VirtualThrottle) -> None:
+        self._plant = plant
+        self._values: Mapping[str, float] | None = None
+        self.input_names = tuple(name for name in plant.input_names if name != "bridge_open")
+        self.sample_s: float | None = plant.sample_s
+
+    def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
+        if self._values is None:  # nothing was sampled yet: a look ahead, taken back
+            before = self._plant.state
+            self.sample(None)
+            self._plant.state = before
+        return facts_of(self._values, envelope.cycle_s)
+
+    def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
+        given = dict.fromkeys(self.input_names, 0.0) if inputs is None else dict(inputs)
+        if inputs is None and "supply_v" in given:
+            given["supply_v"] = self._plant.throttle.supply_v
+        self._plant.apply({**given, "bridge_open": float(inputs is None)})
+        self._values = self._plant.measure().values
+        return Sampled(values=self._values, applied=given)
+
+
+class _Cyclic:
+    """An engine: only a driven one runs, cycle by cycle; one that stands has nothing to measure."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self.input_names = tuple(plant.input_names)
+        self.sample_s: float | None = None
+
+    def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
+        # No plate to look at: told one in mid-travel, the same gate judges commands alone. An `ActuatorGuard` needs
+        # bounds and limits, which the experiment of the host has and the node has not.
+        half_v = 0.5 * envelope.sensor_sum_v
+        middle_deg = 0.5 * (envelope.closed_deg + envelope.open_deg)
+        return {"good_frames": 1, "age_s": 0.0, "sensor_v": (half_v, half_v), "angle_deg": middle_deg}
+
+    def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
+        if inputs is None:
+            return Sampled(values={}, applied={})
+        self._plant.apply(inputs)
+        measured = self._plant.measure()
+        return Sampled(values={**measured.limits, **measured.values}, applied={**inputs, **measured.applied})
+
+
+def node_plant(plant: Plant) -> NodePlant:
+    """Put a plant of the loop behind a node; a throttle must have ``bridge_open`` among its inputs."""
+    if not isinstance(plant, VirtualThrottle):
+        return _Cyclic(plant)
+    if "bridge_open" not in plant.input_names:
+        raise ParameterError.of(
+            "inputs of the throttle", list(plant.input_names), "with 'bridge_open': power off means an open bridge"
+        )
+    return _Throttle(plant)
+
+
 class NodeCore:
     """What a node does: judge commands, ask its safety gate, sample the plant, report.
 
-    Parameters
-    ----------
-    plant : NodePlant
-        What it drives.
-    signal_map : SignalMap
-        Its messages; the time limit of the commands is that of the map.
-    envelope : SafetyEnvelope, optional
-        Of its gate; the shipped ``etb_node`` if left out. Cycle and time limit come from plant and map.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Inputs of the plant that no command carries, or the other way round; modes of its gate that the state signal of
-        the map has no name for.
+    Cycle and time limit of the gate come from plant and map; ParameterError where these do not fit each other.
     """
 
     def __init__(self, plant: NodePlant, signal_map: SignalMap, envelope: SafetyEnvelope | None = None) -> None:
@@ -83,11 +158,6 @@ class NodeCore:
         self._missed = 0  # samples, of a time in which the node stood still
 
     @property
-    def state(self) -> str:
-        """Mode of the gate, as the state signal of the map names it."""
-        return self.gate.mode
-
-    @property
     def driven(self) -> bool:
         """Whether the plant is driven."""
         return self.gate.mode == "run"
@@ -99,22 +169,11 @@ class NodeCore:
         return max(self._limit_s, envelope.missed_deadlines * envelope.cycle_s)
 
     def take(self, frame: Frame, now_ns: int | None = None) -> bool:
-        """Take a frame of the bus; what follows from it, the next sample shows.
+        """Take a frame; whether with it every cyclic command has come since the last sample, usable or not.
 
-        Parameters
-        ----------
-        frame : Frame
-            With the time of its arrival.
-        now_ns : int, optional
-            Monotonic time [ns], of a node with a clock: a frame that waited too long is left out.
-
-        Returns
-        -------
-        bool
-            Whether with it every cyclic command has come since the last sample, usable or not: the tick of a node that
-            runs step by step.
+        That is the tick of a node that runs step by step. One with a clock gives the time: late frames are left out.
         """
-        if now_ns is not None and self._is_late(frame, now_ns):
+        if now_ns is not None and frame.monotonic_ns < max(self._deaf_until_ns, now_ns - round(self.patience_s * 1e9)):
             self.late += 1
             return False
         taken = self._receiver.take(frame)
@@ -132,13 +191,7 @@ class NodeCore:
         return taken.is_new and message.name in self._timeouts_s and self._fresh >= set(self._timeouts_s)
 
     def stood_still(self, since_ns: int, now_ns: int) -> None:
-        """Note that the node did not run: a fault of the next sample, and what waited meanwhile is left out.
-
-        Parameters
-        ----------
-        since_ns, now_ns : int
-            Monotonic times [ns].
-        """
+        """Note that the node did not run: a fault of the next sample, and what waited meanwhile is left out."""
         self._deaf_until_ns = now_ns
         self._missed = max(self._missed, int((now_ns - since_ns) * 1e-9 / self.gate.envelope.cycle_s))
         self._receiver.reset()
@@ -148,18 +201,7 @@ class NodeCore:
         self._is_asked_to_arm = False
 
     def sample(self, now_ns: int) -> list[Frame]:
-        """Run one sample of a node with a clock.
-
-        Parameters
-        ----------
-        now_ns : int
-            Monotonic time [ns].
-
-        Returns
-        -------
-        list of Frame
-            That report it, the trigger message last.
-        """
+        """Run one sample of a node with a clock; give the frames that report it, the trigger message last."""
         stamps = self._receiver.stamps_ns
         shares = [(now_ns - stamps.get(name, 0)) * 1e-9 / limit_s for name, limit_s in self._timeouts_s.items()]
         self.last = self.plant.sample(self._passed(max([0.0, *shares]) * self._limit_s))
@@ -176,9 +218,6 @@ class NodeCore:
         if inputs is not None:
             self.last = self.plant.sample(inputs)
         return self._report(self.last or Sampled(values={}, applied={}))
-
-    def _is_late(self, frame: Frame, now_ns: int) -> bool:
-        return frame.monotonic_ns < max(self._deaf_until_ns, now_ns - round(self.patience_s * 1e9))
 
     def _use(self, message: MappedMessage, payload: bytes) -> bool:
         """Take the inputs; False where one is not finite. A duty that is not, the gate judges."""
@@ -221,7 +260,10 @@ class NodeCore:
         )
         drive = self.gate.command(self._inputs.get("duty", 0.0))
         if was_driven and self.gate.mode == "limp":
-            self._note_trouble(is_late=age_s is None or age_s >= facts["age_s"])
+            if self.gate.reason == "stale" and (age_s is None or age_s >= facts["age_s"]):
+                self._troubles.add("command_timeout")
+            elif self.gate.reason == "bad_frames":
+                self._troubles.add("wrong_counter" if self._bad_status in _COUNTER_ERRORS else "wrong_crc")
         if drive.bridge_open:
             return None
         return self._inputs | ({"duty": drive.duty} if "duty" in self._inputs else {})
@@ -236,18 +278,13 @@ class NodeCore:
             return "none" if drives else "stop"  # at rest, or in a mode that this node does not have
         return "run" if drives else "none"
 
-    def _note_trouble(self, *, is_late: bool) -> None:
-        if self.gate.reason == "stale" and is_late:
-            self._troubles.add("command_timeout")
-        elif self.gate.reason == "bad_frames":
-            self._troubles.add("wrong_counter" if self._bad_status in _COUNTER_ERRORS else "wrong_crc")
-
     def _report(self, sampled: Sampled) -> list[Frame]:
         own = {name: float(name in self._troubles) for name in ("command_timeout", "wrong_crc", "wrong_counter")}
         values = {**own, **sampled.values}
         frames: list[Frame] = []
         for message in self._order:
-            if self.samples % self._every(message):
+            every = round((message.message.cycle_s or self.map.cycle_s) / self.map.cycle_s)
+            if self.samples % max(1, every):
                 continue
             raws: dict[str, Any] = {}
             state = self.map.state
@@ -258,10 +295,6 @@ class NodeCore:
             frames += self._sender.frames(message, message.payloads(known, raws, applied))
         self.samples += 1
         return frames
-
-    def _every(self, message: MappedMessage) -> int:
-        """Return the number of samples between two frames of a message."""
-        return max(1, round((message.message.cycle_s or self.map.cycle_s) / self.map.cycle_s))
 
 
 def _carried(entries: Mapping[str, MappedSignal], values: Mapping[str, float]) -> dict[str, float]:

@@ -9,7 +9,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from types import TracebackType
 from typing import IO, Self
 
 from mgdd.errors import RigError
@@ -79,25 +78,13 @@ class VirtualNode:
 
     @property
     def bus(self) -> str:
-        """Its bus, as `mgdd.rig.CanRig` takes it.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            It does not run.
-        """
+        """Its bus, as `mgdd.rig.CanRig` takes it; RigError where it does not run."""
         if not self._bus:
             raise RigError("the virtual node does not run: use it in a with block")
         return self._bus
 
     def start(self) -> None:
-        """Start both processes, and wait until they are ready.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            One of them ended; the message holds what it said.
-        """
+        """Start both processes, and wait until they are ready; RigError, with what it said, where one of them ended."""
         try:
             bus = self._start("hub", ["--port", "0", *self._hub_options])
             self._start("node", ["--bus", bus, *self._node_options])
@@ -125,9 +112,7 @@ class VirtualNode:
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _start(self, command: str, options: Sequence[str]) -> str:

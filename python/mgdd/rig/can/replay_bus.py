@@ -1,42 +1,35 @@
-"""Recorded frames as a bus: the same checks see them again, in the order in which they came."""
+"""A bus whose frames go into a record, and recorded frames as a bus: the same checks see them again, in their order."""
 
 from __future__ import annotations
 
 import os
+import time
 from collections import deque
 from collections.abc import Iterable
-from typing import Self
+from typing import Any, Self
 
 from mgdd._core.rig import Frame
 from mgdd.errors import RigError
 from mgdd.io.files import existing_file
+from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.recorded import stamped_frames
+from mgdd.rig.recorder import Recorder
 
-__all__ = ["ReplayBus"]
+__all__ = ["RecordedBus", "ReplayBus"]
 
 
 class ReplayBus:
-    """Frames of a run, as `CanRig` saw them with ``on_frame``.
+    """Frames of a run, sent and received, as `CanRig` saw them with ``on_frame``.
 
     A command moves to the next recorded command that drives; what the node sent after it arrives then. A command whose
-    inputs are not the recorded ones is an error, or an entry of `differences`.
-
-    Parameters
-    ----------
-    frames : iterable of Frame
-        Sent and received ones, in their order.
-    signal_map : SignalMap
-        Messages.
-    strict : bool
-        Whether another command is an error.
-
-    Attributes
-    ----------
-    differences : list of (int, dict, dict)
-        Number of the command, from 0, its inputs and the recorded ones.
+    inputs are not the recorded ones is an error if `strict`, else an entry of `differences`: the number of the command,
+    from 0, its inputs and the recorded ones.
     """
+
+    name = "the record"
+    shared = False  # nobody is there
 
     def __init__(self, frames: Iterable[Frame], signal_map: SignalMap, *, strict: bool = True) -> None:
         self._map, self._strict = signal_map, strict
@@ -47,34 +40,9 @@ class ReplayBus:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], signal_map: SignalMap, *, strict: bool = True) -> Self:
-        """Read the frames of a record file.
-
-        Parameters
-        ----------
-        path : path-like
-            File of a `mgdd.rig.Recorder` that was given every frame.
-        signal_map : SignalMap
-            Messages.
-        strict : bool
-            Whether another command is an error.
-
-        Returns
-        -------
-        ReplayBus
-            For a `mgdd.rig.CanRig` in the mode ``replay``.
-        """
+        """Read the frames of a `mgdd.rig.Recorder` that was given every one, for a `CanRig` in the mode ``replay``."""
         frames = [frame for _, frame in stamped_frames(existing_file(path))]
         return cls(frames, signal_map, strict=strict)
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        return "the record"
-
-    @property
-    def shared(self) -> bool:
-        """False: nobody is there."""
-        return False
 
     def open(self) -> None:
         """Begin at the first frame."""
@@ -87,13 +55,7 @@ class ReplayBus:
         """Nobody sends here."""
 
     def send(self, frame: Frame, *, final: bool = False) -> None:  # noqa: ARG002 - nothing is sent
-        """Move to the next recorded command of this message, and compare its inputs.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The record is at its end, or its command had other inputs.
-        """
+        """Move to the next recorded command of this message, and compare its inputs; RigError behind the last one."""
         message = self._by_key[frame.id, frame.extended]
         while self._left:
             recorded = self._left.popleft()
@@ -125,3 +87,60 @@ class ReplayBus:
         self._arrived: deque[Frame] = deque()
         self._commands = 0
         self.differences.clear()
+
+
+class RecordedBus:
+    """Passes everything on to another bus, and appends every frame to a record."""
+
+    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+        self.bus, self.recorder = bus, recorder
+        # Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
+        self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.bus.name
+
+    @property
+    def shared(self) -> bool:
+        """Whether others may be on it."""
+        return self.bus.shared
+
+    @property
+    def stays_here(self) -> bool:
+        """Whether it does not leave this machine, as far as one can tell."""
+        return bool(getattr(self.bus, "stays_here", False))
+
+    @property
+    def counters(self) -> dict[str, Any]:
+        """What the bus counts."""
+        return dict(getattr(self.bus, "counters", {}))
+
+    def open(self) -> None:
+        """Connect."""
+        self.bus.open()
+
+    def close(self) -> None:
+        """Disconnect."""
+        self.bus.close()
+
+    def claim(self, keys: set[tuple[int, bool]]) -> None:
+        """Say which identifiers only we send."""
+        self.bus.claim(keys)
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:
+        """Send a frame; what the bus did not take is not recorded."""
+        self.bus.send(frame, final=final)
+        self._append(frame, received=False)
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame."""
+        frame = self.bus.receive(timeout_s)
+        if frame is not None:
+            self._append(frame, received=(frame.id, frame.extended) not in self.sent_elsewhere)
+        return frame
+
+    def _append(self, frame: Frame, *, received: bool) -> None:
+        stamp_ns = frame.monotonic_ns or time.monotonic_ns()
+        self.recorder.frame(changed(frame, monotonic_ns=stamp_ns, received=received))

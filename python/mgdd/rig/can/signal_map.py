@@ -76,13 +76,8 @@ class SignalMap:
 
         Parameters
         ----------
-        path : path-like
+        path : str or path-like
             A TOML file, or the name of a shipped one: ``etb``, ``engine``, ``surrogate``.
-
-        Returns
-        -------
-        SignalMap
-            Ready for a rig or a node.
 
         Raises
         ------
@@ -113,8 +108,8 @@ class SignalMap:
             raise table.error("format", version, f"{_FORMAT}: this version of mgdd reads no other")
         dbc = DbcFile.read(file.parent / table.take("dbc", "text"))
         reader = MapReader(dbc=dbc)
-        commands = {name: reader.command(name, inner) for name, inner in table.tables("commands")}
-        measurements = {name: reader.measurement(name, inner) for name, inner in table.tables("measurements")}
+        commands = {name: reader.command(name, inner) for name, inner in table.table("commands").tables()}
+        measurements = {name: reader.measurement(name, inner) for name, inner in table.table("measurements").tables()}
         reader.require_whole(table, commands, measurements)
         trigger = table.take("trigger", "text")
         if trigger not in measurements:
@@ -126,15 +121,9 @@ class SignalMap:
         limits = tuple(table.take("limits", "texts", []))
         objective = {row.take("value", "text"): row.take("weight", "number") for row in table.rows("objective")}
         made = cls(
-            file=file,
-            dbc=dbc,
-            commands=commands,
-            measurements=measurements,
-            trigger=trigger,
-            cycle_s=cycle_s,
-            state=state,
-            objective={},
-        )
+            file=file, dbc=dbc, commands=commands, measurements=measurements, trigger=trigger, cycle_s=cycle_s,
+            state=state, objective={},
+        )  # fmt: skip
         try:
             return made.with_goals(limits=limits, objective=objective)
         except ParameterError as error:
@@ -146,24 +135,9 @@ class SignalMap:
         limits: Mapping[str, float] | Sequence[Limit | str] | None = None,
         objective: Mapping[str, float] | None = None,
     ) -> Self:
-        """Give the same map with other limits and components of J.
+        """Give the same map with other limits and weights of the components of J; as they are where left out.
 
-        Parameters
-        ----------
-        limits : sequence of str, or limits by name or as Limit, optional
-            Measured values to report as limits; as they are if left out.
-        objective : mapping of str to float, optional
-            Weight of each measured value; as it is if left out.
-
-        Returns
-        -------
-        SignalMap
-            A new one.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A name that is not measured, a weight that is not finite.
+        ParameterError for a name that is not measured, or a weight that is not finite.
         """
         wanted = self.limits if limits is None else tuple(limit_names_of(limits))
         weights = dict(self.objective if objective is None else objective)

@@ -14,17 +14,7 @@ __all__ = ["TomlTable"]
 
 
 class TomlTable:
-    """Keys of a table that are taken one by one.
-
-    Parameters
-    ----------
-    values : mapping
-        The table.
-    origin : str
-        The file.
-    path : str
-        Name of the table, as in ``commands.ETB_Cmd``; empty for the whole file.
-    """
+    """Keys of a table that are taken one by one."""
 
     def __init__(self, values: Mapping[str, Any], *, origin: str, path: str = "") -> None:
         self._left = dict(values)
@@ -71,11 +61,7 @@ class TomlTable:
             raise self.error(name, value, f"a table [{self.key(name)}]")
         return TomlTable(value, origin=self.origin, path=self.key(name))
 
-    def tables(self, name: str) -> list[tuple[str, TomlTable]]:
-        """Take a table of tables: names and tables."""
-        return self.table(name).tables_here()
-
-    def tables_here(self) -> list[tuple[str, TomlTable]]:
+    def tables(self) -> list[tuple[str, TomlTable]]:
         """Take all that is left as tables: names and tables."""
         return [(name, self.table(name)) for name in list(self._left)]
 

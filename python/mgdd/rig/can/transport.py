@@ -16,9 +16,7 @@ from urllib.parse import parse_qsl
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.io.extras import import_extra
-from mgdd.rig.can.connect import connected, error_code
-from mgdd.rig.can.messages import message_of
-from mgdd.rig.can.reception import THIS_HOST, Reception
+from mgdd.rig.can.python_can import THIS_HOST, Reception, connected, error_code, message_of
 
 __all__ = ["CanTransport", "two_senders"]
 
@@ -60,6 +58,8 @@ class CanTransport:
     ('0x120', 1)
     """
 
+    shared = True  # others may be on the bus
+
     def __init__(
         self,
         interface: str,
@@ -89,22 +89,7 @@ class CanTransport:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Make a transport of ``INTERFACE:CHANNEL?OPTION=VALUE&...``.
-
-        Parameters
-        ----------
-        text : str
-            For example ``socketcan:can0`` or ``socketcand:can0?host=127.0.0.1&port=29536``.
-
-        Returns
-        -------
-        CanTransport
-            Not yet open.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            No interface or channel.
+        """Make a transport, not yet open, of ``INTERFACE:CHANNEL?OPTION=VALUE&...``, as ``socketcan:can0``.
 
         Examples
         --------
@@ -133,26 +118,13 @@ class CanTransport:
         return self.interface == "virtual" or (self.interface == "socketcand" and hub in THIS_HOST)
 
     @property
-    def shared(self) -> bool:
-        """True: others may be on the bus."""
-        return True
-
-    @property
     def counters(self) -> dict[str, int]:
         """Frames sent and received, retries, overflows, error frames by class; malformed and own ones left out."""
         with self._arrived:
             return dict(self._counts + (self._reception.counts if self._reception is not None else Counter()))
 
     def open(self) -> None:
-        """Connect and start to receive.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            No such interface or channel, nobody listens there, or it is open already.
-        ImportError
-            The extra ``can`` is not installed.
-        """
+        """Connect and start to receive; RigError, or ImportError without the extra ``can``, says why it cannot."""
         if self._bus is not None:
             raise RigError(f"{self.name} is open already: close it first")
         self._bus = connected(self.interface, self.channel, self.options, self.name)
@@ -183,30 +155,15 @@ class CanTransport:
         self.close()
 
     def claim(self, keys: set[tuple[int, bool]]) -> None:
-        """Say which identifiers only we send: when one arrives, another node has it too.
-
-        Parameters
-        ----------
-        keys : set of (int, bool)
-            Identifier, and whether it has 29 bits.
-        """
+        """Say which identifiers, with whether they have 29 bits, only we send: one that arrives is of another node."""
         with self._arrived:
             self._claimed = frozenset(keys)
 
     def send(self, frame: Frame, *, final: bool = False) -> None:
         """Hand a frame to the driver; while its queue is full, for `send_timeout_s` at most, try again.
 
-        Parameters
-        ----------
-        frame : Frame
-            To be sent.
-        final : bool
-            Try it even after a fault, as the safe frames at the end do.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The driver does not take it, or the bus has a fault.
+        RigError where the driver does not take it, or the bus has a fault. With `final` it is tried even then, as the
+        safe frames at the end are.
         """
         bus = self._open_bus(final=final)
         can, message = import_extra("can", "can", "a CAN bus"), message_of(frame)
@@ -217,7 +174,8 @@ class CanTransport:
             try:
                 bus.send(message)
             except (can.CanError, OSError) as error:
-                if not _is_full(error) or time.monotonic() + pause > until:
+                full = error_code(error) in (errno.ENOBUFS, errno.EAGAIN) or "buffer" in str(error).lower()
+                if not full or time.monotonic() + pause > until:
                     raise RigError(f"{self.name}: frame {frame.id:#x} was not sent: {error}") from error
                 self._count("retries")
                 time.sleep(pause)
@@ -227,22 +185,9 @@ class CanTransport:
                 return
 
     def receive(self, timeout_s: float) -> Frame | None:
-        """Give the next frame that arrived.
+        """Give the next frame that arrived, waiting for so long [s] at most; None where none came.
 
-        Parameters
-        ----------
-        timeout_s : float
-            Longest time to wait [s]; 0 looks only.
-
-        Returns
-        -------
-        Frame or None
-            None where none came.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            A fault of bus or thread, or an identifier of ours that another node sends.
+        RigError for a fault of bus or thread, or an identifier of ours that another node sends.
         """
         self._open_bus()
         with self._arrived:
@@ -328,7 +273,3 @@ def _plain(text: str) -> Any:
         with contextlib.suppress(ValueError):
             return number(text)
     return text
-
-
-def _is_full(error: Exception) -> bool:
-    return error_code(error) in (errno.ENOBUFS, errno.EAGAIN) or "buffer" in str(error).lower()

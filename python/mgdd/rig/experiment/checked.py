@@ -1,21 +1,22 @@
-"""What an experiment names, loaded and checked before anything is opened or armed."""
+"""What an experiment names, loaded and checked before anything opens, and which loop steps its controller."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.io.files import existing_file
-from mgdd.loop import EngineBench, VirtualThrottle
+from mgdd.loop import EngineBench, Plant, VirtualThrottle
+from mgdd.loop.track import sensors_of
 from mgdd.results.describe import described
+from mgdd.rig.can.loop_map import loop_messages
+from mgdd.rig.can.modes import BUS_MODES
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.loop_choice import LoopChoice, chosen_loop
 from mgdd.rig.experiment.settings import (
     SAMPLE_S,
     EnginePlant,
@@ -23,69 +24,90 @@ from mgdd.rig.experiment.settings import (
     SafetySettings,
     SeekTask,
     TrackTask,
+    beside,
     scaled,
 )
-from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan, throttle_named
+from mgdd.rig.experiment.tasks import IdentifyPlan, SeekPlan, TrackPlan, engine_named, throttle_named
 from mgdd.rig.recorded import RecordedRun, readable_record
-from mgdd.rig.safety_envelope import SafetyEnvelope
+from mgdd.rig.safety import SafetyEnvelope
 
-__all__ = ["CheckedExperiment", "check_experiment"]
+__all__ = ["CheckedExperiment", "LoopChoice", "check_experiment", "chosen_loop", "simulated_plant"]
 
-_BUS_MODES = ("hil", "dry_run", "bench")
 _SIMULATED = ("simulate", "hil")
+
+
+class LoopChoice(NamedTuple):
+    """A loop and why it is that one."""
+
+    name: str
+    reason: str  # also how the loop of the core reaches its bus: by raw socket or bridge
+    channel: str | None = None  # of SocketCAN, where that loop has a raw socket of its own
+
+
+def chosen_loop(experiment: Experiment, signal_map: SignalMap | None) -> LoopChoice | None:
+    """Choose the loop of a task; None without a controller, ParameterError where ``loop = "core"`` cannot serve."""
+    settings = experiment.settings
+    if not isinstance(settings, TrackTask):
+        return None
+    if experiment.mode == "replay":
+        return LoopChoice("python", "mode = 'replay': what was recorded is computed again")
+    if settings.loop == "python":
+        return LoopChoice("python", "track.loop = 'python'")
+    against = _against_core(experiment, signal_map)
+    if not against:
+        # Options of a connection by SocketCAN would be those of python-can: then a bridge serves the loop.
+        bus = None if experiment.bus.connection is None else CanTransport.parse(experiment.bus.connection)
+        channel = str(bus.channel) if bus is not None and bus.interface == "socketcan" and not bus.options else None
+        by = "bridge" if channel is None else "raw socket"
+        return LoopChoice("core", f"a bus at real-time pace, by {by}", channel)
+    if settings.loop == "core":
+        raise ParameterError(
+            f"{experiment.origin}: track.loop = 'core': must be 'auto' or 'python' here: {against}",
+            field="track.loop", value="core", bound="'auto' or 'python'",
+        )  # fmt: skip
+    return LoopChoice("python", against)
+
+
+def _against_core(experiment: Experiment, signal_map: SignalMap | None) -> str:
+    """Say what stands against the loop of the core; empty where nothing does."""
+    if experiment.mode not in BUS_MODES or signal_map is None:
+        return f"mode = {experiment.mode!r}: no bus"
+    if experiment.bus.pace == "step":
+        return "bus.pace = 'step': every command brings one sample, without a clock"
+    try:
+        loop_messages(signal_map)
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedExperiment:
-    """An experiment with all that it names.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        As it was checked.
-    plan : IdentifyPlan, TrackPlan or SeekPlan
-        What will be done, made with its models.
-    sample_s : float or None
-        Time between samples of a throttle [s].
-    envelope : SafetyEnvelope or None
-        Of a throttle.
-    signal_map : SignalMap or None
-        Of a mode with a bus.
-    record, recorded : pathlib.Path and RecordedRun, or None
-        Of ``replay``: the file, and what was read from it.
-    loop : LoopChoice or None
-        Of a task with a controller: which loop steps it, and why.
-    """
+    """An experiment with all that it names."""
 
     experiment: Experiment
-    plan: IdentifyPlan | TrackPlan | SeekPlan
-    sample_s: float | None
-    envelope: SafetyEnvelope | None
-    signal_map: SignalMap | None
-    record: Path | None
+    plan: IdentifyPlan | TrackPlan | SeekPlan  # what will be done, made with its models
+    sample_s: float | None  # between samples of a throttle
+    envelope: SafetyEnvelope | None  # of a throttle
+    signal_map: SignalMap | None  # of a mode with a bus
+    record: Path | None  # of replay, with what was read from it
     recorded: RecordedRun | None = field(default=None, compare=False)
-    loop: LoopChoice | None = None
+    loop: LoopChoice | None = None  # of a task with a controller
 
     @property
     def bus_map(self) -> SignalMap:
         """Map of an experiment over a bus; RigError for one without."""
         if self.signal_map is None:
-            raise RigError(f"mode = {self.experiment.mode!r}: no bus; must be one of {', '.join(_BUS_MODES)}")
+            raise RigError(f"mode = {self.experiment.mode!r}: no bus; must be one of {', '.join(BUS_MODES)}")
         return self.signal_map
 
     def to_dict(self) -> dict[str, Any]:
-        """Say what would run.
-
-        Returns
-        -------
-        dict
-            As JSON holds it.
-        """
+        """Say what would run, as JSON holds it."""
         experiment, known = self.experiment, self.signal_map
         out: dict[str, Any] = {"task": experiment.task, "mode": experiment.mode, "seed": experiment.seed}
         out |= {"samples": self.plan.samples, "sample_s": self.sample_s}
         out |= {"transmits": experiment.mode in ("hil", "bench")}
-        if experiment.mode in _BUS_MODES:
+        if experiment.mode in BUS_MODES:
             out["connection"] = experiment.bus.connection or "a hub and a node of its own"
             out["pace"] = experiment.bus.pace
         if self.loop is not None:
@@ -144,25 +166,19 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     >>> checked.plan.samples, checked.to_dict()["transmits"]
     (1500, False)
     """
-    with _named(experiment.origin):
-        return _checked(experiment)
-
-
-@contextmanager
-def _named(origin: str) -> Iterator[None]:
-    """Put the file of the experiment in front of what is refused."""
     try:
-        yield
+        return _checked(experiment)
     except Error as error:
-        raise error.reworded(f"{origin}: {error}") from error
+        raise error.reworded(f"{experiment.origin}: {error}") from error
     except FileNotFoundError as error:
-        raise FileNotFoundError(error.errno, f"{origin}: {error.strerror}", error.filename) from error
+        raise FileNotFoundError(error.errno, f"{experiment.origin}: {error.strerror}", error.filename) from error
 
 
 def _checked(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
     _require_acting(experiment)
-    signal_map = _map_of(experiment) if mode in _BUS_MODES else None
+    map_name = experiment.bus.map or ("engine" if experiment.task == "seek" else "etb")
+    signal_map = SignalMap.load(beside(experiment.folder, map_name)) if mode in BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
     recorded = None if record is None else readable_record(record)
@@ -173,10 +189,10 @@ def _checked(experiment: Experiment) -> CheckedExperiment:
         # Over a bus the DBC of the recorded run said the time between its samples.
         said = None if recorded is None else recorded.config.get("sample_s")
         sample_s = _sample_s(experiment, signal_map) if said is None else float(said)
-        envelope = _envelope(experiment, sample_s)
+        envelope = SafetyEnvelope.load(beside(experiment.folder, experiment.safety.envelope)).replace(cycle_s=sample_s)
         plan = _throttle_plan(settings, sample_s, experiment, envelope)
     if mode in _SIMULATED:
-        _require_plant(experiment, sample_s)
+        simulated_plant(experiment, sample_s=sample_s, inputs=("duty",))  # a wrong preset, scale or limit shows itself
     checked = CheckedExperiment(
         experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record,
         recorded=recorded,
@@ -191,16 +207,7 @@ def _record_of(experiment: Experiment) -> Path | None:
         return None
     if experiment.replay.record is None:
         raise ParameterError("mode = 'replay': needs [replay] record, the file of a run")
-    return existing_file(_beside(experiment, experiment.replay.record))
-
-
-def _beside(experiment: Experiment, name: str) -> str:
-    beside = experiment.folder / name
-    return str(beside) if beside.is_file() else name
-
-
-def _map_of(experiment: Experiment) -> SignalMap:
-    return SignalMap.load(_beside(experiment, experiment.map_name))
+    return existing_file(beside(experiment.folder, experiment.replay.record))
 
 
 def _require_acting(experiment: Experiment) -> None:
@@ -242,10 +249,6 @@ def _sample_s(experiment: Experiment, signal_map: SignalMap | None) -> float:
     return signal_map.cycle_s
 
 
-def _envelope(experiment: Experiment, sample_s: float) -> SafetyEnvelope:
-    return SafetyEnvelope.load(_beside(experiment, experiment.safety.envelope)).replace(cycle_s=sample_s)
-
-
 def _throttle_plan(
     settings: IdentifyTask | TrackTask, sample_s: float, experiment: Experiment, envelope: SafetyEnvelope
 ) -> IdentifyPlan | TrackPlan:
@@ -262,15 +265,20 @@ def _throttle_plan(
     return IdentifyPlan(settings, sample_s=sample_s, seed=experiment.seed, folder=experiment.folder)
 
 
-def _require_plant(experiment: Experiment, sample_s: float | None) -> None:
-    """Make what will be simulated once: a wrong preset, scale or limit shows itself."""
+def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: Sequence[str]) -> Plant:
+    """Make the plant of ``simulate``, or of a node of our own."""
     plant, folder = experiment.plant, experiment.folder
     if isinstance(plant, EnginePlant):
         engine = engine_named(plant.preset, folder)
-        EngineBench(scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names)
-    else:
-        throttle = scaled(throttle_named(plant.preset, folder), plant.scale, "plant")
-        VirtualThrottle(throttle, inputs=("duty",), sample_s=sample_s or SAMPLE_S)
+        return EngineBench(
+            scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
+            soc_scatter_cad=plant.soc_scatter_cad, efficiency_noise_percent=plant.efficiency_noise_percent,
+            seed=experiment.seed,
+        )  # fmt: skip
+    return VirtualThrottle(
+        scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
+        sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
+    )  # fmt: skip
 
 
 def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:

@@ -1,4 +1,4 @@
-"""Samples of a real-time loop as they come: rows of a record, cycles of a task, and columns of its result."""
+"""Samples of a real-time loop: rows of a record, cycles of a task, columns of its result, and their replay."""
 
 from __future__ import annotations
 
@@ -11,40 +11,32 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd.errors import DataError
 from mgdd.loop import Measurement
 from mgdd.rig.can.loop_map import LOOP_NAMES
 from mgdd.rig.exchange import Exchange, flat
-from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.experiment.checked import CheckedExperiment
+from mgdd.rig.experiment.run_folder import RunRecord
+from mgdd.rig.experiment.stand import Cycle
+from mgdd.rig.experiment.tasks import Outcome, TrackPlan, compared
+from mgdd.rig.recorded import RecordedRun
 from mgdd.rig.recorder import Recorder
+from mgdd.rig.safety import SafetyGate, said_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["LOOP_TABLE", "LoopSamples", "task_columns"]
+__all__ = ["LOOP_TABLE", "LoopSamples", "loop_rows", "replayed", "task_columns"]
 
 LOOP_TABLE = "loop"  # of a record: a row per cycle of the loop
 RUN = _core.rig.safety_states.index("run")
 _MAP_NAMES = {own: name for name, own in LOOP_NAMES.items()}
+_SENT = _core.rig.send_results.index("sent")
+_NOTHING = math.nan
 
 
 class LoopSamples:
-    """Takes the samples of a loop: into a record, to a listener, and keeps what the result needs.
-
-    Parameters
-    ----------
-    recorder : Recorder or None
-        Takes each cycle into the table ``loop``, with all that a replay needs.
-    row : callable
-        Takes each exchange with the plant: the duty of a cycle, and what the next cycle had measured.
-    listener : callable
-        Takes the exchanges of the task as cycles.
-    value_names : sequence of str
-        Measured values of the map; those that a loop does not read are NaN.
-    samples : int
-        How many grid points the task has.
-    sample_s : float
-        Time between two of them [s].
-    """
+    """Takes the samples of a loop: into a record, to a listener, and keeps what the result needs."""
 
     def __init__(
         self,
@@ -78,17 +70,13 @@ class LoopSamples:
         return self._first is not None and not self._running
 
     def take(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Take samples.
-
-        Parameters
-        ----------
-        columns : mapping of str to ndarray
-            As `mgdd.rig.RealtimeLoop.sample_columns` gives them.
-        """
+        """Take samples, as `mgdd.rig.RealtimeLoop.sample_columns` gives them."""
         names = [name for name in columns if name != "deadline_ns"]
         rows = zip(columns["deadline_ns"].tolist(), *(columns[name].tolist() for name in names), strict=True)
         for deadline_ns, *values in rows:
-            self._take(deadline_ns, _recorded(dict(zip(names, map(float, values), strict=True))))
+            row = dict(zip(names, map(float, values), strict=True))
+            row["sensed_angle_deg"], row["mode"] = row.pop("angle_deg"), row.pop("state")  # as other tables name them
+            self._take(deadline_ns, row)
 
     def tell(self) -> None:
         """Tell the listener of the cycles that it has not heard of; what it raises ends the run."""
@@ -135,20 +123,9 @@ class LoopSamples:
 
 
 def task_columns(rows: Sequence[Mapping[str, float]], samples: int) -> dict[str, NDArray[np.float64]]:
-    """Give the columns of a task from the rows of a loop.
+    """Give the duty that was asked, the one that the node reports and the angle that followed, a row per grid point.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        From the first cycle that was driven on.
-    samples : int
-        Grid points of the task, at most.
-
-    Returns
-    -------
-    dict of str to ndarray
-        ``asked_duty``, ``duty`` as the node reports it, and ``sensed_angle_deg``, which was measured after that duty. A
-        grid point that the loop missed has the numbers of the one before: what was sent last held.
+    The rows begin with the first driven cycle; a grid point that the loop missed has the numbers of the one before.
     """
     cycle = np.array([row["cycle"] for row in rows])
     done = 0 if len(rows) == 0 else min(int(cycle[-1] - cycle[0]), samples)
@@ -168,8 +145,60 @@ def _applied(before: Mapping[str, float], after: Mapping[str, float]) -> float:
     return before["duty"] if math.isnan(said) else said
 
 
-def _recorded(row: dict[str, float]) -> dict[str, float]:
-    """Name the numbers of a sample as the other tables of a record do."""
-    row["sensed_angle_deg"] = row.pop("angle_deg")
-    row["mode"] = row.pop("state")
-    return row
+def loop_rows(recorded: RecordedRun) -> list[dict[str, float]]:
+    """Give the rows of the loop in a record; none for the record of another loop."""
+    table = recorded.samples.get(LOOP_TABLE)
+    if table is None:
+        return []
+    names = [str(name) for name in table.data_vars]
+    values = np.column_stack([table[name].to_numpy() for name in names]).tolist()
+    return [dict(zip(names, row, strict=True)) for row in values]
+
+
+def replayed(
+    checked: CheckedExperiment, plan: TrackPlan, rows: list[dict[str, float]], record: RunRecord
+) -> tuple[Outcome, dict[str, Any]]:
+    """Compute every duty of a recorded loop again, and compare it bit for bit."""
+    controller, gate, sent = plan.controller(), SafetyGate(checked.envelope), True
+    again: list[dict[str, float]] = []
+    sizes: list[float] = []
+    for row in rows:
+        gate.observe(**_facts(row, sent=sent))
+        sent = row["send_result"] == _SENT
+        angle_deg = row["sensed_angle_deg"] if row["fresh"] else _NOTHING
+        # The gate of another controller may have taken the drive away: it is stepped where it was, all the same.
+        driven = gate.mode == "run" or not math.isnan(row["asked_duty"])
+        asked = float(controller.step(row["reference_deg"], angle_deg)) if driven else _NOTHING
+        drive = gate.command(asked if gate.mode == "run" else 0.0)
+        if driven:
+            pairs = ((asked, row["asked_duty"]), (drive.duty, row["duty"]))
+            sizes.append(max(_distance(*pair) for pair in pairs))
+        if driven or again:
+            again.append({**row, "asked_duty": asked, "duty": drive.duty})
+        record.say(said_of(gate.drain()))
+    if not again:
+        raise DataError(f"{checked.record}: ends before the first cycle of the task")
+    different = [(place, size) for place, size in enumerate(sizes) if size > 0.0]
+    outcome = plan.outcome(task_columns(again, plan.samples), interrupted=False)
+    return outcome, {"replay": compared(len(sizes), len(sizes), different), "gate": gate.counts}
+
+
+def _facts(row: Mapping[str, float], *, sent: bool) -> dict[str, Any]:
+    age_ns = None if math.isnan(row["age_us"]) else round(row["age_us"] * 1e3)
+    return {
+        "good_frames": int(row["good_frames"]),
+        "bad_frames": int(row["bad_frames"]),
+        "age_s": None if age_ns is None else age_ns * 1e-9,
+        "sensor_v": (row["first_v"], row["second_v"]),
+        "angle_deg": row["sensed_angle_deg"],
+        "bus": _core.rig.bus_states[int(row["bus_state"])],
+        "sent": sent,
+        "missed_deadlines": int(row["missed"]),
+        "request": _core.rig.safety_requests[int(row["request"])],
+    }
+
+
+def _distance(one: float, other: float) -> float:
+    if one == other or (math.isnan(one) and math.isnan(other)):
+        return 0.0
+    return abs(one - other) if math.isfinite(one - other) else math.inf

@@ -19,7 +19,7 @@ from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import check_experiment
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.run import run_experiment
-from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.experiment.stand import Cycle
 
 __all__ = ["drive_and_die", "track_and_die"]
 

@@ -11,9 +11,9 @@ from typing import Any, Self
 from mgdd.errors import ParameterError
 from mgdd.io.files import parsed, read_plain_text
 from mgdd.results.describe import described
+from mgdd.rig.can.modes import MODES
 from mgdd.rig.can.toml_table import TomlTable
 from mgdd.rig.experiment.settings import (
-    MODES,
     PACES,
     TASKS,
     BusSettings,
@@ -96,17 +96,12 @@ class Experiment:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read an experiment file.
+        """Read an experiment file, checked as far as the file itself goes; `check_experiment` looks at what it names.
 
         Parameters
         ----------
         path : path-like
             TOML; the page Experiments lists the keys.
-
-        Returns
-        -------
-        Experiment
-            Checked as far as the file itself goes; `check_experiment` looks at what it names.
 
         Raises
         ------
@@ -166,7 +161,7 @@ class Experiment:
         connection: str | None = None,
         pace: str | None = None,
     ) -> Self:
-        """Give the same experiment in another mode.
+        """Give the same experiment in another mode; ParameterError where there is no such mode or pace.
 
         Parameters
         ----------
@@ -178,27 +173,6 @@ class Experiment:
             The bus, as ``socketcan:can0``; as it is if left out.
         pace : {"step", "real_time"}, optional
             Of the bus; as it is if left out.
-
-        Returns
-        -------
-        Experiment
-            A new one.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            No such mode or pace.
-
-        Examples
-        --------
-        >>> from mgdd.rig import Experiment
-        >>> experiment = Experiment.from_toml('''
-        ... kind = "experiment"
-        ... format = 1
-        ... task = "seek"
-        ... ''')
-        >>> experiment.with_mode("hil").mode
-        'hil'
         """
         for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
             if value not in among:
@@ -208,18 +182,7 @@ class Experiment:
         return replace(self, mode=mode, replay=replay, bus=bus)
 
     def with_files(self, put: Callable[[Path], str]) -> Self:
-        """Give the same experiment with other names for the files that it finds beside it.
-
-        Parameters
-        ----------
-        put : callable
-            Takes the path of a file, gives what the experiment shall call it.
-
-        Returns
-        -------
-        Experiment
-            A new one; names of presets and of what is shipped stay.
-        """
+        """Give the same experiment with the names that `put` gives to the files beside it, by their paths."""
         changed: dict[str, Any] = {}
         for part, keys in _FILES.items():
             record = getattr(self, part)
@@ -239,11 +202,6 @@ class Experiment:
         """Limited quantities that seeker and guard ask for."""
         own = self.settings.limits if isinstance(self.settings, SeekTask) else {}
         return tuple(dict.fromkeys((*own, *self.safety.limits)))
-
-    @property
-    def map_name(self) -> str:
-        """Mapping file of the bus: that of the file, else the shipped one of the plant."""
-        return self.bus.map or ("engine" if self.task == "seek" else "etb")
 
 
 def _rows(experiment: Experiment) -> Mapping[str, Any]:

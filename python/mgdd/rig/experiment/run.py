@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,18 +14,13 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import Result
-from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
-from mgdd.rig.experiment.core_replay import loop_rows, replayed
+from mgdd.rig.experiment.checked import CheckedExperiment, LoopChoice, check_experiment
+from mgdd.rig.experiment.core_samples import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
-from mgdd.rig.experiment.engine_task import SeekPlan
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.loop_choice import LoopChoice
-from mgdd.rig.experiment.outcome import Outcome
-from mgdd.rig.experiment.run_folder import RunFolder, versions
-from mgdd.rig.experiment.run_record import RunRecord
-from mgdd.rig.experiment.stand import Stand, opened, rig_of
-from mgdd.rig.experiment.throttle_tasks import TrackPlan
-from mgdd.rig.experiment.watched import Cycle, Watched
+from mgdd.rig.experiment.run_folder import RunFolder, RunRecord, versions
+from mgdd.rig.experiment.stand import Cycle, Stand, Watched, guarded, opened_rig
+from mgdd.rig.experiment.tasks import Outcome, TrackPlan
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,37 +31,16 @@ __all__ = ["ExperimentResult", "run_experiment"]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ExperimentResult(Result):
-    """What an experiment came to.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        As it was run.
-    figures : dict
-        Numbers and short texts of the task.
-    dataset : xarray.Dataset
-        Signals over time or cycle.
-    timing : dict
-        Cycles, and percentiles of the time for thinking and for waiting [us]; of a controller ``loop``, and of that of
-        the core its account.
-    counters : dict
-        What rig and guard have counted.
-    events : tuple of str
-        What gate or guard had to say.
-    interrupted : bool
-        Whether Ctrl-C cut it.
-    folder : pathlib.Path or None
-        Where its files are.
-    """
+    """What an experiment came to."""
 
     experiment: Experiment
-    figures: dict[str, Any]
-    dataset: xr.Dataset
-    timing: dict[str, Any]
-    counters: dict[str, Any]
-    events: tuple[str, ...] = ()
-    interrupted: bool = False
-    folder: Path | None = None
+    figures: dict[str, Any]  # numbers and short texts of the task
+    dataset: xr.Dataset  # signals over time or cycle
+    timing: dict[str, Any]  # cycles, percentiles of thinking and waiting [us]; which loop, and its account
+    counters: dict[str, Any]  # of rig and guard
+    events: tuple[str, ...] = ()  # what gate or guard had to say
+    interrupted: bool = False  # whether Ctrl-C cut it
+    folder: Path | None = None  # where its files are
 
     def _rows(self) -> list[Row]:
         return rows_of({**self.figures, "folder": str(self.folder)})
@@ -82,13 +55,7 @@ class ExperimentResult(Result):
         return (throttle_track if "reference_deg" in self.dataset else throttle_run)(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give all but the signals.
-
-        Returns
-        -------
-        dict
-            As JSON holds it.
-        """
+        """Give all but the signals, as JSON holds it."""
         return {
             "task": self.experiment.task,
             "mode": self.experiment.mode,
@@ -169,7 +136,7 @@ def run_experiment(
         if run is not None:
             run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
             run.json("run.json", {**versions(), **checked.to_dict()})
-        with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
+        with RunRecord(None if run is None else run.path / "run.rec", checked) as record:
             outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
     except BaseException:
         if run is not None and (record is None or not record.began):
@@ -205,72 +172,43 @@ def _steered(
         if watch is not None:
             watch(cycle)
 
-    if isinstance(checked.plan, TrackPlan):
-        again = loop_rows(checked.recorded) if checked.recorded is not None else []
-        if again:
-            return _again(checked, checked.plan, again, record)
-        if checked.loop is not None and checked.loop.name == "core":
-            return _on_core(checked, checked.plan, record, listen, times, arm=arm, key_file=key_file)
-    with opened(checked, record, arm=arm, key_file=key_file) as stand:
-
-        def listen_here(cycle: Cycle) -> None:
-            record.say(stand.events())
-            listen(cycle)
-
+    plan, choice = checked.plan, checked.loop
+    timing: dict[str, Any]
+    account: dict[str, Any] = {}
+    if isinstance(plan, TrackPlan) and checked.recorded is not None and (rows := loop_rows(checked.recorded)):
         begun = time.monotonic()
-        try:
-            outcome = _run(checked, stand, listen_here)
-        finally:
-            record.say(stand.events())
-        elapsed_s = time.monotonic() - begun
-        timing = _timing(times, elapsed_s)
-        if checked.loop is None:
-            return outcome, stand.counters(), timing
-        return _told(outcome, checked.loop), stand.counters(), {"loop": checked.loop.name, **timing}
+        outcome, counters = replayed(checked, plan, rows, record)
+        choice = LoopChoice("core", "mode = 'replay': the record is one of that loop, computed again cycle by cycle")
+        timing = {"cycles": len(outcome.dataset["time_s"]), "elapsed_s": time.monotonic() - begun}
+    else:
+        with opened_rig(checked, record.recorder, arm=arm, key_file=key_file) as rig:
+            begun = time.monotonic()
+            if isinstance(plan, TrackPlan) and choice is not None and choice.name == "core":
+                outcome, counters, account = track_on_core(checked, plan, rig, record, listen)
+            else:
+                outcome, counters = _run(checked, guarded(checked, rig, record), record, listen)
+            timing = {**_timing(times, time.monotonic() - begun), **account}
+    if choice is None:
+        return outcome, counters, timing
+    figures = {**outcome.figures, "loop": choice.name, "loop_reason": choice.reason}
+    return replace(outcome, figures=figures), counters, {"loop": choice.name, **timing}
 
 
-def _on_core(
-    checked: CheckedExperiment,
-    plan: TrackPlan,
-    record: RunRecord,
-    listen: Callable[[Cycle], None],
-    times: list[tuple[float, float]],
-    *,
-    arm: bool,
-    key_file: str | os.PathLike[str] | None,
-) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
-    with ExitStack() as stack:
-        rig = stack.enter_context(rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file))
-        begun = time.monotonic()
-        outcome, counters, account = track_on_core(checked, plan, rig, record, listen)
-        timing = _timing(times, time.monotonic() - begun)
-    choice = checked.loop or LoopChoice("core", "")
-    return _told(outcome, choice), counters, {"loop": choice.name, **timing, **account}
+def _run(
+    checked: CheckedExperiment, stand: Stand, record: RunRecord, listen: Callable[[Cycle], None]
+) -> tuple[Outcome, dict[str, Any]]:
+    def listen_here(cycle: Cycle) -> None:
+        record.say(stand.events())
+        listen(cycle)
 
-
-def _again(
-    checked: CheckedExperiment, plan: TrackPlan, rows: list[dict[str, float]], record: RunRecord
-) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
-    begun = time.monotonic()
-    outcome, counters = replayed(checked, plan, rows, record)
-    choice = LoopChoice("core", "mode = 'replay': the record is one of that loop, computed again cycle by cycle")
-    timing = {"loop": choice.name, "cycles": len(outcome.dataset["time_s"]), "elapsed_s": time.monotonic() - begun}
-    return _told(outcome, choice), counters, timing
-
-
-def _told(outcome: Outcome, choice: LoopChoice) -> Outcome:
-    """Say in the figures which loop ran, and why that one."""
-    return replace(outcome, figures={**outcome.figures, "loop": choice.name, "loop_reason": choice.reason})
-
-
-def _run(checked: CheckedExperiment, stand: Stand, listen: Callable[[Cycle], None]) -> Outcome:
-    first = stand.start()
-    plant, most = Watched(stand.plant, listen), stand.left()
-    if most is not None and most < 1:
-        raise DataError(f"{checked.record}: ends before the first cycle of the task")
-    if isinstance(checked.plan, SeekPlan):
-        return checked.plan.run(plant, most)
-    return checked.plan.run(plant, first, most)
+    try:
+        first = stand.start()
+        plant, most = Watched(stand.plant, listen_here), stand.left()
+        if most is not None and most < 1:
+            raise DataError(f"{checked.record}: ends before the first cycle of the task")
+        return checked.plan.run(plant, first, most), stand.counters()
+    finally:
+        record.say(stand.events())
 
 
 def _timing(times: list[tuple[float, float]], elapsed_s: float) -> dict[str, Any]:

@@ -1,22 +1,26 @@
-"""The folder of a run: every file is whole as soon as it has its name, so that a kill loses only what was not done."""
+"""What a run leaves: whole files in a folder, and a record of every exchange and event, appended as it happens."""
 
 from __future__ import annotations
 
 import contextlib
 import json
+import math
 import platform
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 from mgdd import _core
 from mgdd.errors import RigError
 from mgdd.io.files import write_whole
 from mgdd.results.labels import to_jsonable
+from mgdd.rig.experiment.checked import CheckedExperiment
+from mgdd.rig.recorder import Recorder
 
 if TYPE_CHECKING:
     import os
@@ -24,25 +28,15 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["RunFolder", "versions"]
+__all__ = ["RunFolder", "RunRecord", "versions"]
 
 _INPUTS = "inputs"
 _PACKAGES = ("numpy", "scipy", "xarray", "python-can", "cantools")
+_TABLE = "rig"  # where `RigRecord.read` looks for exchanges
 
 
 class RunFolder:
-    """A new or empty folder that takes the files of one run.
-
-    Parameters
-    ----------
-    path : path-like
-        It is made where it is not there.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        It holds something already, or cannot be written.
-    """
+    """A new or empty folder that takes the files of one run."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -66,16 +60,13 @@ class RunFolder:
             with contextlib.suppress(OSError):  # another run has come into a folder above
                 folder.rmdir()
 
-    def file(self, name: str) -> Path:
-        """Give the path of a file of the run."""
-        return self.path / name
-
     def keep(self, path: Path) -> str:
         """Copy a file that a run reads, and give its name in the folder; bulk and maps stay where they are.
 
         A map reads its DBC beside it, a record may be large: both are named by their full path.
         """
-        if path.suffix == ".rec" or _is_map(path):
+        is_map = path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
+        if path.suffix == ".rec" or is_map:
             return str(path.resolve())
         inputs = self.path / _INPUTS
         inputs.mkdir(exist_ok=True)
@@ -113,10 +104,6 @@ class RunFolder:
             ) from error
 
 
-def _is_map(path: Path) -> bool:
-    return path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
-
-
 def versions() -> dict[str, Any]:
     """Give time, versions and machine of a run."""
     found: dict[str, str | None] = {}
@@ -133,3 +120,47 @@ def versions() -> dict[str, Any]:
         "system": platform.platform(),
         "arguments": sys.argv[1:],
     }
+
+
+class RunRecord:
+    """Takes what happens in a run: to a file, if there is one, and to a list of events."""
+
+    def __init__(self, file: Path | None, checked: CheckedExperiment) -> None:
+        self.events: list[str] = []
+        self.began = False
+        header = {"experiment": checked.experiment.to_toml(), **checked.to_dict()}
+        self.recorder = None if file is None else Recorder(file, config=header)
+        self._names: tuple[str, ...] = ()
+        self._missed: set[str] = set()
+
+    def row(self, row: Mapping[str, float]) -> None:
+        """Append an exchange; the first one says the names, what a later one lacks is NaN."""
+        if self.recorder is None:
+            return
+        if not self._names:
+            # What a rig applied may be missing at first: it has its place from the start.
+            late = [name.replace("input.", "applied.", 1) for name in row if name.startswith("input.")]
+            self._names = tuple(dict.fromkeys((*row, *late)))
+        new = sorted(set(row).difference(self._names, self._missed))
+        if new:
+            self._missed.update(new)
+            self.say([f"record: {', '.join(new)} came after the first cycle and has no column"])
+        self.recorder.sample(_TABLE, {name: row.get(name, math.nan) for name in self._names})
+
+    def say(self, events: Iterable[str]) -> None:
+        """Append events."""
+        for event in events:
+            self.events.append(event)
+            if self.recorder is not None:
+                category, _, text = event.partition(": ")
+                self.recorder.event(category, text)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None:
+        if self.recorder is not None:
+            self.began = self.recorder.written > 0
+            self.recorder.__exit__(kind, error, trace)

@@ -20,8 +20,8 @@ from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import NumbersResult
 from mgdd.rig.experiment.checked import check_experiment
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.own_node import own_node
-from mgdd.rig.experiment.throttle_tasks import throttle_named
+from mgdd.rig.experiment.stand import own_node
+from mgdd.rig.experiment.tasks import throttle_named
 
 __all__ = ["WAYS_OF", "WAYS_TO_DIE", "SelfTest", "run_self_test"]
 
@@ -45,25 +45,12 @@ _SIGNALS = {"sigint": signal.SIGINT, "sigterm": signal.SIGTERM, "sigkill": signa
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SelfTest(NumbersResult):
-    """How long the plate took to limp-home after each way to die.
+    """How long the plate took to limp-home after each way to die."""
 
-    Parameters
-    ----------
-    ways_to_die : mapping of str to float or None
-        Seconds from the end of the process to limp-home, by way; None where the plate did not come home, or the way
-        could not be tried.
-    limit_s : float
-        What is allowed [s].
-    notes : mapping of str to str
-        Why a way has no time.
-    loop : {"python", "core"}
-        What drove the plate.
-    """
-
-    ways_to_die: Mapping[str, float | None]
+    ways_to_die: Mapping[str, float | None]  # seconds from the end of the process to limp-home; None: see notes
     limit_s: float
-    notes: Mapping[str, str]
-    loop: str = "python"
+    notes: Mapping[str, str]  # why a way has no time
+    loop: str = "python"  # what drove the plate
 
     def _rows(self) -> list[Row]:
         return rows_of({**self.ways_to_die, "limit_s": self.limit_s, "passed": self.passed})
@@ -75,13 +62,7 @@ class SelfTest(NumbersResult):
         return all(time is not None and time <= self.limit_s for time in times)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give all of it.
-
-        Returns
-        -------
-        dict
-            As JSON holds it.
-        """
+        """Give all of it, as JSON holds it."""
         return {
             "passed": self.passed,
             "loop": self.loop,
@@ -95,29 +76,9 @@ def run_self_test(*, loop: str = "python", progress: Callable[[str], None] | Non
     """Let a process that drives a simulated throttle die in every way, and time the way home of the plate.
 
     Three parts on this machine, as on a bench: a hub, a node with the throttle, and the process that dies. The times
-    are those of the truth in the node.
-
-    Parameters
-    ----------
-    loop : {"python", "core"}
-        What drives the plate: Python, command by command, or an experiment on the real-time loop of the core.
-    progress : callable, optional
-        Called with the name of each way.
-
-    Returns
-    -------
-    SelfTest
-        With ``exception``, ``nan``, ``sigint``, ``sigterm``, ``sigkill`` and ``hang``; without ``nan`` for ``core``,
-        whose controllers give none.
-
-    Raises
-    ------
-    ImportError
-        The extra ``can`` is not installed.
-    mgdd.errors.ParameterError
-        No such loop.
-    mgdd.errors.RigError
-        Hub and node did not start.
+    are those of the truth in the node. With ``loop="python"`` Python drives the plate, command by command, with
+    ``"core"`` an experiment on the real-time loop of the core, whose controllers give no ``nan``. `progress` is called
+    with each way.
     """
     if loop not in WAYS_OF:
         raise ParameterError.of("loop", loop, f"one of {', '.join(WAYS_OF)}")

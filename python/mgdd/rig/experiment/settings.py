@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from mgdd.errors import ParameterError
@@ -16,11 +17,11 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.rig.can.toml_table import TomlTable
 
 __all__ = [
-    "LOOPS", "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
-    "SafetySettings", "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "scaled",
+    "LOOPS", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
+    "SafetySettings", "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "beside",
+    "scaled",
 ]  # fmt: skip
 
-MODES = ("simulate", "hil", "dry_run", "replay", "bench")
 PACES = ("step", "real_time")
 LOOPS = ("auto", "core", "python")
 TASKS = ("identify", "track", "seek")
@@ -163,6 +164,12 @@ class SeekTask(Settings):
     upper_cad: float = _key("number", 10.0, low=-60.0, high=60.0)
     cycles: int = _key("integer", 300, low=1, high=2_000_000)
     limits: Mapping[str, float] = _key("scales", {})
+
+
+def beside(folder: Path, name: str) -> Path | str:
+    """Return the file of that name beside an experiment; where there is none, the name."""
+    path = folder / name
+    return path if path.is_file() else name
 
 
 def scaled(record: _T, scale: Mapping[str, float], what: str) -> _T:

@@ -1,133 +1,141 @@
-"""The plant of an experiment in its mode: in process, over a bus, or from a record, with its guard in front."""
+"""The plant of an experiment in its mode, with its guard in front, and who is told of its cycles."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
-from mgdd.loop import EngineBench, Plant, VirtualThrottle
-from mgdd.loop.track import sensors_of
+from mgdd.errors import RigError
+from mgdd.loop import Measurement, Plant
 from mgdd.optimize import Limit
 from mgdd.rig.actuator_guard import ActuatorGuard
+from mgdd.rig.base import AroundPlant, SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.frame import Bus
-from mgdd.rig.can.recorded_bus import RecordedBus
+from mgdd.rig.can.processes import VirtualNode
+from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
-from mgdd.rig.exchange import RecordingRig, RigRecord
-from mgdd.rig.experiment.checked import CheckedExperiment
-from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
-from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.own_node import own_node
-from mgdd.rig.experiment.run_record import RunRecord
-from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
-from mgdd.rig.experiment.throttle_tasks import throttle_named
+from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
+from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
+from mgdd.rig.experiment.run_folder import RunRecord
+from mgdd.rig.experiment.tasks import SeekPlan, compared
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.replay import ReplayRig
-from mgdd.rig.safety import SafetyGate
-from mgdd.rig.simulated import SimulatedRig
+from mgdd.rig.safety import SafetyGate, said_of
 
-if TYPE_CHECKING:
-    import os
-
-__all__ = ["Stand", "opened", "rig_of", "simulated_plant"]
+__all__ = ["Cycle", "Stand", "Watched", "guarded", "opened_rig", "own_node"]
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stand:
-    """A plant that is open and guarded.
+class Cycle(NamedTuple):
+    """One cycle of a plant."""
 
-    Parameters
-    ----------
-    plant : mgdd.loop.Plant
-        What a task steers.
-    counters : callable
-        Gives what rig and guard have counted.
-    events : callable
-        Gives, once each, what guard or gate had to say.
-    start : callable
-        Brings the guard into service; gives the angle or timing there.
-    left : callable
-        Gives how many cycles there can be at most; None without an end.
-    """
+    number: int  # from 0 on
+    asked: Mapping[str, float]
+    measured: Measurement
+    thinking_s: float  # from the measurement before to these inputs
+    waiting_s: float  # from the inputs to this measurement
 
-    plant: Plant
-    counters: Callable[[], dict[str, Any]]
-    events: Callable[[], list[str]]
-    start: Callable[[], float]
-    left: Callable[[], int | None]
+
+class Watched(AroundPlant):
+    """A plant whose cycles are told to a listener, with the time that they took."""
+
+    def __init__(self, plant: Plant, listener: Callable[[Cycle], None]) -> None:
+        super().__init__(plant)
+        self._listener = listener
+        self.cycles = 0
+        self._asked: Mapping[str, float] = {}
+        self._measured_s = self._applied_s = time.perf_counter()
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Pass the inputs on."""
+        self._asked = dict(inputs)
+        self._applied_s = time.perf_counter()
+        self.plant.apply(inputs)
+
+    def measure(self) -> Measurement:
+        """Pass the measurement back, and tell the listener."""
+        measured = self.plant.measure()
+        now = time.perf_counter()
+        cycle = Cycle(self.cycles, self._asked, measured, self._applied_s - self._measured_s, now - self._applied_s)
+        self.cycles += 1
+        self._listener(cycle)
+        self._measured_s = time.perf_counter()
+        return measured
 
 
 @contextmanager
-def opened(
-    checked: CheckedExperiment,
-    record: RunRecord,
-    *,
-    arm: bool = False,
-    key_file: str | os.PathLike[str] | None = None,
-) -> Iterator[Stand]:
-    """Open the plant of an experiment; it is left safe, in whatever way the block ends.
+def own_node(checked: CheckedExperiment, *, truth: str | os.PathLike[str] | None = None) -> Iterator[str]:
+    """Start hub and node with the plant of the experiment, give what their bus is called, and end them."""
+    if checked.signal_map is None:
+        raise RigError("a node needs the map of a bus")
+    with TemporaryDirectory(prefix="mgdd-node-") as folder:
+        file = Path(folder) / "experiment.toml"
+        file.write_text(checked.experiment.with_files(lambda path: str(path.resolve())).to_toml(), encoding="utf-8")
+        with VirtualNode(
+            checked.signal_map.file.resolve(),
+            step=checked.experiment.bus.pace == "step",
+            truth=truth,
+            sample_ms=None if checked.sample_s is None else checked.sample_s * 1e3,
+            experiment=file,
+        ) as node:
+            yield node.bus
 
-    Every exchange with the rig itself, below the guard, and every frame of a bus go into the record.
+
+@dataclass(frozen=True, kw_only=True)
+class Stand:
+    """A plant that is open and guarded."""
+
+    plant: Plant
+    counters: Callable[[], dict[str, Any]]
+    events: Callable[[], list[str]]  # once each, what guard or gate had to say
+    start: Callable[[], float]  # brings the guard into service; gives the angle or timing there
+    left: Callable[[], int | None]  # how many cycles there can be at most; None without an end
+
+
+@contextmanager
+def opened_rig(
+    checked: CheckedExperiment, recorder: Recorder | None, *, arm: bool, key_file: str | os.PathLike[str] | None
+) -> Iterator[Any]:
+    """Open the rig of an experiment in its mode, where need be with a node of our own; every frame goes to the record.
+
+    It is left safe, in whatever way the block ends.
     """
-    with ExitStack() as stack:
-        rig = rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file)
-        yield _guarded(checked, rig, stack.enter_context(RecordingRig(rig, record.row, keep=False)))
-
-
-def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: Sequence[str]) -> Plant:
-    """Make the plant of ``simulate``, or of a node of our own."""
-    plant, folder = experiment.plant, experiment.folder
-    if isinstance(plant, EnginePlant):
-        engine = engine_named(plant.preset, folder)
-        return EngineBench(
-            scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
-            soc_scatter_cad=plant.soc_scatter_cad, efficiency_noise_percent=plant.efficiency_noise_percent,
-            seed=experiment.seed,
-        )  # fmt: skip
-    return VirtualThrottle(
-        scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
-        sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
-    )  # fmt: skip
-
-
-def rig_of(
-    checked: CheckedExperiment,
-    stack: ExitStack,
-    recorder: Recorder | None,
-    *,
-    arm: bool,
-    key_file: str | os.PathLike[str] | None,
-) -> Any:
-    """Make the rig of an experiment in its mode, to be entered; a node of our own ends with the stack."""
     experiment, mode = checked.experiment, checked.experiment.mode
-    if mode == "simulate":
-        return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
-    if checked.recorded is not None:
-        return ReplayRig(RigRecord.of_run(checked.recorded, f"{checked.record}"), strict=False)
-    connection = experiment.bus.connection
-    if connection is None:
-        connection = stack.enter_context(own_node(checked))
-    bus: Bus = CanTransport.parse(connection)
-    if recorder is not None:
-        bus = RecordedBus(bus, recorder)
-    given_ms = experiment.bus.timeout_ms
-    timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
-    return CanRig(
-        checked.bus_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
-        limits=experiment.limit_names or None,
-    )  # fmt: skip
+    with ExitStack() as stack:
+        if mode == "simulate":
+            rig: Any = SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
+        elif checked.recorded is not None:
+            rig = ReplayRig(RigRecord.of_run(checked.recorded, f"{checked.record}"), strict=False)
+        else:
+            bus: Bus = CanTransport.parse(experiment.bus.connection or stack.enter_context(own_node(checked)))
+            if recorder is not None:
+                bus = RecordedBus(bus, recorder)
+            given_ms = experiment.bus.timeout_ms
+            timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
+            rig = CanRig(
+                checked.bus_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
+                limits=experiment.limit_names or None,
+            )  # fmt: skip
+        yield stack.enter_context(rig)
 
 
-def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
+def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
+    """Put the guard of an experiment before its rig; every exchange below it goes into the record."""
+    recorded = RecordingRig(rig, record.row, keep=False)
+
     def counters() -> dict[str, Any]:
         told: dict[str, Any] = dict(getattr(rig, "counters", {}))
         if isinstance(rig, ReplayRig):
-            told["replay"] = _compared(rig)
+            sizes = [(found.sample, abs(found.asked - found.recorded)) for found in rig.differences]
+            told["replay"] = compared(rig.sample, len(rig.record), sizes)
         return told
 
     def left() -> int | None:
@@ -139,7 +147,7 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
         return Stand(
             plant=safe,
             counters=lambda: {**counters(), "gate": gate.counts},
-            events=lambda: [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in gate.drain()],
+            events=lambda: said_of(gate.drain()),
             start=safe.start,
             left=left,
         )
@@ -171,15 +179,3 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
         start=lambda: plan.start_cad,
         left=left,
     )
-
-
-def _compared(rig: ReplayRig) -> dict[str, Any]:
-    """Say how the inputs that were asked for agree with the recorded ones, bit for bit."""
-    sizes = [abs(found.asked - found.recorded) for found in rig.differences]
-    return {
-        "samples": rig.sample,
-        "recorded": len(rig.record),
-        "different": len(sizes),
-        "first_different": rig.differences[0].sample if sizes else None,
-        "largest_difference": max(sizes, default=0.0),
-    }

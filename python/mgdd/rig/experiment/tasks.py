@@ -1,9 +1,10 @@
-"""Identify and track on any plant that takes a duty and measures the angle: simulated, behind a bus, or recorded."""
+"""Identify, track and seek on any plant with the right inputs: simulated, behind a bus, or recorded."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,18 +12,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core, identify, presets
-from mgdd.errors import ParameterError
+from mgdd.engine import Performance
+from mgdd.errors import Interrupted, ParameterError
+from mgdd.guide import CurveSeeking, GuidedEngine, ModelOptimum
 from mgdd.io import throttle_log
-from mgdd.loop import Plant, Reference
+from mgdd.loop import LoopCriteria, Plant, Reference, run_seeker
 from mgdd.loop.controller_families import groups_of
+from mgdd.loop.plant_loop import LoopRun
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
-from mgdd.optimize import FitOptions
+from mgdd.optimize import ExtremumSeeking, FitOptions, Limit
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
-from mgdd.results.labels import labelled_dataset
-from mgdd.rig.experiment.outcome import Outcome
-from mgdd.rig.experiment.settings import IdentifyTask, TrackTask
+from mgdd.results.labels import labelled_dataset, to_jsonable
+from mgdd.rig.experiment.settings import IdentifyTask, SeekTask, TrackTask, beside, scaled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,50 +33,61 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.loop.track import AngleController
+    from mgdd.optimize import Seeker
+    from mgdd.presets import Preset
     from mgdd.throttle import Throttle
 
-__all__ = ["IdentifyPlan", "TrackPlan", "throttle_named"]
+__all__ = ["IdentifyPlan", "Outcome", "SeekPlan", "TrackPlan", "compared", "engine_named", "throttle_named"]
 
 _OF_THE_DUTY = "total_variation"  # the one figure that no angle enters
 _SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
+_START_CAD = -20.0
+_DITHER_CAD = 1.0  # amplitude of extremum seeking
+_ARRIVAL_CAD = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What a task came to."""
+
+    figures: Mapping[str, Any]  # numbers and short texts, as JSON holds them
+    dataset: xr.Dataset
+    interrupted: bool = False  # whether Ctrl-C cut it
+    files: Mapping[str, str] = field(default_factory=dict)  # further texts by file name, as a fitted model
+    drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # by file name without ending
+
+
+def compared(samples: int, recorded: int, differences: Sequence[tuple[int, float]]) -> dict[str, Any]:
+    """Say how what was asked for agrees with a record, bit for bit, from the samples and sizes of the differences."""
+    return {
+        "samples": samples,
+        "recorded": recorded,
+        "different": len(differences),
+        "first_different": differences[0][0] if differences else None,
+        "largest_difference": max((size for _, size in differences), default=0.0),
+    }
 
 
 def throttle_named(name: str, folder: Path) -> Throttle:
     """Load the throttle of a preset or of a TOML file."""
-    beside = folder / name
-    return presets.load(beside if beside.is_file() else name, kind="throttle").throttle
+    return presets.load(beside(folder, name), kind="throttle").throttle
 
 
 class TrackPlan:
-    """A controller along a reference, made and checked before anything moves.
-
-    Parameters
-    ----------
-    task : TrackTask
-        What is asked.
-    sample_s : float
-        Time between samples [s].
-    folder : pathlib.Path
-        Where files of the task are looked for.
-    """
+    """A controller along a reference, made and checked before anything moves."""
 
     def __init__(self, task: TrackTask, *, sample_s: float, folder: Path) -> None:
         self.task, self.sample_s = task, sample_s
-        beside = folder / task.reference
-        self.reference = Reference.parse(str(beside) if beside.is_file() else task.reference, sample_s=sample_s)
+        self.reference = Reference.parse(str(beside(folder, task.reference)), sample_s=sample_s)
         if abs(self.reference.sample_s / sample_s - 1.0) > 1e-9:
             raise ParameterError.of(
                 f"reference {task.reference}: time between samples", self.reference.sample_s,
                 f"{sample_s:g} s, as that of the plant",
             )  # fmt: skip
+        self.samples = len(self.reference.angle_deg)
         self.model = _model_named(task.model, folder)
         require_known_delay(task.controller, sample_s, task.delay_samples or 0)
         _, self.doubts = self._made()
-
-    @property
-    def samples(self) -> int:
-        """How many samples it takes."""
-        return len(self.reference.angle_deg)
 
     def controller(self) -> AngleController:
         """Make the controller, at its beginning."""
@@ -132,34 +146,17 @@ class TrackPlan:
 
 
 class IdentifyPlan:
-    """An excitation that the prior model has been asked about, and the fit of what it shows.
-
-    Parameters
-    ----------
-    task : IdentifyTask
-        What is asked.
-    sample_s : float
-        Time between samples [s].
-    seed : int
-        Of the starts of the fit.
-    folder : pathlib.Path
-        Where files of the task are looked for.
-    """
+    """An excitation that the prior model has been asked about, and the fit of what it shows."""
 
     def __init__(self, task: IdentifyTask, *, sample_s: float, seed: int, folder: Path) -> None:
         self.task, self.sample_s, self.seed = task, sample_s, seed
         self.prior = throttle_named(task.prior, folder)
-        signal, check = identify.design_excitation(
+        signal, _ = identify.design_excitation(
             task.excitation, self.prior, side=task.side, duration_s=task.duration_s, step_s=sample_s
         )
         settle = round(_SETTLE_S / sample_s)
         self.duty = np.r_[np.zeros(settle), signal["duty"].to_numpy()]
-        self.said = check.summary()
-
-    @property
-    def samples(self) -> int:
-        """How many samples it takes."""
-        return len(self.duty)
+        self.samples = len(self.duty)
 
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many samples, and fit."""
@@ -193,9 +190,8 @@ def _fewer(samples: int, most: int | None) -> int:
 
 
 def _model_named(name: str, folder: Path) -> Any:
-    beside = folder / name
     if name.endswith(".toml"):
-        return identify.load_throttle_model(beside if beside.is_file() else name)
+        return identify.load_throttle_model(beside(folder, name))
     return throttle_named(name, folder)
 
 
@@ -251,3 +247,85 @@ def _draw_fit(validation: Any) -> Figure:
     for pane, what in zip(figure.subplots(1, 3), ("free_run", "n_step", "residuals"), strict=True):
         validation.plot(what, ax=pane)
     return figure
+
+
+def engine_named(name: str, folder: Path) -> Preset:
+    """Load the engine of a preset or of a TOML file."""
+    return presets.load(beside(folder, name), kind="engine")
+
+
+class SeekPlan:
+    """A seeker and what guides it, made and checked before anything moves."""
+
+    def __init__(self, task: SeekTask, *, folder: Path) -> None:
+        self.task = task
+        if not task.lower_cad < task.upper_cad:
+            raise ParameterError.of("seek.lower_cad", task.lower_cad, f"< upper_cad, {task.upper_cad:g}")
+        self.samples = task.cycles
+        known = engine_named(task.model, folder)
+        cylinder = scaled(known.cylinder, task.scale, "seek")
+        self.point = known.point
+        self.model = ModelOptimum(
+            cylinder, performance=Performance.efficiency_only(), bounds_cad=(task.lower_cad, task.upper_cad)
+        )
+        best = self.model(self.point)
+        self.guide_cad = None if best is None else float(best["soc_cad"])
+        if task.guide != "none" and self.guide_cad is None:
+            raise ParameterError(
+                f"seek.model {task.model}: has no best timing between {task.lower_cad:g} and {task.upper_cad:g} °CA: "
+                "move the bounds or change scale"
+            )
+        curve = self.model.curve(self.point) if task.guide == "curve" else None
+        self._curve = curve
+        room = 0.0 if task.guide == "curve" else _DITHER_CAD
+        start = task.start_cad
+        if start is None:
+            start = _START_CAD if self.guide_cad is None or task.guide == "none" else self.guide_cad
+            start = min(max(start, task.lower_cad + room), task.upper_cad - room)
+        elif not task.lower_cad + room <= start <= task.upper_cad - room:
+            raise ParameterError.of(
+                "seek.start_cad", start, f"in [{task.lower_cad + room:g}, {task.upper_cad - room:g}] °CA aTDC"
+            )
+        self.start_cad = start
+
+    def seeker(self) -> Seeker | GuidedEngine:
+        """Make the seeker, at its beginning."""
+        task = self.task
+        limits = [Limit(name, upper) for name, upper in task.limits.items()]
+        if self._curve is not None:
+            curves = self.model.limit_curves(self.point, list(task.limits)) if limits else None
+            return CurveSeeking(
+                start=self.start_cad, lower=task.lower_cad, upper=task.upper_cad, curve=self._curve, limits=limits,
+                limit_curves=curves,
+            )  # fmt: skip
+        plain = ExtremumSeeking(
+            start=self.start_cad, lower=task.lower_cad, upper=task.upper_cad, amplitude=_DITHER_CAD, limits=limits
+        )
+        return plain if task.guide == "none" else GuidedEngine(plain, self.model, self.point, keep_start=True)
+
+    def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
+        """Run it on a plant, for at most so many cycles."""
+        cycles = _fewer(self.samples, most)
+        criteria = LoopCriteria(arrival=_ARRIVAL_CAD, limits=dict(self.task.limits) or None)
+        try:
+            run = run_seeker(plant, self.seeker(), cycles, criteria=criteria)
+        except Interrupted as stop:
+            if not isinstance(stop.partial, LoopRun):
+                raise
+            run = stop.partial
+        summary = {name: value for name, value in run.summary.items() if value == value}
+        said = {"guide": self.task.guide, "guide_cad": self.guide_cad, "start_cad": self.start_cad}
+        return Outcome(
+            figures=to_jsonable(
+                {**said, "cycles": run.dataset.sizes["cycle"], **summary, "findings": [str(f) for f in run.findings]}
+            ),
+            dataset=run.dataset,
+            interrupted=run.interrupted,
+            drawings={"seek": partial(_draw, run.dataset, dict(self.task.limits))},
+        )
+
+
+def _draw(cycles: xr.Dataset, limits: dict[str, float]) -> Figure:
+    from mgdd import plot
+
+    return drawn(plot.seeking, cycles, size=(8.0, 7.0), optimum_cad=None, limit_values=limits)
