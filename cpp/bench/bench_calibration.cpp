@@ -18,7 +18,7 @@ using guide::OnlineCalibration;
 std::vector<std::vector<double>> traces() {
   loop::BenchSettings s;
   s.soc_scatter_cad = 0.0;
-  s.pressure_noise_bar = 0.05;
+  s.pressure.noise_bar = 0.05;
   loop::EngineBench bench(s);
   std::vector<std::vector<double>> out;
   for (int k = 0; k < 64; ++k) {

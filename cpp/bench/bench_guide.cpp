@@ -56,7 +56,7 @@ BENCHMARK_CAPTURE(ask_and_tell, curve_with_a_limit, true)->Unit(benchmark::kMicr
 // The plant's cycle is simulated too; the calibration moves the model in every cycle.
 void guided_cycle(benchmark::State& state) {
   loop::BenchSettings b;
-  b.pressure_noise_bar = 0.1;
+  b.pressure.noise_bar = 0.1;
   loop::EngineBench bench(b);
   guide::OnlineCalibrationSettings c;
   c.cylinder.wall_heat.wall_heat_scale = 1.0;

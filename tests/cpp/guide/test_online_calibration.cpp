@@ -90,9 +90,9 @@ TEST(OnlineCalibration, WhatIsKnownBeforehandLeavesRoomForAWrongTiming) {
 TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
   const auto with = [](double tdc, double gain, double offset, double noise) {
     loop::BenchSettings s = steady_bench(noise, 5);
-    s.tdc_error_cad = tdc;
-    s.pressure_gain_error = gain;
-    s.pressure_offset_bar = offset;
+    s.pressure.tdc_error_cad = tdc;
+    s.pressure.gain_error = gain;
+    s.pressure.offset_bar = offset;
     return s;
   };
   for (const CalibrationMethod method : every_method) {
@@ -104,7 +104,7 @@ TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
         run(bench, calibration, 150);
         const double bias = calibration.parameters()[wall] / 0.5 - 1.0;
         EXPECT_TRUE(std::abs(bias) < 0.05 || !calibration.determined())
-            << name_of(method) << " tdc " << s.tdc_error_cad << " gain " << s.pressure_gain_error << " noise " << noise
+            << name_of(method) << " tdc " << s.pressure.tdc_error_cad << " gain " << s.pressure.gain_error << " noise " << noise
             << " " << calibration.explain(wall);
         if (method != CalibrationMethod::extremum_seeking && noise < 0.2) {
           EXPECT_LT(std::abs(bias), 0.05) << calibration.explain(wall);
@@ -154,9 +154,9 @@ Coverage coverage_of(CalibrationMethod method, double noise_bar, double correlat
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     const auto drawn = [&](std::uint64_t of) { return random::normal(seed, 77, of); };
     loop::BenchSettings s = steady_bench(0.0, seed);
-    s.tdc_error_cad = std::clamp(0.3 * drawn(0), -2.0, 2.0);
-    s.pressure_gain_error = 0.005 * drawn(1);
-    s.pressure_offset_bar = 0.1 * drawn(2);
+    s.pressure.tdc_error_cad = std::clamp(0.3 * drawn(0), -2.0, 2.0);
+    s.pressure.gain_error = 0.005 * drawn(1);
+    s.pressure.offset_bar = 0.1 * drawn(2);
     s.cylinder.gas.gamma += 0.01 * drawn(3);
     s.schedule[0].point.fuel_mg *= 1.0 + 0.02 * drawn(4);
     s.schedule[0].point.burn_duration_cad = 30.0 * (1.0 + 0.05 * drawn(5));
@@ -241,7 +241,7 @@ TEST(OnlineCalibration, StandardErrorsHoldWhereTheTimingScatters) {
 
 TEST(OnlineCalibration, SeveralParametersTogether) {
   loop::BenchSettings s = steady_bench(0.05);
-  s.tdc_error_cad = 0.8;
+  s.pressure.tdc_error_cad = 0.8;
   s.schedule[0].point.burn_duration_cad = 33.0;
   loop::EngineBench bench(s);
   OnlineCalibrationSettings g = wrong_guide(CalibrationMethod::recursive);
@@ -264,8 +264,8 @@ TEST(OnlineCalibration, SeveralParametersTogether) {
 // Fuel and burn of each point are off by another share; what belongs to the sensor is learnt over both.
 TEST(OnlineCalibration, WhatBelongsToAPointIsForgottenWithIt) {
   loop::BenchSettings s = steady_bench(0.3, 6);
-  s.tdc_error_cad = 0.4;
-  s.pressure_gain_error = -0.004;
+  s.pressure.tdc_error_cad = 0.4;
+  s.pressure.gain_error = -0.004;
   engine::OperatingPoint low, high;
   low.fuel_mg = 20.0 * 1.03;
   high.fuel_mg = 28.0 * 0.975;

@@ -63,9 +63,9 @@ Plant with_the_rest_off(Plant p) {
   point.burn_duration_cad = 30.0 * p.truth[Calibrated::burn_duration];
   point.fuel_mg *= p.truth[Calibrated::fuel_heat];
   p.bench.cylinder.gas.gamma += p.truth[Calibrated::gamma];
-  p.bench.tdc_error_cad = p.truth[Calibrated::tdc];
-  p.bench.pressure_gain_error = p.truth[Calibrated::gain] - 1.0;
-  p.bench.pressure_offset_bar = p.truth[Calibrated::offset];
+  p.bench.pressure.tdc_error_cad = p.truth[Calibrated::tdc];
+  p.bench.pressure.gain_error = p.truth[Calibrated::gain] - 1.0;
+  p.bench.pressure.offset_bar = p.truth[Calibrated::offset];
   p.told_error_cad = drawn(Calibrated::soc_offset);
   return p;
 }

@@ -57,8 +57,8 @@ TEST(PressureSensor, ExactItShowsTheCycleOnTheCrankGrid) {
 
 TEST(PressureSensor, GainAndOffsetAreThoseOfALine) {
   BenchSettings s = quiet_bench();
-  s.pressure_gain_error = 0.02;
-  s.pressure_offset_bar = -0.3;
+  s.pressure.gain_error = 0.02;
+  s.pressure.offset_bar = -0.3;
   EngineBench bench(s);
   const std::vector<double> shown = trace_of(bench, -6.0), real = true_trace(-6.0);
   for (std::size_t k = 0; k < real.size(); ++k)
@@ -71,7 +71,7 @@ TEST(PressureSensor, ALateTdcShowsEachPressureLater) {
   const auto at = [&](double angle) { return fine[static_cast<std::size_t>(std::lround((angle + 140.0) / 0.0625))]; };
   for (const double error : {0.5625, -0.6875, 2.0}) {
     BenchSettings s = quiet_bench();
-    s.tdc_error_cad = error;
+    s.pressure.tdc_error_cad = error;
     s.step_cad = 0.25;
     EngineBench bench(s);
     bench.step(-6.0);
@@ -93,7 +93,7 @@ TEST(PressureSensor, OneDegreeOfTdcIsNinePercentOfWork) {
   const engine::Geometry<double> geometry{engine::GeometryParameters<double>{}};
   const auto imep = [&](double error) {
     BenchSettings s = quiet_bench();
-    s.tdc_error_cad = error;
+    s.pressure.tdc_error_cad = error;
     EngineBench bench(s);
     bench.step(-6.0);
     const PressureTrace trace = bench.pressure();
@@ -113,10 +113,10 @@ TEST(PressureSensor, NoiseIsWhiteAndNothingElseHearsOfIt) {
   BenchSettings s;
   s.misfire_probability = 0.05;
   EngineBench silent(s);
-  s.pressure_noise_bar = 0.4;
-  s.tdc_error_cad = 0.3;
+  s.pressure.noise_bar = 0.4;
+  s.pressure.tdc_error_cad = 0.3;
   EngineBench noisy(s);
-  s.pressure_noise_bar = 0.0;
+  s.pressure.noise_bar = 0.0;
   EngineBench clean(s);
   double square = 0.0, neighbour = 0.0, next_cycle = 0.0;
   std::vector<double> before;
@@ -160,7 +160,7 @@ TEST(PressureSensor, ShowsTheBurnOfTheCycleWithItsScatterDriftAndMisfires) {
 
 TEST(PressureSensor, ReadingMovesNothingAndSurvivesARestart) {
   BenchSettings s;
-  s.pressure_noise_bar = 0.2;
+  s.pressure.noise_bar = 0.2;
   s.wall_heat_drift_per_kcycle = 3.0;
   EngineBench watched(s), alone(s);
   for (int k = 0; k < 30; ++k) {
@@ -190,12 +190,12 @@ TEST(PressureSensor, RefusesByName) {
     }
     return "";
   };
-  EXPECT_NE(message([](auto& s) { s.pressure_noise_bar = -1.0; }).find("pressure_noise_bar = -1 bar"),
+  EXPECT_NE(message([](auto& s) { s.pressure.noise_bar = -1.0; }).find("pressure_noise_bar = -1 bar"),
             std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.tdc_error_cad = 6.0; }).find("tdc_error_cad = 6"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.pressure_gain_error = std::nan(""); }).find("pressure_gain_error"),
+  EXPECT_NE(message([](auto& s) { s.pressure.tdc_error_cad = 6.0; }).find("tdc_error_cad = 6"), std::string::npos);
+  EXPECT_NE(message([](auto& s) { s.pressure.gain_error = std::nan(""); }).find("pressure_gain_error"),
             std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.pressure_offset_bar = 9.0; }).find("pressure_offset_bar = 9"), std::string::npos);
+  EXPECT_NE(message([](auto& s) { s.pressure.offset_bar = 9.0; }).find("pressure_offset_bar = 9"), std::string::npos);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ inline constexpr int wall = guide::Calibrated::wall_heat_scale;
 /// The default engine without scatter of the start of combustion; its wall heat is 0.5.
 inline loop::BenchSettings steady_bench(double noise_bar = 0.0, std::uint64_t seed = 0) {
   loop::BenchSettings s = quiet_bench();
-  s.pressure_noise_bar = noise_bar;
+  s.pressure.noise_bar = noise_bar;
   s.seed = seed;
   return s;
 }

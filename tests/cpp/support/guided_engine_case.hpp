@@ -61,7 +61,7 @@ inline std::optional<OnlineCalibration> calibration() {
 inline loop::EngineBench bench_at(std::vector<loop::ScheduledPoint> schedule, std::uint64_t seed) {
   loop::BenchSettings s;
   s.schedule = std::move(schedule);
-  s.pressure_noise_bar = 0.05;
+  s.pressure.noise_bar = 0.05;
   s.seed = seed;
   return loop::EngineBench(s);
 }

@@ -57,10 +57,7 @@ struct BenchSettings {
   double soc_drift_cad_per_kcycle = 0.0;    ///< offset of SOC, per 1000 cycles, in [-100, 100]
   double wall_heat_drift_per_kcycle = 0.0;  ///< [-] change of wall_heat_scale per 1000 cycles, in [-100, 100]
 
-  double pressure_noise_bar = 0.0;   ///< standard deviation of each sample of the pressure trace, in [0, 20]
-  double tdc_error_cad = 0.0;        ///< angles of the trace read that much high, in [-5, 5]
-  double pressure_gain_error = 0.0;  ///< [-] pressure reads that share high, in [-0.5, 0.5]
-  double pressure_offset_bar = 0.0;  ///< error of pegging, in [-5, 5]
+  PressureSensorSettings pressure{};
 
   engine::NoxModel true_nox{.map = engine::NoxMap::arrhenius};
   engine::SoftSensor soft_sensor{};
@@ -75,6 +72,7 @@ struct BenchSettings {
 };
 constexpr auto fields_of(const BenchSettings&) {
   using S = BenchSettings;
+  using P = PressureSensorSettings;
   return std::tuple{
       field<&S::cylinder>("cylinder", "the engine", DefaultForm::required),
       field<&S::schedule>("schedule", "first cycle of each operating point", DefaultForm::required),
@@ -92,14 +90,14 @@ constexpr auto fields_of(const BenchSettings&) {
           {"soc_drift_cad_per_kcycle", "°CA", closed(-100.0, 100.0), "offset of SOC per 1000 cycles"}),
       field<&S::wall_heat_drift_per_kcycle>(
           {"wall_heat_drift_per_kcycle", "-", closed(-100.0, 100.0), "change of wall_heat_scale per 1000 cycles"}),
-      field<&S::pressure_noise_bar>(
+      field<&S::pressure, &P::noise_bar>(
           {"pressure_noise_bar", "bar", closed(0.0, 20.0),
            "noise of each sample of the pressure trace, standard deviation; indicators have none of it"}),
-      field<&S::tdc_error_cad>(
+      field<&S::pressure, &P::tdc_error_cad>(
           {"tdc_error_cad", "°CA", closed(-5.0, 5.0), "angles of the pressure trace read that much high"}),
-      field<&S::pressure_gain_error>(
+      field<&S::pressure, &P::gain_error>(
           {"pressure_gain_error", "-", closed(-0.5, 0.5), "share by which the pressure trace reads high"}),
-      field<&S::pressure_offset_bar>(
+      field<&S::pressure, &P::offset_bar>(
           {"pressure_offset_bar", "bar", closed(-5.0, 5.0), "by which the pressure trace is pegged too high"}),
       field<&S::true_nox>("true_nox", "NOx of the plant from its own maximum gas temperature: an Arrhenius map",
                           DefaultForm::none),
