@@ -1,14 +1,13 @@
-"""Draw the picture of the README: a calibrated trace, and its best timing as a range.
+"""Draw the pictures of the README: a calibrated trace with its best timing as a range, and the run of its example.
 
-Run `python tools/readme_picture.py [FILE]` with the package installed; FILE defaults to docs/_static/engine_cycle.png,
-and its suffix chooses the format.
+Run `python tools/readme_picture.py` with the package installed; they go to docs/_static.
 """
 
 from __future__ import annotations
 
-import sys
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -23,7 +22,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-OUT = Path(__file__).parents[1] / "docs" / "_static" / "engine_cycle.png"
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "docs" / "_static"
 LOAD = 1  # the trace at 50 % load
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0072B2", "#D55E00", "#777777"
 
@@ -64,23 +64,29 @@ def draw_timing(ax: Axes, row: BestTiming) -> None:
     ax.set_title("Best timing: equally good models disagree", loc="left")
 
 
+def draw_example() -> None:
+    """Run the example of the README and keep its figure."""
+    code = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)[0]
+    names: dict[str, Any] = {}
+    exec(code, names)  # noqa: S102
+    names["figure"].savefig(FOLDER / "readme_run.png", dpi=150, metadata={"Software": None})
+
+
 def main() -> None:
     """Fit, draw, write."""
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     row = best_timing(traces, cylinder)[LOAD]
     if row.best is None:
         raise SystemExit("no plausible model: there is nothing to draw")
-    plt.rcParams |= {"font.size": 9.5, "axes.titlesize": 9.5, "legend.fontsize": 9.0, "svg.hashsalt": "mgdd"}
-    fig, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.5), layout="constrained")
-    draw_trace(left, analyze(traces[LOAD], cylinder), row.best.member.fit.loads[LOAD])
-    draw_timing(right, row)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    metadata = {"Date": None} if out.suffix == ".svg" else {"Software": None}
-    fig.savefig(out, dpi=200, metadata=metadata)
+    with plt.rc_context({"font.size": 9.5, "axes.titlesize": 9.5, "legend.fontsize": 9.0}):
+        fig, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.5), layout="constrained")
+        draw_trace(left, analyze(traces[LOAD], cylinder), row.best.member.fit.loads[LOAD])
+        draw_timing(right, row)
+        fig.savefig(FOLDER / "engine_cycle.png", dpi=200, metadata={"Software": None})
+    draw_example()
 
 
 if __name__ == "__main__":

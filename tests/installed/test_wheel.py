@@ -12,16 +12,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
 PACKAGE_FILES = re.compile(
     r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|report/templates/[^/]+\.(html|css)"
     r"|data/([^/]+/)*[^/]+\.(csv|txt)|rig/(can/buses|envelopes)/[^/]+\.(dbc|toml)|.*\.pyc)"
     r"|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
 )
 HEAVY = {"scipy", "xarray", "pandas", "matplotlib", "rich", "jinja2", "pooch", "packaging"}
-# Commands of the README that ask for no file of the reader's own; those of the rig are run as one block below.
+# Commands of the tour that ask for no file of the reader's own; those of the rig are run as one block below.
 COMMANDS = [
     line
-    for block in re.findall(r"```console\n(.*?)```", README, re.DOTALL)
+    for block in re.findall(r"```console\n(.*?)```", TOUR, re.DOTALL)
     for line in block.splitlines()
     if line.startswith("mgdd ")
     and not line.startswith("mgdd rig ")
@@ -76,25 +77,25 @@ def test_import_is_light(environment: Path, tmp_path: Path) -> None:
     assert loaded & HEAVY == set()
 
 
-def test_python_of_the_readme_runs(environment: Path, tmp_path: Path) -> None:
-    blocks = re.findall(r"^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
-    assert len(blocks) >= 3
+def test_python_of_readme_and_tour_runs(environment: Path, tmp_path: Path) -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", README + TOUR, re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 4
     call(environment / "bin" / "python", "-c", "\n".join(blocks), cwd=tmp_path)
 
 
 @pytest.mark.parametrize("line", COMMANDS)
-def test_command_of_the_readme_runs(environment: Path, tmp_path: Path, line: str) -> None:
+def test_command_of_the_tour_runs(environment: Path, tmp_path: Path, line: str) -> None:
     assert call(environment / "bin" / "mgdd", *shlex.split(line)[1:], cwd=tmp_path)
 
 
-def test_rig_of_the_readme_runs(environment: Path, tmp_path: Path) -> None:
+def test_rig_of_the_tour_runs(environment: Path, tmp_path: Path) -> None:
     """With what the extra `can` asks for; it comes last: everything above runs without."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     clean |= {"MPLBACKEND": "Agg", "PATH": f"{environment / 'bin'}{os.pathsep}{os.environ['PATH']}"}
     code = "import importlib.metadata as m; print(*m.requires('mgdd'), sep='\\n')"
     asked = call(environment / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
     wanted = [line.partition(";")[0].strip() for line in asked if re.search(r"extra == .can\b", line)]
-    block = next(text for text in re.findall(r"```console\n(.*?)```", README, re.DOTALL) if "mgdd rig " in text)
+    block = next(text for text in re.findall(r"```console\n(.*?)```", TOUR, re.DOTALL) if "mgdd rig " in text)
     for words in (
         [str(environment / "bin" / "python"), "-m", "pip", "install", "-q", *wanted],
         ["sh", "-e", "-c", block],

@@ -1,4 +1,4 @@
-"""The README is true today: its numbers are recomputed, its commands exist, its picture is there."""
+"""README and tour are true today: their numbers are recomputed, their commands exist, their pictures are there."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from study_cache import quick_study
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
 
 
 def span(pair: list[float], form: str) -> str:
@@ -19,7 +20,7 @@ def span(pair: list[float], form: str) -> str:
 
 
 def test_table_of_the_demo() -> None:
-    table = README.split("<!-- numbers: demo -->")[1].split("<!-- end numbers -->")[0]
+    table = TOUR.split("<!-- numbers: demo -->")[1].split("<!-- end numbers -->")[0]
     written = [line for line in table.splitlines() if re.match(r"\| \d+ %", line)]
     summary = quick_study("measured-traces").summary
     computed = []
@@ -49,7 +50,7 @@ def test_pictures_and_links_exist() -> None:
 
 
 def test_commands_parse(capsys: pytest.CaptureFixture[str]) -> None:
-    block = re.findall(r"```console\n(.*?)```", README, re.DOTALL)
+    block = re.findall(r"```console\n(.*?)```", TOUR, re.DOTALL)
     commands = {tuple(line.split()[1:3]) for text in block for line in text.splitlines() if line.startswith("mgdd ")}
     assert ("engine", "calibrate") in commands
     for command in sorted(commands):
@@ -58,3 +59,15 @@ def test_commands_parse(capsys: pytest.CaptureFixture[str]) -> None:
             main([*words, "--help"])
         assert stop.value.code == 0
         assert "example" in capsys.readouterr().out
+
+
+def test_it_is_short() -> None:
+    assert len(README.split()) < 700
+
+
+def test_numbers_in_comments_are_what_the_code_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    written = [number for text in code for number in re.findall(r"^print\(.*\)  # ([-\d.]+)", text, re.MULTILINE)]
+    exec("\n".join(code), {})  # noqa: S102
+    assert capsys.readouterr().out.split() == written
+    assert len(written) > 2
