@@ -129,7 +129,7 @@ def test_steps_outside_their_bounds(step):
 
 
 def test_other_arguments():
-    with pytest.raises(ParameterError, match=r"integrator = 'rk4'.*trapezoid, split, seed, euler"):
+    with pytest.raises(ParameterError, match=r"integrator = 'rk4'.*trapezoid, split, tan2018_lagged, euler"):
         simulate(CYLINDER, POINT, integrator="rk4")
     with pytest.raises(ParameterError, match=r"step_cad.*0\.004"):
         convergence(CYLINDER, POINT, step_cad=0.003)

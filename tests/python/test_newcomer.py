@@ -216,3 +216,21 @@ def test_limits_have_one_grammar() -> None:
         criteria = mgdd.loop.LoopCriteria(limits=limits)
         made.append(mgdd.loop.run_seeker(bench, seeker, 40, criteria=criteria).summary)
     assert made[0]["limit_p_max_bar"] == made[1]["limit_p_max_bar"] == 95
+
+
+def test_a_point_beside_a_trace_is_a_record_a_preset_or_numbers() -> None:
+    preset = mgdd.presets.load("puma_single")
+    cycle = mgdd.engine.simulate(preset, soc_cad=-6.0)
+    trace = pd.DataFrame({name: cycle[name] for name in ("crank_angle_cad", "pressure_bar")})
+    warmer = {"intake_temperature_k": 360.0}
+    found = [
+        mgdd.engine.analyze(trace, preset, point=each)
+        for each in (preset, preset.point, warmer, mgdd.engine.OperatingPoint().replace(**warmer))
+    ]
+    assert found[0].identical(found[1])
+    assert found[2].identical(found[3])
+    assert not found[0].identical(found[2])
+    with pytest.raises(ParameterError, match=r"point = 140\.0: must be an OperatingPoint"):
+        mgdd.engine.analyze(trace, preset, point=140.0)
+    with pytest.raises(ParameterError, match=r"point = 140\.0: must be an OperatingPoint"):
+        mgdd.identify.fit_cylinder([trace], preset, point=140.0)

@@ -245,7 +245,8 @@ def test_two_nodes_with_the_identifier_of_the_measurement() -> None:
         CanTransport("virtual", "twins") as spy,
         sending("twins", lambda: [*one.frames(status, [bytes(8)]), *other.frames(status, [bytes(8)])]),
     ):
-        with pytest.raises(RigError, match=r"alive counter of ETB_Status \(0x121\) jumps .*two nodes send it"):
+        late = r"ETB_Status \(0x121\) came, too few of them valid .*two senders of it"  # of a computer that is too busy
+        with pytest.raises(RigError, match=rf"alive counter of ETB_Status \(0x121\) jumps .*two nodes send it|{late}"):
             rig_on("twins").open()
         assert commands(spy) == []
 

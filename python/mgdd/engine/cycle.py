@@ -60,8 +60,8 @@ def simulate(
         Crank step [°CA], in [0.001, 5]; the last step is shortened.
     integrator : {"trapezoid", "split", "tan2018_lagged", "euler"}
         ``tan2018_lagged`` is the printed scheme of Tan (2018), kept for reproduction: it creates energy. Without wall
-        heat ``trapezoid`` and ``split`` are of second order in the step, ``euler`` and ``tan2018_lagged`` of first (1.7 %
-        too little and 3.1 % too much closed IMEP at 1 °CA), with either gamma law.
+        heat ``trapezoid`` and ``split`` are of second order in the step, ``euler`` and ``tan2018_lagged`` of first
+        (1.7 % too little and 3.1 % too much closed IMEP at 1 °CA), with either gamma law.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace_cycles import is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.pressure import as_trace
-from mgdd.presets.meant import CylinderLike, cylinder_of
+from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def analyze(
     trace: Any,
     cylinder: CylinderLike,
     *,
-    point: OperatingPoint | None = None,
+    point: PointLike | None = None,
     pegging: str = "none",
     pegging_exponent: float = 1.35,
     inlet_pressure_kpa: float | None = None,
@@ -67,7 +67,7 @@ def analyze(
         bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
-    point : OperatingPoint, optional
+    point : OperatingPoint, Preset or mapping of str to float, optional
         Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
         ``ivc_temperature_k`` or the intake temperature + 40 K.
     pegging : {"none", "inlet", "two_point", "least_squares"}
@@ -149,7 +149,7 @@ def analyze(
     9.4
     14.9
     """
-    cylinder = cylinder_of(cylinder)
+    cylinder, point = cylinder_of(cylinder), point_of(point)
     trace = trace if is_of_cycles(trace) else as_trace(trace)
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:

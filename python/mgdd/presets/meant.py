@@ -13,7 +13,16 @@ from mgdd.errors import ParameterError
 from mgdd.presets.preset import Preset, available, load
 from mgdd.results import Fit
 
-__all__ = ["CylinderLike", "PointLike", "ThrottleLike", "cylinder_of", "engine_of", "throttle_model_of", "throttle_of"]
+__all__ = [
+    "CylinderLike",
+    "PointLike",
+    "ThrottleLike",
+    "cylinder_of",
+    "engine_of",
+    "point_of",
+    "throttle_model_of",
+    "throttle_of",
+]
 
 CylinderLike = str | os.PathLike[str] | Preset | Cylinder | Fit
 PointLike = OperatingPoint | Preset | Mapping[str, float]
@@ -55,6 +64,18 @@ def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
     raise _refusal(argument, given, "a Cylinder", "engine")
 
 
+def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoint | None:
+    """Return the operating point that is meant, None for None; numbers by name replace those of a nominal one."""
+    if given is None or isinstance(given, OperatingPoint):
+        return given
+    if isinstance(given, Preset):
+        return given.point
+    if isinstance(given, Mapping):
+        return (nominal or OperatingPoint()).replace(**given)
+    bound = "an OperatingPoint, a preset, or numbers by name, as {'speed_rpm': 1200.0}"
+    raise ParameterError(f"point = {shown(given)}: must be {bound}", field="point", value=given, bound=bound)
+
+
 def engine_of(
     cylinder: Any, point: Any = None, *, argument: str = "cylinder", **fields: float | None
 ) -> tuple[Cylinder, OperatingPoint]:
@@ -92,15 +113,9 @@ def engine_of(
     """
     meant = _loaded(cylinder, "engine")
     own, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
-    if isinstance(point, Preset):
-        point = point.point
     changes = {name: value for name, value in fields.items() if value is not None}
-    if isinstance(point, Mapping):
-        point, changes = nominal, {**point, **changes}
-    elif point is not None and not isinstance(point, OperatingPoint):
-        bound = "an OperatingPoint, a preset, or numbers by name, as {'speed_rpm': 1200.0}"
-        raise ParameterError(f"point = {shown(point)}: must be {bound}", field="point", value=point, bound=bound)
-    elif point is None and not changes and not isinstance(meant, Preset):
+    point = point_of(point, nominal)
+    if point is None and not changes and not isinstance(meant, Preset):
         raise TypeError(
             "point is missing: a Cylinder has no operating point of its own; give an OperatingPoint, or numbers by "
             "name as {'speed_rpm': 1200.0}, or a preset instead of the Cylinder"

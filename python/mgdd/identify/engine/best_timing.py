@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd._core.engine import OperatingPoint
 from mgdd._core.optimize import Limit
 from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import DEFAULT_CAD, check_request
@@ -18,7 +17,7 @@ from mgdd.identify.engine.request import Bounds, Request
 from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
-from mgdd.presets.meant import CylinderLike
+from mgdd.presets.meant import CylinderLike, PointLike
 
 if TYPE_CHECKING:
     from mgdd.identify.engine.tdc import TdcEstimate
@@ -35,7 +34,7 @@ def best_timing(
     family: ModelFamily | None = None,
     fuel_heat_j: float | Sequence[float | None] | None = None,
     bounds: Bounds | None = None,
-    point: OperatingPoint | None = None,
+    point: PointLike | None = None,
     objective: str = "imep_closed_bar",
     limits: Mapping[str, float] | Sequence[Limit] | None = None,
     bounds_cad: tuple[float, float] | None = None,

@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from mgdd import _core
-from mgdd._core.engine import OperatingPoint
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit
-from mgdd.presets.meant import CylinderLike, cylinder_of
+from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +29,7 @@ def compare_laws(
     traces: Sequence[xr.Dataset],
     cylinder: CylinderLike,
     *,
-    point: OperatingPoint | None = None,
+    point: PointLike | None = None,
     laws: Sequence[tuple[str, str]] = LAWS,
     fuel_heat_j: float | Sequence[float | None] | None = None,
     progress: Callable[[str], None] | None = None,

@@ -17,7 +17,7 @@ from mgdd.identify.engine.findings import findings_of
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.presets.meant import CylinderLike
+from mgdd.presets.meant import CylinderLike, PointLike
 from mgdd.results import FitReport
 from mgdd.results.fit import FitQuality
 from mgdd.results.labels import ANGLE, labelled_dataset
@@ -35,7 +35,7 @@ def fit_cylinder(
     free: Sequence[str] | None = None,
     fuel_heat_j: float | Sequence[float | None] | None = None,
     bounds: Bounds | None = None,
-    point: OperatingPoint | None = None,
+    point: PointLike | None = None,
     start_values: Sequence[Mapping[str, float]] | None = None,
     pegging: str = "none",
     pegging_exponent: float = 1.35,
@@ -67,7 +67,7 @@ def fit_cylinder(
         Lower and upper bound of a free parameter, ``NAME`` for all traces or ``NAME[file]`` for one; None leaves a side
         open. Unless said here, a burn starts at the earliest at the injection or spark of its trace, and gamma stays in
         1.15 to 1.45 (linear law at 300 K: 1.28 to 1.45).
-    point : OperatingPoint, optional
+    point : OperatingPoint, Preset or mapping of str to float, optional
         Conditions that a trace does not carry.
     start_values : sequence of mapping, optional
         Start values of the per-trace parameters; from the heat release of the trace if left out.

@@ -17,7 +17,7 @@ from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.pressure import one_cycle
 from mgdd.optimize.fit_options import FitOptions
-from mgdd.presets.meant import CylinderLike, cylinder_of
+from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Request:
         free: Sequence[str] | None,
         fuel_heat_j: float | Sequence[float | None] | None,
         bounds: Bounds | None,
-        point: OperatingPoint | None,
+        point: PointLike | None,
         start_values: Sequence[Mapping[str, float]] | None,
         step_cad: float,
         integrator: str,
@@ -74,7 +74,7 @@ class Request:
         """Check the arguments of `fit_cylinder` against each other."""
         if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
             raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
-        cylinder = cylinder_of(cylinder)
+        cylinder, point = cylinder_of(cylinder), point_of(point)
         given = [one_cycle(trace) for trace in traces]
         if not given:
             raise DataError("no traces: a calibration needs at least one")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core.engine import OperatingPoint
 from mgdd.engine import analyze, simulate
 from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
@@ -16,7 +15,7 @@ from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import of_law
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Bounds, Request, closed
-from mgdd.presets.meant import CylinderLike, cylinder_of
+from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import Result
 from mgdd.results.units import unit_attributes
@@ -117,7 +116,7 @@ def estimate_tdc(
     traces: Sequence[Any],
     cylinder: CylinderLike,
     *,
-    point: OperatingPoint | None = None,
+    point: PointLike | None = None,
     fuel_heat_j: float | Sequence[float | None] | None = None,
     bounds: Bounds | None = None,
     span_cad: float = 3.0,
