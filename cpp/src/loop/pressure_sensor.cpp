@@ -34,10 +34,11 @@ PressureTrace PressureSensor::read(const engine::CycleModel<double>& model, cons
     return work.pressure_pa.back() * std::pow(expansion, model.cylinder().gas.gamma);
   };
   const auto first = static_cast<std::uint64_t>(cycle) * label_cad_.size();
+  const double offset_bar = settings_.offset_bar + settings_.drift_bar_per_kcycle * 1e-3 * static_cast<double>(cycle);
   for (std::size_t k = 0; k < label_cad_.size(); ++k) {
     const std::optional<CubicWeights>& weights = weights_[k];
     const double pa = weights ? weights->value_of(work.pressure_pa) : open_pa(label_cad_[k] - settings_.tdc_error_cad);
-    pressure_bar_[k] = pa / units::pa_per_bar * (1.0 + settings_.gain_error) + settings_.offset_bar;
+    pressure_bar_[k] = pa / units::pa_per_bar * (1.0 + settings_.gain_error) + offset_bar;
     if (settings_.noise_bar > 0.0) pressure_bar_[k] += settings_.noise_bar * random::normal(seed, stream, first + k);
   }
   return out;

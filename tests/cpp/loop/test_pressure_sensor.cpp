@@ -65,6 +65,19 @@ TEST(PressureSensor, GainAndOffsetAreThoseOfALine) {
     EXPECT_NEAR(shown[k], 1.02 * real[k] - 0.3, 1e-12);
 }
 
+TEST(PressureSensor, TheOffsetDriftsFromCycleToCycle) {
+  BenchSettings s = quiet_bench();
+  s.pressure.offset_bar = -0.3;
+  s.pressure.drift_bar_per_kcycle = 40.0;
+  EngineBench bench(s);
+  const std::vector<double> real = true_trace(-6.0);
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    const std::vector<double> shown = trace_of(bench, -6.0);
+    for (std::size_t k = 0; k < real.size(); k += 29)
+      EXPECT_NEAR(shown[k], real[k] - 0.3 + 0.04 * cycle, 1e-12) << cycle;
+  }
+}
+
 // A finer grid, which holds the shifted angles, gives what must be read there; 4e-4 is the error of its step.
 TEST(PressureSensor, ALateTdcShowsEachPressureLater) {
   const std::vector<double> fine = true_trace(-6.0, 0.0625);

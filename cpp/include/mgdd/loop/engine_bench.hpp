@@ -99,6 +99,8 @@ constexpr auto fields_of(const BenchSettings&) {
           {"pressure_gain_error", "-", closed(-0.5, 0.5), "share by which the pressure trace reads high"}),
       field<&S::pressure, &P::offset_bar>(
           {"pressure_offset_bar", "bar", closed(-5.0, 5.0), "by which the pressure trace is pegged too high"}),
+      field<&S::pressure, &P::drift_bar_per_kcycle>({"pressure_drift_bar_per_kcycle", "bar", closed(-100.0, 100.0),
+                                                     "change of pressure_offset_bar per 1000 cycles"}),
       field<&S::true_nox>("true_nox", "NOx of the plant from its own maximum gas temperature: an Arrhenius map",
                           DefaultForm::none),
       field<&S::soft_sensor>("soft_sensor", "the soft sensor: an affine-log map of the same constants",

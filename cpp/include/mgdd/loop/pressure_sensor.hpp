@@ -18,6 +18,7 @@ struct PressureSensorSettings {
   double tdc_error_cad = 0.0;  ///< the label of an angle less the true angle: > 0 reports the cycle late
   double gain_error = 0.0;     ///< [-] share by which pressure reads high
   double offset_bar = 0.0;
+  double drift_bar_per_kcycle = 0.0;  ///< of the offset, as of a charge amplifier that warms up
 };
 
 /// Angles as labelled, and the pressure read there. Both empty before the first cycle.
