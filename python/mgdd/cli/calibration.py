@@ -6,12 +6,14 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder
-from mgdd.cli.options import engine_of, traces_of
+from mgdd.cli.from_library import Options, named_options
+from mgdd.cli.options import CYLINDER_CHOICES, SCHEME, engine_of, traces_of
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.cli.study import run_or_part
+from mgdd.engine import analyze
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import estimate_tdc, fit_cylinder, wall_heat_profile
-from mgdd.identify.engine.burn_laws import compare_laws
+from mgdd.identify.engine.burn_laws import better_laws, compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.identify.engine.tdc import TdcEstimate
@@ -23,15 +25,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "PEGGING",
     "TDC_SPAN_CAD",
     "add_calibration",
-    "add_pegging",
     "calibrate",
     "calibration_arguments",
     "check_pegging",
     "traces_for",
 ]
 
+PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
 TDC_SPAN_CAD = 2.0
 _PER_TRACE = (
     "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "
@@ -42,17 +45,10 @@ _PER_TRACE = (
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Add how the traces of a calibration are made absolute."""
     group = parser.add_argument_group("pressure of the traces")
-    add_pegging(group)
+    PEGGING.add(group)
     group.add_argument(
         "--mean-cycle", action="store_true", help="calibrate to the mean of a file's cycles (one cycle is needed)"
     )
-
-
-def add_pegging(group: Any) -> None:
-    """Add how pressure is made absolute."""
-    group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
-    group.add_argument("--pegging-exponent", type=float, metavar="X", help="default: 1.35")
-    group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
 
 
 def traces_for(args: argparse.Namespace) -> list[xr.Dataset]:
@@ -73,9 +69,7 @@ def calibration_arguments(args: argparse.Namespace, cylinder: Cylinder) -> dict[
     """Give pegging, and the fuel heat where the fuel was said, as arguments of `fit_cylinder` and `best_timing`."""
     check_pegging(args)
     return {
-        "pegging": args.pegging,
-        "pegging_exponent": args.pegging_exponent or 1.35,
-        "inlet_pressure_kpa": args.inlet_pressure_kpa,
+        **PEGGING.given(args),
         "fuel_heat_j": None if args.fuel_mg is None else args.fuel_mg * cylinder.lower_heating_value_mj_per_kg,
     }
 
@@ -86,7 +80,7 @@ def calibrate(args: argparse.Namespace) -> None:
     cylinder, point, preset = engine_of(args)
     traces = traces_for(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
-    scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
+    scheme = SCHEME.given(args)
     step = args.progress.expect(45 + (90 if args.report_folder else 0))
     step("calibrate")
     pegging = calibration_arguments(args, cylinder)
@@ -105,7 +99,8 @@ def calibrate(args: argparse.Namespace) -> None:
             "measured-traces", traces=traces, cylinder=cylinder, point=point, progress=step, **scheme
         )
         write_report(result, args.report_folder)
-    payload = {"preset": preset.name, **_payload(fit, profile, laws, tdc)}
+    with named_options(**{field: option for option, field in CYLINDER_CHOICES.items()}):
+        payload = {"preset": preset.name, **_payload(fit, profile, laws, tdc)}
     emit(args, payload, text=payload["report"])
     if stopped:
         raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
@@ -149,7 +144,7 @@ def _payload(
         "unidentifiable": ordered,
         "laws": [law_row(law) for law in laws],
         "tdc": tdc_payload(tdc),
-        "warnings": [*(str(finding) for finding in fit.findings), *tdc.doubts(), *_better_laws(fit, laws)],
+        "warnings": [*(str(finding) for finding in fit.findings), *tdc.doubts(), *better_laws(fit, laws)],
         "cylinder": fit.model.to_dict(),
         "report": _report(fit, profile, laws, ordered, tdc),
     }
@@ -159,17 +154,6 @@ def tdc_payload(tdc: TdcEstimate) -> dict[str, Any]:
     """Give an estimate of TDC as plain values."""
     names = ("method", "tdc_offset_cad", "low_cad", "high_cad", "suspect")
     return {**{name: getattr(tdc, name) for name in names}, "others_cad": list(tdc.others_cad)}
-
-
-def _better_laws(fit: CylinderFit, laws: list[CylinderFit]) -> list[str]:
-    """Name a law that meets the traces much better than the one that was asked for."""
-    best = min(laws, key=lambda law: law.report.rmse if law.report.rmse == law.report.rmse else float("inf"))
-    if not best.report.rmse < 0.7 * fit.report.rmse:
-        return []
-    rmse, own = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
-    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}"
-    remedy = "--burn and --gamma choose the law, mgdd engine optimum compares a family"
-    return [f"{met}: do not read burn, fuel heat or wall heat from the latter; {remedy}"]
 
 
 def _was_fitted(fit: CylinderFit, name: str) -> bool:
@@ -200,7 +184,7 @@ def _report(
     if unidentifiable:
         out += ["", f"not identifiable: {', '.join(unidentifiable)}"]
     out += ["", f"TDC offset {tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
-    doubts = [*map(str, fit.findings), *tdc.doubts(), *_better_laws(fit, laws)]
+    doubts = [*map(str, fit.findings), *tdc.doubts(), *better_laws(fit, laws)]
     if doubts:
         out += ["", "what to distrust:", *(f"  - {text}" for text in doubts)]
     out += ["", "every burn law on the same traces:"]

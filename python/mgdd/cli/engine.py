@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import math
 from typing import Any
 
-from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.analyze import add_analyze
 from mgdd.cli.calibration import TDC_SPAN_CAD, add_calibration, calibrate, calibration_arguments, traces_for
+from mgdd.cli.from_library import Options, default_of, shown
 from mgdd.cli.options import (
+    SCHEME,
     add_command,
     add_engine,
     add_files,
     add_group,
-    add_scheme,
     engine_of,
     number_pairs,
     refuse_idle,
@@ -23,15 +22,17 @@ from mgdd.cli.options import (
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.seek import add_seek
 from mgdd.cli.sweep import add_sweep
-from mgdd.engine import find_optimum, ignition_delay, simulate, timing_sweep
-from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify import best_timing, estimate_tdc
+from mgdd.engine import find_optimum, simulate, timing_sweep
+from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
+from mgdd.errors import ConvergenceError
+from mgdd.identify import best_timing, estimate_tdc, fit_cylinder
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
 from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
 
 __all__ = ["add"]
 
-_DEFAULT_SOC_CAD = -6.0
+_TIMING = Options(simulate, "soc_cad")
+_SEARCH = Options(find_optimum, "objective", "bounds_cad")
 _RANGED = ("soc_cad", "ca50_cad", "shift_cad", "gain_percent")
 
 
@@ -58,52 +59,26 @@ def _add_simulate(verbs: Any) -> None:
         endings=".json or .csv",
     )  # fmt: skip
     timing = parser.add_mutually_exclusive_group()
-    timing.add_argument(
-        "--soc-cad", type=float, metavar="X", help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})"
-    )
+    _TIMING.add(timing)
     timing.add_argument(
         "--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on"
     )
     add_engine(parser)
-    add_scheme(parser, step_cad=1.0)
+    SCHEME.add(parser, "scheme")
 
 
 def _simulate(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
-    soc = _start_of_combustion(args, cylinder, point)
-    cycle = simulate(cylinder, point, soc_cad=soc, step_cad=args.step_cad, integrator=args.integrator)
+    timing = _TIMING.of(args)
+    if args.soi_cad is not None:
+        timing["soc_cad"] = ignited_soc_cad(cylinder, point, soi_cad=args.soi_cad)
+    scheme = SCHEME.of(args)
+    cycle = simulate(cylinder, point, **timing, **scheme)
     scalars = {str(name): float(v) for name, v in cycle.data_vars.items() if v.ndim == 0}
-    soi = args.soi_cad if args.soi_cad is not None else _injection_of(cylinder, point, soc)
-    payload = {
-        "preset": preset.name,
-        "integrator": args.integrator,
-        "step_cad": args.step_cad,
-        **scalars,
-        "soi_cad": soi,
-        "motored": point.fuel_mg == 0.0,
-    }
-    emit(args, payload, traces=cycle)
-
-
-def _injection_of(cylinder: Cylinder, point: OperatingPoint, soc: float) -> float:
-    timing = ignition_delay(cylinder, point, soc_cad=soc)
-    return math.nan if timing.clipped else timing.soi_cad
-
-
-def _start_of_combustion(args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint) -> float:
-    if args.soi_cad is None:
-        return _DEFAULT_SOC_CAD if args.soc_cad is None else float(args.soc_cad)
-    timing = ignition_delay(cylinder, point, soi_cad=args.soi_cad)
-    if not timing.ignites:
-        raise ConvergenceError(f"soi_cad = {args.soi_cad:g} does not ignite before EVO: inject earlier")
-    latest = _core.engine.timing_window_cad[1]
-    if timing.soc_cad > latest:
-        raise ParameterError(
-            f"soi_cad = {args.soi_cad:g} ignites at {timing.soc_cad:.1f} °CA aTDC, later than {latest:g}, the latest "
-            "start of combustion that is simulated: inject earlier"
-        )
-    return timing.soc_cad
+    soi = reached_soi_cad(cylinder, point, **timing) if args.soi_cad is None else args.soi_cad
+    known = {"soi_cad": soi, "motored": point.fuel_mg == 0.0}
+    emit(args, {"preset": preset.name, **scheme, **scalars, **known}, traces=cycle)
 
 
 def _add_calibrate(verbs: Any) -> None:
@@ -122,7 +97,8 @@ def _add_calibrate(verbs: Any) -> None:
     parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
     add_calibration(parser)
     add_engine(parser)
-    add_scheme(parser, step_cad=0.25)
+    Options(fit_cylinder, "step_cad").add(parser, "scheme")
+    Options(simulate, "integrator").add(parser)
 
 
 def _add_optimum(verbs: Any) -> None:
@@ -134,22 +110,16 @@ def _add_optimum(verbs: Any) -> None:
     )  # fmt: skip
     add_files(parser, nargs="*")
     parser.add_argument(
-        "--objective", choices=("efficiency_gross", "imep_gross_bar", "imep_closed_bar"),
-        help="default: efficiency_gross; with files imep_closed_bar, the work that a closed-valve trace carries",
-    )  # fmt: skip
-    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable"
     )
-    parser.add_argument(
-        "--bounds-cad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="searched range of SOC (default: -30 10)"
+    objective, step_cad = (
+        f"{shown(default_of(find_optimum, name))}, with files {shown(default_of(best_timing, name))}"
+        for name in ("objective", "step_cad")
     )
+    _SEARCH.add(parser, "search", objective=objective)
     add_calibration(parser)
     add_engine(parser)
-    add_scheme(parser, step_cad=None)
-
-
-def _bounds(args: argparse.Namespace) -> tuple[float, float] | None:
-    return (args.bounds_cad[0], args.bounds_cad[1]) if args.bounds_cad else None
+    SCHEME.add(parser, "scheme", step_cad=step_cad)
 
 
 def _optimum(args: argparse.Namespace) -> None:
@@ -159,10 +129,8 @@ def _optimum(args: argparse.Namespace) -> None:
     if args.files:
         _optimum_of_files(args, cylinder, point, limits, preset.name)
         return
-    scheme = {"step_cad": args.step_cad or 1.0, "integrator": args.integrator}
-    best = find_optimum(
-        cylinder, point, args.objective or "efficiency_gross", limits=limits, bounds_cad=_bounds(args), **scheme
-    )
+    scheme = SCHEME.given(args)
+    best = find_optimum(cylinder, point, limits=limits, **_SEARCH.given(args), **scheme)
     now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
     payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}
     payload |= {
@@ -173,7 +141,7 @@ def _optimum(args: argparse.Namespace) -> None:
     }
     payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
     payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
-    payload["soi_cad"] = _injection_of(cylinder, point, best["soc_cad"])
+    payload["soi_cad"] = reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])
     sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
     emit(args, payload, traces=sweep)
 
@@ -187,12 +155,10 @@ def _optimum_of_files(
         traces,
         cylinder,
         point=point,
-        objective=args.objective or "imep_closed_bar",
         limits=limits,
-        bounds_cad=_bounds(args),
         progress=args.progress.expect(70),
-        step_cad=args.step_cad or 0.25,
-        integrator=args.integrator,
+        **_SEARCH.given(args),
+        **SCHEME.given(args),
         **calibration_arguments(args, cylinder),
     )
     main = headline_of(rows)

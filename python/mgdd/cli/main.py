@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 from mgdd import _core
 from mgdd.cli import demo, doctor, engine, maps, rig, study, throttle
-from mgdd.cli.options import Parser, UsageError, as_option
+from mgdd.cli.from_library import as_option
+from mgdd.cli.options import Parser, UsageError
 from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
 from mgdd.errors import ConvergenceError, Error, arguments_written

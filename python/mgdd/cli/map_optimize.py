@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table, named_options
+from mgdd.cli.from_library import Options, named_options
+from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table
 from mgdd.cli.map_text import map_blocks
 from mgdd.cli.options import add_command, assignments, number_pairs
 from mgdd.cli.output import check_figure, check_output
@@ -17,6 +18,8 @@ from mgdd.maps import CalibrationMap, optimize_map, read_map, smooth_map
 
 __all__ = ["add_optimize", "add_smooth"]
 
+_OPTIMUM = Options(optimize_map, "max_loss", "infeasible", over="along")
+_SMOOTH = Options(smooth_map, "weight", "fill")
 _FORMS = ".csv, .json or .nc, which hold everything; .dcm for calibration tools"
 
 
@@ -37,25 +40,14 @@ def add_optimize(verbs: Any) -> None:
     goal.add_argument("--maximize", metavar="NAME", help="variable whose highest value is best, as efficiency_gross")
     goal.add_argument("--minimize", metavar="NAME", help="variable whose lowest value is best, as a consumption")
     parser.add_argument(
-        "--along", default="soc_cad", metavar="NAME", help="the input that is chosen per operating point (soc_cad)"
-    )
-    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help="keep a variable of the table at or below X, in the unit that its name ends in; repeatable",
     )  # fmt: skip
-    parser.add_argument(
-        "--max-loss", type=float, metavar="X",
-        help="what smoothing may cost in any cell, in the unit of the objective; it makes the allowed range of each "
-        "cell (left out: all values that keep the limits)",
-    )  # fmt: skip
+    _OPTIMUM.add(parser)
     parser.add_argument(
         "--sd", action="append", default=[], metavar="NAME=X",
         help="standard deviation of objective or limited variable at one point: a number, or a variable of the table; "
         "it makes that of the optimum; repeatable",
-    )  # fmt: skip
-    parser.add_argument(
-        "--infeasible", choices=("raise", "keep"), default="raise",
-        help="cells in which nothing keeps the limits: an error, or cells without a value (default: raise)",
     )  # fmt: skip
     _add_figure(parser)
 
@@ -69,13 +61,11 @@ def _optimize(args: argparse.Namespace) -> None:
         best = optimize_map(
             grid_table(args.file),
             args.maximize or args.minimize,
-            over=args.along,
             limits=limits,
             maximize=args.maximize is not None,
-            max_loss=args.max_loss,
             sd=scatter,
-            infeasible=args.infeasible,
             provenance={"from": " ".join(Path(args.file).name.split())},
+            **_OPTIMUM.given(args),
         )
     emit_map(args, best, _shown(args, best), n_held=_held(best))
 
@@ -89,15 +79,11 @@ def add_smooth(verbs: Any) -> None:
         endings=_FORMS,
     )  # fmt: skip
     parser.add_argument("file", metavar="MAP", help="of mgdd map optimize --max-loss, .csv, .json or .nc")
-    parser.add_argument(
-        "--weight", type=float, default=1.0, metavar="X",
-        help="of smoothness against the distance from the optimum, 0 to 1e6 (default: 1)",
-    )  # fmt: skip
+    _SMOOTH.add(parser)
     parser.add_argument(
         "--slope-limit", action="append", default=[], metavar="AXIS=X",
         help="largest change of the value per unit of an axis, for example speed_rpm=0.004; repeatable",
     )  # fmt: skip
-    parser.add_argument("--fill", action="store_true", help="give empty cells what their neighbours make of them")
     _add_figure(parser)
 
 
@@ -106,7 +92,7 @@ def _smooth(args: argparse.Namespace) -> None:
     check_figure(args.figure)
     optimum = read_map(args.file)
     slopes = number_pairs(args.slope_limit, "--slope-limit")
-    smooth = smooth_map(optimum, weight=args.weight, slope_limits=slopes, fill=args.fill)
+    smooth = smooth_map(optimum, slope_limits=slopes, **_SMOOTH.given(args))
     moved = np.abs(smooth.values - optimum.values)
     shift = float(np.nanmax(moved))  # smooth_map refuses a map without a value
     steepest = {name: _steepest(smooth, place) for place, name in enumerate(smooth.axes)}

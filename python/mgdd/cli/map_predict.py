@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.cli.map_files import add_csv_options, write_table
+from mgdd.cli.from_library import Options
+from mgdd.cli.map_files import CSV, write_table
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.cli.ranges import add_over, grid_of
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["add_predict"]
 
 _LOG = logging.getLogger(__name__)
+_LEVEL = Options(ResponseModel.predict, "level")
 # What stands behind the name of a response, and the part of a prediction that it is.
 _PARTS = {"": "mean", "_sd": "sd", "_lower": "lower", "_upper": "upper"}
 
@@ -44,15 +46,12 @@ def add_predict(verbs: Any) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     add_over(what, what="a factor")
     what.add_argument("--points", metavar="FILE", help="the points of a .csv or .nc file instead of a grid")
-    parser.add_argument(
-        "--level", type=float, default=0.95, metavar="X",
-        help="probability that a new measurement lies between NAME_lower and NAME_upper (default: 0.95)",
-    )  # fmt: skip
+    _LEVEL.add(parser)
     parser.add_argument(
         "--extrapolate", action="store_true",
         help="also give values outside of the points that were fitted; they are NaN otherwise",
     )  # fmt: skip
-    add_csv_options(parser)
+    CSV.add(parser)
 
 
 def _predict(args: argparse.Namespace) -> None:
@@ -70,8 +69,9 @@ def _predict(args: argparse.Namespace) -> None:
     }
     variables |= {name: (POINT, columns[name], *labels[name]) for name in names if name not in axes}
     outside: dict[str, int] = {}
+    level = _LEVEL.of(args)
     for model in models:
-        found = model.predict({name: columns[name].ravel() for name in model.factors}, level=args.level)
+        found = model.predict({name: columns[name].ravel() for name in model.factors}, **level)
         beyond = found["extrapolated"].to_numpy()
         outside[model.name] = int(beyond.sum())
         keep = np.ones(beyond.shape, dtype=bool) if args.extrapolate else ~beyond
@@ -81,7 +81,7 @@ def _predict(args: argparse.Namespace) -> None:
         if args.extrapolate:
             where = beyond.reshape(shape).astype(np.int8)
             variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
-    table = labelled_dataset(variables, attrs={"level": args.level, "models": ", ".join(args.files)})
+    table = labelled_dataset(variables, attrs={**level, "models": ", ".join(args.files)})
     table = table.set_coords([name for name in names if name not in axes])
     for model in models:
         table[model.name].attrs["source"] = "predicted"
@@ -123,7 +123,7 @@ def _places(
 ) -> tuple[dict[str, NDArray[Any]], tuple[str, ...], dict[str, NDArray[np.float64]]]:
     """Give the axes of the answer, their names, and where the models are asked."""
     if args.points:
-        table = read_points(args.points, names, delimiter=args.delimiter, decimal=args.decimal)
+        table = read_points(args.points, names, **CSV.given(args))
         return {POINT: table[POINT].to_numpy()}, (POINT,), {name: table[name].to_numpy() for name in names}
     grid = grid_of(args.over)
     lacking = [name for name in names if name not in grid]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table, write_table
 from mgdd.cli.map_text import COLUMNS, grid_blocks, map_blocks
 from mgdd.cli.options import add_command
@@ -23,7 +24,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["add_diff", "add_show"]
+__all__ = ["READING", "add_diff", "add_show"]
+
+READING = Options(read_map, "name", "decimal")
+_COMPARED = Options(compare_maps, "grid", "tolerance")
 
 
 def add_show(verbs: Any) -> None:
@@ -35,7 +39,7 @@ def add_show(verbs: Any) -> None:
         endings=".csv, .json, .nc or .dcm, the map",
     )  # fmt: skip
     parser.add_argument("file", metavar="MAP", help=".csv, .json, .nc or .dcm")
-    add_map_reading(parser)
+    READING.add(parser)
     parser.add_argument(
         "--column", choices=COLUMNS, default="value",
         help="what is shown of the cells: the value, its standard deviation, the ends of its range (default: value)",
@@ -47,12 +51,6 @@ def add_show(verbs: Any) -> None:
     parser.add_argument("--contour", action="store_true", help="draw contours instead of the cells")
 
 
-def add_map_reading(parser: argparse.ArgumentParser) -> None:
-    """Add how to read a file of a map."""
-    parser.add_argument("--name", metavar="NAME", help="which map or variable, where a file holds several")
-    parser.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark of a CSV file (default: .)")
-
-
 def _show(args: argparse.Namespace) -> None:
     check_output(args, *MAP_ENDINGS)
     check_figure(args.figure)
@@ -60,7 +58,7 @@ def _show(args: argparse.Namespace) -> None:
         raise ParameterError("--contour does not act here; it is a form of the picture: name one with --figure FILE")
     if args.contour and args.column in TEXTS:
         raise ParameterError(f"--contour and --column {args.column} contradict each other: it holds texts")
-    table = read_map(args.file, args.name, decimal=args.decimal)
+    table = read_map(args.file, **READING.given(args))
     text, more = map_blocks(table, args.column), {}
     if args.sweep is not None:
         more["achieved"], said = _achieved(table, grid_table(args.sweep))
@@ -116,22 +114,16 @@ def add_diff(verbs: Any) -> None:
     )  # fmt: skip
     parser.add_argument("first", metavar="FIRST", help=".csv, .json, .nc or .dcm")
     parser.add_argument("second", metavar="SECOND", help="the map that the first is subtracted from")
-    add_map_reading(parser)
-    parser.add_argument(
-        "--grid", choices=("union", "first"), default="union",
-        help="compare at the breakpoints of both inside of both, or at those of the first (default: union)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--tolerance", type=float, metavar="X", help="count and mark differences beyond X, in the unit of the map"
-    )
+    READING.add(parser)
+    _COMPARED.add(parser)
     parser.add_argument("--figure", metavar="FILE", help="draw the differences (.png, .svg or .pdf)")
 
 
 def _diff(args: argparse.Namespace) -> None:
     check_output(args, ".nc", ".json")
     check_figure(args.figure)
-    first, second = (read_map(file, args.name, decimal=args.decimal) for file in (args.first, args.second))
-    found = compare_maps(first, second, grid=args.grid, tolerance=args.tolerance)
+    first, second = (read_map(file, **READING.given(args)) for file in (args.first, args.second))
+    found = compare_maps(first, second, **_COMPARED.given(args))
     file = args.output
     if file is not None and Path(file).suffix == ".nc":
         write_table(found, file)

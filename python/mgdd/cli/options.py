@@ -11,26 +11,25 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.cli.from_library import Options, as_option
+from mgdd.engine import simulate
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_conditions, read_pressure
 from mgdd.io.point_table import CONDITIONS
-from mgdd.io.pressure_checks import PRESSURE_UNITS
-from mgdd.io.pressure_file import ANGLE_UNITS
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "CYLINDER_CHOICES",
+    "SCHEME",
     "Parser",
     "UsageError",
     "add_command",
     "add_engine",
     "add_files",
     "add_group",
-    "add_scheme",
-    "as_option",
     "assignments",
-    "column_of",
     "engine_of",
     "number_pairs",
     "refuse_idle",
@@ -41,7 +40,12 @@ __all__ = [
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
-_CYLINDER_CHOICES = {
+SCHEME = Options(simulate, "step_cad", "integrator")
+_READING = Options(
+    read_pressure, "pressure_column", "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_column",
+    "angle_unit", "firing_tdc_deg", "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
+)  # fmt: skip
+CYLINDER_CHOICES = {
     "burn": "burn_shape",
     "gamma": "gamma_model",
     "wall_heat": "wall_heat_model",
@@ -63,14 +67,6 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise the message."""
         raise UsageError(message, self)
-
-
-def as_option(name: str, text: str | None = None) -> str:
-    """Write an argument of the library as the option that sets it."""
-    option = f"--{name.replace('_', '-')}"
-    if text in ("True", "False"):
-        return option if text == "True" else f"{option} left out"
-    return f"{option} {text}" if text else option
 
 
 def add_group(commands: Any, name: str, *, help_text: str, example: str) -> Any:
@@ -111,7 +107,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("engine")
     group.add_argument(
         "--preset", metavar="NAME_OR_FILE.toml",
-        help=f"{', '.join(presets.available('engine'))} or a TOML file (default: puma_single)",
+        help=f"{', '.join(presets.available('engine'))} or a TOML file (default: {_DEFAULT_PRESET})",
     )  # fmt: skip
     group.add_argument(
         "--set", action="append", default=[], metavar="FIELD=VALUE",
@@ -122,22 +118,9 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
         meaning = info["meaning"].replace("; none = ", "; left out: ")
         group.add_argument(as_option(field), type=float, metavar="X", help=f"{meaning}{unit}")
     group.add_argument("--motored", action="store_true", help="no fuel")
-    for option, field in _CYLINDER_CHOICES.items():
+    for option, field in CYLINDER_CHOICES.items():
         info = Cylinder.fields()[field]
         group.add_argument(as_option(option), choices=info["choices"], help=info["meaning"])
-
-
-def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float | None) -> None:
-    """Add integrator and crank step."""
-    group = parser.add_argument_group("scheme")
-    group.add_argument("--integrator", choices=("trapezoid", "split", "seed", "euler"), default="trapezoid")
-    group.add_argument(
-        "--step-cad",
-        type=float,
-        default=step_cad,
-        metavar="X",
-        help=f"crank step, 0.001 to 5 (default: {'1, with files 0.25' if step_cad is None else f'{step_cad:g}'})",
-    )
 
 
 def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
@@ -147,49 +130,7 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
         help="measured pressure as text: one column of crank angle [°CA aTDC: firing TDC = 0, compression negative] "
         "and one of pressure, or one per cycle; several cycles may also stand below each other",
     )  # fmt: skip
-    group = parser.add_argument_group("files", "what the files hold, where they do not say it or say it otherwise")
-    group.add_argument(
-        "--pressure-column", action="append", metavar="NAME",
-        help="column name, or number from 0; repeat it for several cycles (default: all behind the angle, if they are "
-        "cycles of one cylinder)",
-    )  # fmt: skip
-    group.add_argument(
-        "--pressure-unit", choices=PRESSURE_UNITS, help="default: what header or units row say, else bar"
-    )
-    group.add_argument(
-        "--gain-bar-per-v",
-        type=float,
-        metavar="X",
-        help="the pressure is in volts: bar per volt of the charge amplifier",
-    )
-    group.add_argument(
-        "--offset-bar", type=float, metavar="X", help="bar at 0 V (left out: relative pressure, use --pegging)"
-    )
-    group.add_argument(
-        "--tdc-offset-cad",
-        type=float,
-        default=0.0,
-        metavar="X",
-        help="the angles are too large by this; taken off [°CA]",
-    )
-    group.add_argument("--angle-column", metavar="NAME", help="column name, or number from 0 (default: 0)")
-    group.add_argument(
-        "--angle-unit", choices=ANGLE_UNITS,
-        help="s, ms and us are a time, which needs --speed-rpm (default: what header or units row say, else deg)",
-    )  # fmt: skip
-    group.add_argument(
-        "--firing-tdc-deg", type=float, metavar="X",
-        help="angle of firing TDC in files that count 0 to 720 or run on: 360 if they start at gas-exchange TDC, 0 if "
-        "at firing TDC",
-    )  # fmt: skip
-    group.add_argument("--before-tdc", action="store_true", help="angles count degrees before firing TDC")
-    group.add_argument("--angle-step-deg", type=float, metavar="X", help="no angle column: degrees between two samples")
-    group.add_argument(
-        "--angle-start-deg", type=float, metavar="X",
-        help="no angle column, or a time: angle of the first sample [°CA aTDC, or as --firing-tdc-deg counts]",
-    )  # fmt: skip
-    group.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark (default: .)")
-    group.add_argument("--delimiter", metavar="CHAR", help="column separator (default: found in the file)")
+    group = _READING.add(parser, "what the files hold, where they do not say it or say it otherwise")
     group.add_argument(
         "--conditions", metavar="FILE.csv",
         help=f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}",
@@ -208,7 +149,7 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, prese
     given = assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
     point = {name: value for name, value in given.items() if name in _POINT}
     cylinder = {name: value for name, value in given.items() if name not in _POINT}
-    for option, field in _CYLINDER_CHOICES.items():
+    for option, field in CYLINDER_CHOICES.items():
         if getattr(args, option) is not None:
             if field in cylinder:
                 raise ParameterError(f"{as_option(option)} and --set {field} contradict each other: give one")
@@ -232,26 +173,9 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     conditions = read_conditions(args.conditions) if args.conditions else {}
     rows = _rows_of(args.files, conditions, args.conditions)
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
-    columns = [column_of(name) for name in args.pressure_column or ()]
     traces = []
     for file in args.files:
-        trace = read_pressure(
-            file,
-            angle_column=column_of(args.angle_column),
-            pressure_column=columns or None,
-            angle_unit=args.angle_unit,
-            pressure_unit=args.pressure_unit,
-            firing_tdc_deg=args.firing_tdc_deg,
-            before_tdc=args.before_tdc,
-            tdc_offset_cad=args.tdc_offset_cad,
-            angle_step_deg=args.angle_step_deg,
-            angle_start_deg=args.angle_start_deg,
-            speed_rpm=rows[file].get("speed_rpm", speed),
-            gain_bar_per_v=args.gain_bar_per_v,
-            offset_bar=args.offset_bar,
-            delimiter=args.delimiter,
-            decimal=args.decimal,
-        )
+        trace = read_pressure(file, speed_rpm=rows[file].get("speed_rpm", speed), **_READING.given(args))
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
         traces.append(trace.assign_attrs(**rows[file]))
@@ -336,8 +260,3 @@ def _value(name: str, text: str, fields: Mapping[str, Mapping[str, Any]]) -> flo
         if name in fields:
             raise ParameterError.of(name, text, f"a number [{fields[name]['unit']}]") from None
         return text
-
-
-def column_of(text: str | None) -> Any:
-    """Read a column, by name or by number from 0; None where none is named."""
-    return int(text) if text is not None and text.isdigit() else text

@@ -1,4 +1,4 @@
-"""Options for the parameters of a throttle: a preset and single fields over it."""
+"""Options that the commands of `mgdd throttle` share: parameters of a throttle, and how to read a log."""
 
 from __future__ import annotations
 
@@ -7,11 +7,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from mgdd import presets
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import assignments
 from mgdd.errors import ParameterError, did_you_mean
+from mgdd.io import read_throttle_log
 from mgdd.throttle import Throttle
 
-__all__ = ["add_throttle", "changes_of", "throttle_of"]
+__all__ = ["LOG", "add_throttle", "changes_of", "throttle_of"]
+
+LOG = Options(
+    read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
+    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal",
+)  # fmt: skip
 
 _DEFAULT_PRESET = "P1"
 

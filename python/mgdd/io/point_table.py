@@ -61,8 +61,10 @@ def read_points(
     always : collection of str
         Columns that must hold numbers where a CSV file has them, even if all columns are wanted; others without a
         number, remarks for example, are left out then.
-    delimiter, decimal : str
-        Of a CSV file; the separator is found in the file if left out.
+    delimiter : str, optional
+        Column separator of a CSV file; found in it if left out.
+    decimal : {".", ","}
+        Decimal mark of a CSV file.
 
     Returns
     -------

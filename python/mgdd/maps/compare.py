@@ -35,7 +35,7 @@ def compare_maps(
     grid : {"union", "first"}
         Where they are compared: at the breakpoints of both inside of both, or at those of the first.
     tolerance : float, optional
-        Differences beyond it are counted [unit of the value].
+        Differences beyond it are counted, in the unit of the value.
 
     Returns
     -------

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mgdd import _core
 from mgdd._core.engine import OperatingPoint
+from mgdd.errors import argument
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.presets.meant import CylinderLike, cylinder_of
@@ -14,7 +15,9 @@ from mgdd.presets.meant import CylinderLike, cylinder_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LAWS", "compare_laws"]
+__all__ = ["LAWS", "better_laws", "compare_laws"]
+
+_MUCH_BETTER = 0.7  # of the RMSE
 
 # Burn shape and gamma law of each row of the comparison; the last two are worth reading on.
 LAWS = (
@@ -83,3 +86,16 @@ def compare_laws(
             )
         )
     return fits
+
+
+def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
+    """Doubt a fit where the best of the compared laws meets the traces much better; an empty list where none does."""
+    best = min(laws, key=lambda law: law.report.rmse if law.report.rmse == law.report.rmse else float("inf"))
+    if not best.report.rmse < _MUCH_BETTER * fit.report.rmse:
+        return []
+    rmse, own = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
+    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}"
+    remedy = (
+        f"{argument('burn_shape')} and {argument('gamma_model')} choose the law, mgdd engine optimum compares a family"
+    )
+    return [f"{met}: do not read burn, fuel heat or wall heat from the latter; {remedy}"]
