@@ -6,7 +6,7 @@ import argparse
 import logging
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.calibration import PEGGING, check_pegging, tdc_payload
+from mgdd.cli.calibration import PEGGING, check_pegging
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, add_engine, add_files, engine_of, refuse_idle, traces_of
 from mgdd.cli.output import check_output, emit, lines
@@ -88,7 +88,7 @@ def _analyze(args: argparse.Namespace) -> None:
     }
     if args.tdc:
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
-        payload["tdc"] = tdc_payload(found)
+        payload["tdc"] = found.figures
         payload["warnings"] += found.doubts()
         for doubt in found.doubts():
             _LOG.warning("%s: %s", payload["file"], doubt)

@@ -7,7 +7,7 @@ from typing import Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.analyze import add_analyze
-from mgdd.cli.calibration import TDC_SPAN_CAD, add_calibration, calibrate, calibration_arguments, traces_for
+from mgdd.cli.calibration import add_calibration, calibrate, calibration_arguments, traces_for
 from mgdd.cli.from_library import Options, default_of, shown
 from mgdd.cli.options import (
     SCHEME,
@@ -27,6 +27,7 @@ from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
 from mgdd.errors import ConvergenceError
 from mgdd.identify import best_timing, estimate_tdc, fit_cylinder
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
+from mgdd.identify.engine.calibration import TDC_SPAN_CAD
 from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
 
 __all__ = ["add"]
