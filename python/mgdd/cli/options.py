@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -13,7 +14,7 @@ from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
 from mgdd.engine import simulate
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hinted
 from mgdd.io import read_conditions, read_pressure
 from mgdd.io.point_table import CONDITIONS
 
@@ -40,7 +41,7 @@ __all__ = [
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
-SCHEME = Options(simulate, "step_cad", "integrator")
+SCHEME = Options(simulate, "integrator", "step_cad")
 _READING = Options(
     read_pressure, "pressure_column", "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_column",
     "angle_unit", "firing_tdc_deg", "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
@@ -65,8 +66,19 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that raises usage errors, so that ``--json`` commands can print them as JSON."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise the message."""
+        """Raise the message, with the nearest choice behind one that is none."""
+        if found := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)$", message):
+            message = hinted(message, found[1], [choice.strip("' ") for choice in found[2].split(",")])
         raise UsageError(message, self)
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse what the command that was found does not know, with the nearest of its options."""
+        found, extra = self.parse_known_args(args, namespace)
+        if extra:
+            known = re.findall(r"--[a-z-]+", found.parser.format_usage())
+            strange = next((word.partition("=")[0] for word in extra if word.startswith("--")), "")
+            found.parser.error(hinted(f"unrecognized arguments: {' '.join(extra)}", strange, known))
+        return found
 
 
 def add_group(commands: Any, name: str, *, help_text: str, example: str) -> Any:

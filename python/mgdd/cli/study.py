@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit
-from mgdd.errors import Interrupted, ParameterError
+from mgdd.errors import Interrupted, ParameterError, hinted
 from mgdd.parallel.pool import processes
 from mgdd.report import write_report
 from mgdd.studies import StudyResult, available_studies, run_study
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> None:
         return
     if args.name not in titles:
         given = "no study named" if args.name is None else f"no study {args.name!r}"
-        raise ParameterError(f"{given}: must be one of {', '.join(titles)}")
+        raise ParameterError(hinted(f"{given}: must be one of {', '.join(titles)}", args.name or "", titles))
     options: dict[str, Any] = {}
     for option, studies in _OPTIONS.items():
         if args.name not in studies:
