@@ -6,9 +6,17 @@ import argparse
 import logging
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.calibration import PEGGING, check_pegging
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, add_engine, add_files, engine_of, refuse_idle, traces_of
+from mgdd.cli.options import (
+    PEGGING,
+    add_command,
+    add_engine,
+    add_files,
+    check_pegging,
+    engine_of,
+    refuse_idle,
+    traces_of,
+)
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.engine import analyze
 from mgdd.errors import ParameterError

@@ -3,32 +3,41 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.analyze import add_analyze
-from mgdd.cli.calibration import add_calibration, calibrate, calibration_arguments, traces_for
-from mgdd.cli.from_library import Options, default_of, shown
+from mgdd.cli.from_library import Options, default_of, named_options, shown
 from mgdd.cli.options import (
+    CYLINDER_CHOICES,
+    PEGGING,
     SCHEME,
     add_command,
     add_engine,
     add_files,
     add_group,
+    check_pegging,
     engine_of,
     number_pairs,
     refuse_idle,
+    traces_of,
 )
-from mgdd.cli.output import check_output, emit, lines
+from mgdd.cli.output import Stopped, check_output, emit, lines
 from mgdd.cli.seek import add_seek
+from mgdd.cli.study import run_or_part
 from mgdd.cli.sweep import add_sweep
 from mgdd.engine import find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
 from mgdd.errors import ConvergenceError
 from mgdd.identify import best_timing, estimate_tdc, fit_cylinder
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
-from mgdd.identify.engine.calibration import TDC_SPAN_CAD
+from mgdd.identify.engine.calibration import TDC_SPAN_CAD, judge_fit
 from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
+from mgdd.io.pressure import mean_cycle
+from mgdd.report import write_report
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["add"]
 
@@ -84,7 +93,7 @@ def _simulate(args: argparse.Namespace) -> None:
 
 def _add_calibrate(verbs: Any) -> None:
     parser = add_command(
-        verbs, "calibrate", calibrate,
+        verbs, "calibrate", _calibrate,
         help_text="calibrate the cycle model to measured traces, and name what the traces do not identify",
         example="mgdd engine calibrate a25.csv a50.csv --preset hd_diesel_128x144 --conditions conditions.csv --json",
     )  # fmt: skip
@@ -96,10 +105,61 @@ def _add_calibrate(verbs: Any) -> None:
         "the double Wiebe also its shape); gamma is that of the gamma law in use; with --fuel-mg the heat is held",
     )
     parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
-    add_calibration(parser)
+    _add_pressure(parser)
     add_engine(parser)
     Options(fit_cylinder, "step_cad").add(parser, "scheme")
     Options(simulate, "integrator").add(parser)
+
+
+def _add_pressure(parser: argparse.ArgumentParser) -> None:
+    """Add how the traces of a calibration are made absolute."""
+    group = parser.add_argument_group("pressure of the traces")
+    PEGGING.add(group)
+    group.add_argument(
+        "--mean-cycle", action="store_true", help="calibrate to the mean of a file's cycles (one cycle is needed)"
+    )
+
+
+def _traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
+    """Read the traces; with --mean-cycle the mean of each file's cycles."""
+    traces = traces_of(args)
+    return [mean_cycle(trace) for trace in traces] if args.mean_cycle else traces
+
+
+def _known(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
+    """Give pegging, and the fuel heat where the fuel was said, as arguments of `fit_cylinder` and `best_timing`."""
+    check_pegging(args)
+    return {
+        **PEGGING.given(args),
+        "fuel_heat_j": None if args.fuel_mg is None else args.fuel_mg * cylinder.lower_heating_value_mj_per_kg,
+    }
+
+
+def _calibrate(args: argparse.Namespace) -> None:
+    """Fit, judge, compare, print."""
+    check_output(args)
+    cylinder, point, preset = engine_of(args)
+    traces = _traces_of(args)
+    free = [name.strip() for name in args.free.split(",")] if args.free else None
+    known, scheme = _known(args, cylinder), SCHEME.given(args)
+    step = args.progress.expect(45 + (90 if args.report_folder else 0))
+    step("calibrate")
+    fit = fit_cylinder(traces, cylinder, free=free, point=point, **known, **scheme)
+    found = judge_fit(fit, fuel_heat_j=known["fuel_heat_j"], progress=step)
+    stopped = False
+    if args.report_folder:
+        absolute = list(fit.request.traces)
+        result, stopped = run_or_part(
+            "measured-traces", traces=absolute, cylinder=cylinder, point=point, progress=step, **scheme
+        )
+        write_report(result, args.report_folder)
+    with named_options(**{field: option for option, field in CYLINDER_CHOICES.items()}):
+        payload = {"preset": preset.name, **found.to_dict()}
+    emit(args, payload, text=payload["report"])
+    if stopped:
+        raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
+    if not fit.report.success:
+        raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 
 
 def _add_optimum(verbs: Any) -> None:
@@ -118,7 +178,7 @@ def _add_optimum(verbs: Any) -> None:
         for name in ("objective", "step_cad")
     )
     _SEARCH.add(parser, "search", objective=objective)
-    add_calibration(parser)
+    _add_pressure(parser)
     add_engine(parser)
     SCHEME.add(parser, "scheme", step_cad=step_cad)
 
@@ -151,7 +211,7 @@ def _optimum_of_files(
     args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
     refuse_idle(args, "burn", "burn_duration_cad", why="the family tries its own burn laws: leave it out")
-    traces = traces_for(args)
+    traces = _traces_of(args)
     rows = best_timing(
         traces,
         cylinder,
@@ -160,10 +220,10 @@ def _optimum_of_files(
         progress=args.progress.expect(70),
         **_SEARCH.given(args),
         **SCHEME.given(args),
-        **calibration_arguments(args, cylinder),
+        **_known(args, cylinder),
     )
     main = headline_of(rows)
-    pegging = calibration_arguments(args, cylinder)
+    pegging = _known(args, cylinder)
     tdc = estimate_tdc(
         list(main.fit.request.traces), cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=TDC_SPAN_CAD,
         progress=args.progress,

@@ -134,9 +134,9 @@ def _documented(call: Callable[..., Any]) -> dict[str, tuple[str, str]]:
 
 def _help(text: str, open_ended: bool) -> str:
     """Give the first sentence, and what holds without an option that has no default; as help is written."""
-    first, *rest = re.split(r"\.(?:\s+|$)", text.replace("``", ""))
+    first, *rest = re.split(r"\.(?:\s+|$)", re.sub(r"``|\*", "", text))
     said = [first, *[each for each in rest if open_ended and re.match("None|Left out", each)][:1]]
-    return "; ".join(_small(re.sub(r"\bNone:? ", "left out: ", each)) for each in said)
+    return "; ".join(_small(re.sub(r"\bNone(:| is)? ", "left out: ", each)) for each in said)
 
 
 def _small(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,9 @@ from mgdd.cli.ranges import add_over, grid_of
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import POINT, read_points
-from mgdd.results.labels import label_of, labelled_dataset
+from mgdd.results.labels import label_of
 from mgdd.surrogate import ResponseModel
+from mgdd.surrogate.prediction_table import prediction_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,8 +31,6 @@ __all__ = ["add_predict"]
 
 _LOG = logging.getLogger(__name__)
 _LEVEL = Options(ResponseModel.predict, "level")
-# What stands behind the name of a response, and the part of a prediction that it is.
-_PARTS = {"": "mean", "_sd": "sd", "_lower": "lower", "_upper": "upper"}
 
 
 def add_predict(verbs: Any) -> None:
@@ -61,31 +61,10 @@ def _predict(args: argparse.Namespace) -> None:
     if twice is not None:
         raise ParameterError(f"two files hold a model of {twice}: give one of each response")
     names = list(dict.fromkeys(name for model in models for name in model.factors))
-    axes, dims, columns = _places(args, names)
-    labels = {name: label for model in models for name, label in model.factors.items()}
-    shape = tuple(len(values) for values in axes.values())
-    variables: dict[str, tuple[Any, ...]] = {
-        name: (name, values, *labels.get(name, ("-", "number of the point"))) for name, values in axes.items()
-    }
-    variables |= {name: (POINT, columns[name], *labels[name]) for name in names if name not in axes}
-    outside: dict[str, int] = {}
-    level = _LEVEL.of(args)
-    for model in models:
-        found = model.predict({name: columns[name].ravel() for name in model.factors}, **level)
-        beyond = found["extrapolated"].to_numpy()
-        outside[model.name] = int(beyond.sum())
-        keep = np.ones(beyond.shape, dtype=bool) if args.extrapolate else ~beyond
-        for ending, part in _PARTS.items():
-            values = np.where(keep, found[part].to_numpy(), np.nan).reshape(shape)
-            variables[f"{model.name}{ending}"] = (dims, values, *label_of(found[part]))
-        if args.extrapolate:
-            where = beyond.reshape(shape).astype(np.int8)
-            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
-    table = labelled_dataset(variables, attrs={**level, "models": ", ".join(args.files)})
-    table = table.set_coords([name for name in names if name not in axes])
-    for model in models:
-        table[model.name].attrs["source"] = "predicted"
-    total = int(np.prod(shape))
+    axes, columns = _places(args, names)
+    table, outside = prediction_table(models, axes, columns, extrapolate=args.extrapolate, **_LEVEL.of(args))
+    table.attrs["models"] = ", ".join(args.files)
+    total = math.prod(table.sizes.values())
     what = "kept, extrapolated)"
     if not args.extrapolate:
         fewer = "leave them out" if args.points else "narrow --over"
@@ -120,11 +99,11 @@ def _model(file: str) -> ResponseModel:
 
 def _places(
     args: argparse.Namespace, names: Sequence[str]
-) -> tuple[dict[str, NDArray[Any]], tuple[str, ...], dict[str, NDArray[np.float64]]]:
-    """Give the axes of the answer, their names, and where the models are asked."""
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[np.float64]]]:
+    """Give the axes of the answer, and where the models are asked."""
     if args.points:
         table = read_points(args.points, names, **CSV.given(args))
-        return {POINT: table[POINT].to_numpy()}, (POINT,), {name: table[name].to_numpy() for name in names}
+        return {POINT: table[POINT].to_numpy()}, {name: table[name].to_numpy() for name in names}
     grid = grid_of(args.over)
     lacking = [name for name in names if name not in grid]
     if lacking:
@@ -133,7 +112,7 @@ def _places(
     if odd:
         near = did_you_mean(odd[0], names) or f"they have {', '.join(names)}"
         raise ParameterError(f"--over {odd[0]}: not a factor of the models: {near}")
-    return dict(grid), tuple(grid), dict(zip(grid, np.meshgrid(*grid.values(), indexing="ij"), strict=True))
+    return dict(grid), dict(zip(grid, np.meshgrid(*grid.values(), indexing="ij"), strict=True))
 
 
 def _range(values: xr.DataArray) -> list[float] | None:

@@ -7,22 +7,22 @@ import logging
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
-from mgdd.engine import simulate
-from mgdd.errors import DataError, ParameterError, hinted
-from mgdd.io import read_conditions, read_pressure
-from mgdd.io.point_table import CONDITIONS
+from mgdd.engine import analyze, simulate
+from mgdd.errors import ParameterError, hinted
+from mgdd.io import read_pressure
+from mgdd.io.point_table import CONDITIONS, conditions_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
     "CYLINDER_CHOICES",
+    "PEGGING",
     "SCHEME",
     "Parser",
     "UsageError",
@@ -31,6 +31,7 @@ __all__ = [
     "add_files",
     "add_group",
     "assignments",
+    "check_pegging",
     "engine_of",
     "number_pairs",
     "refuse_idle",
@@ -42,6 +43,7 @@ _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
 SCHEME = Options(simulate, "integrator", "step_cad")
+PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
 _READING = Options(
     read_pressure, "pressure_column", "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_column",
     "angle_unit", "firing_tdc_deg", "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
@@ -182,8 +184,7 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     """Read the pressure files, with their conditions as attributes."""
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
-    conditions = read_conditions(args.conditions) if args.conditions else {}
-    rows = _rows_of(args.files, conditions, args.conditions)
+    rows = conditions_of(args.files, args.conditions)
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
     traces = []
     for file in args.files:
@@ -194,23 +195,12 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     return traces
 
 
-def _rows_of(
-    files: Sequence[str], conditions: Mapping[str, dict[str, float]], table: str | None
-) -> dict[str, dict[str, float]]:
-    """Give each file its row of the conditions, by path, name or stem; an empty row without a table."""
-    used: dict[str, str] = {}
-    rows: dict[str, dict[str, float]] = {}
-    for file in files:
-        if not conditions:
-            rows[file] = {}
-            continue
-        key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
-        if key is None:
-            raise DataError(f"{table}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}")
-        if key in used:
-            raise DataError(f"{table}: row {key!r} fits both {used[key]} and {file}: write their paths as given here")
-        used[key], rows[file] = file, conditions[key]
-    return rows
+def check_pegging(args: argparse.Namespace) -> None:
+    """Refuse options of pegging that would act on nothing."""
+    if args.pegging_exponent is not None and args.pegging not in ("two_point", "least_squares"):
+        raise ParameterError("--pegging-exponent acts with --pegging two_point or least_squares only: choose one")
+    if args.inlet_pressure_kpa is not None and args.pegging != "inlet":
+        raise ParameterError("--inlet-pressure-kpa acts with --pegging inlet only: choose it")
 
 
 def refuse_idle(args: argparse.Namespace, *names: str, why: str) -> None:

@@ -55,16 +55,18 @@ def add(verbs: Any) -> None:
         "--offset", type=float, metavar="X", help="mean duty, with --amplitude: no design, only the check"
     )
     group.add_argument("--amplitude", type=float, metavar="X", help="half the swing of the duty")
-    _DESIGN.add(group, duration_s=_defaults_of("duration_s"))
+    _DESIGN.add(group, **_defaults_of("duration_s"))
     for name, options in _OWN.items():
-        options.add(group, **{name: _defaults_of(name)})
+        options.add(group, **_defaults_of(name))
     _CHECK.add(parser, "limits")
 
 
-def _defaults_of(name: str) -> str:
-    """Write the default of every signal that has this option."""
-    own = {kind: default_of(getattr(signals, kind), name) for kind, names in _OF_KIND.items() if name in names}
-    return ", ".join(f"{kind} {'none' if value is None else shown(value)}" for kind, value in own.items())
+def _defaults_of(name: str) -> dict[str, str]:
+    """Write the default of every signal that has this option and a default."""
+    kinds = (kind for kind, names in _OF_KIND.items() if name in names)
+    own = {kind: default_of(getattr(signals, kind), name) for kind in kinds}
+    said = ", ".join(f"{kind} {shown(value)}" for kind, value in own.items() if value is not None)
+    return {name: said} if said else {}
 
 
 def _excite(args: argparse.Namespace) -> None:

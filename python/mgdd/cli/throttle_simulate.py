@@ -11,11 +11,11 @@ from mgdd.cli.from_library import Options, as_option
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
-from mgdd.errors import DataError, ParameterError
-from mgdd.io.table import Place, read_table
+from mgdd.errors import ParameterError
 from mgdd.plot.style import drawn
-from mgdd.signals.even_grid import even_step
+from mgdd.plot.throttle_run import throttle_run
 from mgdd.throttle import simulate
+from mgdd.throttle.duty_file import read_duty
 from mgdd.throttle.simulation import step_summary
 
 __all__ = ["add"]
@@ -52,7 +52,14 @@ def _simulate(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
     throttle, preset = throttle_of(args)
-    run = simulate(throttle, **(_constant(args) if args.input is None else _from_file(args)), **_RUN.given(args))
+    timed, signals = _TIME.given(args), _SIGNALS.given(args)
+    if args.input is None:
+        given = {"duty": args.duty, **timed, **signals}
+    elif timed:
+        raise ParameterError(f"{as_option(next(iter(timed)))} goes with --duty: the times of --input are its own")
+    else:
+        given = read_duty(args.input, signals)
+    run = simulate(throttle, **given, **_RUN.given(args))
     payload = {
         "preset": preset,
         "duty": args.duty,
@@ -65,47 +72,5 @@ def _simulate(args: argparse.Namespace) -> None:
         "parameters": throttle.to_dict(),
     }
     if args.figure is not None:
-        from mgdd.plot.throttle_run import throttle_run
-
         save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
     emit(args, payload, traces=run)
-
-
-def _constant(args: argparse.Namespace) -> dict[str, Any]:
-    return {"duty": args.duty, **_TIME.given(args), **_SIGNALS.given(args)}
-
-
-def _from_file(args: argparse.Namespace) -> dict[str, Any]:
-    for name in _TIME.given(args):
-        raise ParameterError(f"{as_option(name)} goes with --duty: the times of --input are its own")
-    table = read_table(args.input)
-    header = table.header
-    if header is None:
-        raise DataError(f"{args.input}: no header: name the columns, at least time_s,duty")
-    table.require_units_of_names()
-    out: dict[str, Any] = {name: table.numbers(table.index(name)) for name in ("time_s", "duty")}
-    for name in _SIGNALS.options:
-        if name in header:
-            out[name] = table.numbers(table.index(name))
-    for name, value in _SIGNALS.given(args).items():
-        if name in header:
-            said = f"{as_option(name)} and the column {name} of {args.input} contradict each other: give one"
-            raise ParameterError(said)
-        out[name] = value
-    _check_rows(out, Place(table.source, table.lines))
-    return out
-
-
-def _check_rows(columns: dict[str, Any], place: Place) -> None:
-    """Refuse by line of the file what the simulation would refuse by sample."""
-    even_step(columns["time_s"], where=lambda at: place.cell(at, "time_s"), remedy="resample the duty first")
-    duty = columns["duty"]
-    if np.abs(duty).max() > 1.0:
-        at = int(np.argmax(np.abs(duty) > 1.0))
-        raise DataError(
-            f"{place.cell(at, 'duty')}: duty = {duty[at]:g}: must be in [-1, 1]; a duty in percent is divided by 100"
-        )
-    supply = np.asarray(columns.get("supply_v", 0.0))
-    if supply.ndim and supply.min() < 0.0:
-        at = int(np.argmax(supply < 0.0))
-        raise DataError(f"{place.cell(at, 'supply_v')}: supply_v = {supply[at]:g} V: must be >= 0")

@@ -12,11 +12,13 @@ from mgdd.cli.options import add_command, assignments
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError, did_you_mean
+from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.track import FIGURES, step_times_us
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.plot.style import drawn
+from mgdd.plot.throttle_track import throttle_track
 from mgdd.studies.sections import Table
 from mgdd.throttle import Throttle
 
@@ -93,8 +95,6 @@ def _track(args: argparse.Namespace) -> None:
     plant = known.replace(**{name: getattr(known, name) * factor for name, factor in scales.items()})
     model: Any = known
     if args.model is not None:
-        from mgdd.identify import load_throttle_model
-
         model = load_throttle_model(args.model)
     reference = Reference.parse(args.reference)
     how = _RUN.of(args)
@@ -122,8 +122,6 @@ def _track(args: argparse.Namespace) -> None:
         "warnings": list(doubts),
     }
     if args.figure is not None:
-        from mgdd.plot.throttle_track import throttle_track
-
         save_figure(drawn(throttle_track, run, size=(7.0, 5.4)), args.figure)
     emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
 

@@ -46,8 +46,10 @@ class TimingSearch:
     start_cad : float, optional
         First SOC [°CA aTDC]; -20 if left out, with a guide its best timing, with limits a start whose noise-free values
         stay below them.
-    lower_cad, upper_cad : float
-        Earliest and latest SOC [°CA aTDC].
+    lower_cad : float
+        Earliest SOC [°CA aTDC].
+    upper_cad : float
+        Latest SOC [°CA aTDC].
     cycles : int, optional
         Length of the run; 2000 if left out, behind a late analyser 16 time constants of the seeker, 4000 at least.
     limits : mapping of str to float
