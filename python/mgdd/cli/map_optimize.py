@@ -15,6 +15,7 @@ from mgdd.cli.map_text import map_blocks
 from mgdd.cli.options import add_command, assignments, number_pairs
 from mgdd.cli.output import check_figure, check_output
 from mgdd.maps import CalibrationMap, optimize_map, read_map, smooth_map
+from mgdd.maps.compare import steepest
 
 __all__ = ["add_optimize", "add_smooth"]
 
@@ -95,19 +96,18 @@ def _smooth(args: argparse.Namespace) -> None:
     smooth = smooth_map(optimum, slope_limits=slopes, **_SMOOTH.given(args))
     moved = np.abs(smooth.values - optimum.values)
     shift = float(np.nanmax(moved))  # smooth_map refuses a map without a value
-    steepest = {name: _steepest(smooth, place) for place, name in enumerate(smooth.axes)}
+    slopes_now = {name: steepest(smooth, name) for name in smooth.axes}
     unit = smooth.unit.removesuffix(" aTDC")
     said = [f"moved by at most {shift:.3g} {unit} in a cell"]
-    for place, (name, slope) in enumerate(steepest.items()):
+    for name, slope in slopes_now.items():
         if slope is None:
             continue
         limit = f", limit {slopes[name]:g}" if name in slopes else ""
-        of_unit = smooth.labels[name].units
-        before = _steepest(optimum, place)
+        before = steepest(optimum, name)
         was = "" if before is None else f"; before {before:.3g}"
-        said.append(f"steepest over {name}: {slope:.3g} {unit}/{of_unit}{limit}{was}")
+        said.append(f"steepest over {name}: {slope:.3g} {unit}/{smooth.labels[name].units}{limit}{was}")
     text = [*_shown(args, smooth), "", *said]
-    emit_map(args, smooth, text, largest_shift=shift, largest_slope=steepest, n_held=_held(smooth))
+    emit_map(args, smooth, text, largest_shift=shift, largest_slope=slopes_now, n_held=_held(smooth))
 
 
 def _add_figure(parser: argparse.ArgumentParser) -> None:
@@ -120,12 +120,3 @@ def _shown(args: argparse.Namespace, table: CalibrationMap) -> list[Any]:
 
 def _held(table: CalibrationMap) -> dict[str, int]:
     return dict(sorted(Counter(name for name in table.cells["active_limit"].ravel().tolist() if name).items()))
-
-
-def _steepest(table: CalibrationMap, axis: int) -> float | None:
-    """Give the largest change per unit of an axis; None where no two neighbours have a value."""
-    steps = np.diff(list(table.axes.values())[axis])
-    shape = [1] * table.values.ndim
-    shape[axis] = steps.size
-    slopes = np.abs(np.diff(table.values, axis=axis)) / steps.reshape(shape)
-    return float(np.nanmax(slopes)) if np.isfinite(slopes).any() else None

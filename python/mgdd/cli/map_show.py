@@ -16,6 +16,7 @@ from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.errors import ParameterError
 from mgdd.maps import CalibrationMap, apply_map, compare_maps, read_map
 from mgdd.maps.cells import TEXTS, cell_at
+from mgdd.maps.compare import achieved_figures
 from mgdd.plot import map_cells, map_contour
 from mgdd.plot.style import drawn
 from mgdd.results.labels import label_of
@@ -74,32 +75,14 @@ def _show(args: argparse.Namespace) -> None:
 def _achieved(table: CalibrationMap, sweep: xr.Dataset) -> tuple[dict[str, Any], list[str]]:
     """Say what objective, limited variables and loss become at the values of a map."""
     found = apply_map(table, sweep)
-    task = table.task
-    wanted = [] if task is None else [name for name in ("loss", task.objective, *task.limits) if name in found]
-    names = wanted or [str(name) for name in found.data_vars if name != table.name]
-    figures, said = {}, []
-    for name in names:
-        values = found[name].transpose(*table.axes).to_numpy()
-        if not np.isfinite(values).any():
-            continue
-        worst = int(np.nanargmax(values))
-        figures[name] = {
-            "mean": float(np.nanmean(values)),
-            "lowest": float(np.nanmin(values)),
-            "highest": float(np.nanmax(values)),
-            "highest_at": {
-                axis: float(entries[place])
-                for (axis, entries), place in zip(
-                    table.axes.items(), np.unravel_index(worst, values.shape), strict=True
-                )
-            },
-        }
-        limit = "" if task is None or name not in task.limits else f", limit {task.limits[name]:g}"
+    figures, said = achieved_figures(table, found), []
+    for name, own in figures.items():
+        limit = "" if table.task is None or name not in table.task.limits else f", limit {table.task.limits[name]:g}"
         unit = label_of(found[name]).units
+        worst = int(np.nanargmax(found[name].transpose(*table.axes).to_numpy()))
         said.append(
-            f"  {name}{'' if unit == '-' else f' [{unit}]'}: mean {figures[name]['mean']:.4g}, "
-            f"{figures[name]['lowest']:.4g} to {figures[name]['highest']:.4g}{limit}, highest at "
-            f"{cell_at(table.axes, worst)}"
+            f"  {name}{'' if unit == '-' else f' [{unit}]'}: mean {own['mean']:.4g}, {own['lowest']:.4g} to "
+            f"{own['highest']:.4g}{limit}, highest at {cell_at(table.axes, worst)}"
         )
     return figures, said
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mgdd import presets
@@ -13,7 +13,7 @@ from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.throttle import Throttle
 
-__all__ = ["LOG", "add_throttle", "changes_of", "throttle_of"]
+__all__ = ["LOG", "add_throttle", "changes_of", "known_only", "preset_of", "throttle_of"]
 
 LOG = Options(
     read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
@@ -33,22 +33,30 @@ def add_throttle(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def preset_of(args: argparse.Namespace, option: str = "--preset") -> presets.Preset:
+    """Load the preset of a throttle."""
+    preset = presets.load(args.preset or _DEFAULT_PRESET)
+    if preset.kind != "throttle":
+        raise ParameterError(f"{option} {args.preset}: is not a throttle; P1, P2 and P3 are")
+    return preset
+
+
 def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
     """Make the throttle of a preset and the fields over it."""
-    preset = presets.load(args.preset or _DEFAULT_PRESET)
-    throttle = getattr(preset, "throttle", None)
-    if throttle is None:
-        raise ParameterError(f"--preset {args.preset}: is not a throttle; P1, P2 and P3 are")
-    return throttle.replace(**changes_of(args, Throttle.fields())), str(preset.name)
+    preset = preset_of(args)
+    return preset.throttle.replace(**changes_of(args, Throttle.fields())), preset.name
 
 
 def changes_of(args: argparse.Namespace, fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Read ``--set FIELD=VALUE`` over the fields of a record; an unknown name is refused with the closest one."""
-    values = assignments(args.set, fields)
+    return known_only(assignments(args.set, fields), fields, "--set")
+
+
+def known_only(values: dict[str, Any], fields: Iterable[str], option: str) -> dict[str, Any]:
+    """Refuse a name that is not among the fields."""
     for name in values:
         if name not in fields:
             guess = did_you_mean(name, fields)
-            raise ParameterError(
-                f"--set {name}: no field {name!r}; {guess + '; ' if guess else ''}the fields are {', '.join(fields)}"
-            )
+            have = f"{guess + '; ' if guess else ''}the fields are {', '.join(fields)}"
+            raise ParameterError(f"{option} {name}: no field {name!r}; {have}")
     return values

@@ -6,16 +6,15 @@ import argparse
 import logging
 from typing import Any
 
-from mgdd import presets
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, assignments
+from mgdd.cli.options import add_command, number_pairs
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
-from mgdd.cli.throttle_parameters import add_throttle, throttle_of
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.cli.throttle_parameters import add_throttle, known_only, preset_of, throttle_of
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.track import FIGURES, step_times_us
+from mgdd.loop.tune import with_stiction
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.plot.style import drawn
 from mgdd.plot.throttle_track import throttle_track
@@ -87,15 +86,12 @@ def _add_controller(parser: argparse.ArgumentParser) -> None:
 def _track(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
-    preset = presets.load(args.preset or "P1")
-    known = getattr(preset, "throttle", None)
-    if known is None:
-        raise ParameterError(f"--plant {args.preset}: is not a throttle; P1, P2 and P3 are")
-    scales = _scales(args.plant_scale)
+    preset = preset_of(args, "--plant")
+    known = preset.throttle
+    numbers = [name for name, field in Throttle.fields().items() if "choices" not in field]
+    scales = with_stiction(known_only(number_pairs(args.plant_scale, "--plant-scale"), numbers, "--plant-scale"))
     plant = known.replace(**{name: getattr(known, name) * factor for name, factor in scales.items()})
-    model: Any = known
-    if args.model is not None:
-        model = load_throttle_model(args.model)
+    model: Any = known if args.model is None else load_throttle_model(args.model)
     reference = Reference.parse(args.reference)
     how = _RUN.of(args)
     controller, doubts = tuned_with_doubts(
@@ -112,7 +108,7 @@ def _track(args: argparse.Namespace) -> None:
     payload = {
         "controller": args.controller,
         "reference": reference.name,
-        "preset": str(preset.name),
+        "preset": preset.name,
         "plant_scale": scales,
         "seed": how["seed"],
         **{name: float(run[name]) for name in FIGURES},
@@ -151,19 +147,3 @@ def _tune(args: argparse.Namespace) -> None:
         f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, {delay})",
     ]
     emit(args, payload, text=text)
-
-
-def _scales(given: list[str]) -> dict[str, float]:
-    fields = Throttle.fields()
-    values = assignments(given, fields)
-    out = {}
-    for name, value in values.items():
-        if name not in fields:
-            guess = did_you_mean(name, fields)
-            raise ParameterError(f"--plant-scale {name}: no field {name!r}; {guess + '; ' if guess else ''}see --set")
-        if not isinstance(value, (int, float)):
-            raise ParameterError(f"--plant-scale {name}={value}: must be a factor, for example {name}=1.2")
-        out[name] = float(value)
-    if "coulomb_nm" in out:  # more friction is more stiction, too
-        out.setdefault("stiction_nm", out["coulomb_nm"])
-    return out
