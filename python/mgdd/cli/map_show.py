@@ -43,7 +43,7 @@ def add_show(verbs: Any) -> None:
     READING.add(parser)
     parser.add_argument(
         "--column", choices=COLUMNS, default="value",
-        help="what is shown of the cells: the value, its standard deviation, the ends of its range (default: value)",
+        help="what is shown of the cells: value, its standard deviation, the ends of its range (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
         "--sweep", metavar="TABLE.nc", help="also say what the map achieves in the table that it was made of"

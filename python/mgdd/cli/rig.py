@@ -55,7 +55,9 @@ def _add_hub(verbs: Any) -> None:
         example="mgdd rig hub --port 29536 --fault drop:p=0.01 --bit-rate 500000",
     )  # fmt: skip
     _HUB.add(parser)
-    parser.add_argument("--port", type=int, default=29536, metavar="N", help="0 takes a free one (default: 29536)")
+    parser.add_argument(
+        "--port", type=int, default=29536, metavar="N", help="0 takes a free one (default: %(default)s)"
+    )
     parser.add_argument(
         "--fault", action="append", default=[], metavar="KIND:KEY=VALUE,...",
         help="drop, duplicate, delay, reorder, corrupt, error or freeze, with p, id, from_s, until_s, ms, class, "
@@ -70,12 +72,12 @@ def _add_node(verbs: Any) -> None:
         example="mgdd rig node --map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv",
     )  # fmt: skip
     parser.add_argument(
-        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: etb)"
+        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: %(default)s)"
     )
     rig_records.add_bus(parser)
     parser.add_argument(
         "--envelope", default="etb_node", metavar="NAME_OR_FILE.toml",
-        help="of the safety gate of the node; cycle and time limit come from the map (default: etb_node)",
+        help="of the safety gate of the node; cycle and time limit come from the map (default: %(default)s)",
     )  # fmt: skip
     _NODE.add(parser)
     parser.add_argument("--period-ms", type=float, metavar="X", help="between samples (default: that of the map)")

@@ -56,7 +56,7 @@ def add_seek(verbs: Any) -> None:
     group = parser.add_argument_group("bench")
     group.add_argument(
         "--sensor", choices=("none", "analyser", "soft"), default="none",
-        help="none: J is the efficiency in percent; otherwise less 0.004 per ppm NOx by that sensor (default: none)",
+        help="none: J is the efficiency in percent; else less 0.004 per ppm NOx by that sensor (default: %(default)s)",
     )  # fmt: skip
     _BENCH.add(group)
     add_guide(parser)

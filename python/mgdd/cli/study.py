@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
-    parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: png)")
+    parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: %(default)s)")
 
 
 def run(args: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.throttle import Throttle
 
-__all__ = ["LOG", "add_throttle", "changes_of", "known_only", "preset_of", "throttle_of"]
+__all__ = ["LOG", "add_preset", "add_throttle", "changes_of", "known_only", "preset_of", "throttle_of"]
 
 LOG = Options(
     read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
@@ -23,22 +23,26 @@ LOG = Options(
 _DEFAULT_PRESET = "P1"
 
 
+def add_preset(group: Any, option: str) -> None:
+    """Add the preset of a throttle."""
+    names = ", ".join(presets.available("throttle"))
+    what = f"{names} or a TOML file (default: {_DEFAULT_PRESET})"
+    group.add_argument(option, dest="preset", metavar="NAME_OR_FILE.toml", help=what)
+
+
 def add_throttle(parser: argparse.ArgumentParser) -> None:
     """Add preset and fields; the names are those of the parameters."""
     group = parser.add_argument_group("throttle")
-    group.add_argument("--preset", metavar="NAME_OR_FILE.toml", help="P1, P2, P3 or a TOML file (default: P1)")
+    add_preset(group, "--preset")
     group.add_argument(
         "--set", action="append", default=[], metavar="FIELD=VALUE",
         help="any field of the throttle, repeatable, for example coulomb_nm=0.3",
     )  # fmt: skip
 
 
-def preset_of(args: argparse.Namespace, option: str = "--preset") -> presets.Preset:
-    """Load the preset of a throttle."""
-    preset = presets.load(args.preset or _DEFAULT_PRESET)
-    if preset.kind != "throttle":
-        raise ParameterError(f"{option} {args.preset}: is not a throttle; P1, P2 and P3 are")
-    return preset
+def preset_of(args: argparse.Namespace) -> presets.Preset:
+    """Load the preset of a throttle; it refuses to be an engine when it is asked for its throttle."""
+    return presets.load(args.preset or _DEFAULT_PRESET)
 
 
 def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:

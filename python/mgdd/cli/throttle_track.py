@@ -9,7 +9,7 @@ from typing import Any
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, number_pairs
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
-from mgdd.cli.throttle_parameters import add_throttle, known_only, preset_of, throttle_of
+from mgdd.cli.throttle_parameters import add_preset, add_throttle, known_only, preset_of, throttle_of
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
@@ -45,7 +45,7 @@ def _add_track(verbs: Any) -> None:
     _add_controller(parser)
     parser.add_argument(
         "--reference", default="step:40:42", metavar="REFERENCE",
-        help="step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg (default: step:40:42)",
+        help="step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg (default: %(default)s)",
     )  # fmt: skip
     _AIR.add(parser)
     _add_plant(parser)
@@ -59,7 +59,7 @@ def _add_track(verbs: Any) -> None:
 
 def _add_plant(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("plant")
-    group.add_argument("--plant", dest="preset", metavar="NAME_OR_FILE.toml", help="P1, P2, P3 or a TOML file")
+    add_preset(group, "--plant")
     group.add_argument(
         "--plant-scale", action="append", default=[], metavar="FIELD=FACTOR",
         help="multiply a field of the plant, repeatable; the controller does not know, for example coulomb_nm=1.4 "
@@ -80,13 +80,13 @@ def _add_tune(verbs: Any) -> None:
 
 
 def _add_controller(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--controller", choices=tuple(FAMILIES), default="guided", help="default: guided")
+    parser.add_argument("--controller", choices=tuple(FAMILIES), default="guided", help="kind (default: %(default)s)")
 
 
 def _track(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
-    preset = preset_of(args, "--plant")
+    preset = preset_of(args)
     known = preset.throttle
     numbers = [name for name, field in Throttle.fields().items() if "choices" not in field]
     scales = with_stiction(known_only(number_pairs(args.plant_scale, "--plant-scale"), numbers, "--plant-scale"))
