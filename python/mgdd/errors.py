@@ -292,6 +292,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]!r}?" if close else ""
 
 
+def hinted(message: str, name: str, known: Iterable[str]) -> str:
+    """Put the nearest of the known names behind a message, where one is near."""
+    return "; ".join(filter(None, (message, did_you_mean(name, known))))
+
+
 _written: ContextVar[Callable[[str, str | None], str] | None] = ContextVar("written", default=None)
 
 

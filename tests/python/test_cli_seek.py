@@ -276,7 +276,7 @@ def test_ctrl_c_leaves_the_cycles_so_far(tmp_path: Path) -> None:
     ready = tmp_path / "ready"
     program = (
         "import pathlib, sys\n"
-        "import mgdd.cli.seek as seek\n"
+        "import mgdd.loop.timing_search as seek\n"
         "run = seek.run_seeker\n"
         "def told(*args, **kwargs):\n"
         f"    pathlib.Path({str(ready)!r}).touch()\n"

@@ -5,14 +5,17 @@ from __future__ import annotations
 import functools
 import math
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mgdd import datasets, presets
+from mgdd.cli.from_library import named_options
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import fit_cylinder, wall_heat_profile
+from mgdd.identify.engine.burn_laws import better_laws
 from mgdd.io import pressure_trace
 from mgdd.results.labels import check_labels
 
@@ -341,3 +344,16 @@ def test_a_motored_trace_is_refused():
     trace = pressure_trace(cycle.crank_angle_cad.values, cycle.pressure_bar.values)
     with pytest.raises(DataError, match=r"motored"):
         fit_cylinder([trace], START)
+
+
+def test_a_law_that_meets_the_traces_much_better_is_named() -> None:
+    own, near, better, failed = (
+        SimpleNamespace(kind=kind, report=SimpleNamespace(rmse=rmse))
+        for kind, rmse in (("triangle", 0.02), ("wiebe", 0.016), ("double_wiebe", 0.01), ("none", math.nan))
+    )
+    assert better_laws(own, [own, near, failed]) == []
+    (said,) = better_laws(own, [failed, own, near, better])
+    assert said.startswith("double_wiebe meets the traces with an RMSE of 1.00 % against 2.00 % of triangle")
+    assert "burn_shape and gamma_model choose the law" in said
+    with named_options(burn_shape="burn", gamma_model="gamma"):
+        assert "--burn and --gamma choose the law" in better_laws(own, [better])[0]

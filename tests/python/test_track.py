@@ -270,6 +270,30 @@ def test_the_command_line_tracks(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert "coulomb_nm" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("scales", "said"),
+    [
+        (["coulomb_nm=2", "coulomb_nm=3"], "--plant-scale coulomb_nm is given twice"),
+        (["coulomb_nm=much"], "--plant-scale coulomb_nm=much: 'much' is not a number"),
+        (["friction=1.2"], "--plant-scale friction: no field 'friction'"),
+    ],
+)
+def test_scales_of_the_plant_are_refused_by_their_option(
+    scales: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = [word for scale in scales for word in ("--plant-scale", scale)]
+    assert main(["throttle", "track", *options]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_more_friction_is_more_stiction_unless_it_is_given(capsys: pytest.CaptureFixture[str]) -> None:
+    run = run_json(capsys, "throttle", "track", "--controller", "pid", "--plant-scale", "coulomb_nm=1.3")
+    assert run["plant_scale"] == {"coulomb_nm": 1.3, "stiction_nm": 1.3}
+    own = ("--plant-scale", "coulomb_nm=1.3", "--plant-scale", "stiction_nm=1.5")
+    run = run_json(capsys, "throttle", "track", "--controller", "pid", *own)
+    assert run["plant_scale"] == {"coulomb_nm": 1.3, "stiction_nm": 1.5}
+
+
 def test_a_sensor_without_noise_is_told_its_converter() -> None:
     run = track(tuned_controller("guided", noise_deg=0.0), "step:40:42", noise_deg=0.0)
     assert float(run["settling_ms"]) < 30.0

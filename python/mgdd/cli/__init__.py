@@ -1,4 +1,4 @@
-"""The command line: `mgdd demo`, `mgdd engine simulate | analyze | calibrate | optimum`, `mgdd doctor`."""
+"""The command line `mgdd`: options, defaults and help come from the functions of the library that commands call."""
 
 from __future__ import annotations
 

@@ -6,8 +6,17 @@ import argparse
 import logging
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.calibration import add_pegging, check_pegging, tdc_payload
-from mgdd.cli.options import add_command, add_engine, add_files, engine_of, refuse_idle, traces_of
+from mgdd.cli.from_library import Options
+from mgdd.cli.options import (
+    PEGGING,
+    add_command,
+    add_engine,
+    add_files,
+    check_pegging,
+    engine_of,
+    refuse_idle,
+    traces_of,
+)
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.engine import analyze
 from mgdd.errors import ParameterError
@@ -24,6 +33,11 @@ __all__ = ["add_analyze"]
 
 _LOG = logging.getLogger(__name__)
 
+_ANALYSIS = Options(
+    analyze, "heat_window_cad", "smoothing", "smoothing_width_cad", "smoothing_cutoff_hz", "fractions",
+    gamma="analysis_gamma", n_cylinders="cylinders",
+)  # fmt: skip
+_BRAKE = Options(analyze, "bmep_bar", "brake_torque_nm")
 # Columns of a record: what stands before and after the name of a figure.
 _COLUMNS = {
     "mean": ("", ""),
@@ -43,29 +57,13 @@ def add_analyze(verbs: Any) -> None:
     )  # fmt: skip
     add_files(parser, nargs=1)
     group = parser.add_argument_group("analysis")
-    add_pegging(group)
-    group.add_argument(
-        "--analysis-gamma", type=float, metavar="X",
-        help="constant gamma of the heat release (default: 1.33, or the law that --gamma names)",
-    )  # fmt: skip
-    group.add_argument(
-        "--heat-window-cad", type=float, nargs=2, metavar=("FROM", "TO"), help="default: found from the trace"
-    )
-    group.add_argument(
-        "--smoothing", choices=("none", "savitzky_golay", "low_pass", "angle_window"),
-        help="of the pressure before the heat release (default: savitzky_golay where 9 samples fall into the width)",
-    )  # fmt: skip
-    group.add_argument("--smoothing-width-cad", type=float, metavar="X", help="default: 4")
-    group.add_argument("--smoothing-cutoff-hz", type=float, metavar="X", help="for low_pass (default: 3000)")
-    brake = group.add_mutually_exclusive_group()
-    brake.add_argument("--bmep-bar", type=float, metavar="X", help="measured BMEP: a gross IMEP below it is refused")
-    brake.add_argument("--brake-torque-nm", type=float, metavar="X", help="measured torque, in place of the BMEP")
-    group.add_argument("--cylinders", type=int, default=1, metavar="N", help="behind the torque (default: 1)")
+    PEGGING.add(group)
+    _ANALYSIS.add(group)
+    _BRAKE.add(group.add_mutually_exclusive_group())
     group.add_argument(
         "--tdc", action="store_true",
         help="also estimate TDC, of a fired trace by calibrations over a scan of the angle (seconds), and doubt it",
     )  # fmt: skip
-    group.add_argument("--fractions", choices=("net", "gross"), default="net", help="heat that CA10/50/90 refer to")
     add_engine(parser)
 
 
@@ -76,29 +74,17 @@ def _analyze(args: argparse.Namespace) -> None:
     _check_analysis(args)
     refuse_idle(args, "fuel_mg", "burn", "burn_duration_cad", "ignition", why="an analysis takes no burn: leave it out")
     (trace,) = traces_of(args)
-    gamma: float | str = 1.33 if args.gamma is None else "cylinder"
-    if args.analysis_gamma is not None:
-        if args.gamma is not None:
+    given = _ANALYSIS.given(args) | _BRAKE.given(args) | PEGGING.given(args)
+    if args.gamma is not None:
+        if args.analysis_gamma is not None:
             raise ParameterError("--analysis-gamma and --gamma contradict each other: give one")
-        gamma = args.analysis_gamma
-    result = analyze(
-        trace,
-        cylinder,
-        point=point,
-        pegging=args.pegging,
-        pegging_exponent=args.pegging_exponent or 1.35,
-        inlet_pressure_kpa=args.inlet_pressure_kpa or args.intake_pressure_kpa,
-        gamma=gamma,
-        heat_window_cad=tuple(args.heat_window_cad) if args.heat_window_cad else None,
-        fractions=args.fractions,
-        smoothing=args.smoothing,
-        smoothing_width_cad=4.0 if args.smoothing_width_cad is None else args.smoothing_width_cad,
-        smoothing_cutoff_hz=3000.0 if args.smoothing_cutoff_hz is None else args.smoothing_cutoff_hz,
-        bmep_bar=args.bmep_bar,
-        brake_torque_nm=args.brake_torque_nm,
-        n_cylinders=args.cylinders,
-    )
-    named = gamma if args.gamma is None else (cylinder.gamma if args.gamma == "constant" else args.gamma)
+        given["gamma"] = "cylinder"
+    if args.intake_pressure_kpa is not None:
+        given.setdefault("inlet_pressure_kpa", args.intake_pressure_kpa)
+    result = analyze(trace, cylinder, point=point, **given)
+    named = result.attrs["gamma"]
+    if named == "cylinder":
+        named = cylinder.gamma if args.gamma == "constant" else args.gamma
     payload = {
         "file": result.attrs["file"],
         "preset": preset.name,
@@ -110,7 +96,7 @@ def _analyze(args: argparse.Namespace) -> None:
     }
     if args.tdc:
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
-        payload["tdc"] = tdc_payload(found)
+        payload["tdc"] = found.figures
         payload["warnings"] += found.doubts()
         for doubt in found.doubts():
             _LOG.warning("%s: %s", payload["file"], doubt)
@@ -166,5 +152,5 @@ def _check_analysis(args: argparse.Namespace) -> None:
         raise ParameterError("--smoothing-width-cad acts with --smoothing savitzky_golay or angle_window: choose one")
     if args.smoothing_cutoff_hz is not None and args.smoothing != "low_pass":
         raise ParameterError("--smoothing-cutoff-hz acts with --smoothing low_pass only: choose it")
-    if args.cylinders != 1 and args.brake_torque_nm is None:
+    if args.cylinders is not None and args.brake_torque_nm is None:
         raise ParameterError("--cylinders acts with --brake-torque-nm only: give it")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.cli.study import run_or_part
@@ -15,6 +15,7 @@ from mgdd.studies.sections import Table
 
 __all__ = ["add"]
 
+_REPORT = Options(write_report, "folder")
 _GUIDED = {
     "unguided": "extremum seeking, unguided",
     "feed_forward": "extremum seeking from the model's timing",
@@ -35,7 +36,7 @@ def add(commands: Any) -> None:
         help_text="calibrate four measured traces, find their best timing, report; a guided seeker, a throttle",
         example="mgdd demo",
     )
-    parser.add_argument("--folder", default="mgdd-report", help="folder of the report (default: mgdd-report)")
+    _REPORT.add(parser)
 
 
 def run(args: argparse.Namespace) -> None:
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> None:
     step = args.progress.expect(120)
     result, stopped = run_or_part("measured-traces", progress=step)
     step("write the report")
-    page = write_report(result, Path(args.folder))
+    page = write_report(result, **_REPORT.given(args))
     summary, text = {**result.summary, "report": page.as_posix()}, _text(result.summary)
     for key, study, told in (("guided", "guided", _guided_text), ("throttle", "throttle-tracking", _throttle_text)):
         if stopped:

@@ -3,35 +3,46 @@
 from __future__ import annotations
 
 import argparse
-import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.analyze import add_analyze
-from mgdd.cli.calibration import TDC_SPAN_CAD, add_calibration, calibrate, calibration_arguments, traces_for
+from mgdd.cli.from_library import Options, default_of, named_options, shown
 from mgdd.cli.options import (
+    CYLINDER_CHOICES,
+    PEGGING,
+    SCHEME,
     add_command,
     add_engine,
     add_files,
     add_group,
-    add_scheme,
+    check_pegging,
     engine_of,
     number_pairs,
     refuse_idle,
+    traces_of,
 )
-from mgdd.cli.output import check_output, emit, lines
+from mgdd.cli.output import Stopped, check_output, emit, lines
 from mgdd.cli.seek import add_seek
+from mgdd.cli.study import run_or_part
 from mgdd.cli.sweep import add_sweep
-from mgdd.engine import find_optimum, ignition_delay, simulate, timing_sweep
-from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify import best_timing, estimate_tdc
+from mgdd.engine import find_optimum, simulate, timing_sweep
+from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
+from mgdd.errors import ConvergenceError
+from mgdd.identify import best_timing, estimate_tdc, fit_cylinder
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
+from mgdd.identify.engine.calibration import TDC_SPAN_CAD, judge_fit
 from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
+from mgdd.io.pressure import mean_cycle
+from mgdd.report import write_report
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["add"]
 
-_DEFAULT_SOC_CAD = -6.0
+_TIMING = Options(simulate, "soc_cad")
+_SEARCH = Options(find_optimum, "objective", "bounds_cad")
 _RANGED = ("soc_cad", "ca50_cad", "shift_cad", "gain_percent")
 
 
@@ -58,57 +69,31 @@ def _add_simulate(verbs: Any) -> None:
         endings=".json or .csv",
     )  # fmt: skip
     timing = parser.add_mutually_exclusive_group()
-    timing.add_argument(
-        "--soc-cad", type=float, metavar="X", help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})"
-    )
+    _TIMING.add(timing)
     timing.add_argument(
         "--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on"
     )
     add_engine(parser)
-    add_scheme(parser, step_cad=1.0)
+    SCHEME.add(parser, "scheme")
 
 
 def _simulate(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
-    soc = _start_of_combustion(args, cylinder, point)
-    cycle = simulate(cylinder, point, soc_cad=soc, step_cad=args.step_cad, integrator=args.integrator)
+    timing = _TIMING.of(args)
+    if args.soi_cad is not None:
+        timing["soc_cad"] = ignited_soc_cad(cylinder, point, soi_cad=args.soi_cad)
+    scheme = SCHEME.of(args)
+    cycle = simulate(cylinder, point, **timing, **scheme)
     scalars = {str(name): float(v) for name, v in cycle.data_vars.items() if v.ndim == 0}
-    soi = args.soi_cad if args.soi_cad is not None else _injection_of(cylinder, point, soc)
-    payload = {
-        "preset": preset.name,
-        "integrator": args.integrator,
-        "step_cad": args.step_cad,
-        **scalars,
-        "soi_cad": soi,
-        "motored": point.fuel_mg == 0.0,
-    }
-    emit(args, payload, traces=cycle)
-
-
-def _injection_of(cylinder: Cylinder, point: OperatingPoint, soc: float) -> float:
-    timing = ignition_delay(cylinder, point, soc_cad=soc)
-    return math.nan if timing.clipped else timing.soi_cad
-
-
-def _start_of_combustion(args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint) -> float:
-    if args.soi_cad is None:
-        return _DEFAULT_SOC_CAD if args.soc_cad is None else float(args.soc_cad)
-    timing = ignition_delay(cylinder, point, soi_cad=args.soi_cad)
-    if not timing.ignites:
-        raise ConvergenceError(f"soi_cad = {args.soi_cad:g} does not ignite before EVO: inject earlier")
-    latest = _core.engine.timing_window_cad[1]
-    if timing.soc_cad > latest:
-        raise ParameterError(
-            f"soi_cad = {args.soi_cad:g} ignites at {timing.soc_cad:.1f} °CA aTDC, later than {latest:g}, the latest "
-            "start of combustion that is simulated: inject earlier"
-        )
-    return timing.soc_cad
+    soi = reached_soi_cad(cylinder, point, **timing) if args.soi_cad is None else args.soi_cad
+    known = {"soi_cad": soi, "motored": point.fuel_mg == 0.0}
+    emit(args, {"preset": preset.name, **scheme, **scalars, **known}, traces=cycle)
 
 
 def _add_calibrate(verbs: Any) -> None:
     parser = add_command(
-        verbs, "calibrate", calibrate,
+        verbs, "calibrate", _calibrate,
         help_text="calibrate the cycle model to measured traces, and name what the traces do not identify",
         example="mgdd engine calibrate a25.csv a50.csv --preset hd_diesel_128x144 --conditions conditions.csv --json",
     )  # fmt: skip
@@ -120,9 +105,61 @@ def _add_calibrate(verbs: Any) -> None:
         "the double Wiebe also its shape); gamma is that of the gamma law in use; with --fuel-mg the heat is held",
     )
     parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
-    add_calibration(parser)
+    _add_pressure(parser)
     add_engine(parser)
-    add_scheme(parser, step_cad=0.25)
+    Options(fit_cylinder, "step_cad").add(parser, "scheme")
+    Options(simulate, "integrator").add(parser)
+
+
+def _add_pressure(parser: argparse.ArgumentParser) -> None:
+    """Add how the traces of a calibration are made absolute."""
+    group = parser.add_argument_group("pressure of the traces")
+    PEGGING.add(group)
+    group.add_argument(
+        "--mean-cycle", action="store_true", help="calibrate to the mean of a file's cycles (one cycle is needed)"
+    )
+
+
+def _traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
+    """Read the traces; with --mean-cycle the mean of each file's cycles."""
+    traces = traces_of(args)
+    return [mean_cycle(trace) for trace in traces] if args.mean_cycle else traces
+
+
+def _known(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
+    """Give pegging, and the fuel heat where the fuel was said, as arguments of `fit_cylinder` and `best_timing`."""
+    check_pegging(args)
+    return {
+        **PEGGING.given(args),
+        "fuel_heat_j": None if args.fuel_mg is None else args.fuel_mg * cylinder.lower_heating_value_mj_per_kg,
+    }
+
+
+def _calibrate(args: argparse.Namespace) -> None:
+    """Fit, judge, compare, print."""
+    check_output(args)
+    cylinder, point, preset = engine_of(args)
+    traces = _traces_of(args)
+    free = [name.strip() for name in args.free.split(",")] if args.free else None
+    known, scheme = _known(args, cylinder), SCHEME.given(args)
+    step = args.progress.expect(45 + (90 if args.report_folder else 0))
+    step("calibrate")
+    fit = fit_cylinder(traces, cylinder, free=free, point=point, **known, **scheme)
+    found = judge_fit(fit, fuel_heat_j=known["fuel_heat_j"], progress=step)
+    stopped = False
+    if args.report_folder:
+        absolute = list(fit.request.traces)
+        result, stopped = run_or_part(
+            "measured-traces", traces=absolute, cylinder=cylinder, point=point, progress=step, **scheme
+        )
+        write_report(result, args.report_folder)
+    with named_options(**{field: option for option, field in CYLINDER_CHOICES.items()}):
+        payload = {"preset": preset.name, **found.to_dict()}
+    emit(args, payload, text=payload["report"])
+    if stopped:
+        raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
+    if not fit.report.success:
+        raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 
 
 def _add_optimum(verbs: Any) -> None:
@@ -134,22 +171,16 @@ def _add_optimum(verbs: Any) -> None:
     )  # fmt: skip
     add_files(parser, nargs="*")
     parser.add_argument(
-        "--objective", choices=("efficiency_gross", "imep_gross_bar", "imep_closed_bar"),
-        help="default: efficiency_gross; with files imep_closed_bar, the work that a closed-valve trace carries",
-    )  # fmt: skip
-    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable"
     )
-    parser.add_argument(
-        "--bounds-cad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="searched range of SOC (default: -30 10)"
+    objective, step_cad = (
+        f"{shown(default_of(find_optimum, name))}, with files {shown(default_of(best_timing, name))}"
+        for name in ("objective", "step_cad")
     )
-    add_calibration(parser)
+    _SEARCH.add(parser, "search", objective=objective)
+    _add_pressure(parser)
     add_engine(parser)
-    add_scheme(parser, step_cad=None)
-
-
-def _bounds(args: argparse.Namespace) -> tuple[float, float] | None:
-    return (args.bounds_cad[0], args.bounds_cad[1]) if args.bounds_cad else None
+    SCHEME.add(parser, "scheme", step_cad=step_cad)
 
 
 def _optimum(args: argparse.Namespace) -> None:
@@ -159,10 +190,8 @@ def _optimum(args: argparse.Namespace) -> None:
     if args.files:
         _optimum_of_files(args, cylinder, point, limits, preset.name)
         return
-    scheme = {"step_cad": args.step_cad or 1.0, "integrator": args.integrator}
-    best = find_optimum(
-        cylinder, point, args.objective or "efficiency_gross", limits=limits, bounds_cad=_bounds(args), **scheme
-    )
+    scheme = SCHEME.given(args)
+    best = find_optimum(cylinder, point, limits=limits, **_SEARCH.given(args), **scheme)
     now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
     payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}
     payload |= {
@@ -173,7 +202,7 @@ def _optimum(args: argparse.Namespace) -> None:
     }
     payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
     payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
-    payload["soi_cad"] = _injection_of(cylinder, point, best["soc_cad"])
+    payload["soi_cad"] = reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])
     sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
     emit(args, payload, traces=sweep)
 
@@ -182,21 +211,19 @@ def _optimum_of_files(
     args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
     refuse_idle(args, "burn", "burn_duration_cad", why="the family tries its own burn laws: leave it out")
-    traces = traces_for(args)
+    traces = _traces_of(args)
     rows = best_timing(
         traces,
         cylinder,
         point=point,
-        objective=args.objective or "imep_closed_bar",
         limits=limits,
-        bounds_cad=_bounds(args),
         progress=args.progress.expect(70),
-        step_cad=args.step_cad or 0.25,
-        integrator=args.integrator,
-        **calibration_arguments(args, cylinder),
+        **_SEARCH.given(args),
+        **SCHEME.given(args),
+        **_known(args, cylinder),
     )
     main = headline_of(rows)
-    pegging = calibration_arguments(args, cylinder)
+    pegging = _known(args, cylinder)
     tdc = estimate_tdc(
         list(main.fit.request.traces), cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=TDC_SPAN_CAD,
         progress=args.progress,

@@ -1,34 +1,48 @@
-"""The table of `--guide map`: read, and written back once the run has confirmed an optimum."""
+"""The guide of `mgdd engine seek`: the cylinder of its model, or its table, written back once it has learnt."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.cli.options import refuse_idle
+from mgdd import presets
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.cli.from_library import Options, default_of
+from mgdd.cli.options import assignments, refuse_idle
 from mgdd.cli.output import check_file, wrote
-from mgdd.engine import OperatingPoint
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table
 from mgdd.io.files import existing_file
 from mgdd.io.parameters import ParameterFile
+from mgdd.loop.timing_search import TimingSearch
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["MAP_ENDINGS", "add_map_options", "check_map_options", "learn_map", "read_map"]
+__all__ = ["GUIDE", "add_guide", "check_guide", "guide_of", "learn_map"]
 
-MAP_ENDINGS = (".csv", ".toml")
-_CYCLES, _SPREAD_CAD = 100, 1.0  # what `TimingMap.learn_from` takes for settled
+GUIDE = Options(TimingSearch, "guide", "guide_shape")
+_ENDINGS = (".csv", ".toml")
+_POINT = frozenset(OperatingPoint.fields())
 
 
-def add_map_options(group: Any) -> None:
-    """Add the options of the table."""
+def add_guide(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the guide."""
+    group = GUIDE.add(parser, "guide: a rough model that leads while the measurements decide")
+    group.add_argument(
+        "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"
+    )
+    group.add_argument(
+        "--guide-set", action="append", default=[], metavar="FIELD=VALUE",
+        help="any field of the model's cylinder, repeatable, for example wall_heat_scale=1.0",
+    )  # fmt: skip
     group.add_argument("--guide-map", metavar="FILE", help="the table of --guide map, .csv or .toml")
     group.add_argument(
         "--guide-map-out", metavar="FILE",
@@ -36,24 +50,61 @@ def add_map_options(group: Any) -> None:
     )  # fmt: skip
 
 
-def check_map_options(args: argparse.Namespace) -> None:
-    """Refuse a table that is not said, or is written where nothing is learnt."""
-    if args.guide != "map":
-        why = "--guide none has no model" if args.guide == "none" else f"--guide {args.guide} has a model, not a table"
-        refuse_idle(args, "guide_map", "guide_map_out", why=why)
+def check_guide(args: argparse.Namespace) -> None:
+    """Refuse options of a guide that is not there, and a table that is not said, or written where nothing is learnt."""
+    guide = args.guide or default_of(TimingSearch, "guide")
+    why = {"none": "has no model", "map": "has a table, not a model"}.get(guide, "has a model, not a table")
+    models, tables = ("guide_preset", "guide_set"), ("guide_map", "guide_map_out")
+    idle = {"none": (*models, *tables), "map": models}.get(guide, tables)
+    refuse_idle(args, *idle, why=f"--guide {guide} {why}")
+    if guide != "map":
         return
     if args.guide_map is None:
         raise ParameterError(
             "--guide map needs --guide-map FILE, a table as TimingMap.write_csv or TimingMap.to_toml writes it"
         )
-    check_file("--guide-map", args.guide_map, MAP_ENDINGS)
-    check_file("--guide-map-out", args.guide_map_out, MAP_ENDINGS)
+    check_file("--guide-map", args.guide_map, _ENDINGS)
+    check_file("--guide-map-out", args.guide_map_out, _ENDINGS)
     if args.limit:
         why = "with --limit a run ends at the best timing within the limit, which is not what the table holds"
         refuse_idle(args, "guide_map_out", why=why)
 
 
-def read_map(file: str) -> TimingMap:
+def guide_of(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
+    """Give the guide as arguments of a search, whose bench has this cylinder."""
+    if args.guide == "map":
+        return {**GUIDE.given(args), "guide_table": _read_map(args.guide_map)}
+    return {**GUIDE.given(args), "guide_cylinder": _cylinder_of(args, cylinder)}
+
+
+def _cylinder_of(args: argparse.Namespace, base: Cylinder) -> Cylinder:
+    if args.guide_preset is not None:
+        with _named("--guide-preset", f"{args.guide_preset}: "):
+            base = presets.load(args.guide_preset, kind="engine").cylinder
+    fields = {**Cylinder.fields(), **OperatingPoint.fields()}
+    with _named("--guide-set"):
+        given = assignments(args.guide_set, fields, "--guide-set")
+        if known := sorted(_POINT & given.keys()):
+            raise ParameterError(f"--guide-set {known[0]}: belongs to the operating point, which guide and bench share")
+        if strange := [name for name in given if name not in fields]:
+            raise ParameterError(
+                f"--guide-set {strange[0]}: is not a field of the cylinder; mgdd.engine.Cylinder has "
+                f"{', '.join(Cylinder.fields())}"
+            )
+        return base.replace(**given)
+
+
+@contextmanager
+def _named(option: str, given: str = "") -> Iterator[None]:
+    """Let errors of the library name the option."""
+    try:
+        yield
+    except ParameterError as error:
+        said = str(error)
+        raise error.reworded(said if said.startswith(option) else f"{option} {given}{said}") from error
+
+
+def _read_map(file: str) -> TimingMap:
     """Read a table by the ending of its file; its axes are numbers of the operating point."""
     is_csv = Path(file).suffix == ".csv"
     if is_csv and existing_file(file).read_bytes()[:64].lstrip(b"\xef\xbb\xbf").startswith(b"mgdd_map"):
@@ -85,12 +136,13 @@ def learn_map(
     if args.guide_map_out is None or table is None or not isinstance(seeker, FeedForward):
         return {}, []
     before = table.support
-    learnt = not interrupted and table.learn_from(seeker, point, cycles=_CYCLES, spread_cad=_SPREAD_CAD)
+    learnt = not interrupted and table.learn_from(seeker, point)
     doubts = []
     if learnt:
         _write(table, args, point, before)
     else:
-        why = f"the estimate has not settled within {_SPREAD_CAD:g} °CA over the last {_CYCLES} cycles: raise --cycles"
+        spread_cad, cycles = (default_of(TimingMap.learn_from, name) for name in ("spread_cad", "cycles"))
+        why = f"the estimate has not settled within {spread_cad:g} °CA over the last {cycles} cycles: raise --cycles"
         if interrupted:
             why = "the run was interrupted: let it run to its end"
         doubts.append(f"--guide-map-out {args.guide_map_out}: not written, {why}")
@@ -108,7 +160,7 @@ def _write(table: TimingMap, args: argparse.Namespace, point: OperatingPoint, be
     """Write the table; the cells that have learnt say so, the others what they said before."""
     own = point.to_dict()
     where = " ".join(f"{name}={own[name]:g}" for name in table.axes if own.get(name) is not None)
-    said = f"mgdd engine seek at {where} seed={args.seed}"
+    said = f"mgdd engine seek at {where} seed={args.seed or 0}"
     known, out = Path(args.guide_map), Path(args.guide_map_out)
     if out.suffix == ".csv":
         old = read_map_table(known, ".")[1] if known.suffix == ".csv" else np.full(before.shape, _plain(known.name))

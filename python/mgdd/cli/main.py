@@ -10,8 +10,9 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import demo, doctor, engine, maps, rig, study, throttle
-from mgdd.cli.options import Parser, UsageError, as_option
+from mgdd.cli import completion, demo, doctor, engine, maps, preset, rig, study, throttle
+from mgdd.cli.from_library import as_option
+from mgdd.cli.options import Parser, UsageError
 from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
 from mgdd.errors import ConvergenceError, Error, arguments_written
@@ -114,5 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     throttle.add(commands)
     rig.add(commands)
     study.add(commands)
+    preset.add(commands)
     doctor.add(commands)
+    completion.add(commands, parser)
     return parser

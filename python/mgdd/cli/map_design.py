@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import OperatingPoint
-from mgdd.cli.map_files import add_csv_options, named_options, write_table
-from mgdd.cli.options import add_command, add_engine, add_scheme, engine_of, number_pairs, refuse_idle
+from mgdd.cli.from_library import Options, named_options
+from mgdd.cli.map_files import CSV, write_table
+from mgdd.cli.options import SCHEME, add_command, add_engine, engine_of, number_pairs, refuse_idle
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.ranges import factors_of
 from mgdd.design import FeasibleRegion, design_points
-from mgdd.design.points import METHODS
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.point_table import read_points
 from mgdd.studies.sections import Table
-from mgdd.surrogate.polynomial import MODELS
 from mgdd.sweep import sweep
 
 if TYPE_CHECKING:
@@ -30,6 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["add_design"]
 
 _LOG = logging.getLogger(__name__)
+_DESIGN = Options(design_points, "method", "seed", "model", "n_starts", n="points")
+_MARGIN, _TIMING = Options(FeasibleRegion.of_points, "margin"), Options(sweep, "soc_cad")
 _ENGINE = ("preset", "set", *OperatingPoint.fields(), "burn", "gamma", "wall_heat", "ignition", "soc_cad")
 
 
@@ -47,14 +48,7 @@ def add_design(verbs: Any) -> None:
         help="range of a factor in the unit that its name ends in; with N, or as NAME=VALUE,VALUE, only these levels; "
         "repeatable",
     )  # fmt: skip
-    parser.add_argument(
-        "--method", choices=METHODS, default="sobol",
-        help="sobol, halton, lhs: points that fill the space; maximin: far from each other; factorial: every "
-        "combination of levels, 3 where none are given; d_optimal: those that determine the terms of --model best "
-        "(default: sobol)",
-    )  # fmt: skip
-    parser.add_argument("--points", type=int, metavar="N", help="points to add; all methods but factorial need it")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="the same seed gives the same points (0)")
+    _DESIGN.add(parser)
     parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help="keep an indicator of the model at or below X, in the unit that its name ends in; repeatable",
@@ -63,10 +57,7 @@ def add_design(verbs: Any) -> None:
         "--within", metavar="FILE",
         help="points that the engine was driven at, .csv or .nc: new ones stay between them, in their convex hull",
     )  # fmt: skip
-    parser.add_argument(
-        "--margin", type=float, metavar="X",
-        help="of --within: kept free inside the boundary, in ranges of the factors (default: 0; 0.05 is 5 %%)",
-    )  # fmt: skip
+    _MARGIN.add(parser)
     parser.add_argument(
         "--refused", metavar="FILE",
         help="of --within: points that could not be driven; what is nearer to one of them than to a driven one is out",
@@ -75,40 +66,23 @@ def add_design(verbs: Any) -> None:
         "--extend", metavar="FILE",
         help="points that were run, .csv or .nc: new ones keep away from them and are numbered behind them",
     )  # fmt: skip
-    parser.add_argument(
-        "--model", choices=tuple(MODELS), help="of d_optimal: terms of the polynomial (default: quadratic)"
-    )
-    parser.add_argument(
-        "--n-starts", type=int, default=10, metavar="N",
-        help="searches of d_optimal and tries of lhs, of which the best is kept (default: 10)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--soc-cad", type=float, metavar="X", help="of --limit: start of combustion where it is not a factor (-6)"
-    )
-    add_csv_options(parser)
+    _TIMING.add(parser)
+    CSV.add(parser)
     add_engine(parser)
-    add_scheme(parser, step_cad=1.0)
+    SCHEME.add(parser, "scheme")
 
 
 def _design(args: argparse.Namespace) -> None:
     check_output(args, ".csv", ".nc", ".json")
-    if args.method != "d_optimal":
-        refuse_idle(args, "model", why=f"--method {args.method} fits no polynomial")
+    method = _DESIGN.of(args)["method"]
+    if method != "d_optimal":
+        refuse_idle(args, "model", why=f"--method {method} fits no polynomial")
     factors, limits = factors_of(args.over), number_pairs(args.limit, "--limit")
     region, driven = _region(args, limits), _driven(args, tuple(factors))
     before = _before(args, tuple(factors))
     with warnings.catch_warnings(record=True) as doubts, named_options(n="points", existing="extend", outputs="limit"):
         warnings.simplefilter("always", UserWarning)
-        plan = design_points(
-            factors,
-            args.points,
-            method=args.method,
-            feasible=_both(region, driven),
-            existing=before,
-            model=args.model or "quadratic",
-            n_starts=args.n_starts,
-            seed=args.seed,
-        )
+        plan = design_points(factors, feasible=_both(region, driven), existing=before, **_DESIGN.given(args))
     said = [str(doubt.message) for doubt in doubts]
     for text in said:
         _LOG.warning("%s", text)
@@ -129,13 +103,10 @@ def _region(args: argparse.Namespace, limits: Mapping[str, float]) -> FeasibleRe
             raise ParameterError("--motored does not act here; without --limit no model is asked")
         return None
     cylinder, point, _ = engine_of(args)
-    soc_cad = -6.0 if args.soc_cad is None else args.soc_cad
+    how = _TIMING.given(args) | SCHEME.given(args)
 
     def indicators(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-        found = sweep(
-            cylinder, point, columns, points=True, soc_cad=soc_cad, outputs=tuple(limits), step_cad=args.step_cad,
-            integrator=args.integrator,
-        )  # fmt: skip
+        found = sweep(cylinder, point, columns, points=True, outputs=tuple(limits), **how)
         return {name: found[name].to_numpy() for name in limits}
 
     return FeasibleRegion.of_model(indicators, limits)
@@ -145,13 +116,12 @@ def _driven(args: argparse.Namespace, names: tuple[str, ...]) -> FeasibleRegion 
     if args.within is None:
         refuse_idle(args, "margin", "refused", why="it is of the measured points of --within FILE")
         return None
-    how = {"delimiter": args.delimiter, "decimal": args.decimal}
+    how = CSV.given(args)
     driven = read_points(args.within, names, **how)[list(names)]
     refused = None if args.refused is None else read_points(args.refused, names, **how)[list(names)]
-    margin = 0.0 if args.margin is None else args.margin
     with named_options(infeasible="refused"):
         try:
-            return FeasibleRegion.of_points(driven, margin=margin, infeasible=refused)
+            return FeasibleRegion.of_points(driven, infeasible=refused, **_MARGIN.given(args))
         except DataError as error:
             said = str(error)
             raise error.reworded(said if said.startswith("--") else f"{args.within}: {said}") from error
@@ -169,7 +139,7 @@ def _before(args: argparse.Namespace, names: tuple[str, ...]) -> xr.Dataset | No
         return None
     if args.output is not None and Path(args.output).resolve() == Path(args.extend).resolve():
         raise ParameterError(f"-o {args.output}: the file of --extend; new points would replace it: name another")
-    return read_points(args.extend, names, delimiter=args.delimiter, decimal=args.decimal)
+    return read_points(args.extend, names, **CSV.given(args))
 
 
 def _payload(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import datasets
 from mgdd.cli.map_files import MAP_ENDINGS
-from mgdd.cli.map_show import add_map_reading
+from mgdd.cli.map_show import READING
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
@@ -33,7 +33,7 @@ def add_export(verbs: Any) -> None:
         endings=".csv, .json or .nc, which hold everything; .dcm, which may hold several maps; with --guide-map .toml",
     )  # fmt: skip
     parser.add_argument("files", nargs="*", metavar="MAP", help=".csv, .json, .nc or .dcm; several only into a .dcm")
-    add_map_reading(parser)
+    READING.add(parser)
     parser.add_argument(
         "--label", action="append", default=[], metavar="NAME",
         help="label in a DCM file, one per map in their order (default: the names of the maps)",
@@ -93,7 +93,7 @@ def _maps(args: argparse.Namespace) -> list[CalibrationMap]:
     if args.advisor is None:
         if not args.files:
             raise ParameterError("no map: name a file, or a measured engine with --advisor")
-        return [read_map(file, args.name, decimal=args.decimal) for file in args.files]
+        return [read_map(file, **READING.given(args)) for file in args.files]
     if args.files:
         raise ParameterError(f"--advisor and {args.files[0]} contradict each other: give one")
     data = datasets.load("advisor_engine_maps")[_ENGINES.index(args.advisor)]

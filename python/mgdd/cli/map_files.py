@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.cli.options import as_option
+from mgdd.cli.from_library import Options
 from mgdd.cli.output import emit, save_figure, wrote
-from mgdd.errors import DataError, arguments_written
+from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf, write_netcdf
-from mgdd.io.point_table import POINT
+from mgdd.io.point_table import POINT, read_points
 from mgdd.io.table import write_columns
 from mgdd.maps import write_map
 from mgdd.maps.files import map_content
@@ -26,25 +25,11 @@ if TYPE_CHECKING:
 
     from mgdd.maps import CalibrationMap
 
-__all__ = ["MAP_ENDINGS", "add_csv_options", "emit_map", "grid_table", "named_options", "write_table"]
+__all__ = ["CSV", "MAP_ENDINGS", "emit_map", "grid_table", "write_table"]
 
+CSV = Options(read_points, "delimiter", "decimal")
 MAP_ENDINGS = (".csv", ".json", ".nc", ".dcm")
 _SIZE = (6.6, 4.6)
-
-
-def named_options(**options: str) -> AbstractContextManager[None]:
-    """Let messages write arguments of the library as the options of a command that are called otherwise."""
-
-    def write(name: str, text: str | None = None) -> str:
-        return as_option(options.get(name, name), text)
-
-    return arguments_written(write)
-
-
-def add_csv_options(parser: Any) -> None:
-    """Add how to read a text table."""
-    parser.add_argument("--delimiter", metavar="CHAR", help="column separator of a CSV file (default: found in it)")
-    parser.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark of a CSV file (default: .)")
 
 
 def grid_table(file: str) -> xr.Dataset:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.cli.map_files import add_csv_options
+from mgdd.cli.from_library import Options
+from mgdd.cli.map_files import CSV
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
 from mgdd.errors import DataError, ParameterError
@@ -22,7 +23,6 @@ from mgdd.plot import response_diagnostics
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.surrogate import fit_response
-from mgdd.surrogate.response_fit import KINDS, SELECTIONS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["add_fit"]
 
 _LOG = logging.getLogger(__name__)
+_COLUMN = Options(fit_response, "response")
+_FIT = Options(fit_response, "kind", "degree", "select", "folds", "n_starts", "seed")
 
 
 def add_fit(verbs: Any) -> None:
@@ -48,32 +50,15 @@ def add_fit(verbs: Any) -> None:
         help=".nc of mgdd engine sweep, or .csv with a point per row and the unit in each name, in brackets behind it "
         "or in a second row",
     )  # fmt: skip
-    parser.add_argument("--response", required=True, metavar="NAME", help="column to fit")
+    _COLUMN.add(parser)
     parser.add_argument(
         "--factors",
         metavar="NAME[,NAME]",
         help="columns to fit it over (default: the inputs of a sweep; needed for .csv)",
     )
-    parser.add_argument(
-        "--kind", choices=KINDS, default="polynomial",
-        help="least squares on products of the factors, or a Gaussian process, for what no polynomial follows "
-        "(default: polynomial)",
-    )  # fmt: skip
-    parser.add_argument("--degree", type=int, default=2, metavar="N", help="of the full polynomial, 1 to 4 (2)")
-    parser.add_argument(
-        "--select", choices=SELECTIONS, default="bic",
-        help="terms that are kept: by the Schwarz criterion, by the error of left-out points, or all (default: bic)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--folds", type=int, metavar="N",
-        help="leave out one of N random parts at a time and repeat the whole fit (default: each point alone)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--n-starts", type=int, default=5, metavar="N", help="searches for the length scales of a Gaussian process (5)"
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of these searches and of the parts (0)")
+    _FIT.add(parser)
     parser.add_argument("--figure", metavar="FILE", help="draw the diagnostics of the fit (.png, .svg or .pdf)")
-    add_csv_options(parser)
+    CSV.add(parser)
 
 
 def _fit(args: argparse.Namespace) -> None:
@@ -81,17 +66,7 @@ def _fit(args: argparse.Namespace) -> None:
     check_figure(args.figure)
     table, left_out = _table(args)
     factors = [str(name) for name in table.data_vars if name != args.response]
-    fit = fit_response(
-        table,
-        args.response,
-        kind=args.kind,
-        factors=factors,
-        degree=args.degree,
-        select=args.select,
-        folds=args.folds,
-        n_starts=args.n_starts,
-        seed=args.seed,
-    )
+    fit = fit_response(table, args.response, factors=factors, **_FIT.given(args))
     if args.output is not None and Path(args.output).suffix == ".toml":
         source = f"{args.response} of {Path(args.file).name}, {table.sizes[POINT]} points"
         write_whole_text(args.output, replace(fit.model.to_parameters(), notes={"source": source}).to_toml())
@@ -106,7 +81,6 @@ def _fit(args: argparse.Namespace) -> None:
 
 def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
     """Read response and factors; points where one is NaN, as of a cycle that was not simulated, are left out."""
-    reading = {"delimiter": args.delimiter, "decimal": args.decimal}
     if args.factors is not None:
         factors = [name.strip() for name in args.factors.split(",")]
         if args.response in factors or len(set(factors)) < len(factors) or not all(factors):
@@ -115,7 +89,7 @@ def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
         raise ParameterError(f"--factors is needed: which columns of {args.file} make {args.response}")
     else:
         factors = _inputs(args.file, args.response)
-    table = read_points(args.file, [*factors, args.response], **reading)
+    table = read_points(args.file, [*factors, args.response], **CSV.given(args))
     known = np.all([np.isfinite(column.to_numpy()) for column in table.data_vars.values()], axis=0)
     gone = int((~known).sum())
     if gone == known.size:

@@ -9,14 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table, named_options
+from mgdd.cli.from_library import Options, named_options
+from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table
 from mgdd.cli.map_text import map_blocks
 from mgdd.cli.options import add_command, assignments, number_pairs
 from mgdd.cli.output import check_figure, check_output
 from mgdd.maps import CalibrationMap, optimize_map, read_map, smooth_map
+from mgdd.maps.compare import steepest
 
 __all__ = ["add_optimize", "add_smooth"]
 
+_OPTIMUM = Options(optimize_map, "max_loss", "infeasible", over="along")
+_SMOOTH = Options(smooth_map, "weight", "fill")
 _FORMS = ".csv, .json or .nc, which hold everything; .dcm for calibration tools"
 
 
@@ -37,25 +41,14 @@ def add_optimize(verbs: Any) -> None:
     goal.add_argument("--maximize", metavar="NAME", help="variable whose highest value is best, as efficiency_gross")
     goal.add_argument("--minimize", metavar="NAME", help="variable whose lowest value is best, as a consumption")
     parser.add_argument(
-        "--along", default="soc_cad", metavar="NAME", help="the input that is chosen per operating point (soc_cad)"
-    )
-    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help="keep a variable of the table at or below X, in the unit that its name ends in; repeatable",
     )  # fmt: skip
-    parser.add_argument(
-        "--max-loss", type=float, metavar="X",
-        help="what smoothing may cost in any cell, in the unit of the objective; it makes the allowed range of each "
-        "cell (left out: all values that keep the limits)",
-    )  # fmt: skip
+    _OPTIMUM.add(parser)
     parser.add_argument(
         "--sd", action="append", default=[], metavar="NAME=X",
         help="standard deviation of objective or limited variable at one point: a number, or a variable of the table; "
         "it makes that of the optimum; repeatable",
-    )  # fmt: skip
-    parser.add_argument(
-        "--infeasible", choices=("raise", "keep"), default="raise",
-        help="cells in which nothing keeps the limits: an error, or cells without a value (default: raise)",
     )  # fmt: skip
     _add_figure(parser)
 
@@ -69,13 +62,11 @@ def _optimize(args: argparse.Namespace) -> None:
         best = optimize_map(
             grid_table(args.file),
             args.maximize or args.minimize,
-            over=args.along,
             limits=limits,
             maximize=args.maximize is not None,
-            max_loss=args.max_loss,
             sd=scatter,
-            infeasible=args.infeasible,
             provenance={"from": " ".join(Path(args.file).name.split())},
+            **_OPTIMUM.given(args),
         )
     emit_map(args, best, _shown(args, best), n_held=_held(best))
 
@@ -89,15 +80,11 @@ def add_smooth(verbs: Any) -> None:
         endings=_FORMS,
     )  # fmt: skip
     parser.add_argument("file", metavar="MAP", help="of mgdd map optimize --max-loss, .csv, .json or .nc")
-    parser.add_argument(
-        "--weight", type=float, default=1.0, metavar="X",
-        help="of smoothness against the distance from the optimum, 0 to 1e6 (default: 1)",
-    )  # fmt: skip
+    _SMOOTH.add(parser)
     parser.add_argument(
         "--slope-limit", action="append", default=[], metavar="AXIS=X",
         help="largest change of the value per unit of an axis, for example speed_rpm=0.004; repeatable",
     )  # fmt: skip
-    parser.add_argument("--fill", action="store_true", help="give empty cells what their neighbours make of them")
     _add_figure(parser)
 
 
@@ -106,22 +93,21 @@ def _smooth(args: argparse.Namespace) -> None:
     check_figure(args.figure)
     optimum = read_map(args.file)
     slopes = number_pairs(args.slope_limit, "--slope-limit")
-    smooth = smooth_map(optimum, weight=args.weight, slope_limits=slopes, fill=args.fill)
+    smooth = smooth_map(optimum, slope_limits=slopes, **_SMOOTH.given(args))
     moved = np.abs(smooth.values - optimum.values)
     shift = float(np.nanmax(moved))  # smooth_map refuses a map without a value
-    steepest = {name: _steepest(smooth, place) for place, name in enumerate(smooth.axes)}
+    slopes_now = {name: steepest(smooth, name) for name in smooth.axes}
     unit = smooth.unit.removesuffix(" aTDC")
     said = [f"moved by at most {shift:.3g} {unit} in a cell"]
-    for place, (name, slope) in enumerate(steepest.items()):
+    for name, slope in slopes_now.items():
         if slope is None:
             continue
         limit = f", limit {slopes[name]:g}" if name in slopes else ""
-        of_unit = smooth.labels[name].units
-        before = _steepest(optimum, place)
+        before = steepest(optimum, name)
         was = "" if before is None else f"; before {before:.3g}"
-        said.append(f"steepest over {name}: {slope:.3g} {unit}/{of_unit}{limit}{was}")
+        said.append(f"steepest over {name}: {slope:.3g} {unit}/{smooth.labels[name].units}{limit}{was}")
     text = [*_shown(args, smooth), "", *said]
-    emit_map(args, smooth, text, largest_shift=shift, largest_slope=steepest, n_held=_held(smooth))
+    emit_map(args, smooth, text, largest_shift=shift, largest_slope=slopes_now, n_held=_held(smooth))
 
 
 def _add_figure(parser: argparse.ArgumentParser) -> None:
@@ -134,12 +120,3 @@ def _shown(args: argparse.Namespace, table: CalibrationMap) -> list[Any]:
 
 def _held(table: CalibrationMap) -> dict[str, int]:
     return dict(sorted(Counter(name for name in table.cells["active_limit"].ravel().tolist() if name).items()))
-
-
-def _steepest(table: CalibrationMap, axis: int) -> float | None:
-    """Give the largest change per unit of an axis; None where no two neighbours have a value."""
-    steps = np.diff(list(table.axes.values())[axis])
-    shape = [1] * table.values.ndim
-    shape[axis] = steps.size
-    slopes = np.abs(np.diff(table.values, axis=axis)) / steps.reshape(shape)
-    return float(np.nanmax(slopes)) if np.isfinite(slopes).any() else None

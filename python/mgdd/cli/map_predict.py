@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.cli.map_files import add_csv_options, write_table
+from mgdd.cli.from_library import Options
+from mgdd.cli.map_files import CSV, write_table
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.cli.ranges import add_over, grid_of
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import POINT, read_points
-from mgdd.results.labels import label_of, labelled_dataset
+from mgdd.results.labels import label_of
 from mgdd.surrogate import ResponseModel
+from mgdd.surrogate.prediction_table import prediction_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,8 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["add_predict"]
 
 _LOG = logging.getLogger(__name__)
-# What stands behind the name of a response, and the part of a prediction that it is.
-_PARTS = {"": "mean", "_sd": "sd", "_lower": "lower", "_upper": "upper"}
+_LEVEL = Options(ResponseModel.predict, "level")
 
 
 def add_predict(verbs: Any) -> None:
@@ -44,15 +46,12 @@ def add_predict(verbs: Any) -> None:
     what = parser.add_mutually_exclusive_group(required=True)
     add_over(what, what="a factor")
     what.add_argument("--points", metavar="FILE", help="the points of a .csv or .nc file instead of a grid")
-    parser.add_argument(
-        "--level", type=float, default=0.95, metavar="X",
-        help="probability that a new measurement lies between NAME_lower and NAME_upper (default: 0.95)",
-    )  # fmt: skip
+    _LEVEL.add(parser)
     parser.add_argument(
         "--extrapolate", action="store_true",
         help="also give values outside of the points that were fitted; they are NaN otherwise",
     )  # fmt: skip
-    add_csv_options(parser)
+    CSV.add(parser)
 
 
 def _predict(args: argparse.Namespace) -> None:
@@ -62,30 +61,10 @@ def _predict(args: argparse.Namespace) -> None:
     if twice is not None:
         raise ParameterError(f"two files hold a model of {twice}: give one of each response")
     names = list(dict.fromkeys(name for model in models for name in model.factors))
-    axes, dims, columns = _places(args, names)
-    labels = {name: label for model in models for name, label in model.factors.items()}
-    shape = tuple(len(values) for values in axes.values())
-    variables: dict[str, tuple[Any, ...]] = {
-        name: (name, values, *labels.get(name, ("-", "number of the point"))) for name, values in axes.items()
-    }
-    variables |= {name: (POINT, columns[name], *labels[name]) for name in names if name not in axes}
-    outside: dict[str, int] = {}
-    for model in models:
-        found = model.predict({name: columns[name].ravel() for name in model.factors}, level=args.level)
-        beyond = found["extrapolated"].to_numpy()
-        outside[model.name] = int(beyond.sum())
-        keep = np.ones(beyond.shape, dtype=bool) if args.extrapolate else ~beyond
-        for ending, part in _PARTS.items():
-            values = np.where(keep, found[part].to_numpy(), np.nan).reshape(shape)
-            variables[f"{model.name}{ending}"] = (dims, values, *label_of(found[part]))
-        if args.extrapolate:
-            where = beyond.reshape(shape).astype(np.int8)
-            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
-    table = labelled_dataset(variables, attrs={"level": args.level, "models": ", ".join(args.files)})
-    table = table.set_coords([name for name in names if name not in axes])
-    for model in models:
-        table[model.name].attrs["source"] = "predicted"
-    total = int(np.prod(shape))
+    axes, columns = _places(args, names)
+    table, outside = prediction_table(models, axes, columns, extrapolate=args.extrapolate, **_LEVEL.of(args))
+    table.attrs["models"] = ", ".join(args.files)
+    total = math.prod(table.sizes.values())
     what = "kept, extrapolated)"
     if not args.extrapolate:
         fewer = "leave them out" if args.points else "narrow --over"
@@ -120,11 +99,11 @@ def _model(file: str) -> ResponseModel:
 
 def _places(
     args: argparse.Namespace, names: Sequence[str]
-) -> tuple[dict[str, NDArray[Any]], tuple[str, ...], dict[str, NDArray[np.float64]]]:
-    """Give the axes of the answer, their names, and where the models are asked."""
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[np.float64]]]:
+    """Give the axes of the answer, and where the models are asked."""
     if args.points:
-        table = read_points(args.points, names, delimiter=args.delimiter, decimal=args.decimal)
-        return {POINT: table[POINT].to_numpy()}, (POINT,), {name: table[name].to_numpy() for name in names}
+        table = read_points(args.points, names, **CSV.given(args))
+        return {POINT: table[POINT].to_numpy()}, {name: table[name].to_numpy() for name in names}
     grid = grid_of(args.over)
     lacking = [name for name in names if name not in grid]
     if lacking:
@@ -133,7 +112,7 @@ def _places(
     if odd:
         near = did_you_mean(odd[0], names) or f"they have {', '.join(names)}"
         raise ParameterError(f"--over {odd[0]}: not a factor of the models: {near}")
-    return dict(grid), tuple(grid), dict(zip(grid, np.meshgrid(*grid.values(), indexing="ij"), strict=True))
+    return dict(grid), dict(zip(grid, np.meshgrid(*grid.values(), indexing="ij"), strict=True))
 
 
 def _range(values: xr.DataArray) -> list[float] | None:

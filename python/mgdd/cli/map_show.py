@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table, write_table
 from mgdd.cli.map_text import COLUMNS, grid_blocks, map_blocks
 from mgdd.cli.options import add_command
@@ -15,6 +16,7 @@ from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.errors import ParameterError
 from mgdd.maps import CalibrationMap, apply_map, compare_maps, read_map
 from mgdd.maps.cells import TEXTS, cell_at
+from mgdd.maps.compare import achieved_figures
 from mgdd.plot import map_cells, map_contour
 from mgdd.plot.style import drawn
 from mgdd.results.labels import label_of
@@ -23,7 +25,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["add_diff", "add_show"]
+__all__ = ["READING", "add_diff", "add_show"]
+
+READING = Options(read_map, "name", "decimal")
+_COMPARED = Options(compare_maps, "grid", "tolerance")
 
 
 def add_show(verbs: Any) -> None:
@@ -35,22 +40,16 @@ def add_show(verbs: Any) -> None:
         endings=".csv, .json, .nc or .dcm, the map",
     )  # fmt: skip
     parser.add_argument("file", metavar="MAP", help=".csv, .json, .nc or .dcm")
-    add_map_reading(parser)
+    READING.add(parser)
     parser.add_argument(
         "--column", choices=COLUMNS, default="value",
-        help="what is shown of the cells: the value, its standard deviation, the ends of its range (default: value)",
+        help="what is shown of the cells: value, its standard deviation, the ends of its range (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
         "--sweep", metavar="TABLE.nc", help="also say what the map achieves in the table that it was made of"
     )
     parser.add_argument("--figure", metavar="FILE", help="draw the cells of the map (.png, .svg or .pdf)")
     parser.add_argument("--contour", action="store_true", help="draw contours instead of the cells")
-
-
-def add_map_reading(parser: argparse.ArgumentParser) -> None:
-    """Add how to read a file of a map."""
-    parser.add_argument("--name", metavar="NAME", help="which map or variable, where a file holds several")
-    parser.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark of a CSV file (default: .)")
 
 
 def _show(args: argparse.Namespace) -> None:
@@ -60,7 +59,7 @@ def _show(args: argparse.Namespace) -> None:
         raise ParameterError("--contour does not act here; it is a form of the picture: name one with --figure FILE")
     if args.contour and args.column in TEXTS:
         raise ParameterError(f"--contour and --column {args.column} contradict each other: it holds texts")
-    table = read_map(args.file, args.name, decimal=args.decimal)
+    table = read_map(args.file, **READING.given(args))
     text, more = map_blocks(table, args.column), {}
     if args.sweep is not None:
         more["achieved"], said = _achieved(table, grid_table(args.sweep))
@@ -76,32 +75,14 @@ def _show(args: argparse.Namespace) -> None:
 def _achieved(table: CalibrationMap, sweep: xr.Dataset) -> tuple[dict[str, Any], list[str]]:
     """Say what objective, limited variables and loss become at the values of a map."""
     found = apply_map(table, sweep)
-    task = table.task
-    wanted = [] if task is None else [name for name in ("loss", task.objective, *task.limits) if name in found]
-    names = wanted or [str(name) for name in found.data_vars if name != table.name]
-    figures, said = {}, []
-    for name in names:
-        values = found[name].transpose(*table.axes).to_numpy()
-        if not np.isfinite(values).any():
-            continue
-        worst = int(np.nanargmax(values))
-        figures[name] = {
-            "mean": float(np.nanmean(values)),
-            "lowest": float(np.nanmin(values)),
-            "highest": float(np.nanmax(values)),
-            "highest_at": {
-                axis: float(entries[place])
-                for (axis, entries), place in zip(
-                    table.axes.items(), np.unravel_index(worst, values.shape), strict=True
-                )
-            },
-        }
-        limit = "" if task is None or name not in task.limits else f", limit {task.limits[name]:g}"
+    figures, said = achieved_figures(table, found), []
+    for name, own in figures.items():
+        limit = "" if table.task is None or name not in table.task.limits else f", limit {table.task.limits[name]:g}"
         unit = label_of(found[name]).units
+        worst = int(np.nanargmax(found[name].transpose(*table.axes).to_numpy()))
         said.append(
-            f"  {name}{'' if unit == '-' else f' [{unit}]'}: mean {figures[name]['mean']:.4g}, "
-            f"{figures[name]['lowest']:.4g} to {figures[name]['highest']:.4g}{limit}, highest at "
-            f"{cell_at(table.axes, worst)}"
+            f"  {name}{'' if unit == '-' else f' [{unit}]'}: mean {own['mean']:.4g}, {own['lowest']:.4g} to "
+            f"{own['highest']:.4g}{limit}, highest at {cell_at(table.axes, worst)}"
         )
     return figures, said
 
@@ -116,22 +97,16 @@ def add_diff(verbs: Any) -> None:
     )  # fmt: skip
     parser.add_argument("first", metavar="FIRST", help=".csv, .json, .nc or .dcm")
     parser.add_argument("second", metavar="SECOND", help="the map that the first is subtracted from")
-    add_map_reading(parser)
-    parser.add_argument(
-        "--grid", choices=("union", "first"), default="union",
-        help="compare at the breakpoints of both inside of both, or at those of the first (default: union)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--tolerance", type=float, metavar="X", help="count and mark differences beyond X, in the unit of the map"
-    )
+    READING.add(parser)
+    _COMPARED.add(parser)
     parser.add_argument("--figure", metavar="FILE", help="draw the differences (.png, .svg or .pdf)")
 
 
 def _diff(args: argparse.Namespace) -> None:
     check_output(args, ".nc", ".json")
     check_figure(args.figure)
-    first, second = (read_map(file, args.name, decimal=args.decimal) for file in (args.first, args.second))
-    found = compare_maps(first, second, grid=args.grid, tolerance=args.tolerance)
+    first, second = (read_map(file, **READING.given(args)) for file in (args.first, args.second))
+    found = compare_maps(first, second, **_COMPARED.given(args))
     file = args.output
     if file is not None and Path(file).suffix == ".nc":
         write_table(found, file)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import grid_table
-from mgdd.cli.map_show import add_map_reading
+from mgdd.cli.map_show import READING
 from mgdd.cli.options import add_command, number_pairs, refuse_idle
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.errors import DataError, ParameterError, did_you_mean
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_trade_off"]
 
+_ALONG, _EVERY = Options(trade_off, over="along"), Options(trade_off, "every")
 _SIZE = (6.6, 4.6)
 
 
@@ -43,23 +45,22 @@ def add_trade_off(verbs: Any) -> None:
     )  # fmt: skip
     parser.add_argument("--right", required=True, metavar="NAME", help="variable to the right, as nox_affine_log_ppm")
     parser.add_argument("--up", required=True, metavar="NAME", help="variable upwards, as efficiency_gross")
-    parser.add_argument("--along", default="soc_cad", metavar="NAME", help="the input along a line (soc_cad)")
+    _ALONG.add(parser)
     parser.add_argument(
         "--at", action="append", default=[], metavar="AXIS=X",
         help="keep an operating axis at one of its breakpoints; one axis may be left, with a line for each of its "
         "breakpoints; repeatable",
     )  # fmt: skip
     parser.add_argument("--map", metavar="MAP", help="also say where the values of this map stand on the lines")
-    add_map_reading(parser)
-    parser.add_argument(
-        "--every", type=int, metavar="N", help="of --figure: label every N-th value of the input (default: 4)"
-    )
+    READING.add(parser)
+    _EVERY.add(parser)
     parser.add_argument("--figure", metavar="FILE", help="draw it (.png, .svg or .pdf)")
 
 
 def _trade_off(args: argparse.Namespace) -> None:
     check_output(args, ".json")
     check_figure(args.figure)
+    args.along = _ALONG.of(args)["over"]
     if args.map is None:
         refuse_idle(args, "name", why="without --map no map is read")
     if args.figure is None:
@@ -72,12 +73,12 @@ def _trade_off(args: argparse.Namespace) -> None:
         raise ParameterError(f"{args.file}: one line each for {' x '.join(free)} is too much: fix one with --at AXIS=X")
     shown, marked = table[[args.right, args.up]].sel(fixed), None
     if args.map is not None:
-        marked = apply_map(read_map(args.map, args.name, decimal=args.decimal), table)
+        marked = apply_map(read_map(args.map, **READING.given(args)), table)
         if args.along not in marked.data_vars:
             raise DataError(f"{args.map}: not a map of {args.along}: choose another --along or another map")
         marked = marked[[args.along, args.right, args.up]].sel(fixed)
     if args.figure is not None:
-        how = {"x": args.right, "y": args.up, "over": args.along, "every": 4 if args.every is None else args.every}
+        how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
         save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
     lines = _lines(args, shown, marked, free)
     payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}

@@ -5,32 +5,33 @@ from __future__ import annotations
 import argparse
 import logging
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.errors import DataError, ParameterError
-from mgdd.io import read_conditions, read_pressure
-from mgdd.io.point_table import CONDITIONS
-from mgdd.io.pressure_checks import PRESSURE_UNITS
-from mgdd.io.pressure_file import ANGLE_UNITS
+from mgdd.cli.from_library import Options, as_option
+from mgdd.engine import analyze, simulate
+from mgdd.errors import ParameterError, hinted
+from mgdd.io import read_pressure
+from mgdd.io.point_table import CONDITIONS, conditions_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "CYLINDER_CHOICES",
+    "PEGGING",
+    "SCHEME",
     "Parser",
     "UsageError",
     "add_command",
     "add_engine",
     "add_files",
     "add_group",
-    "add_scheme",
-    "as_option",
     "assignments",
-    "column_of",
+    "check_pegging",
     "engine_of",
     "number_pairs",
     "refuse_idle",
@@ -41,7 +42,13 @@ __all__ = [
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
-_CYLINDER_CHOICES = {
+SCHEME = Options(simulate, "integrator", "step_cad")
+PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
+_READING = Options(
+    read_pressure, "pressure_column", "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_column",
+    "angle_unit", "firing_tdc_deg", "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
+)  # fmt: skip
+CYLINDER_CHOICES = {
     "burn": "burn_shape",
     "gamma": "gamma_model",
     "wall_heat": "wall_heat_model",
@@ -61,16 +68,19 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that raises usage errors, so that ``--json`` commands can print them as JSON."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise the message."""
+        """Raise the message, with the nearest choice behind one that is none."""
+        if found := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)$", message):
+            message = hinted(message, found[1], [choice.strip("' ") for choice in found[2].split(",")])
         raise UsageError(message, self)
 
-
-def as_option(name: str, text: str | None = None) -> str:
-    """Write an argument of the library as the option that sets it."""
-    option = f"--{name.replace('_', '-')}"
-    if text in ("True", "False"):
-        return option if text == "True" else f"{option} left out"
-    return f"{option} {text}" if text else option
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse what the command that was found does not know, with the nearest of its options."""
+        found, extra = self.parse_known_args(args, namespace)
+        if extra:
+            known = re.findall(r"--[a-z-]+", found.parser.format_usage())
+            strange = next((word.partition("=")[0] for word in extra if word.startswith("--")), "")
+            found.parser.error(hinted(f"unrecognized arguments: {' '.join(extra)}", strange, known))
+        return found
 
 
 def add_group(commands: Any, name: str, *, help_text: str, example: str) -> Any:
@@ -111,7 +121,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("engine")
     group.add_argument(
         "--preset", metavar="NAME_OR_FILE.toml",
-        help=f"{', '.join(presets.available('engine'))} or a TOML file (default: puma_single)",
+        help=f"{', '.join(presets.available('engine'))} or a TOML file (default: {_DEFAULT_PRESET})",
     )  # fmt: skip
     group.add_argument(
         "--set", action="append", default=[], metavar="FIELD=VALUE",
@@ -122,22 +132,9 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
         meaning = info["meaning"].replace("; none = ", "; left out: ")
         group.add_argument(as_option(field), type=float, metavar="X", help=f"{meaning}{unit}")
     group.add_argument("--motored", action="store_true", help="no fuel")
-    for option, field in _CYLINDER_CHOICES.items():
+    for option, field in CYLINDER_CHOICES.items():
         info = Cylinder.fields()[field]
         group.add_argument(as_option(option), choices=info["choices"], help=info["meaning"])
-
-
-def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float | None) -> None:
-    """Add integrator and crank step."""
-    group = parser.add_argument_group("scheme")
-    group.add_argument("--integrator", choices=("trapezoid", "split", "tan2018_lagged", "euler"), default="trapezoid")
-    group.add_argument(
-        "--step-cad",
-        type=float,
-        default=step_cad,
-        metavar="X",
-        help=f"crank step, 0.001 to 5 (default: {'1, with files 0.25' if step_cad is None else f'{step_cad:g}'})",
-    )
 
 
 def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
@@ -147,49 +144,7 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
         help="measured pressure as text: one column of crank angle [°CA aTDC: firing TDC = 0, compression negative] "
         "and one of pressure, or one per cycle; several cycles may also stand below each other",
     )  # fmt: skip
-    group = parser.add_argument_group("files", "what the files hold, where they do not say it or say it otherwise")
-    group.add_argument(
-        "--pressure-column", action="append", metavar="NAME",
-        help="column name, or number from 0; repeat it for several cycles (default: all behind the angle, if they are "
-        "cycles of one cylinder)",
-    )  # fmt: skip
-    group.add_argument(
-        "--pressure-unit", choices=PRESSURE_UNITS, help="default: what header or units row say, else bar"
-    )
-    group.add_argument(
-        "--gain-bar-per-v",
-        type=float,
-        metavar="X",
-        help="the pressure is in volts: bar per volt of the charge amplifier",
-    )
-    group.add_argument(
-        "--offset-bar", type=float, metavar="X", help="bar at 0 V (left out: relative pressure, use --pegging)"
-    )
-    group.add_argument(
-        "--tdc-offset-cad",
-        type=float,
-        default=0.0,
-        metavar="X",
-        help="the angles are too large by this; taken off [°CA]",
-    )
-    group.add_argument("--angle-column", metavar="NAME", help="column name, or number from 0 (default: 0)")
-    group.add_argument(
-        "--angle-unit", choices=ANGLE_UNITS,
-        help="s, ms and us are a time, which needs --speed-rpm (default: what header or units row say, else deg)",
-    )  # fmt: skip
-    group.add_argument(
-        "--firing-tdc-deg", type=float, metavar="X",
-        help="angle of firing TDC in files that count 0 to 720 or run on: 360 if they start at gas-exchange TDC, 0 if "
-        "at firing TDC",
-    )  # fmt: skip
-    group.add_argument("--before-tdc", action="store_true", help="angles count degrees before firing TDC")
-    group.add_argument("--angle-step-deg", type=float, metavar="X", help="no angle column: degrees between two samples")
-    group.add_argument(
-        "--angle-start-deg", type=float, metavar="X",
-        help="no angle column, or a time: angle of the first sample [°CA aTDC, or as --firing-tdc-deg counts]",
-    )  # fmt: skip
-    group.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark (default: .)")
-    group.add_argument("--delimiter", metavar="CHAR", help="column separator (default: found in the file)")
+    group = _READING.add(parser, "what the files hold, where they do not say it or say it otherwise")
     group.add_argument(
         "--conditions", metavar="FILE.csv",
         help=f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}",
@@ -208,7 +163,7 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, prese
     given = assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
     point = {name: value for name, value in given.items() if name in _POINT}
     cylinder = {name: value for name, value in given.items() if name not in _POINT}
-    for option, field in _CYLINDER_CHOICES.items():
+    for option, field in CYLINDER_CHOICES.items():
         if getattr(args, option) is not None:
             if field in cylinder:
                 raise ParameterError(f"{as_option(option)} and --set {field} contradict each other: give one")
@@ -229,52 +184,23 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     """Read the pressure files, with their conditions as attributes."""
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
-    conditions = read_conditions(args.conditions) if args.conditions else {}
-    rows = _rows_of(args.files, conditions, args.conditions)
+    rows = conditions_of(args.files, args.conditions)
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
-    columns = [column_of(name) for name in args.pressure_column or ()]
     traces = []
     for file in args.files:
-        trace = read_pressure(
-            file,
-            angle_column=column_of(args.angle_column),
-            pressure_column=columns or None,
-            angle_unit=args.angle_unit,
-            pressure_unit=args.pressure_unit,
-            firing_tdc_deg=args.firing_tdc_deg,
-            before_tdc=args.before_tdc,
-            tdc_offset_cad=args.tdc_offset_cad,
-            angle_step_deg=args.angle_step_deg,
-            angle_start_deg=args.angle_start_deg,
-            speed_rpm=rows[file].get("speed_rpm", speed),
-            gain_bar_per_v=args.gain_bar_per_v,
-            offset_bar=args.offset_bar,
-            delimiter=args.delimiter,
-            decimal=args.decimal,
-        )
+        trace = read_pressure(file, speed_rpm=rows[file].get("speed_rpm", speed), **_READING.given(args))
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
         traces.append(trace.assign_attrs(**rows[file]))
     return traces
 
 
-def _rows_of(
-    files: Sequence[str], conditions: Mapping[str, dict[str, float]], table: str | None
-) -> dict[str, dict[str, float]]:
-    """Give each file its row of the conditions, by path, name or stem; an empty row without a table."""
-    used: dict[str, str] = {}
-    rows: dict[str, dict[str, float]] = {}
-    for file in files:
-        if not conditions:
-            rows[file] = {}
-            continue
-        key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
-        if key is None:
-            raise DataError(f"{table}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}")
-        if key in used:
-            raise DataError(f"{table}: row {key!r} fits both {used[key]} and {file}: write their paths as given here")
-        used[key], rows[file] = file, conditions[key]
-    return rows
+def check_pegging(args: argparse.Namespace) -> None:
+    """Refuse options of pegging that would act on nothing."""
+    if args.pegging_exponent is not None and args.pegging not in ("two_point", "least_squares"):
+        raise ParameterError("--pegging-exponent acts with --pegging two_point or least_squares only: choose one")
+    if args.inlet_pressure_kpa is not None and args.pegging != "inlet":
+        raise ParameterError("--inlet-pressure-kpa acts with --pegging inlet only: choose it")
 
 
 def refuse_idle(args: argparse.Namespace, *names: str, why: str) -> None:
@@ -336,8 +262,3 @@ def _value(name: str, text: str, fields: Mapping[str, Mapping[str, Any]]) -> flo
         if name in fields:
             raise ParameterError.of(name, text, f"a number [{fields[name]['unit']}]") from None
         return text
-
-
-def column_of(text: str | None) -> Any:
-    """Read a column, by name or by number from 0; None where none is named."""
-    return int(text) if text is not None and text.isdigit() else text

@@ -1,28 +1,35 @@
-"""`mgdd rig hub | node`: the other side of a bus, for experiments without hardware."""
+"""`mgdd rig hub | node | selftest`: the other side of a bus, for experiments without hardware."""
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import signal
 import sys
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from mgdd.cli import rig_records, rig_run, rig_selftest
+from mgdd.cli import rig_records, rig_run
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
-from mgdd.rig import CanTransport, SafetyEnvelope, SignalMap
+from mgdd.rig import CanTransport, Experiment, SafetyEnvelope, SignalMap
+from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signals import noted_signals
-
-if TYPE_CHECKING:
-    from mgdd.rig.can.hub import Hub
+from mgdd.rig.experiment.checked import simulated_plant
+from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test
+from mgdd.studies.sections import Table
 
 __all__ = ["add"]
 
+_HUB = Options(Hub, "host", "bit_rate", "seed")
+_NODE, _PLANT = Options(run_node, "step"), Options(node_of, "seed")
+_SELF_TEST = Options(run_self_test, "loop")
+_FAILED = 1
 _LOOK_S = 0.2  # how often the hub looks for the process that started it
 
 
@@ -35,7 +42,7 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     rig_run.add(verbs)
     rig_records.add(verbs)
-    rig_selftest.add(verbs)
+    _add_selftest(verbs)
     _add_hub(verbs)
     _add_node(verbs)
 
@@ -46,15 +53,15 @@ def _add_hub(verbs: Any) -> None:
         help_text="join processes of this machine by a bus of the socketcand protocol, until Ctrl-C or its parent ends",
         example="mgdd rig hub --port 29536 --fault drop:p=0.01 --bit-rate 500000",
     )  # fmt: skip
-    parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default: 127.0.0.1)")
-    parser.add_argument("--port", type=int, default=29536, metavar="N", help="0 takes a free one (default: 29536)")
+    _HUB.add(parser)
+    parser.add_argument(
+        "--port", type=int, default=29536, metavar="N", help="0 takes a free one (default: %(default)s)"
+    )
     parser.add_argument(
         "--fault", action="append", default=[], metavar="KIND:KEY=VALUE,...",
         help="drop, duplicate, delay, reorder, corrupt, error or freeze, with p, id, from_s, until_s, ms, class, "
         "client; repeatable, for example delay:ms=5,id=0x121",
     )  # fmt: skip
-    parser.add_argument("--bit-rate", type=float, metavar="X", help="of the simulated bus [bit/s] (default: no limit)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the faults (default: 0)")
 
 
 def _add_node(verbs: Any) -> None:
@@ -64,19 +71,14 @@ def _add_node(verbs: Any) -> None:
         example="mgdd rig node --map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv",
     )  # fmt: skip
     parser.add_argument(
-        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: etb)"
+        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: %(default)s)"
     )
-    parser.add_argument(
-        "--bus",
-        required=True,
-        metavar="INTERFACE:CHANNEL",
-        help="any interface of python-can, ?OPTION=VALUE&... behind",
-    )
+    rig_records.add_bus(parser)
     parser.add_argument(
         "--envelope", default="etb_node", metavar="NAME_OR_FILE.toml",
-        help="of the safety gate of the node; cycle and time limit come from the map (default: etb_node)",
+        help="of the safety gate of the node; cycle and time limit come from the map (default: %(default)s)",
     )  # fmt: skip
-    parser.add_argument("--step", action="store_true", help="no clock: one sample per command, always the same bits")
+    _NODE.add(parser)
     parser.add_argument("--period-ms", type=float, metavar="X", help="between samples (default: that of the map)")
     parser.add_argument(
         "--sample-ms", type=float, metavar="X", help="time in the throttle per sample (default: the same)"
@@ -86,33 +88,21 @@ def _add_node(verbs: Any) -> None:
         help="of the throttle and its sensors, with from_s, until_s, size, sensor; repeatable, for example "
         "offset:sensor=2,size=0.3,from_s=1",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the plant (default: 0)")
+    _PLANT.add(parser)
     parser.add_argument("--experiment", metavar="FILE.toml", help="serve the plant of this experiment, with its seed")
     parser.add_argument("--truth", metavar="FILE.csv", help="write a line per sample: what really happened")
     parser.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
 
 
 def _hub(args: argparse.Namespace) -> None:
-    import asyncio
-
-    from mgdd.rig.can.hub import Hub
-
     check_output(args)
-    hub = Hub(
-        args.host,
-        args.port,
-        faults=[BusFault.parse(text) for text in args.fault],
-        bit_rate=args.bit_rate,
-        seed=args.seed,
-    )
+    hub = Hub(port=args.port, faults=[BusFault.parse(text) for text in args.fault], **_HUB.given(args))
     args.progress.close()
     asyncio.run(_serve(args, hub))
     emit(args, hub.counts)
 
 
 async def _serve(args: argparse.Namespace, hub: Hub) -> None:
-    import asyncio
-
     stop, alive = asyncio.Event(), parent_watch()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
@@ -141,7 +131,9 @@ def _node(args: argparse.Namespace) -> None:
             bus.claim({message.key for message in signal_map.measurements.values()})
             args.progress.close()
             _say(args, f"{signal_map.file.stem} on {bus.name}: ready")
-            run_node(core, bus, step=args.step, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped))
+            run_node(
+                core, bus, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped), **_NODE.given(args)
+            )
             counts = {"samples": core.samples, "late": core.late, "mode": core.gate.mode, "reason": core.gate.reason}
             counts |= {"gate": core.gate.counts, **bus.counters}
     finally:
@@ -152,10 +144,7 @@ def _node(args: argparse.Namespace) -> None:
 
 def _plant_of(args: argparse.Namespace, signal_map: SignalMap, sample_s: float | None) -> NodePlant:
     if args.experiment is None:
-        return node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s)
-    from mgdd.rig.experiment import Experiment
-    from mgdd.rig.experiment.checked import simulated_plant
-
+        return node_of(signal_map, faults=args.fault, sample_s=sample_s, **_PLANT.given(args))
     refuse_idle(args, "fault", why="--experiment says what the plant is")
     inputs = (*signal_map.input_names, "bridge_open")
     sample_s = signal_map.cycle_s if sample_s is None else sample_s
@@ -172,3 +161,27 @@ def _until(duration_s: float | None, stopped: list[int]) -> Callable[[], bool]:
 def _say(args: argparse.Namespace, text: str) -> None:
     """Say that the command is ready; beside a JSON object on stderr."""
     print(text, file=sys.stderr if args.json else sys.stdout, flush=True)
+
+
+def _add_selftest(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "selftest", _selftest,
+        help_text="let a process that drives a simulated throttle over a bus die in six ways, and time the plate's way "
+        "to limp-home; exit code 1 above 0.4 s",
+        example="mgdd rig selftest --json",
+    )  # fmt: skip
+    _SELF_TEST.add(parser)
+
+
+def _selftest(args: argparse.Namespace) -> None:
+    check_output(args)
+    how = _SELF_TEST.of(args)
+    test = run_self_test(progress=args.progress.expect(len(WAYS_OF[how["loop"]])), **how)
+    rows = tuple(
+        (way, "–" if time is None else f"{time:.3f}", test.notes.get(way, "")) for way, time in test.ways_to_die.items()
+    )
+    verdict = "passed" if test.passed else "failed"
+    said = f"\n{verdict}: at most {test.limit_s:g} s are allowed"
+    emit(args, test.to_dict(), text=[Table(columns=("way to die", "home after [s]", "note"), rows=rows), said])
+    if not test.passed:
+        args.exit_code = _FAILED

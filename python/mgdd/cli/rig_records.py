@@ -8,13 +8,16 @@ import time
 from pathlib import Path
 from typing import Any
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, require_positive
 from mgdd.cli.output import check_output, emit, lines, wrote
 from mgdd.errors import DataError
+from mgdd.rig import CanTransport, Experiment, Recorder, check_experiment, export_record, run_experiment
+from mgdd.rig.can.replay_bus import RecordedBus
 
-__all__ = ["add"]
+__all__ = ["add", "add_bus"]
 
-_KINDS = ("mf4", "blf", "asc", "log", "netcdf", "csv", "parquet")
+_KEEP, _EXPORT = Options(run_experiment, "folder"), Options(export_record, "kind")
 _POLL_S = 0.1
 _SYNC_S = 1.0
 _DIFFERENT = 1
@@ -28,12 +31,7 @@ def add(verbs: Any) -> None:
         example="mgdd rig record bench.rec --bus socketcan:can0 --duration-s 60",
     )  # fmt: skip
     record.add_argument("file", metavar="FILE.rec", help="new record")
-    record.add_argument(
-        "--bus",
-        required=True,
-        metavar="INTERFACE:CHANNEL",
-        help="any interface of python-can, ?OPTION=VALUE&... behind",
-    )
+    add_bus(record)
     record.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
     replay = add_command(
         verbs, "replay", _replay,
@@ -42,7 +40,7 @@ def add(verbs: Any) -> None:
         example="mgdd rig replay mgdd-runs/first --json",
     )  # fmt: skip
     replay.add_argument("source", metavar="DIR", help="folder of a run, with experiment.toml and run.rec")
-    replay.add_argument("--folder", metavar="NEW_DIR", help="keep the replayed run there (default: only compare)")
+    _KEEP.add(replay)
     export = add_command(
         verbs, "export", _export,
         help_text="write a record in the format of other tools",
@@ -50,13 +48,16 @@ def add(verbs: Any) -> None:
     )  # fmt: skip
     export.add_argument("file", metavar="FILE.rec", help="record")
     export.add_argument("target", metavar="TARGET", help="file, or a new folder for netcdf, csv and parquet")
-    export.add_argument("--kind", choices=_KINDS, help="default: the ending of TARGET")
+    _EXPORT.add(export)
+
+
+def add_bus(parser: argparse.ArgumentParser) -> None:
+    """Add the bus of a command that needs one."""
+    what = "any interface of python-can, ?OPTION=VALUE&... behind"
+    parser.add_argument("--bus", required=True, metavar="INTERFACE:CHANNEL", help=what)
 
 
 def _record(args: argparse.Namespace) -> None:
-    from mgdd.rig import CanTransport, Recorder
-    from mgdd.rig.can.replay_bus import RecordedBus
-
     check_output(args)
     require_positive(args, "duration_s")
     transport, frames = CanTransport.parse(args.bus), 0
@@ -79,15 +80,13 @@ def _record(args: argparse.Namespace) -> None:
 
 
 def _replay(args: argparse.Namespace) -> None:
-    from mgdd.rig import Experiment, check_experiment, run_experiment
-
     check_output(args)
     folder = Path(args.source)
     for name in ("experiment.toml", "run.rec"):
         if not (folder / name).is_file():
             raise DataError(f"{folder}: holds no {name}: give the folder of a run of `mgdd rig run`")
     experiment = Experiment.load(folder / "experiment.toml").with_mode("replay", record=(folder / "run.rec").resolve())
-    result = run_experiment(check_experiment(experiment), args.folder)
+    result = run_experiment(check_experiment(experiment), **_KEEP.given(args))
     compared = result.counters["replay"]
     same = compared["different"] == 0 and compared["samples"] > 0
     verdict = "every output is the recorded one, bit for bit" if same else "the outputs differ"
@@ -101,8 +100,6 @@ def _replay(args: argparse.Namespace) -> None:
 
 
 def _export(args: argparse.Namespace) -> None:
-    from mgdd.rig import export_record
-
     check_output(args)
-    written = [str(path) for path in export_record(args.file, args.target, kind=args.kind)]
+    written = [str(path) for path in export_record(args.file, args.target, **_EXPORT.given(args))]
     emit(args, {"files": written}, text="\n".join(written))

@@ -11,18 +11,21 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit, is_terminal, lines, wrote
+from mgdd.rig import CanRig, Experiment, check_experiment, run_experiment
+from mgdd.rig.can.modes import MODES
+from mgdd.rig.experiment import CheckedExperiment, ExperimentResult
 
 if TYPE_CHECKING:
-    from mgdd.rig.experiment import CheckedExperiment, ExperimentResult
     from mgdd.rig.experiment.stand import Cycle
 
 __all__ = ["add"]
 
 _LOG = logging.getLogger(__name__)
-
-_MODES = ("simulate", "hil", "dry_run", "replay", "bench")
+_WHERE = Options(Experiment.with_mode, "connection", "pace", "record")
+_ARMED = Options(run_experiment, "arm", "key_file")
 
 
 def add(verbs: Any) -> None:
@@ -38,10 +41,7 @@ def add(verbs: Any) -> None:
         "--folder", metavar="DIR", help="new folder for record, signals, timing, result and figures (default: "
         "mgdd-runs/TASK-MODE-TIME)",
     )  # fmt: skip
-    run.add_argument(
-        "--arm", action="store_true", help="of the modes bench, and hil with a connection, which drive hardware"
-    )
-    run.add_argument("--key-file", metavar="FILE", help="confirms --arm instead of a person at the terminal")
+    _ARMED.add(run)
     check = add_command(
         verbs, "check", _check,
         help_text="check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
@@ -52,27 +52,21 @@ def add(verbs: Any) -> None:
 
 def _add_experiment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="EXPERIMENT.toml", help="what to do; the page Experiments lists its keys")
-    parser.add_argument("--mode", choices=_MODES, help="instead of the mode of the file")
-    parser.add_argument("--connection", metavar="INTERFACE:CHANNEL", help="the bus, for example socketcan:can0")
-    parser.add_argument("--pace", choices=("step", "real_time"), help="of the bus; step needs a simulated node")
-    parser.add_argument("--record", metavar="FILE", help="of the mode replay: run.rec of a run")
+    parser.add_argument("--mode", choices=MODES, help="instead of the mode of the file")
+    _WHERE.add(parser)
 
 
 def _checked(args: argparse.Namespace) -> CheckedExperiment:
-    from mgdd.rig.experiment import Experiment, check_experiment
-
     experiment = Experiment.load(args.file)
     mode = args.mode or experiment.mode
     if mode in ("simulate", "replay"):
         refuse_idle(args, "connection", "pace", why=f"mode = {mode!r} has no bus")
     if mode != "replay":
         refuse_idle(args, "record", why=f"mode = {mode!r} replays nothing")
-    return check_experiment(experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace))
+    return check_experiment(experiment.with_mode(mode, **_WHERE.given(args)))
 
 
 def _run(args: argparse.Namespace) -> None:
-    from mgdd.rig.experiment import run_experiment
-
     check_output(args)
     checked = _checked(args)
     for doubt in checked.to_dict().get("warnings", []):
@@ -82,7 +76,7 @@ def _run(args: argparse.Namespace) -> None:
     folder = args.folder or str(Path("mgdd-runs") / f"{experiment.task}-{experiment.mode}-{stamp}")
     args.progress(f"{experiment.task}, {experiment.mode}")
     with _watching(args, checked) as watch:
-        result = run_experiment(checked, folder, arm=args.arm, key_file=args.key_file, watch=watch)
+        result = run_experiment(checked, folder, watch=watch, **_ARMED.given(args))
     emit(args, {**result.to_dict(), "folder": folder}, text=_text(result, folder))
     wrote(folder)
     if result.interrupted:
@@ -130,7 +124,5 @@ def _flat(found: Mapping[str, Any], path: str = "") -> dict[str, Any]:
 
 def _listen(checked: CheckedExperiment) -> dict[str, Any]:
     """Listen on the bus without sending; RigError where nobody is there, or another one sends our commands."""
-    from mgdd.rig.can.can_rig import CanRig
-
     with CanRig(checked.bus_map, checked.experiment.bus.connection, mode="dry_run") as rig:
         return {"connection": checked.experiment.bus.connection, "state": rig.state, **rig.counters}

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit
-from mgdd.errors import Interrupted, ParameterError
+from mgdd.errors import Interrupted, ParameterError, hinted
 from mgdd.parallel.pool import processes
 from mgdd.report import write_report
 from mgdd.studies import StudyResult, available_studies, run_study
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add", "run_or_part"]
 
+_STUDY = Options(run_study, "seeds", "quick")
 _LOW = "_low"
 _OPTIONS = {"real": ("guided",)}  # of single studies
 
@@ -36,10 +38,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("name", nargs="?", metavar="NAME", help=f"one of {', '.join(available_studies())}")
     parser.add_argument("--list", action="store_true", help="list the studies and their titles")
-    parser.add_argument(
-        "--seeds", type=int, metavar="N", help="seeds behind every statistic (default: the study's own)"
-    )
-    parser.add_argument("--quick", action="store_true", help="a shorter study with wider intervals")
+    _STUDY.add(parser)
     parser.add_argument(
         "--real", action="store_true", default=None,
         help="of guided: on the surrogate of the measured hydrogen-diesel engine instead of the virtual bench",
@@ -49,7 +48,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
-    parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: png)")
+    parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: %(default)s)")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -64,7 +63,7 @@ def run(args: argparse.Namespace) -> None:
         return
     if args.name not in titles:
         given = "no study named" if args.name is None else f"no study {args.name!r}"
-        raise ParameterError(f"{given}: must be one of {', '.join(titles)}")
+        raise ParameterError(hinted(f"{given}: must be one of {', '.join(titles)}", args.name or "", titles))
     options: dict[str, Any] = {}
     for option, studies in _OPTIONS.items():
         if args.name not in studies:
@@ -77,7 +76,7 @@ def run(args: argparse.Namespace) -> None:
     drawn = folder is not None or args.report is not None
     step = args.progress.expect(10)
     result, stopped = run_or_part(
-        args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step,
+        args.name, figures=drawn, progress=step, **_STUDY.given(args),
         executor=None if args.workers is None else processes(args.workers), **options,
     )  # fmt: skip
     paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")

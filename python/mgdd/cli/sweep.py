@@ -7,8 +7,9 @@ import math
 import time
 from typing import Any
 
-from mgdd.cli.map_files import named_options, write_table
-from mgdd.cli.options import add_command, add_engine, add_scheme, engine_of
+from mgdd.cli.from_library import Options, named_options
+from mgdd.cli.map_files import write_table
+from mgdd.cli.options import SCHEME, add_command, add_engine, engine_of
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.cli.ranges import add_over, grid_of
 from mgdd.errors import Interrupted
@@ -18,6 +19,8 @@ from mgdd.sweep import sweep
 from mgdd.sweep.inputs import input_labels
 
 __all__ = ["add_sweep"]
+
+_POINT = Options(sweep, "soc_cad")
 
 
 def add_sweep(verbs: Any) -> None:
@@ -38,10 +41,10 @@ def add_sweep(verbs: Any) -> None:
     parser.add_argument(
         "--outputs", metavar="NAME[,NAME]", help="indicators that are wanted (default: all of them and the NOx proxies)"
     )
-    parser.add_argument("--soc-cad", type=float, default=-6.0, metavar="X", help="where it is not swept (default: -6)")
+    _POINT.add(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="threads (default: one per core)")
     add_engine(parser)
-    add_scheme(parser, step_cad=1.0)
+    SCHEME.add(parser, "scheme")
 
 
 def _sweep(args: argparse.Namespace) -> None:
@@ -52,16 +55,9 @@ def _sweep(args: argparse.Namespace) -> None:
     begun, stopped = time.perf_counter(), False
     try:
         with named_options(over="points" if args.points else "over"):
-            table = sweep(
-                cylinder,
-                point,
-                over,
-                soc_cad=args.soc_cad,
-                outputs=args.outputs.split(",") if args.outputs else None,
-                step_cad=args.step_cad,
-                integrator=args.integrator,
-                workers=args.workers,
-            )
+            outputs = args.outputs.split(",") if args.outputs else None
+            given = _POINT.given(args) | SCHEME.given(args)
+            table = sweep(cylinder, point, over, outputs=outputs, workers=args.workers, **given)
         cycles = math.prod(table.sizes.values())
     except Interrupted as stop:
         stopped, table = True, stop.partial

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd import identify, signals
-from mgdd.cli.options import add_command, as_option
+from mgdd.cli.from_library import Options, as_option, default_of, shown
+from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
@@ -20,27 +22,21 @@ if TYPE_CHECKING:
 
 __all__ = ["add"]
 
+_DESIGN = Options(identify.design_excitation, "side", "duration_s", "step_s")
+_CHECK = Options(
+    identify.check_excitation, "angle_window_deg", "max_rate_deg_per_s", "max_current_a", "start_deg"
+)  # fmt: skip
+_COMMON = ("offset", "amplitude", "step_s")
 # Options that only some of the signals have, as the arguments of their functions.
 _OF_KIND = {
-    "chirp": ("duration_s", "low_hz", "high_hz"),
-    "multisine": ("duration_s", "fundamental_hz", "high_hz", "harmonics"),
-    "prbs": ("duration_s", "hold_s", "register"),
-    "amplitude_random_steps": ("duration_s", "hold_s", "seed"),
-    "staircase": ("rise", "hold_s", "cycles"),
-    "triangle": ("duration_s", "frequency_hz"),
+    kind: tuple(name for name in inspect.signature(getattr(signals, kind)).parameters if name not in _COMMON)
+    for kind in EXCITATIONS
 }
-_HELP = {
-    "duration_s": (float, "length [s]"),
-    "low_hz": (float, "first frequency of a chirp [Hz]"),
-    "high_hz": (float, "last frequency of a chirp, band of a multisine [Hz]"),
-    "fundamental_hz": (float, "of a multisine [Hz]"),
-    "harmonics": (int, "of a multisine"),
-    "frequency_hz": (float, "of a triangle [Hz]"),
-    "hold_s": (float, "time on a level [s]"),
-    "rise": (float, "height of a step of a staircase"),
-    "cycles": (int, "of a staircase"),
-    "register": (int, "length of the register of a PRBS"),
-    "seed": (int, "of random steps (default: golden-ratio levels)"),
+_OWN = {
+    name: Options(getattr(signals, kind), name)
+    for kind in EXCITATIONS
+    for name in _OF_KIND[kind]
+    if name != "duration_s"
 }
 
 
@@ -56,32 +52,30 @@ def add(verbs: Any) -> None:
     add_throttle(parser)
     group = parser.add_argument_group("signal")
     group.add_argument(
-        "--side", choices=("above", "below", "both"), default="above",
-        help="of limp-home; offset and amplitude are designed for it unless they are given (default: above)",
-    )  # fmt: skip
-    group.add_argument(
         "--offset", type=float, metavar="X", help="mean duty, with --amplitude: no design, only the check"
     )
     group.add_argument("--amplitude", type=float, metavar="X", help="half the swing of the duty")
-    for name, (kind, text) in _HELP.items():
-        group.add_argument(as_option(name), type=kind, metavar="X", help=text)
-    group.add_argument("--step-s", type=float, default=1e-3, metavar="X", help="sample time [s] (default: 0.001)")
-    limits = parser.add_argument_group("limits")
-    limits.add_argument(
-        "--angle-window-deg", type=float, nargs=2, metavar=("LOW", "HIGH"),
-        help="where the plate may go (default: 1 deg off its stops)",
-    )  # fmt: skip
-    limits.add_argument("--max-rate-deg-per-s", type=float, metavar="X", help="highest speed [deg/s]")
-    limits.add_argument("--max-current-a", type=float, metavar="X", help="highest motor current [A]")
-    limits.add_argument("--start-deg", type=float, metavar="X", help="where the plate starts (default: limp-home)")
+    _DESIGN.add(group, **_defaults_of("duration_s"))
+    for name, options in _OWN.items():
+        options.add(group, **_defaults_of(name))
+    _CHECK.add(parser, "limits")
+
+
+def _defaults_of(name: str) -> dict[str, str]:
+    """Write the default of every signal that has this option and a default."""
+    kinds = (kind for kind, names in _OF_KIND.items() if name in names)
+    own = {kind: default_of(getattr(signals, kind), name) for kind in kinds}
+    said = ", ".join(f"{kind} {shown(value)}" for kind, value in own.items() if value is not None)
+    return {name: said} if said else {}
 
 
 def _excite(args: argparse.Namespace) -> None:
     check_output(args, ".csv", ".json")
     throttle, preset = throttle_of(args)
-    window = None if args.angle_window_deg is None else tuple(args.angle_window_deg)
-    limits = {name: getattr(args, name) for name in ("max_rate_deg_per_s", "max_current_a", "start_deg")}
-    given = {name: getattr(args, name) for name in _HELP if getattr(args, name) is not None}
+    limits = _CHECK.given(args)
+    designed = _DESIGN.given(args)
+    step_s = _DESIGN.of(args)["step_s"]
+    given = {name: getattr(args, name) for name in ("duration_s", *_OWN) if getattr(args, name) is not None}
     for name in given:
         if name not in _OF_KIND[args.kind]:
             have = ", ".join(as_option(n) for n in _OF_KIND[args.kind])
@@ -94,18 +88,15 @@ def _excite(args: argparse.Namespace) -> None:
             raise ParameterError(
                 f"{as_option(others[0])} acts on a signal of your own only: give --offset and --amplitude too"
             )
-        signal, check = identify.design_excitation(
-            args.kind, throttle, side=args.side, duration_s=args.duration_s, step_s=args.step_s,
-            angle_window_deg=window, **limits,
-        )  # fmt: skip
+        signal, check = identify.design_excitation(args.kind, throttle, **designed, **limits)
     else:
         make = getattr(signals, args.kind)
-        signal = make(offset=args.offset, amplitude=args.amplitude, step_s=args.step_s, **given)
-        check = identify.check_excitation(signal, throttle, angle_window_deg=window, **limits)
+        signal = make(offset=args.offset, amplitude=args.amplitude, step_s=step_s, **given)
+        check = identify.check_excitation(signal, throttle, **limits)
         if not check.passed:
             raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
-    payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": args.step_s}
+    payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": step_s}
     payload |= attrs | check.to_dict()
     emit(args, payload, text=_text(args.kind, attrs, check), traces=_table(args.output, check))
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd import identify
+from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
-from mgdd.cli.throttle_files import add_log_options, log_of
+from mgdd.cli.throttle_parameters import LOG
 from mgdd.errors import ConvergenceError
-from mgdd.identify.throttle.fits import CHOICES
+from mgdd.io import read_throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import figures_of
 
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 __all__ = ["add"]
 
+_MODEL = Options(identify.identify_throttle, "model")
+_FIT = Options(identify.identify_throttle, "limp_home_deg", "two_sided", "closed_deg", "open_deg")
+_SEARCH = Options(FitOptions, "seed")
+_LOG_TITLE = "columns of the log, by name, or by number from 0"
 _LOG = logging.getLogger(__name__)
 
 # Searches that ended without a tolerance met, but with a model: stiction makes the last of the cost rough.
@@ -39,25 +44,18 @@ def add(verbs: Any) -> None:
         endings=".toml, the parameters, or .json",
     )  # fmt: skip
     fit.add_argument("file", metavar="FILE", help="log to fit: CSV, plain columns or .mat")
-    fit.add_argument(
-        "--model", choices=CHOICES, default="auto", help="default: auto, which says in its findings what it took"
-    )
+    _MODEL.add(fit)
     fit.add_argument("--test", metavar="FILE", help="log to test on, with the same columns")
-    fit.add_argument(
-        "--limp-home-deg", type=float, metavar="X", help="limp-home angle [deg] (default: from the log, or the model's)"
-    )
-    fit.add_argument("--two-sided", action="store_true", help="fit both sides of limp-home")
-    fit.add_argument("--closed-deg", type=float, default=0.0, metavar="X", help="lower end stop [deg] (default: 0)")
-    fit.add_argument("--open-deg", type=float, default=90.0, metavar="X", help="upper end stop [deg] (default: 90)")
+    _FIT.add(fit)
     fit.add_argument(
         "--delay-samples",
         type=_counts,
         metavar="N[,N...]",
         help="samples until the duty acts; of several the best (default: searched for the groups, 0 for pw_*)",
     )
-    fit.add_argument("--seed", type=int, default=0, metavar="N", help="of the starts (default: 0)")
+    _SEARCH.add(fit)
     fit.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
-    add_log_options(fit)
+    LOG.add(fit, _LOG_TITLE)
     check = add_command(
         verbs, "validate", _validate,
         help_text="run a fitted model against a log: free run, 5, 20 and 50 ms ahead, residual tests",
@@ -66,7 +64,7 @@ def add(verbs: Any) -> None:
     check.add_argument("fit", metavar="FIT.toml", help="parameters written by identify")
     check.add_argument("file", metavar="FILE", help="log: CSV, plain columns or .mat")
     check.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
-    add_log_options(check)
+    LOG.add(check, _LOG_TITLE)
 
 
 def _counts(text: str) -> list[int]:
@@ -79,13 +77,11 @@ def _counts(text: str) -> list[int]:
 def _identify(args: argparse.Namespace) -> None:
     check_output(args, ".toml", ".json")
     check_figure(args.figure)
-    log = log_of(args, args.file)
-    test = None if args.test is None else log_of(args, args.test)
-    fit = identify.identify_throttle(
-        log, args.model, test=test, limp_home_deg=args.limp_home_deg, two_sided=args.two_sided,
-        closed_deg=args.closed_deg, open_deg=args.open_deg, delay_samples=args.delay_samples,
-        options=FitOptions(seed=args.seed),
-    )  # fmt: skip
+    log = read_throttle_log(args.file, **LOG.given(args))
+    test = None if args.test is None else read_throttle_log(args.test, **LOG.given(args))
+    options = FitOptions(**_SEARCH.given(args))
+    given = _MODEL.given(args) | _FIT.given(args)
+    fit = identify.identify_throttle(log, test=test, delay_samples=args.delay_samples, options=options, **given)
     own = args.output if args.output is not None and Path(args.output).suffix == ".toml" else None
     if own is not None:
         Path(own).write_text(fit.to_toml(), encoding="utf-8", newline="\n")
@@ -118,7 +114,7 @@ def _validate(args: argparse.Namespace) -> None:
     check_output(args)
     check_figure(args.figure)
     model = identify.load_throttle_model(args.fit)
-    validation = identify.validate_throttle(model, log_of(args, args.file))
+    validation = identify.validate_throttle(model, read_throttle_log(args.file, **LOG.given(args)))
     emit(args, validation.to_dict(), text=validation.summary())
     if args.figure:
         _draw(validation, args.figure, None)

@@ -6,21 +6,26 @@ import argparse
 import logging
 from typing import Any
 
-from mgdd import presets
-from mgdd.cli.options import add_command, assignments
+from mgdd.cli.from_library import Options
+from mgdd.cli.options import add_command, number_pairs
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
-from mgdd.cli.throttle_parameters import add_throttle, throttle_of
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.cli.throttle_parameters import add_preset, add_throttle, known_only, preset_of, throttle_of
+from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.track import FIGURES, step_times_us
+from mgdd.loop.tune import with_stiction
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.plot.style import drawn
+from mgdd.plot.throttle_track import throttle_track
 from mgdd.studies.sections import Table
 from mgdd.throttle import Throttle
 
 __all__ = ["add"]
 
+_AIR = Options(track, airflow_torque_nm="airflow")
+_RUN = Options(track, "delay_samples", "noise_deg", "seed")
+_TUNE = Options(tune_controller, "spread", "budget", "seed", "delay_samples", "noise_deg", n_throttles="throttles")
 _LOG = logging.getLogger(__name__)
 
 
@@ -37,14 +42,12 @@ def _add_track(verbs: Any) -> None:
         example="mgdd throttle track --controller guided --reference step:40:42 --plant-scale coulomb_nm=1.2 --json",
         endings=".json or .csv",
     )  # fmt: skip
-    parser.add_argument("--controller", choices=tuple(FAMILIES), default="guided", help="default: guided")
+    _add_controller(parser)
     parser.add_argument(
         "--reference", default="step:40:42", metavar="REFERENCE",
-        help="step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg (default: step:40:42)",
+        help="step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg (default: %(default)s)",
     )  # fmt: skip
-    parser.add_argument(
-        "--airflow", type=float, default=0.0, metavar="NM", help="torque of the air on the plate, positive opens"
-    )
+    _AIR.add(parser)
     _add_plant(parser)
     parser.add_argument(
         "--model",
@@ -56,19 +59,13 @@ def _add_track(verbs: Any) -> None:
 
 def _add_plant(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("plant")
-    group.add_argument("--plant", dest="preset", metavar="NAME_OR_FILE.toml", help="P1, P2, P3 or a TOML file")
+    add_preset(group, "--plant")
     group.add_argument(
         "--plant-scale", action="append", default=[], metavar="FIELD=FACTOR",
         help="multiply a field of the plant, repeatable; the controller does not know, for example coulomb_nm=1.4 "
         "(stiction goes with it)",
     )  # fmt: skip
-    group.add_argument(
-        "--delay-samples", type=int, default=1, metavar="N", help="from a duty to its effect (default: 1)"
-    )
-    group.add_argument(
-        "--noise-deg", type=float, default=0.03, metavar="X", help="of the measured angle (default: 0.03)"
-    )
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
+    _RUN.add(group)
 
 
 def _add_tune(verbs: Any) -> None:
@@ -77,60 +74,43 @@ def _add_tune(verbs: Any) -> None:
         help_text="tune a controller for throttles around a preset, with one cost and budget for every kind",
         example="mgdd throttle tune --controller pid --preset P2 --budget 60 --throttles 8 --json",
     )  # fmt: skip
-    parser.add_argument("--controller", choices=tuple(FAMILIES), default="guided", help="default: guided")
-    parser.add_argument("--throttles", type=int, default=20, metavar="N", help="drawn around the preset (default: 20)")
-    parser.add_argument("--spread", type=float, default=0.2, metavar="X", help="of each number (default: 0.2)")
-    parser.add_argument("--budget", type=int, default=200, metavar="N", help="runs of the whole set (default: 200)")
-    parser.add_argument(
-        "--delay-samples", type=int, default=1, metavar="N", help="from a duty to its effect (default: 1)"
-    )
-    parser.add_argument(
-        "--noise-deg", type=float, default=0.03, metavar="X", help="of the measured angle (default: 0.03)"
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of throttles, noise and search (default: 0)")
+    _add_controller(parser)
+    _TUNE.add(parser)
     add_throttle(parser)
+
+
+def _add_controller(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--controller", choices=tuple(FAMILIES), default="guided", help="kind (default: %(default)s)")
 
 
 def _track(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
-    preset = presets.load(args.preset or "P1")
-    known = getattr(preset, "throttle", None)
-    if known is None:
-        raise ParameterError(f"--plant {args.preset}: is not a throttle; P1, P2 and P3 are")
-    scales = _scales(args.plant_scale)
+    preset = preset_of(args)
+    known = preset.throttle
+    numbers = [name for name, field in Throttle.fields().items() if "choices" not in field]
+    scales = with_stiction(known_only(number_pairs(args.plant_scale, "--plant-scale"), numbers, "--plant-scale"))
     plant = known.replace(**{name: getattr(known, name) * factor for name, factor in scales.items()})
-    model: Any = known
-    if args.model is not None:
-        from mgdd.identify import load_throttle_model
-
-        model = load_throttle_model(args.model)
+    model: Any = known if args.model is None else load_throttle_model(args.model)
     reference = Reference.parse(args.reference)
+    how = _RUN.of(args)
     controller, doubts = tuned_with_doubts(
         args.controller,
         model,
         sample_s=reference.sample_s,
-        delay_samples=None if args.model is not None else args.delay_samples,
-        noise_deg=args.noise_deg,
+        delay_samples=None if args.model is not None else how["delay_samples"],
+        noise_deg=how["noise_deg"],
     )
     for doubt in doubts:
         _LOG.warning("%s", doubt)
-    run = track(
-        controller,
-        reference,
-        throttle=plant,
-        delay_samples=args.delay_samples,
-        airflow_torque_nm=args.airflow or None,
-        noise_deg=args.noise_deg,
-        seed=args.seed,
-    )
+    run = track(controller, reference, throttle=plant, **_AIR.given(args), **how)
     p50, p999 = step_times_us(controller, run)
     payload = {
         "controller": args.controller,
         "reference": reference.name,
-        "preset": str(preset.name),
+        "preset": preset.name,
         "plant_scale": scales,
-        "seed": args.seed,
+        "seed": how["seed"],
         **{name: float(run[name]) for name in FIGURES},
         "band_deg": reference.band_deg,
         "step_us_p50": p50,
@@ -138,8 +118,6 @@ def _track(args: argparse.Namespace) -> None:
         "warnings": list(doubts),
     }
     if args.figure is not None:
-        from mgdd.plot.throttle_track import throttle_track
-
         save_figure(drawn(throttle_track, run, size=(7.0, 5.4)), args.figure)
     emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
 
@@ -147,16 +125,7 @@ def _track(args: argparse.Namespace) -> None:
 def _tune(args: argparse.Namespace) -> None:
     check_output(args)
     throttle, preset = throttle_of(args)
-    found = tune_controller(
-        args.controller,
-        throttle,
-        n_throttles=args.throttles,
-        spread=args.spread,
-        budget=args.budget,
-        seed=args.seed,
-        delay_samples=args.delay_samples,
-        noise_deg=args.noise_deg,
-    )
+    found = tune_controller(args.controller, throttle, **_TUNE.given(args))
     payload = {
         "controller": found.kind,
         "preset": preset,
@@ -166,30 +135,15 @@ def _tune(args: argparse.Namespace) -> None:
         "numbers": dict(found.numbers),
         **found.settings,
     }
+    settings = _TUNE.of(args)
     said = (
         f"{FAMILIES[found.kind].label} for throttles around {preset}: cost {found.start_cost:.3f} -> {found.cost:.3f} "
-        f"in {found.evaluations} runs of {args.throttles} throttles\n"
+        f"in {found.evaluations} runs of {settings['n_throttles']} throttles\n"
     )
-    delay = f"delay_samples={args.delay_samples}"
+    delay = f"delay_samples={settings['delay_samples']}"
     text: list[str | Table] = [
         said,
         Table(columns=("number", "tuned"), rows=tuple((name, f"{value:g}") for name, value in found.numbers.items())),
         f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, {delay})",
     ]
     emit(args, payload, text=text)
-
-
-def _scales(given: list[str]) -> dict[str, float]:
-    fields = Throttle.fields()
-    values = assignments(given, fields)
-    out = {}
-    for name, value in values.items():
-        if name not in fields:
-            guess = did_you_mean(name, fields)
-            raise ParameterError(f"--plant-scale {name}: no field {name!r}; {guess + '; ' if guess else ''}see --set")
-        if not isinstance(value, (int, float)):
-            raise ParameterError(f"--plant-scale {name}={value}: must be a factor, for example {name}=1.2")
-        out[name] = float(value)
-    if "coulomb_nm" in out:  # more friction is more stiction, too
-        out.setdefault("stiction_nm", out["coulomb_nm"])
-    return out

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from mgdd import _core
-from mgdd.errors import ParameterError
+from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.result import NumbersResult
 
-__all__ = ["Timing", "ignition_delay"]
+__all__ = ["Timing", "ignited_soc_cad", "ignition_delay", "reached_soi_cad"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -90,3 +91,23 @@ def ignition_delay(
     if soc_cad is not None and soi_cad is None:
         return Timing(**_core.engine.start_of_injection(cylinder, point, soc_cad))
     raise ParameterError("soi_cad, soc_cad: give exactly one of them")
+
+
+def ignited_soc_cad(cylinder: CylinderLike, point: PointLike | None = None, *, soi_cad: float) -> float:
+    """Give the start of combustion of an injection [°CA aTDC], where there is one that `simulate` takes."""
+    timing = ignition_delay(cylinder, point, soi_cad=soi_cad)
+    if not timing.ignites:
+        raise ConvergenceError(f"soi_cad = {soi_cad:g} does not ignite before EVO: inject earlier")
+    latest = _core.engine.timing_window_cad[1]
+    if timing.soc_cad > latest:
+        raise ParameterError(
+            f"soi_cad = {soi_cad:g} ignites at {timing.soc_cad:.1f} °CA aTDC, later than {latest:g}, the latest start "
+            "of combustion that is simulated: inject earlier"
+        )
+    return timing.soc_cad
+
+
+def reached_soi_cad(cylinder: CylinderLike, point: PointLike | None = None, *, soc_cad: float) -> float:
+    """Give the injection that ignites at a start of combustion [°CA aTDC]; NaN where none does."""
+    timing = ignition_delay(cylinder, point, soc_cad=soc_cad)
+    return math.nan if timing.clipped else timing.soi_cad

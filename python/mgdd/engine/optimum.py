@@ -11,7 +11,7 @@ from mgdd import _core
 from mgdd._arguments import require_plain
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.optimize import Limit
-from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.errors import ConvergenceError, ParameterError, hinted
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
@@ -198,7 +198,8 @@ def check_request(objective: str, limits: Iterable[str]) -> None:
     known = _core.engine.indicator_units()
     for name in limits:
         if name not in known:
-            raise ParameterError(f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}")
+            refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}"
+            raise ParameterError(hinted(refused, name, known))
 
 
 def _check(point: OperatingPoint, low: float, high: float) -> None:

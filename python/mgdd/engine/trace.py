@@ -79,9 +79,9 @@ def analyze(
         For ``inlet`` (there the point's intake pressure if only a point is given). With any pegging, p(IVC) beyond a
         factor of 1.5 of it is a warning.
     gamma : float or {"split", "cylinder"}, optional
-        1.33 for a measured trace and ``cylinder`` for a simulated one if left out. A number is a constant [-];
-        ``split`` is 1.37 before the burn and 1.30 from its start on, and falls to first order in the crank step at
-        the jump; ``cylinder`` is the cylinder's own law.
+        Of the heat release; 1.33 for a measured trace and ``cylinder`` for a simulated one if left out. A number is a
+        constant [-]; ``split`` is 1.37 before the burn and 1.30 from its start on, and falls to first order in the
+        crank step at the jump; ``cylinder`` is the cylinder's own law.
     heat_window_cad : tuple of float, optional
         Window of the cumulative heat [°CA aTDC]. Left out, it is found: from 5 CAD before the burn, searched from
         ``soi_cad`` or ``spark_cad`` on where the trace has it, to 20 CAD after its end; for a simulated trace it is the

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CONDITIONS",
     "POINT",
+    "conditions_of",
     "flat_points",
     "input_names",
     "read_conditions",
@@ -61,8 +62,10 @@ def read_points(
     always : collection of str
         Columns that must hold numbers where a CSV file has them, even if all columns are wanted; others without a
         number, remarks for example, are left out then.
-    delimiter, decimal : str
-        Of a CSV file; the separator is found in the file if left out.
+    delimiter : str, optional
+        Column separator of a CSV file; found in it if left out.
+    decimal : {".", ","}
+        Decimal mark of a CSV file.
 
     Returns
     -------
@@ -248,6 +251,22 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
             column: _value(cell, column, f"{table.source}, line {line}") for column, cell in cells.items() if cell
         }
     return conditions
+
+
+def conditions_of(files: Sequence[str], table: str | None) -> dict[str, dict[str, float]]:
+    """Give each file its row of `read_conditions`, by path, name or stem; an empty row without a table."""
+    conditions, used = {} if table is None else read_conditions(table), dict[str, str]()
+    if not conditions:
+        return {file: {} for file in files}
+    rows: dict[str, dict[str, float]] = {}
+    for file in files:
+        key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
+        if key is None:
+            raise DataError(f"{table}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}")
+        if key in used:
+            raise DataError(f"{table}: row {key!r} fits both {used[key]} and {file}: write their paths as given here")
+        used[key], rows[file] = file, conditions[key]
+    return rows
 
 
 def _value(cell: str, column: str, where: str) -> float:

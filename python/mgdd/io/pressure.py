@@ -151,8 +151,10 @@ def read_pressure(
         Engine speed [rpm], which turns a time into an angle: first angle + 6 n t; stored as ``attrs["speed_rpm"]``. Of
         a record of two cycles and more the period is compared with it: what differs by at most 1 % is corrected and
         told, more is refused.
-    gain_bar_per_v, offset_bar : float, optional
-        For a pressure in volts: bar per volt, and bar at 0 V. Without `offset_bar` the pressure is relative.
+    gain_bar_per_v : float, optional
+        For a pressure in volts: bar per volt of the charge amplifier.
+    offset_bar : float, optional
+        For a pressure in volts: bar at 0 V; without it the pressure is relative.
     delimiter : str, optional
         Column separator; None detects it.
     decimal : {".", ","}

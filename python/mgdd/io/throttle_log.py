@@ -114,8 +114,10 @@ def read_throttle_log(
     time, duty, angle : int or str
         Column by position from 0 or by name in the header; in a MATLAB file the variable, ``struct.field``, or the
         column of the only matrix.
-    current, supply : int or str, optional
-        Motor current [A] and supply voltage [V]; None takes ``current_a`` and ``supply_v`` where the file has them.
+    current : int or str, optional
+        Motor current [A]; None takes ``current_a`` where the file has it.
+    supply : int or str, optional
+        Supply voltage [V]; None takes ``supply_v`` where the file has it.
     time_unit : {"s", "ms"}, optional
         Unit of the time column; None takes what the units row or brackets in the header say, else s. A unit that
         contradicts the file, and one that is not known, is refused; so for the others.

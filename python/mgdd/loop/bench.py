@@ -9,7 +9,7 @@ from mgdd import _core
 from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import SensorDynamics
 from mgdd._settings import takes_settings_of
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import ParameterError, RigError, hinted
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.loop.steady import find_optimum, steady_map
@@ -87,13 +87,19 @@ class EngineBench(_core.loop.EngineBench):
         if not 0 <= seed < 2**64:
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
         cylinder, first = engine_of(engine, {} if point is None else point, argument="engine")
-        super().__init__(
-            cylinder=cylinder,
-            schedule=[(0, first)] if schedule is None else list(schedule),
-            limits=limit_names_of(limits),
-            seed=seed,
-            **settings,
-        )
+        try:
+            super().__init__(
+                cylinder=cylinder,
+                schedule=[(0, first)] if schedule is None else list(schedule),
+                limits=limit_names_of(limits),
+                seed=seed,
+                **settings,
+            )
+        except ParameterError as error:
+            if error.field != "limits" or not isinstance(error.value, str):
+                raise
+            known = str(error.bound).removeprefix("one of ").split(", ")
+            raise error.reworded(hinted(str(error), error.value, known)) from None
 
     @property
     def input_names(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError
+from mgdd.errors import Interrupted, ParameterError, hinted
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.bench_record import FLAGS
 from mgdd.loop.criteria import LoopCriteria
@@ -179,7 +179,8 @@ def _require_match(seeker: Seeker | FeedForward | GuidedEngine, measured: Measur
     for name in seeker.limit_names:
         if name not in measured.limits:
             have = ", ".join(measured.limits) or "no limited quantity"
-            raise ParameterError(f"limits: {name!r} is not measured by the plant: it measures {have}")
+            refused = f"limits: {name!r} is not measured by the plant: it measures {have}"
+            raise ParameterError(hinted(refused, name, measured.limits))
 
 
 def _steered(log: list[_Row], inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from mgdd.throttle import Throttle
 
-__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller"]
+__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller", "with_stiction"]
 
 _SPREAD_FIELDS = (
     ("inertia_kgm2",),
@@ -36,6 +36,12 @@ _SPREAD_FIELDS = (
     ("coulomb_nm", "stiction_nm"),
 )
 _MOST = 5.0  # a run that never settles costs as much as one that takes five times as long as wanted
+
+
+def with_stiction(factors: Mapping[str, float]) -> dict[str, float]:
+    """Let stiction grow by the factor of the dry friction, unless it has one of its own."""
+    friction = {"stiction_nm": factors["coulomb_nm"]} if "coulomb_nm" in factors else {}
+    return dict(factors) | {name: factor for name, factor in friction.items() if name not in factors}
 
 
 def draw_throttles(throttle: Throttle, n: int, *, spread: float = 0.2, seed: int = 0) -> list[Throttle]:

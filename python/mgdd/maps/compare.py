@@ -16,7 +16,7 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["apply_map", "compare_maps"]
+__all__ = ["achieved_figures", "apply_map", "compare_maps", "steepest"]
 
 
 def compare_maps(
@@ -35,7 +35,7 @@ def compare_maps(
     grid : {"union", "first"}
         Where they are compared: at the breakpoints of both inside of both, or at those of the first.
     tolerance : float, optional
-        Differences beyond it are counted [unit of the value].
+        Differences beyond it are counted, in the unit of the value.
 
     Returns
     -------
@@ -192,3 +192,31 @@ def _common(name: str, one: Any, two: Any, grid: str) -> Any:
 
 def _rms(values: Any) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+def achieved_figures(table: CalibrationMap, found: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Give mean, ends and place of the highest of what `apply_map` found: of loss, objective and limits, or all."""
+    task = table.task
+    wanted = [] if task is None else [name for name in ("loss", task.objective, *task.limits) if name in found]
+    figures: dict[str, dict[str, Any]] = {}
+    for name in wanted or [str(name) for name in found.data_vars if name != table.name]:
+        values = found[name].transpose(*table.axes).to_numpy()
+        if not np.isfinite(values).any():
+            continue
+        places = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        figures[name] = {
+            "mean": float(np.nanmean(values)),
+            "lowest": float(np.nanmin(values)),
+            "highest": float(np.nanmax(values)),
+            "highest_at": {axis: float(table.axes[axis][k]) for axis, k in zip(table.axes, places, strict=True)},
+        }
+    return figures
+
+
+def steepest(table: CalibrationMap, axis: str) -> float | None:
+    """Give the largest change per unit of an axis; None where no two neighbours have a value."""
+    place = list(table.axes).index(axis)
+    shape = [1] * table.values.ndim
+    shape[place] = -1
+    slopes = np.abs(np.diff(table.values, axis=place)) / np.diff(table.axes[axis]).reshape(shape)
+    return float(np.nanmax(slopes)) if np.isfinite(slopes).any() else None

@@ -91,7 +91,7 @@ def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: 
         ``.csv``, ``.json``, ``.nc`` or ``.dcm``, as `write_map` writes them.
     name : str, optional
         Which map or variable, where the file holds several.
-    decimal : str
+    decimal : {".", ","}
         Decimal mark of a CSV file.
 
     Returns

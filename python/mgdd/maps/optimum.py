@@ -59,9 +59,9 @@ def optimize_map(
     maximize : bool
         Whether the best objective is the highest; False for consumption.
     max_loss : float, optional
-        What a value may lose against the optimum [unit of the objective]: with it ``low`` and ``high`` of a cell hold
-        the values that keep the limits and lose no more, without it those that keep the limits. `smooth_map` stays
-        between them.
+        What a value may lose against the optimum, in the unit of the objective: with it ``low`` and ``high`` of a cell
+        hold the values that keep the limits and lose no more, without it those that keep the limits. `smooth_map`
+        stays between them.
     sd : mapping of str to float or str, optional
         Standard deviation of the objective and of limited variables at one point, a number or a variable of the
         sweep; it makes that of the optimum.

@@ -39,11 +39,11 @@ def export_record(
         File of a `Recorder`; what cannot be read of it is left out, with a warning.
     target : path-like
         The file; of the kinds that hold one table per file a new folder.
-    kind : str, optional
-        Default the ending of `target`. One file with everything: ``"mf4"`` (asammdf: tables, events and raw frames as
-        a bus log; ``pip install "mgdd[mdf]"``). One file with the frames: ``"blf"``, ``"asc"`` or ``"log"`` (candump;
-        ``pip install "mgdd[can]"``). A folder with ``frames``, ``events`` and each table of samples: ``"netcdf"``
-        (classic format, by scipy), ``"csv"``, ``"parquet"`` (``pip install "mgdd[parquet]"``).
+    kind : {"mf4", "blf", "asc", "log", "netcdf", "csv", "parquet"}, optional
+        The ending of `target` if left out. One file with everything: ``"mf4"`` (asammdf: tables, events and raw frames
+        as a bus log; ``pip install "mgdd[mdf]"``). One file with the frames: ``"blf"``, ``"asc"`` or ``"log"``
+        (candump; ``pip install "mgdd[can]"``). A folder with ``frames``, ``events`` and each table of samples:
+        ``"netcdf"`` (classic format, by scipy), ``"csv"``, ``"parquet"`` (``pip install "mgdd[parquet]"``).
 
     Returns
     -------

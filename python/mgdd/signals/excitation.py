@@ -42,8 +42,10 @@ def chirp(
         Length [s].
     offset, amplitude : float
         Mean duty and half the swing [-].
-    low_hz, high_hz : float
-        First and last frequency [Hz].
+    low_hz : float
+        First frequency [Hz].
+    high_hz : float
+        Last frequency [Hz].
     step_s : float
         Sample time [s].
 
@@ -91,8 +93,10 @@ def multisine(
         Length [s]; whole periods of the fundamental use it best.
     offset, amplitude : float
         Mean duty and largest swing from it [-].
-    fundamental_hz, high_hz : float
-        Fundamental and upper end of the band [Hz].
+    fundamental_hz : float
+        Fundamental of a multisine [Hz].
+    high_hz : float
+        Upper end of the band, of a chirp its last frequency [Hz].
     harmonics : int
         How many.
     step_s : float

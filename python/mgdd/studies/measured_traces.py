@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,8 @@ from mgdd.engine import analyze
 from mgdd.errors import Interrupted, hand_over
 from mgdd.identify import best_timing, estimate_tdc, wall_heat_profile
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
-from mgdd.identify.engine.burn_laws import compare_laws
+from mgdd.identify.engine.burn_laws import compare_laws, law_row
+from mgdd.identify.engine.calibration import TDC_SPAN_CAD
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import Member
 from mgdd.identify.engine.profile import WallHeatProfile
@@ -31,10 +31,9 @@ if TYPE_CHECKING:
     from mgdd.identify.engine.tdc import TdcEstimate
     from mgdd.identify.engine.timing_records import BestTiming
 
-__all__ = ["law_row", "run_measured_traces"]
+__all__ = ["run_measured_traces"]
 
 _GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
-_TDC_SPAN_CAD = 2.0
 
 
 def run_measured_traces(
@@ -100,7 +99,7 @@ def run_measured_traces(
         try:
             fits = compare_laws(traces, cylinder, point=point, progress=progress, **scheme)
             if not quick:
-                tdc = estimate_tdc(traces, cylinder, point=point, span_cad=_TDC_SPAN_CAD, progress=progress)
+                tdc = estimate_tdc(traces, cylinder, point=point, span_cad=TDC_SPAN_CAD, progress=progress)
                 profiles = _profiles(main, progress)
         except KeyboardInterrupt:
             stop = Interrupted("interrupted: the models and their best timing are in .partial, not all checks of them")
@@ -154,7 +153,6 @@ _PROVENANCE = (
     "Four cycle-averaged closed-valve pressure traces of a heavy-duty diesel at 25, 50, 75 and 100 % load, from "
     "LibICE-post (F. Ramognino), MIT licence."
 )
-_PER_LOAD = "rmse_percent imep_closed_error_percent soc_cad largest_error_bar largest_error_cad".split()
 _ANALYSIS = (
     "n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar p_max_bar p_max_cad"
 ).split()
@@ -220,20 +218,6 @@ def _trace_row(load: Load, best: BestTiming) -> dict[str, Any]:
         "best_soc_to_cad": late,
         "gain_from_percent": least,
         "gain_to_percent": most,
-    }
-
-
-def law_row(fit: CylinderFit) -> dict[str, Any]:
-    """Give one row of the comparison of burn laws: lists over the traces."""
-    known = any(math.isfinite(load.soi_cad) for load in fit.loads)
-    onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if known else {}
-    return {
-        "law": fit.kind,
-        **onset,
-        "file": [load.file for load in fit.loads],
-        **{name: [getattr(load, name) for load in fit.loads] for name in _PER_LOAD},
-        "wall_heat_scale": fit.model.wall_heat_scale,
-        "warnings": [str(finding) for finding in fit.findings],
     }
 
 

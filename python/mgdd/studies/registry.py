@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, hinted
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.studies.base import Progress, StudyResult, check_seeds, parts_on
 
@@ -155,7 +155,7 @@ def run_study(
 def function_of(name: str) -> Callable[..., StudyResult]:
     """Give the function that runs a study; ParameterError for an unknown name."""
     if name not in _STUDIES:
-        raise ParameterError(f"study {name!r}: must be one of {', '.join(_STUDIES)}")
+        raise ParameterError(hinted(f"study {name!r}: must be one of {', '.join(_STUDIES)}", name, _STUDIES))
     own = name.replace("-", "_")
     function: Callable[..., StudyResult] = getattr(
         import_module(f"mgdd.studies.{_MODULES.get(name, own)}"), f"run_{own}"

@@ -79,6 +79,12 @@ class TdcEstimate(Result):
         object.__setattr__(self, "dataset", self.dataset.assign(ends))
 
     @property
+    def figures(self) -> dict[str, Any]:
+        """The estimate as plain values."""
+        names = ("method", "tdc_offset_cad", "low_cad", "high_cad", "suspect")
+        return {**{name: getattr(self, name) for name in names}, "others_cad": list(self.others_cad)}
+
+    @property
     def suspect(self) -> bool:
         """Whether the angles as they stand are outside the range."""
         return not self.low_cad <= 0.0 <= self.high_cad

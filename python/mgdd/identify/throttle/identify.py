@@ -66,8 +66,10 @@ def identify_throttle(
     two_sided : bool
         Fit a set of parameters above and one below limp-home (the groups have both always); the log must have been on
         both sides.
-    closed_deg, open_deg : float
-        Mechanical stops [deg].
+    closed_deg : float
+        Lower mechanical stop [deg].
+    open_deg : float
+        Upper mechanical stop [deg].
     delay_samples : float or sequence of float, optional
         Samples until the duty acts, 0 to 20, of a pseudo-Wiener model 0 to 5; of several the best is kept. None: the
         groups look at 0 to 5, and on to 20 where the best are the longest; a pseudo-Wiener model has none.

@@ -1,4 +1,4 @@
-"""Seekers of the command line, with settings that suit the bench that they run on."""
+"""Seekers of the best timing with settings that suit the bench that they run on."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, argument
 from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
 from mgdd.optimize.by_curvature import approach_gain, newton_settings
 from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
-    from mgdd.loop import EngineBench
+    from mgdd.loop.bench import EngineBench
     from mgdd.optimize import Optimum, Seeker
 
 __all__ = ["Task", "amplitude_of", "default_cycles", "make_seeker"]
@@ -59,14 +59,15 @@ def make_seeker(task: Task) -> Seeker:
     amplitude = amplitude_of(task)
     if low + amplitude > high - amplitude:
         raise ParameterError(
-            f"--upper-cad {high:g}: must be at least {2.0 * amplitude:g} °CA above --lower-cad {low:g}, room for what "
-            f"--method {task.method} moves to both sides"
+            f"{argument('upper_cad', f'{high:g}')}: must be at least {2.0 * amplitude:g} °CA above "
+            f"{argument('lower_cad', f'{low:g}')}, room for what {argument('method', task.method)} moves to both sides"
         )
     if not low + amplitude <= task.start_cad <= high - amplitude:
-        less = f", less the {amplitude:g} °CA that --method {task.method} moves about it" if amplitude else ""
+        moves = f"{amplitude:g} °CA that {argument('method', task.method)} moves about it"
         raise ParameterError(
-            f"--start-cad {task.start_cad:g}: must be in [{low + amplitude:g}, {high - amplitude:g}], --lower-cad to "
-            f"--upper-cad{less}; move it or widen the bounds"
+            f"{argument('start_cad', f'{task.start_cad:g}')}: must be in [{low + amplitude:g}, {high - amplitude:g}], "
+            f"{argument('lower_cad')} to {argument('upper_cad')}{f', less the {moves}' if amplitude else ''}; move it "
+            "or widen the bounds"
         )
     space: dict[str, Any] = {"start": task.start_cad, "lower": low, "upper": high}
     curvature = abs(task.best.curvature)

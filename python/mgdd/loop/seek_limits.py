@@ -1,4 +1,4 @@
-"""Limits of `mgdd engine seek`: where a run with limits starts, and how its limits were kept."""
+"""Limits of a search of the best timing: where a run with limits starts, and how its limits were kept."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from mgdd.cli.seekers import Task, amplitude_of
 from mgdd.loop.limit_figures import FIGURES, NOISE_FREE
 from mgdd.loop.plant_loop import LoopRun
+from mgdd.loop.seek_task import Task, amplitude_of
 from mgdd.optimize import Optimum
 
-__all__ = ["COV", "COV_CYCLES", "choose_start", "doubts_of", "limit_report", "limit_text"]
+__all__ = ["COV", "COV_CYCLES", "SCATTER", "choose_start", "doubts_of", "limit_report"]
 
 COV, COV_CYCLES = "cov_imep_percent", 50
-_SCATTER = 3.0  # standard deviations of the reading
+SCATTER = 3.0  # standard deviations of the reading
 _START_MARGIN = 0.1  # of a limit
 _SCAN_CAD = 0.1
 
@@ -78,7 +78,7 @@ def limit_report(
     summary, out = run.summary, dict[str, dict[str, Any]]()
     own = 1.0 / math.sqrt(2.0 * (COV_CYCLES - 1))  # a COV of n cycles scatters by 1/sqrt(2n - 2) of its value
     for name, upper in limits.items():
-        margin = _SCATTER * best.values.get(f"scatter_{name}", own * upper)
+        margin = SCATTER * best.values.get(f"scatter_{name}", own * upper)
         judged = run.dataset["limits"].sel(limit=name).to_numpy()[int(summary["judged_from"]) :]
         free = {figure: summary.get(f"{NOISE_FREE}{figure}_{name}") for figure in FIGURES}
         out[name] = {figure: summary[f"{figure}_{name}"] for figure in FIGURES if f"{figure}_{name}" in summary}
@@ -90,33 +90,6 @@ def limit_report(
             "judged_above_threshold_fraction": float((judged > upper + margin).mean()) if judged.size else math.nan,
         }
     return out
-
-
-def limit_text(report: Mapping[str, Mapping[str, Any]], judged_from: int) -> list[str]:
-    """Say in two lines per limit how it was kept."""
-    out = []
-    for name, own in report.items():
-        infeasible = "; infeasible with the other limits and the bounds" if own["state"] == "infeasible" else ""
-        out.append(
-            f"{name} as measured: {_kept(own, judged_from)}, {_percent(own['judged_above_threshold_fraction'])} above "
-            f"{own['threshold_with_margin']:.6g} (plus {_SCATTER:g} standard deviations of the scatter){infeasible}"
-        )
-        if own["noise_free"] is not None:
-            free = {"limit": own["limit"], **own["noise_free"]}
-            out.append(f"{name} noise-free at the applied timing: {_kept(free, judged_from)}")
-    return out
-
-
-def _kept(own: Mapping[str, Any], judged_from: int) -> str:
-    return (
-        f"worst {own['worst']:.6g} in cycle {own['worst_cycle']:.0f}; above {own['limit']:g} in "
-        f"{own['above_cycles']:.0f} cycles ({_percent(own['above_fraction'])}), from cycle {judged_from} on in "
-        f"{own['judged_above_cycles']:.0f} ({_percent(own['judged_above_fraction'])})"
-    )
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
 
 
 def doubts_of(run: LoopRun, limits: Mapping[str, float], remedy: str) -> list[str]:

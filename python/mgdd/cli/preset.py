@@ -1,0 +1,78 @@
+"""`mgdd preset list | show | copy`: the shipped parameter sets, their values, and one as a file to change."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from mgdd import presets
+from mgdd.cli.from_library import Options
+from mgdd.cli.options import add_command, add_group
+from mgdd.cli.output import check_file, check_output, emit, wrote
+from mgdd.errors import ParameterError
+from mgdd.io.files import write_whole_text
+from mgdd.studies.sections import Table
+
+__all__ = ["add"]
+
+_KIND = Options(presets.available, "kind")
+
+
+def add(commands: Any) -> None:
+    """Add the group and its commands."""
+    verbs = add_group(
+        commands, "preset", help_text="named engines and throttles: list, show, copy", example="mgdd preset show P1"
+    )
+    listed = add_command(
+        verbs, "list", _list, help_text="name the shipped presets", example="mgdd preset list --kind throttle"
+    )
+    _KIND.add(listed)
+    shown = add_command(
+        verbs, "show", _show, help_text="show every value of a preset with its unit and source",
+        example="mgdd preset show puma_single --json",
+    )  # fmt: skip
+    copied = add_command(
+        verbs, "copy", _copy, help_text="write a preset into a new file, which --preset reads after you changed it",
+        example="mgdd preset copy puma_single mine.toml",
+    )  # fmt: skip
+    for parser in (shown, copied):
+        parser.add_argument("name", metavar="NAME_OR_FILE.toml", help=", ".join(presets.available()))
+    copied.add_argument("file", metavar="FILE.toml", help="new file")
+
+
+def _list(args: argparse.Namespace) -> None:
+    check_output(args)
+    found = [presets.load(name) for name in presets.available(**_KIND.given(args))]
+    rows = [{"name": preset.name, "kind": preset.kind, "title": preset.title} for preset in found]
+    table = Table(columns=("name", "kind", "title"), rows=tuple(tuple(row.values()) for row in rows))
+    emit(args, {"presets": rows}, text=[table])
+
+
+def _show(args: argparse.Namespace) -> None:
+    check_output(args)
+    preset = presets.load(args.name)
+    tables = preset.to_parameters().tables
+    values = {
+        table: {name: {"value": e.value, "unit": e.unit, "source": e.source} for name, e in entries.items()}
+        for table, entries in tables.items()
+    }
+    rows = tuple(
+        (name, f"{e.value:g}" if isinstance(e.value, float) else str(e.value), str(e.unit), str(e.source))
+        for entries in tables.values()
+        for name, e in entries.items()
+    )
+    head = f"{preset.name}, {preset.kind}: {preset.title}\n"
+    text: list[str | Table] = [head, Table(columns=("field", "value", "unit", "source"), rows=rows)]
+    emit(args, {"name": preset.name, "kind": preset.kind, "title": preset.title, **values}, text=text)
+
+
+def _copy(args: argparse.Namespace) -> None:
+    check_output(args)
+    check_file("FILE", args.file, (".toml",))
+    preset = presets.load(args.name)
+    if Path(args.file).exists():
+        raise ParameterError(f"{args.file}: exists already, and is not replaced: name another file")
+    write_whole_text(args.file, preset.to_toml())
+    emit(args, {"name": preset.name, "file": args.file}, text=f"--preset {args.file} reads it")
+    wrote(args.file)

@@ -1,0 +1,136 @@
+"""A calibration with all that judges it: profile of the wall heat, TDC, and every burn law on the same traces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mgdd.identify.engine.burn_laws import better_laws, compare_laws, law_row
+from mgdd.identify.engine.profile import WallHeatProfile, wall_heat_profile
+from mgdd.identify.engine.records import CylinderFit, figures_of
+from mgdd.identify.engine.tdc import TdcEstimate, estimate_tdc
+
+__all__ = ["TDC_SPAN_CAD", "Calibration", "judge_fit"]
+
+TDC_SPAN_CAD = 2.0
+_PER_TRACE = (
+    "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "
+    "largest_error_bar largest_error_cad heat_loss_fraction"
+).split()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """A fit, and what says how far it may be believed; the profile is None where the wall heat was not fitted."""
+
+    fit: CylinderFit
+    profile: WallHeatProfile | None
+    tdc: TdcEstimate
+    laws: list[CylinderFit]
+
+    def unidentifiable(self) -> list[str]:
+        """Name the parameters that the traces do not identify, by the fit or by the profile."""
+        doubted = set(self.fit.report.unidentifiable)
+        if self.profile is not None and not self.profile.identifiable:
+            doubted.add("wall_heat_scale")
+        return [name for name in self.fit.report.names if name in doubted]
+
+    def doubts(self) -> list[str]:
+        """Say what to distrust: findings of the fit, TDC, a law that fits much better."""
+        return [*map(str, self.fit.findings), *self.tdc.doubts(), *better_laws(self.fit, self.laws)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give everything as plain values."""
+        return {
+            "law": self.fit.kind,
+            "status": self.fit.report.status,
+            "traces": self._trace_rows(),
+            "common": self._common(),
+            "unidentifiable": self.unidentifiable(),
+            "laws": [law_row(law) for law in self.laws],
+            "tdc": self.tdc.figures,
+            "warnings": self.doubts(),
+            "cylinder": self.fit.model.to_dict(),
+            "report": self.summary(),
+        }
+
+    def _trace_rows(self) -> list[dict[str, Any]]:
+        names = list(_PER_TRACE)
+        if any(math.isfinite(load.soi_cad) for load in self.fit.loads):
+            names += ["soi_cad", "onset_against_soi_cad"]
+        shape = [
+            name for name in self.fit.model.fields() if any(n.startswith(f"{name}[") for n in self.fit.report.names)
+        ]
+        return [
+            {name: figures_of(load)[name] for name in names} | {name: load.cylinder.to_dict()[name] for name in shape}
+            for load in self.fit.loads
+        ]
+
+    def _common(self) -> dict[str, Any]:
+        report, doubted = self.fit.report, self.unidentifiable()
+        scale: dict[str, Any] = {"value": self.fit.model.wall_heat_scale, "stderr": None, "identifiable": None}
+        common = {"wall_heat_scale": scale if self.profile is None else self.profile.to_dict()}
+        for name, value, error in zip(report.names, report.values, report.stderr, strict=True):
+            if "[" not in name and name != "wall_heat_scale":
+                common[name] = {"value": float(value), "stderr": float(error), "identifiable": name not in doubted}
+        return common
+
+    def summary(self) -> str:
+        """Say all of it in words."""
+        fit, profile, tdc = self.fit, self.profile, self.tdc
+        out = [f"Calibration with {fit.kind}: {fit.report.message}", "", *_loads(fit)]
+        for name, value, error in zip(fit.report.names, fit.report.values, fit.report.stderr, strict=True):
+            if "[" not in name and name != "wall_heat_scale":
+                out.append(f"  {name} = {value:.6g} +- {error:.2g} (all traces)")
+        if profile is not None:
+            error = f" +- {profile.stderr:.3f}" if profile.stderr == profile.stderr else ", at a bound"
+            verdict = "identifiable" if profile.identifiable else "not identifiable from these traces"
+            out += [
+                "",
+                f"wall-heat scale {profile.value:.3f}{error}: {verdict}",
+                f"  strongest correlation {profile.correlation:+.2f}, with {profile.correlated_with}",
+                *(f"  {reason}" for reason in profile.reasons),
+            ]
+        if self.unidentifiable():
+            out += ["", f"not identifiable: {', '.join(self.unidentifiable())}"]
+        out += ["", f"TDC offset {tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
+        if self.doubts():
+            out += ["", "what to distrust:", *(f"  - {text}" for text in self.doubts())]
+        out += ["", "every burn law on the same traces:"]
+        for law in self.laws:
+            out += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
+            out += [f"  - {text}" for text in law.findings]
+        return "\n".join(out)
+
+
+def _loads(fit: CylinderFit) -> list[str]:
+    onset = any(load.soi_cad == load.soi_cad for load in fit.loads)
+    last = f" {'SOC - SOI':>10}" if onset else ""
+    form = "  {:24} {:>9} {:>15} {:>7} {:>9} {:>9} {:>7} {:>20}"
+    head = ("trace", "RMSE [%]", "closed IMEP [%]", "SOC", "duration", "heat [J]", "CA50", "largest error")
+    out = [form.format(*head) + last]
+    for load in fit.loads:
+        error = f"{load.largest_error_bar:+.1f} bar at {load.largest_error_cad:.0f}"
+        late = f" {load.onset_against_soi_cad:+10.1f}" if onset else ""
+        out.append(
+            f"  {load.file:24} {load.rmse_percent:9.2f} {load.imep_closed_error_percent:+15.1f} {load.soc_cad:7.2f} "
+            f"{load.burn_duration_cad:9.1f} {load.fuel_heat_j:9.0f} {load.ca50_cad:7.1f} {error:>20}{late}"
+        )
+    return out
+
+
+def judge_fit(fit: CylinderFit, *, fuel_heat_j: float | None, progress: Callable[[str], None]) -> Calibration:
+    """Judge a fit of `mgdd.identify.fit_cylinder`, which was told this heat of the fuel, on its own traces."""
+    request = fit.request
+    traces, cylinder, point = list(request.traces), request.cylinder, request.point
+    profile = None
+    if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
+        profile = wall_heat_profile(fit, progress=progress)
+    tdc = estimate_tdc(traces, cylinder, point=point, fuel_heat_j=fuel_heat_j, span_cad=TDC_SPAN_CAD, progress=progress)
+    laws = compare_laws(
+        traces, cylinder, point=point, fuel_heat_j=fuel_heat_j, progress=progress, step_cad=request.step_cad,
+        integrator=request.integrator,
+    )  # fmt: skip
+    return Calibration(fit=fit, profile=profile, tdc=tdc, laws=laws)
