@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from mgdd.errors import RigError
-from mgdd.rig import RingTransport
+from mgdd.rig.realtime import RingTransport
 from realtime_loops import becomes, make_loop
 
 

@@ -17,10 +17,11 @@ import pytest
 from bus_node import ETB, LONG_S, commands, is_safe, node, rig_on
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, SignalMap
+from mgdd.rig import CanRig, SignalMap
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.modes import RigMode, key_line, may_be_real
 from mgdd.rig.can.punctual import Punctual
+from mgdd.rig.can.transport import CanTransport
 
 
 @pytest.fixture(autouse=True)

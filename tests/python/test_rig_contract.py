@@ -12,7 +12,9 @@ import pytest
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import EngineBench, Measurement, Plant, SurrogatePlant, VirtualThrottle
-from mgdd.rig import CanRig, RecordingRig, ReplayRig, Rig, RigRecord, SimulatedRig
+from mgdd.rig import CanRig, RecordingRig, ReplayRig, SimulatedRig
+from mgdd.rig.base import Rig
+from mgdd.rig.exchange import RigRecord
 from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
 
 pytest.importorskip("can", reason="the extra `can` is not installed")

@@ -21,7 +21,8 @@ from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.identify import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
-from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, recorded, run_experiment
+from mgdd.rig import Experiment, SafetyEnvelope, read_record, recorded, run_experiment
+from mgdd.rig.experiment import check_experiment
 from mgdd.rig.experiment.throttle_tasks import TrackPlan
 from mgdd.rig.experiment.watched import Cycle
 

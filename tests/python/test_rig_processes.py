@@ -20,7 +20,8 @@ from mgdd.identify import fit_pseudo_wiener
 from mgdd.io import throttle_log
 from mgdd.loop import EngineBench, Measurement, Reference, VirtualThrottle, run_seeker
 from mgdd.optimize import ExtremumSeeking, FitOptions
-from mgdd.rig import CanRig, Rig, VirtualNode
+from mgdd.rig import CanRig, VirtualNode
+from mgdd.rig.base import Rig
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from mgdd._core.rig import RecordReader
 from mgdd.errors import DataError, ParameterError, RigError, ShapeError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Frame, Recorder, read_record, repair_record
+from mgdd.rig import Recorder, read_record, repair_record
+from mgdd.rig.realtime import Frame
 from recorded_rig import FRAMES, independent, write
 
 

@@ -14,13 +14,16 @@ import pytest
 
 from mgdd._core.rig import RecordReader
 from mgdd.errors import DataError, RigError
-from mgdd.rig import Frame, Recorder, RigRecord, export_record, read_record, repair_record
+from mgdd.rig import Recorder, export_record, read_record, repair_record
+from mgdd.rig.exchange import RigRecord
+from mgdd.rig.realtime import Frame
 from recorded_rig import write
 from sample_files import sample_file
 
 WRITER = """
 import sys
-from mgdd.rig import Frame, Recorder
+from mgdd.rig import Recorder
+from mgdd.rig.realtime import Frame
 record = Recorder(sys.argv[1])
 i = 0
 while True:
@@ -59,7 +62,8 @@ def test_a_killed_process_loses_at_most_the_record_it_was_writing(tmp_path: Path
 FULL = """
 import resource, sys
 from mgdd.errors import RigError
-from mgdd.rig import Frame, Recorder, read_record
+from mgdd.rig import Recorder, read_record
+from mgdd.rig.realtime import Frame
 record = Recorder(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (3000, resource.RLIM_INFINITY))
 written = 0

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 from mgdd.cli import rig_records, rig_run, rig_selftest
 from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
-from mgdd.rig import CanTransport, SafetyEnvelope, SignalMap
+from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import NodePlant, node_plant
 from mgdd.rig.can.signals import noted_signals
+from mgdd.rig.can.transport import CanTransport
 
 if TYPE_CHECKING:
     from mgdd.rig.can.hub import Hub

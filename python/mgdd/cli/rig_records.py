@@ -54,8 +54,9 @@ def add(verbs: Any) -> None:
 
 
 def _record(args: argparse.Namespace) -> None:
-    from mgdd.rig import CanTransport, Recorder
+    from mgdd.rig import Recorder
     from mgdd.rig.can.recorded_bus import RecordedBus
+    from mgdd.rig.can.transport import CanTransport
 
     check_output(args)
     require_positive(args, "duration_s")
@@ -79,7 +80,8 @@ def _record(args: argparse.Namespace) -> None:
 
 
 def _replay(args: argparse.Namespace) -> None:
-    from mgdd.rig import Experiment, check_experiment, run_experiment
+    from mgdd.rig import Experiment, run_experiment
+    from mgdd.rig.experiment import check_experiment
 
     check_output(args)
     folder = Path(args.source)

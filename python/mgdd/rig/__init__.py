@@ -1,25 +1,20 @@
 """Test rigs: one protocol for the simulated plant and the real one, in this process, over a CAN bus, or recorded.
 
 `mgdd.loop.run_seeker` steers a rig as it steers any plant. Below every optimiser stands an `ActuatorGuard`, below every
-throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of them.
+throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of them. What a `RealtimeLoop` made by hand
+takes, frames, messages and transports, is in `mgdd.rig.realtime`.
 """
 
 from __future__ import annotations
 
-from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport
 from mgdd.rig.actuator_guard import ActuatorGuard
-from mgdd.rig.base import Rig
-from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.can.transport import CanTransport
-from mgdd.rig.exchange import RecordingRig, RigRecord
-from mgdd.rig.experiment import Experiment, check_experiment, run_experiment
+from mgdd.rig.exchange import RecordingRig
+from mgdd.rig.experiment import Experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
-from mgdd.rig.loop_message import LoopMessage
-from mgdd.rig.protection import protect
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
@@ -30,32 +25,19 @@ from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
     "ActuatorGuard",
-    "BusBridge",
     "CanRig",
-    "CanTransport",
-    "E2eCheck",
-    "E2eSettings",
     "Experiment",
-    "Frame",
     "GatedThrottle",
-    "LoopMessage",
     "RealtimeLoop",
     "Recorder",
     "RecordingRig",
     "ReplayRig",
-    "Rig",
-    "RigRecord",
-    "RingTransport",
     "SafetyEnvelope",
     "SafetyGate",
-    "SignalLayout",
     "SignalMap",
     "SimulatedRig",
-    "SocketCanTransport",
     "VirtualNode",
-    "check_experiment",
     "export_record",
-    "protect",
     "read_record",
     "repair_record",
     "run_experiment",

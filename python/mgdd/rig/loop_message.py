@@ -39,7 +39,7 @@ class LoopMessage:
 
     Examples
     --------
-    >>> from mgdd.rig import E2eSettings, LoopMessage, SignalLayout
+    >>> from mgdd.rig.realtime import E2eSettings, LoopMessage, SignalLayout
     >>> duty = SignalLayout(start=16, length=16, raw_type="signed", scale=5e-5)
     >>> enable = SignalLayout(start=32, length=1)
     >>> command = LoopMessage(

@@ -99,7 +99,7 @@ class Recorder:
 
         Parameters
         ----------
-        frame : mgdd.rig.Frame
+        frame : mgdd.rig.realtime.Frame
             With its stamps.
         """
         with self._lock:

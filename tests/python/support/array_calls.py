@@ -16,7 +16,7 @@ from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
-from mgdd.rig import RigRecord
+from mgdd.rig.exchange import RigRecord
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.sweep import sweep

@@ -11,7 +11,8 @@ import sys
 import time
 
 from mgdd.errors import RigError
-from mgdd.rig import CanRig, CanTransport
+from mgdd.rig import CanRig
+from mgdd.rig.can.transport import CanTransport
 
 OPEN_DEG, SAMPLES = 40.0, 8
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from mgdd.control import Pid
-from mgdd.rig import LoopMessage, RealtimeLoop, RingTransport, SafetyEnvelope, SignalLayout
+from mgdd.rig import RealtimeLoop, SafetyEnvelope
+from mgdd.rig.realtime import LoopMessage, RingTransport, SignalLayout
 
 
 def idle_loop() -> RealtimeLoop:

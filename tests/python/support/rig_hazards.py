@@ -10,12 +10,13 @@ from typing import Any
 from mgdd.control import Pid
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
-from mgdd.rig import Frame, SafetyEnvelope, SafetyGate, SignalMap
+from mgdd.rig import SafetyEnvelope, SafetyGate, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.gated import facts_of
+from mgdd.rig.realtime import Frame
 from mgdd.throttle import SensorFault
 
 ONSET, OVER = 600, 1500  # samples: the hazard sets in, and ends

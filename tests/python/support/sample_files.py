@@ -22,17 +22,17 @@ from mgdd.io.point_table import read_points
 from mgdd.loop import Reference
 from mgdd.maps import CalibrationMap, read_dcm, read_map, write_dcm, write_map
 from mgdd.optimize import BoundedSeeking, Limit, Seeker
-from mgdd.rig import (
+from mgdd.rig import (  # fmt: skip
     Experiment,
     Recorder,
-    RigRecord,
     SafetyEnvelope,
     SignalMap,
     export_record,
     read_record,
     repair_record,
-)  # fmt: skip
+)
 from mgdd.rig.can.dbc import DbcFile
+from mgdd.rig.exchange import RigRecord  # fmt: skip
 from mgdd.surrogate import EngineSurrogate, ResponseModel, fit_response, fit_surrogate, random_step_records
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair
 from recorded_rig import write as write_record

@@ -25,7 +25,7 @@ _SEND_ERRORS = 3  # in a row, until the bus counts as gone
 
 
 class FrameBus(Protocol):
-    """What a bridge needs of a bus: a `mgdd.rig.CanTransport`, for example."""
+    """What a bridge needs of a bus: a `CanTransport`, for example."""
 
     def receive(self, timeout_s: float) -> Frame | None:
         """Give the next frame that arrived, or None after the time."""
@@ -65,7 +65,8 @@ class BusBridge:
     Examples
     --------
     >>> import can
-    >>> from mgdd.rig import BusBridge, Frame, RingTransport
+    >>> from mgdd.rig.can.bus_bridge import BusBridge
+    >>> from mgdd.rig.realtime import Frame, RingTransport
     >>> transport = RingTransport()
     >>> with can.Bus(interface="virtual", channel="demo", ignore_config=True) as node:
     ...     with can.Bus(interface="virtual", channel="demo", ignore_config=True) as host, BusBridge(host, transport):

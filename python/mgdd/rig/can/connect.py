@@ -23,7 +23,7 @@ def connected(interface: str, channel: str | int, options: Mapping[str, Any], na
     Parameters
     ----------
     interface, channel : str or int
-        As `mgdd.rig.CanTransport` takes them.
+        As `CanTransport` takes them.
     options : mapping
         Further keywords of the interface.
     name : str

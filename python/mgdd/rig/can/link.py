@@ -19,7 +19,7 @@ class Taken(NamedTuple):
     message : MappedMessage
         Whose frame it is.
     status : str
-        As `mgdd.rig.E2eCheck.push` says it; of an unprotected one ``ok`` or ``wrong_length``.
+        As `E2eCheck.push` says it; of an unprotected one ``ok`` or ``wrong_length``.
     usable : bool
         Whether its content may be used.
     """

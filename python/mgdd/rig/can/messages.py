@@ -30,7 +30,7 @@ def message_of(frame: Frame, *, timestamp_s: float = 0.0) -> can.Message:
 
     Parameters
     ----------
-    frame : mgdd.rig.Frame
+    frame : mgdd.rig.realtime.Frame
         Any frame.
     timestamp_s : float
         Stamp of the message [s]; in files since 1970.
@@ -42,7 +42,7 @@ def message_of(frame: Frame, *, timestamp_s: float = 0.0) -> can.Message:
 
     Examples
     --------
-    >>> from mgdd.rig import Frame
+    >>> from mgdd.rig.realtime import Frame
     >>> from mgdd.rig.can.messages import message_of
     >>> message_of(Frame(id=0x120, data=bytes(2), received=True)).dlc
     2
@@ -80,7 +80,7 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
 
     Returns
     -------
-    mgdd.rig.Frame
+    mgdd.rig.realtime.Frame
         With the stamp of the message as ``bus_ns``.
 
     Raises

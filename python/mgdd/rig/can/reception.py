@@ -62,7 +62,7 @@ class Reception:
 
         Returns
         -------
-        mgdd.rig.Frame or None
+        mgdd.rig.realtime.Frame or None
             ``monotonic_ns`` is when it arrived.
         """
         looked_ns = time.monotonic_ns()

@@ -29,7 +29,7 @@ def own_node(checked: CheckedExperiment, *, truth: str | os.PathLike[str] | None
     Yields
     ------
     str
-        As `mgdd.rig.CanTransport.parse` reads it.
+        As `CanTransport.parse` reads it.
 
     Raises
     ------
