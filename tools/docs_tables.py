@@ -33,6 +33,7 @@ from tables_of_model import (
 
 from mgdd import engine
 from mgdd.engine import Cylinder, OperatingPoint, simulate
+from mgdd.engine.cycle import convergence as step_error
 from mgdd.guide import OnlineCalibration
 from mgdd.loop import EngineBench
 from mgdd.studies import guided_transients as plane_study
@@ -213,7 +214,7 @@ NUMBERS: Mapping[str, Callable[[], float]] = {
     "efficiency_gross": lambda: float(simulate(*single(), soc_cad=-6.0)["efficiency_gross"]),
     "seed_motored_work_j": lambda: integrators()["`seed`"][1],
     "step_error_imep_percent": lambda: (
-        100.0 * float(np.abs(engine.convergence(*single())["error"].sel(indicator="imep_gross_bar")) / 9.627)
+        100.0 * float(np.abs(step_error(*single())["error"].sel(indicator="imep_gross_bar")) / 9.627)
     ),
 }
 

@@ -15,7 +15,7 @@ import numpy as np
 from mgdd import datasets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.identify import fit_cylinder
-from mgdd.presets import Preset
+from mgdd.presets.preset import Preset
 
 OUT = Path(__file__).parents[1] / "python" / "mgdd" / "presets" / "hd_diesel_128x144.toml"
 DATA = "LibICE-post (Ramognino), tutorial data, commit c1bc6acc"

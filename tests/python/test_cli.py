@@ -25,7 +25,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], str]:
     names, rows = [], ["file,speed_rpm,trapped_mass_g,soi_cad"]
     for trace in datasets.load("hd_diesel_128x144"):
         file = folder / f"{trace.attrs['file']}.csv"
-        io.write_pressure(trace, file)
+        io.write_csv(trace, file)
         names.append(str(file))
         a = trace.attrs
         rows.append(f"{file.name},{a['speed_rpm']},{a['trapped_mass_g']},{a['soi_cad']}")
@@ -120,7 +120,7 @@ def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.Captu
     motored = simulate(Cylinder(wall_heat_scale=0.0), OperatingPoint(fuel_mg=0.0))
     shifted = io.pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values - 0.2, name="shifted")
     file = tmp_path / "shifted.csv"
-    io.write_pressure(shifted, file)
+    io.write_csv(shifted, file)
     out = run_json(capsys, "engine", "analyze", str(file), "--pegging", "two_point", "--pegging-exponent", "1.37")
     assert out["pegging_bar"] == pytest.approx(0.2, abs=0.005)
 
@@ -278,7 +278,7 @@ def test_a_short_trace_is_told_and_still_reported(
 ) -> None:
     trace = io.read_pressure(files[0][1]).sel(crank_angle_cad=slice(-90.0, 50.0))
     short = tmp_path / "short.csv"
-    io.write_pressure(trace, short)
+    io.write_csv(trace, short)
     assert "trapped_mass_g" in refused(capsys, "engine", "calibrate", str(short), *HD)
     out = run_json(
         capsys,

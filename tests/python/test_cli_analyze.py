@@ -18,7 +18,7 @@ HD = ("--preset", "hd_diesel_128x144")
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("trace") / "a50.csv"
-    io.write_pressure(datasets.load("hd_diesel_128x144")[1], path)
+    io.write_csv(datasets.load("hd_diesel_128x144")[1], path)
     return str(path)
 
 

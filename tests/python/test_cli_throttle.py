@@ -44,7 +44,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     train = measured(signals.chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0), "train", 1)
     test = measured(signals.amplitude_random_steps(3.0, offset=0.0, amplitude=0.33), "test", 2)
     for name, log in (("train", train), ("test", test)):
-        io.write_throttle_log(log, folder / f"{name}.csv")
+        io.write_csv(log, folder / f"{name}.csv")
     return str(folder / "train.csv"), str(folder / "test.csv")
 
 
@@ -176,7 +176,7 @@ def test_bad_logs_and_files_are_refused(
         capsys, "throttle", "identify", files[0], "--duty", "angle_deg", "--angle", "duty"
     )
     above = measured(signals.chirp(3.0, offset=0.15, amplitude=0.15), "above", 3)
-    io.write_throttle_log(above, tmp_path / "above.csv")
+    io.write_csv(above, tmp_path / "above.csv")
     said = refused(capsys, "throttle", "identify", str(tmp_path / "above.csv"), "--two-sided")
     assert "below limp-home" in said
     assert "fit one side with --two-sided left out" in said

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mgdd import _core, datasets, io, presets
-from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, find_optimum, sensitivities, simulate
+from mgdd.engine import Cylinder, OperatingPoint, analyze, find_optimum, sensitivities, simulate
+from mgdd.engine.cycle import convergence
 from mgdd.errors import ConvergenceError, DataError, ParameterError, ShapeError
 from mgdd.identify import ModelFamily, best_timing, fit_cylinder, wall_heat_profile
 from mgdd.optimize import FitOptions

@@ -16,7 +16,10 @@ from scipy.signal import lfilter
 
 from mgdd import identify
 from mgdd.errors import DataError, ShapeError
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.n_step import n_step_rms
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.labels import labelled_dataset
@@ -80,9 +83,9 @@ USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "sense": lambda time: SensorPair().sense(log(time)),
     "pseudo-Wiener run": lambda time: MODEL.simulate(log(time)),
     "pseudo-Wiener prediction": lambda time: MODEL.predict(log(time), 5),
-    "first-principle run": lambda time: identify.FirstPrincipleModel().simulate(log(time)),
-    "fit_first_principle": lambda time: identify.fit_first_principle(log(time), options=ONCE),
-    "fit_pseudo_wiener": lambda time: identify.fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
+    "first-principle run": lambda time: FirstPrincipleModel().simulate(log(time)),
+    "fit_first_principle": lambda time: fit_first_principle(log(time), options=ONCE),
+    "fit_pseudo_wiener": lambda time: fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
     "identify_throttle": lambda time: identify.identify_throttle(log(time), options=FitOptions(n_starts=1)),
     "validate_throttle": lambda time: identify.validate_throttle(MODEL, log(time)),
     "n_step_rms": lambda time: n_step_rms(MODEL, log(time)),

@@ -20,15 +20,20 @@ from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
-from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
+from mgdd.engine import Cylinder, OperatingPoint, analyze, sensitivities, simulate, timing_sweep
+from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
-from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
+from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_csv
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
-from mgdd.results import FitReport
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
@@ -45,7 +50,7 @@ def log() -> xr.Dataset:
 
 
 def written_log(folder: Path) -> xr.Dataset:
-    write_throttle_log(log(), folder / "log.csv")
+    write_csv(log(), folder / "log.csv")
     return read_throttle_log(folder / "log.csv")
 
 
@@ -101,12 +106,12 @@ def taught() -> OnlineCalibration:
 
 
 def validation() -> ThrottleValidation:
-    model = identify.FirstPrincipleModel()
+    model = FirstPrincipleModel()
     return identify.validate_throttle(model, log())
 
 
-def of_records() -> surrogate.EngineSurrogate:
-    return surrogate.fit_surrogate(surrogate.random_step_records(1500))
+def of_records() -> EngineSurrogate:
+    return surrogate.fit_surrogate(random_step_records(1500))
 
 
 def planned(**options: Any) -> xr.Dataset:
@@ -181,17 +186,17 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "results.FitReport.dataset": lambda _: report().dataset,
-    "results.Fit.dataset": lambda _: identify.fit_first_principle(
+    "results.Fit.dataset": lambda _: fit_first_principle(
         log(), options=optimize.FitOptions(n_starts=1)
     ).dataset,
-    "results.Fit.run": lambda _: identify.fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
+    "results.Fit.run": lambda _: fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "guide.FeedForward.history": lambda _: guided().history,
     "guide.GuidedEngine.history": lambda _: guided_engine().history,
     "guide.OnlineCalibration.history": lambda _: taught().history,
     "guide.TimingMap.to_dataset": lambda _: TimingMap({"fuel_mg": [6.0, 20.0]}, -5.0).to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
-    "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),
+    "surrogate.random_step_records": lambda _: random_step_records(50),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
     "io.read_pressure": pressures,
     "io.read_throttle_log": written_log,

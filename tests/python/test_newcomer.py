@@ -48,7 +48,7 @@ def test_sweep_two_inputs_and_fit_a_response() -> None:
     assert fit.success
     assert fit.residual.shape == (12,)
     assert fit.covariance.shape == (len(fit.report.names),) * 2
-    mgdd.plot.response_diagnostics(fit)
+    fit.plot()
     at = fit.model.predict({"speed_rpm": [1200.0], "soc_cad": [-6.0]})
     assert 5.0 < float(at["mean"][0]) < 15.0
 
@@ -99,7 +99,7 @@ def test_look_a_map_up_at_a_point() -> None:
 
 
 def test_track_a_step_with_a_fitted_model() -> None:
-    fit = mgdd.identify.fit_first_principle(frame(), options=mgdd.optimize.FitOptions(n_starts=1))
+    fit = mgdd.identify.identify_throttle(frame(), "first_principle", options=mgdd.optimize.FitOptions(n_starts=1))
     controller = mgdd.loop.tuned_controller("guided", fit)
     run = mgdd.loop.track(controller, mgdd.loop.Reference.step(20, 60), throttle="P1")
     assert float(run["settling_ms"]) < 200.0
@@ -117,7 +117,7 @@ def test_save_and_load_each_result(tmp_path: Path) -> None:
     table = mgdd.maps.CalibrationMap({"fuel_mg": [10, 20]}, [1.0, 2.0], name="soc_cad")
     mgdd.maps.write_map(table, tmp_path / "map.csv")
     assert mgdd.maps.read_map(tmp_path / "map.csv") == table
-    fit = mgdd.identify.fit_first_principle(frame(), options=mgdd.optimize.FitOptions(n_starts=1))
+    fit = mgdd.identify.identify_throttle(frame(), "first_principle", options=mgdd.optimize.FitOptions(n_starts=1))
     (tmp_path / "throttle.toml").write_text(fit.to_toml(), encoding="utf-8")
     assert mgdd.identify.load_throttle_model(tmp_path / "throttle.toml") == fit.model
 
@@ -170,7 +170,7 @@ def test_a_signal_without_its_time_is_refused(given: Any) -> None:
 
 def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
     with pytest.raises(mgdd.errors.DataError, match="log have no duty: needed are time_s, duty, angle_deg; given are"):
-        mgdd.identify.fit_first_principle(frame().rename(columns={"duty": "u"}))
+        mgdd.identify.identify_throttle(frame().rename(columns={"duty": "u"}))
 
 
 @pytest.mark.parametrize(

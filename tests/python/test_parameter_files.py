@@ -18,15 +18,18 @@ from mgdd import _core, presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
-from mgdd.identify.throttle.first_principle_model import TYPICAL
+from mgdd.identify import OdeModel, load_throttle_model
+from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.loop import SurrogatePlant
-from mgdd.presets import Preset
+from mgdd.presets.preset import Preset
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
-from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 TIME = 1e-3 * np.arange(300)

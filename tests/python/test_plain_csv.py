@@ -28,14 +28,14 @@ def throttle_run() -> xr.Dataset:
 
 def of_pressure(path: Path) -> xr.Dataset:
     trace = datasets.load("hd_diesel_128x144")[0]
-    io.write_pressure(trace, path)
+    io.write_csv(trace, path)
     return trace
 
 
 def of_log(path: Path) -> xr.Dataset:
     run = throttle_run()
     log = io.throttle_log(run["time_s"], run["duty"], run["angle_deg"], current_a=run["current_a"])
-    io.write_throttle_log(log, path)
+    io.write_csv(log, path)
     return log
 
 
@@ -58,8 +58,8 @@ def of_map(path: Path) -> xr.Dataset:
 
 WRITERS = {
     "timing map": of_map,
-    "write_pressure": of_pressure,
-    "write_throttle_log": of_log,
+    "write_csv, trace": of_pressure,
+    "write_csv, log": of_log,
     "cycle": of_traces(lambda: simulate(Cylinder(), OperatingPoint())),
     "throttle": of_traces(throttle_run),
     "flags and NaN": of_traces(lambda: SensorPair().sense(throttle_run())),

@@ -15,7 +15,8 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.report import write_report
 from mgdd.results.labels import labelled_dataset
-from mgdd.studies import StudyResult, available_studies
+from mgdd.studies.base import StudyResult
+from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import Section, Table
 
 NEEDS = {"measured-engine-seek": "h2df_502", "identification-benchmarks": "cascaded_tanks"}

@@ -23,16 +23,19 @@ from mgdd import datasets, identify, plot, presets
 from mgdd.engine import find_optimum, ignition_delay, simulate
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
+from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.loop import EngineBench, SurrogatePlant, run_seeker, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
-from mgdd.results import Result
+from mgdd.plot.response import response_diagnostics
 from mgdd.results.labels import check_labels
+from mgdd.results.result import Result
 from mgdd.rig import Experiment, Recorder, read_record, run_experiment
 from mgdd.rig.experiment.self_test import WAYS_OF, SelfTest
 from mgdd.signals import chirp
 from mgdd.studies import run_study
-from mgdd.surrogate import fit_response, fit_surrogate, random_step_records
+from mgdd.surrogate import fit_response, fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
 from mgdd.throttle import Throttle
 from mgdd.throttle import simulate as simulate_throttle
 
@@ -53,7 +56,7 @@ def cylinder_fit() -> Any:
 
 @cache
 def throttle_fit() -> Any:
-    return identify.fit_first_principle(log(), options=FitOptions(n_starts=1))
+    return fit_first_principle(log(), options=FitOptions(n_starts=1))
 
 
 @cache
@@ -203,9 +206,13 @@ class Drawn(Result):
         self.dataset = dataset  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("name", plot.__all__)
+def test_every_public_figure_is_here() -> None:
+    assert set(plot.__all__) <= set(DRAWN)
+
+
+@pytest.mark.parametrize("name", DRAWN)
 def test_a_figure_takes_a_result_or_its_dataset_and_nothing_else(name: str) -> None:
-    draw = getattr(plot, name)
+    draw = response_diagnostics if name == "response_diagnostics" else getattr(plot, name)
     first, *_ = inspect.signature(draw).parameters.values()
     assert first.annotation == "xr.Dataset | Result"
     make, more = DRAWN[name]

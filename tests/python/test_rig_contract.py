@@ -15,7 +15,9 @@ from mgdd.loop import EngineBench, Measurement, Plant, SurrogatePlant, VirtualTh
 from mgdd.rig import CanRig, RecordingRig, ReplayRig, SimulatedRig
 from mgdd.rig.base import Rig
 from mgdd.rig.exchange import RigRecord
-from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")

@@ -16,7 +16,7 @@ from mgdd.cli import main
 from mgdd.control import Pid
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import Experiment, RealtimeLoop, SafetyEnvelope, SignalMap, read_record, run_experiment
+from mgdd.rig import Experiment, SafetyEnvelope, SignalMap, read_record, run_experiment
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.node_core import NodeCore
@@ -24,7 +24,7 @@ from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.experiment import check_experiment, core_track
 from mgdd.rig.experiment.loop_bus import WatchedBus
 from mgdd.rig.experiment.watched import Cycle
-from mgdd.rig.realtime import Frame, RingTransport
+from mgdd.rig.realtime import Frame, RealtimeLoop, RingTransport
 from patient_bench import patient_experiment
 from realtime_loops import becomes
 

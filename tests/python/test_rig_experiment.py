@@ -18,7 +18,7 @@ import xarray as xr
 
 from mgdd._core.loop import tracking_figures
 from mgdd.errors import DataError, ParameterError, RigError
-from mgdd.identify import FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
 from mgdd.rig import Experiment, SafetyEnvelope, read_record, recorded, run_experiment

@@ -16,7 +16,7 @@ import xarray as xr
 
 from mgdd.control import Pid
 from mgdd.errors import RigError
-from mgdd.identify import fit_pseudo_wiener
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.io import throttle_log
 from mgdd.loop import EngineBench, Measurement, Reference, VirtualThrottle, run_seeker
 from mgdd.optimize import ExtremumSeeking, FitOptions

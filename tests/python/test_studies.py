@@ -18,7 +18,8 @@ from mgdd.identify import best_timing
 from mgdd.identify.engine import family
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
 from study_cache import quick_study
 
 HD = presets.load("hd_diesel_128x144").cylinder
@@ -259,7 +260,7 @@ def test_ctrl_c_in_the_report_of_a_calibration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trace = datasets.load("hd_diesel_128x144")[2]
-    io.write_pressure(trace, tmp_path / "one.csv")
+    io.write_csv(trace, tmp_path / "one.csv")
     told = ["--speed-rpm", str(trace.attrs["speed_rpm"]), "--trapped-mass-g", str(trace.attrs["trapped_mass_g"])]
     monkeypatch.setattr(study, "run_study", lambda name, **given: run_study(name, **{**given, "progress": press_at(1)}))
     command = ["engine", "calibrate", str(tmp_path / "one.csv"), "--preset", "hd_diesel_128x144", *told]

@@ -13,7 +13,7 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guide_accuracy import HARD, HardCase, run_hard
 from mgdd.studies.guide_cases import (
     GUIDES,

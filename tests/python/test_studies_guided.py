@@ -12,7 +12,8 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
-from mgdd.studies import StudyResult, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guided import LimitedRuns, limited_parts
 from mgdd.studies.measured_engine_cases import measured_guide
 from mgdd.surrogate import fit_surrogate

@@ -11,7 +11,7 @@ import pytest
 from mgdd.engine import OperatingPoint, ignition_delay
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
 from mgdd.studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, told_laws
 from mgdd.studies.ignition_delay import plane_of

@@ -15,7 +15,7 @@ from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
 from mgdd.results.labels import ANGLE, check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.validation_fits import LAWS, Burn, Law, best_slopes, burns_of, meet, redraw
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder

@@ -18,7 +18,8 @@ from mgdd.cli.options import assignments, refuse_idle
 from mgdd.cli.seekers import Task, amplitude_of, make_seeker
 from mgdd.errors import ParameterError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
-from mgdd.optimize import Limit, Optimum
+from mgdd.optimize import Limit
+from mgdd.optimize.optimum import Optimum
 
 if TYPE_CHECKING:
     import xarray as xr

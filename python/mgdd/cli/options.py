@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
-from mgdd.io import read_conditions, read_pressure
-from mgdd.io.point_table import CONDITIONS
+from mgdd.io import read_pressure
+from mgdd.io.point_table import CONDITIONS, read_conditions
 from mgdd.io.pressure_checks import PRESSURE_UNITS
 from mgdd.io.pressure_file import ANGLE_UNITS
+from mgdd.presets.preset import Preset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -196,7 +197,7 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     )  # fmt: skip
 
 
-def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, presets.Preset]:
+def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
     """Make cylinder and point from a preset and the options over it."""
     preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
     if args.preset is None and getattr(args, "files", None):

@@ -33,7 +33,7 @@ from mgdd.errors import ConvergenceError, Interrupted, ParameterError
 from mgdd.guide import GuidedEngine
 from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.loop.plant_loop import LoopRun
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.plot.style import drawn
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.results.units import unit_attributes

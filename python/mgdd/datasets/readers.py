@@ -11,7 +11,8 @@ import numpy as np
 from mgdd.datasets.engine_maps import engine_map
 from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, path
 from mgdd.errors import DataError, ParameterError
-from mgdd.io import read_conditions, read_pressure
+from mgdd.io import read_pressure
+from mgdd.io.point_table import read_conditions
 from mgdd.io.table import read_table
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import check_count

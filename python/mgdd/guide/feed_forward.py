@@ -14,8 +14,8 @@ from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.guide.conditions import change_between, numbers_of
 from mgdd.guide.guided import TOLD, Column, Guided
-from mgdd.optimize import Optimum, Seeker
-from mgdd.optimize.seeker import rebuilt
+from mgdd.optimize.optimum import Optimum
+from mgdd.optimize.seeker import Seeker, rebuilt
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
         Golden section searches its whole bracket at every new point and gains nothing from a guide.
     guide : callable, optional
         ``guide(point)`` gives the optimum of the model there: a number, one number per input, or an
-        `mgdd.optimize.Optimum`, whose ``curvature`` then must be in the unit of J; None where the point lies outside
+        `Optimum`, whose ``curvature`` then must be in the unit of J; None where the point lies outside
         of what the guide knows. Without a guide every call is that of the seeker, bit for bit.
     trust : float
         Trust in the guide before its first test, in [0, 1].

@@ -16,7 +16,8 @@ from mgdd.optimize import least_squares
 from mgdd.optimize.fit_options import FitOptions, Resolved, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run, quality_of
 from mgdd.parallel.pool import MakesExecutor
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
+from mgdd.results.fit_report import FitReport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of
 

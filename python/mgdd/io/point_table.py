@@ -223,7 +223,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> from mgdd.io import read_conditions
+    >>> from mgdd.io.point_table import read_conditions
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder) / "conditions.csv"
     ...     _ = file.write_text("file,speed_rpm,soi_cad\nmean.csv,1200,-5.06\n")

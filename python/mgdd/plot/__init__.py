@@ -11,7 +11,6 @@ from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
-from mgdd.plot.response import response_diagnostics
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import holding_duty
@@ -26,7 +25,6 @@ __all__ = [
     "map_cells",
     "map_contour",
     "pressure",
-    "response_diagnostics",
     "seeking",
     "sensors",
     "timing",

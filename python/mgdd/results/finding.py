@@ -32,7 +32,7 @@ class Finding:
 
     Examples
     --------
-    >>> from mgdd.results import Finding
+    >>> from mgdd.results.finding import Finding
     >>> found = Finding("one_way", (), "the plate only opens", "add a triangle across limp-home")
     >>> found.code, str(found)
     ('one_way', 'the plate only opens; add a triangle across limp-home')

@@ -1,8 +1,8 @@
 """Test rigs: one protocol for the simulated plant and the real one, in this process, over a CAN bus, or recorded.
 
 `mgdd.loop.run_seeker` steers a rig as it steers any plant. Below every optimiser stands an `ActuatorGuard`, below every
-throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of them. What a `RealtimeLoop` made by hand
-takes, frames, messages and transports, is in `mgdd.rig.realtime`.
+throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of them. The loop in a thread of the
+core, with its frames, messages and transports, is in `mgdd.rig.realtime`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from mgdd.rig.exchange import RecordingRig
 from mgdd.rig.experiment import Experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
-from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
@@ -28,7 +27,6 @@ __all__ = [
     "CanRig",
     "Experiment",
     "GatedThrottle",
-    "RealtimeLoop",
     "Recorder",
     "RecordingRig",
     "ReplayRig",

@@ -91,7 +91,8 @@ class RealtimeLoop(GateRequests):
     Examples
     --------
     >>> from mgdd.control import Pid
-    >>> from mgdd.rig import RealtimeLoop, SafetyEnvelope
+    >>> from mgdd.rig import SafetyEnvelope
+    >>> from mgdd.rig.realtime import RealtimeLoop
     >>> from mgdd.rig.realtime import LoopMessage, RingTransport, SignalLayout
     >>> duty = SignalLayout(start=0, length=16, raw_type="signed", scale=5e-5)
     >>> measured = {

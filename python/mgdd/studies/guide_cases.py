@@ -13,7 +13,8 @@ from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
 from mgdd.loop import EngineBench
-from mgdd.optimize import ExtremumSeeking, Optimum
+from mgdd.optimize import ExtremumSeeking
+from mgdd.optimize.optimum import Optimum
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.engine import Cylinder, OperatingPoint, ignition_delay
 from mgdd.engine.ignition import Timing
 from mgdd.guide import Curve, ModelOptimum
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT
 
 if TYPE_CHECKING:

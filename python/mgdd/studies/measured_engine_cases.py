@@ -21,14 +21,14 @@ from mgdd.optimize import (
     GoldenSection,
     Limit,
     NewtonSeeking,
-    Optimum,
     Seeker,
     Spsa,
     tune,
 )
 from mgdd.optimize.by_curvature import newton_settings
+from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.tuning import Tuning
-from mgdd.surrogate import EngineSurrogate
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     import xarray as xr

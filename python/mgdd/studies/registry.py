@@ -71,7 +71,7 @@ def available_studies() -> dict[str, str]:
 
     Examples
     --------
-    >>> from mgdd.studies import available_studies
+    >>> from mgdd.studies.registry import available_studies
     >>> "sensor-delay" in available_studies()
     True
     """
@@ -94,7 +94,7 @@ def run_study(
     Parameters
     ----------
     name : str
-        One of `available_studies`.
+        One of the names that ``mgdd study`` lists, ``sensor-delay`` for example.
     seeds : int, optional
         Number of seeds behind every statistic, >= 1; the study's own number if left out.
     quick : bool

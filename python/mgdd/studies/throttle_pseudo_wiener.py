@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.errors import ParameterError
-from mgdd.identify import fit_pseudo_wiener
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
 from mgdd.results.labels import labelled_dataset

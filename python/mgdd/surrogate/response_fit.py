@@ -11,10 +11,12 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.io.point_table import flat_points, input_names
 from mgdd.optimize import least_squares
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.fit import FitQuality
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import Label, label_of
-from mgdd.signals import nrmse_fit_percent, rmse
+from mgdd.signals import nrmse_fit_percent
+from mgdd.signals.metrics import rmse
 from mgdd.surrogate.points import column_label, column_names, points_of
 from mgdd.surrogate.polynomial import PolynomialBasis, PolynomialSurface, choose_terms, support_of
 from mgdd.surrogate.process import ProcessSurface, fit_process

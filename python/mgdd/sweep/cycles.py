@@ -18,7 +18,7 @@ from mgdd.errors import ParameterError, argument, did_you_mean, hand_over
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 from mgdd.results.labels import ANGLE, labelled_dataset
 from mgdd.sweep.batch import NOX, VOID, Request, angles_of, said, simulate_cases
 from mgdd.sweep.cases import Cases, cases_of

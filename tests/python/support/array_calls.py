@@ -13,12 +13,15 @@ from idle_loop import idle_loop
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import DiscreteModel, Pid, RecedingHorizon
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
 from mgdd.rig.exchange import RigRecord
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.metrics import mse
+from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
+from mgdd.surrogate.random_steps import random_step_records
 from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 
@@ -29,14 +32,14 @@ TIME = np.arange(600) * 1e-3
 DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + 4.0 * TIME))
 MODEL = throttle.PseudoWiener("pw_r")
 ANGLE = MODEL.simulate({"time_s": TIME, "duty": DUTY})["angle_deg"].to_numpy()
-GROUPS, SMOOTH = identify.FirstPrincipleModel(), identify.SmoothThrottle()
+GROUPS, SMOOTH = FirstPrincipleModel(), SmoothThrottle()
 CRANK = np.arange(-90.0, 91.0)
 BAR = 40.0 * np.exp(-((CRANK / 40.0) ** 2)) + 1.0
 NOISE = np.random.default_rng(0).standard_normal(600)
 TEN = np.array(mgdd._core.identify.smooth_example)
 KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
 SOC = np.array([-8.0, -6.0, -4.0])
-RECORDS = surrogate.fit_surrogate(surrogate.random_step_records(1500))
+RECORDS = surrogate.fit_surrogate(random_step_records(1500))
 SWEEP = np.linspace(-3.0, 3.0, 40)
 OPEN = np.array([10.0, 30.0, 60.0])
 CHAIN = throttle.DemandChain()
@@ -221,7 +224,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "guide.TimingMap.of_guide": (mapped_by_guide, (FUEL,)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
-    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
@@ -229,8 +231,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
     "maps.CalibrationMap.__call__": (lambda x: table(FUEL, TIMING, 0.2)(fuel_mg=x), (OPEN,)),
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
-    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
-    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
     "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
     "loop.track": (
@@ -255,15 +255,9 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda x, y: optimize.measure_map(x, y).curvature, (SWEEP, -SWEEP**2),
     ),
     "signals.nrmse_fit_percent": (signals.nrmse_fit_percent, (ANGLE, ANGLE + NOISE)),
-    "signals.residual_tests": (lambda e, u: signals.residual_tests(e, u).share_white, (NOISE, DUTY)),
-    "signals.rmse": (signals.rmse, (ANGLE, ANGLE + NOISE)),
-    "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
     "surrogate.fit_response": (
         lambda fuel, imep: surrogate.fit_response({"fuel_mg": fuel}, imep, degree=1).diagnostics["left_out"].to_numpy(),
         (np.array([6.0, 13.0, 20.0, 30.0, 41.0]), np.array([1.1, 2.9, 6.1, 8.8, 12.1])),
-    ),
-    "surrogate.EngineSurrogate.predict": (
-        lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),
     "sweep.sweep": (
         lambda soc, fuel: sweep(Cylinder(), OperatingPoint(), {"soc_cad": soc, "fuel_mg": fuel})["t_max_k"].to_numpy(),
@@ -304,6 +298,15 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "throttle.PseudoWiener.simulate": (run(MODEL), (TIME, DUTY)),
     "throttle.PseudoWiener.predict": (ahead(MODEL), (TIME, DUTY, ANGLE)),
     "io.pressure_checks.check_trace": (check_trace, (CRANK, BAR)),
+    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
+    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
+    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
+    "signals.residual_tests": (lambda e, u: residual_tests(e, u).share_white, (NOISE, DUTY)),
+    "signals.rmse": (rmse, (ANGLE, ANGLE + NOISE)),
+    "signals.vaf_percent": (vaf_percent, (ANGLE, ANGLE + NOISE)),
+    "surrogate.EngineSurrogate.predict": (
+        lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
+    ),
     "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
     "throttle.characteristics.mass_flow_kg_per_s": (
         lambda area, drop: mass_flow_kg_per_s(area_m2=area, pressure_drop_kpa=drop), (1e-6 * OPEN, 1.0 + OPEN),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mgdd.control import Pid
-from mgdd.rig import RealtimeLoop, SafetyEnvelope
-from mgdd.rig.realtime import LoopMessage, RingTransport, SignalLayout
+from mgdd.rig import SafetyEnvelope
+from mgdd.rig.realtime import LoopMessage, RealtimeLoop, RingTransport, SignalLayout
 
 
 def idle_loop() -> RealtimeLoop:

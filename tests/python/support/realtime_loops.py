@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mgdd.control import Pid
-from mgdd.rig import RealtimeLoop
-from mgdd.rig.realtime import RingTransport
+from mgdd.rig.realtime import RealtimeLoop, RingTransport
 from throttle_node import COMMAND, MEASUREMENTS, PERIOD_S, patient_envelope
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mgdd.control import DiscreteModel
-from mgdd.identify import FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.throttle import PseudoWiener, Throttle
 
 A = np.array([[0.95, 0.2, 0.0], [-0.3, 0.9, 0.15], [0.05, 0.0, 0.7]])

@@ -17,7 +17,8 @@ from typing import Any
 
 import mgdd
 from mgdd import _core
-from mgdd.studies import StudyResult, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
 from mgdd.studies.registry import function_of
 
 ALL = Path(__file__).resolve().parents[3] / "build" / "studies"

@@ -16,8 +16,7 @@ from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
 from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
-from mgdd.optimize import Optimum
-from mgdd.optimize.optimum import limits_of
+from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.presets.meant import CylinderLike
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.presets.meant import CylinderLike
-from mgdd.results import FitReport
 from mgdd.results.fit import FitQuality
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:

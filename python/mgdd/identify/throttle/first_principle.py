@@ -18,7 +18,9 @@ from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.parallel.pool import MakesExecutor, threads_of
-from mgdd.results import Finding, Fit, FitReport
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
+from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     import numpy as np
@@ -103,7 +105,8 @@ def fit_first_principle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, fit_first_principle
+    >>> from mgdd.identify.throttle.first_principle import fit_first_principle
+    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
     >>> from mgdd.optimize import FitOptions
     >>> time = 1e-3 * np.arange(4000)
     >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))

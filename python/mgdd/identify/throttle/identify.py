@@ -16,8 +16,8 @@ from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
 from mgdd.io.throttle_checks import check_sides, check_throttle_log
-from mgdd.results import Finding, Fit
-from mgdd.results.finding import unique
+from mgdd.results import Fit
+from mgdd.results.finding import Finding, unique
 from mgdd.results.fit import FitQuality
 
 if TYPE_CHECKING:

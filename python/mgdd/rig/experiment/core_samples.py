@@ -83,7 +83,7 @@ class LoopSamples:
         Parameters
         ----------
         columns : mapping of str to ndarray
-            As `mgdd.rig.RealtimeLoop.sample_columns` gives them.
+            As `RealtimeLoop.sample_columns` gives them.
         """
         names = [name for name in columns if name != "deadline_ns"]
         rows = zip(columns["deadline_ns"].tolist(), *(columns[name].tolist() for name in names), strict=True)

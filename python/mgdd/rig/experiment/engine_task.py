@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mgdd.optimize import Seeker
-    from mgdd.presets import Preset
+    from mgdd.presets.preset import Preset
 
 __all__ = ["SeekPlan", "engine_named"]
 

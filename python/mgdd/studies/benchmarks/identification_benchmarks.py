@@ -15,7 +15,8 @@ from mgdd.optimize import FitOptions
 from mgdd.plot.measured import measured_and_model
 from mgdd.plot.style import residual_below
 from mgdd.results.labels import labelled_dataset
-from mgdd.signals import nrmse_fit_percent, rmse
+from mgdd.signals import nrmse_fit_percent
+from mgdd.signals.metrics import rmse
 from mgdd.studies.base import Parts, Progress, StudyResult
 from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks

@@ -14,8 +14,9 @@ from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.describe import described
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
