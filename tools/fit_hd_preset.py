@@ -37,7 +37,7 @@ def main() -> None:
         gamma_model="linear",
         wall_heat_scale=0.5,
     )
-    fit = fit_cylinder(datasets.load("hd_diesel_128x144"), base, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
+    fit = fit_cylinder(datasets.read("hd_diesel_128x144"), base, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
     heat = np.array([load.fuel_heat_j for load in fit.loads])
     duration = np.array([load.burn_duration_cad for load in fit.loads])
     fuel = heat / base.lower_heating_value_mj_per_kg

@@ -70,7 +70,7 @@ def main() -> None:
     import matplotlib.pyplot as plt
 
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
-    traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     row = best_timing(traces, cylinder)[LOAD]
     if row.best is None:
         raise SystemExit("no plausible model: there is nothing to draw")

@@ -11,7 +11,7 @@ import pytest
 
 from mgdd import identify, io, signals
 from mgdd.cli import main
-from mgdd.throttle import Throttle, simulate
+from mgdd.throttle import Throttle, simulate_throttle
 
 KINDS = ("pw_r", "first_principle")
 
@@ -32,7 +32,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> st
 
 
 def measured(signal: Any, name: str, seed: int) -> Any:
-    run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
     noise = 0.03 * np.random.default_rng(seed).standard_normal(run.sizes["time_s"])
     return io.throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise, name=name)
 

@@ -30,7 +30,7 @@ from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
-from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate
+from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate_throttle
 
 
 def objects() -> dict[str, Callable[[], Any]]:
@@ -39,7 +39,7 @@ def objects() -> dict[str, Callable[[], Any]]:
 
     def log() -> Any:
         signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
-        run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+        run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
     example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
@@ -90,7 +90,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(
-            datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder
+            datasets.read("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder
         ),
     }
 

@@ -49,7 +49,7 @@ def fits() -> dict[str, Fit]:
         "first_principle": fit_first_principle(log(), test=log(), options=once),
         "pw_r": identify_throttle(log(), test=log(), limp_home_deg=8.0, options=once),
         "ode": fit_ode(lag, record, **start),
-        "cylinder": fit_cylinder(datasets.load("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),
+        "cylinder": fit_cylinder(datasets.read("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),
     }
 
 

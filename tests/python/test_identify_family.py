@@ -209,7 +209,7 @@ def test_a_shift_moves_angles_pressure_and_injection_together() -> None:
 
 @pytest.mark.slow
 def test_the_measured_engine_has_its_tdc_where_it_says() -> None:
-    found = estimate_tdc(datasets.load("hd_diesel_128x144"), PRESET.cylinder, span_cad=1.5)
+    found = estimate_tdc(datasets.read("hd_diesel_128x144"), PRESET.cylinder, span_cad=1.5)
     assert not found.suspect
     assert abs(found.tdc_offset_cad) < 0.3
     assert found.plot(ax=Figure().add_subplot()).get_ylim()[0] == 0.0

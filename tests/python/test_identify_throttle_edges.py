@@ -18,14 +18,14 @@ from mgdd.identify.throttle.limp_home import doubts
 from mgdd.io import throttle_log, write_csv
 from mgdd.optimize import FitOptions
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import Throttle, characteristics, simulate
+from mgdd.throttle import Throttle, characteristics, simulate_throttle
 
 NOISE_DEG = 0.03
 
 
 def measured(throttle: Throttle, duty: np.ndarray, *, start_deg: float | None = None, delay: int = 0) -> xr.Dataset:
     acting = np.concatenate([np.full(delay, duty[0]), duty[: duty.size - delay]])
-    run = simulate(throttle, acting, start_deg=start_deg)
+    run = simulate_throttle(throttle, acting, start_deg=start_deg)
     noise = np.random.default_rng(3).normal(0.0, NOISE_DEG, duty.size)
     return throttle_log(run["time_s"].to_numpy(), duty, run["angle_deg"].to_numpy() + noise)
 

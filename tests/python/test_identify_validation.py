@@ -21,7 +21,7 @@ from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
 from mgdd.signals.model import RunInputs, SampledModel
-from mgdd.throttle import Throttle, simulate
+from mgdd.throttle import Throttle, simulate_throttle
 
 TIME = np.arange(6000) * 1e-3
 RNG = np.random.default_rng(7)
@@ -285,7 +285,8 @@ def test_a_fit_in_percent_has_one_definition(how: str) -> None:
     train, test = (
         throttle_log(run["time_s"], run["duty"], run["angle_deg"] + 0.03 * rng.standard_normal(run.sizes["time_s"]))
         for run in (
-            simulate(Throttle(), signals.chirp(4.0, offset=0.15, amplitude=swing)["duty"]) for swing in (0.2, 0.15)
+            simulate_throttle(Throttle(), signals.chirp(4.0, offset=0.15, amplitude=swing)["duty"])
+            for swing in (0.2, 0.15)
         )
     )
     once = FitOptions(n_starts=1)

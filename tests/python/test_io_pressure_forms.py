@@ -21,7 +21,7 @@ from mgdd.io.pressure_checks import to_bar
 from mgdd.results.labels import ANGLE, check_labels
 
 Array = NDArray[np.float64]
-MEASURED = datasets.load("hd_diesel_128x144")
+MEASURED = datasets.read("hd_diesel_128x144")
 CLOSED, BAR = MEASURED[1][ANGLE].to_numpy(), MEASURED[1]["pressure_bar"].to_numpy()
 # Five whole cycles: the measured closed part of one load, each 1 % higher than the last, gas exchange at 2 bar and,
 # later, 2.2 bar, so that neither cycles nor halves of them look alike.

@@ -18,9 +18,7 @@ from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 
-needs_records = pytest.mark.skipif(
-    "h2df_502" not in datasets.available(), reason="MGDD_DATA_DIR holds no folder h2df_502"
-)
+needs_records = pytest.mark.skipif("h2df_502" not in datasets.names(), reason="MGDD_DATA_DIR holds no folder h2df_502")
 
 
 @pytest.fixture(scope="module")

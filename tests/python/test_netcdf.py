@@ -35,8 +35,15 @@ from mgdd.rig import SimulatedRig
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.sweep import sweep
-from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
-from mgdd.throttle import simulate as simulate_throttle
+from mgdd.throttle import (
+    DemandChain,
+    PseudoWiener,
+    SensorFault,
+    SensorPair,
+    Throttle,
+    characteristics,
+    simulate_throttle,
+)
 from study_cache import quick_study
 
 POINT = OperatingPoint()
@@ -55,7 +62,7 @@ def written_log(folder: Path) -> xr.Dataset:
 
 
 def pressures(folder: Path) -> xr.Dataset:
-    trace = datasets.load("hd_diesel_128x144")[0]
+    trace = datasets.read("hd_diesel_128x144")[0]
     columns = np.column_stack([trace["crank_angle_cad"], trace["pressure_bar"]])
     np.savetxt(folder / "trace.csv", columns, delimiter=",")
     return read_pressure(folder / "trace.csv")
@@ -141,7 +148,7 @@ def loop_samples() -> xr.Dataset:
 
 
 def wall_heat() -> xr.Dataset:
-    traces = datasets.load("hd_diesel_128x144")[:2]
+    traces = datasets.read("hd_diesel_128x144")[:2]
     fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
     return identify.wall_heat_profile(fit, scales=[0.5, 1.0]).dataset
 
@@ -151,7 +158,7 @@ def report() -> FitReport:
 
 
 def fitted_load() -> xr.Dataset:
-    fit = identify.fit_cylinder(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
+    fit = identify.fit_cylinder(datasets.read("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
     return fit.loads[0].overlay
 
 
@@ -159,8 +166,8 @@ SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", 
 NEEDS = ("advisor_engine_maps", "cascaded_tanks", "emps", "h2df_502", "wh2009")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
-    "datasets.load": lambda _: datasets.load("hd_diesel_128x144"),
-    **{f"datasets.load.{name}": lambda _, n=name: datasets.load(n) for name in NEEDS},
+    "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
+    **{f"datasets.read.{name}": lambda _, n=name: datasets.read(n) for name in NEEDS},
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
     "engine.convergence": lambda _: convergence(Cylinder(), POINT),
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),
@@ -222,11 +229,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     ],
     "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),
-    "throttle.holding_duty": lambda _: holding_duty(Throttle()),
     "throttle.SensorPair.sense": lambda _: SensorPair().sense(
         simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[SensorFault(kind="open_wire", sensor=2)]
     ),
-    "throttle.simulate": lambda _: [
+    "throttle.simulate_throttle": lambda _: [
         simulate_throttle(Throttle(), 0.3, duration_s=0.2, start_deg=start) for start in (None, [0.0, 20.0])
     ],
 }  # fmt: skip
@@ -264,7 +270,7 @@ def test_every_public_source_of_a_dataset_is_here() -> None:
 @pytest.mark.parametrize("source", sorted(MADE))
 def test_written_and_read_back(source: str, tmp_path: Path) -> None:
     needed = source.rpartition(".")[2]
-    if needed in NEEDS and needed not in datasets.available():
+    if needed in NEEDS and needed not in datasets.names():
         pytest.skip(f"MGDD_DATA_DIR holds no folder {needed}")
     made = MADE[source](tmp_path)
     for dataset in [made] if isinstance(made, xr.Dataset) else made:

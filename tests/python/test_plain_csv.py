@@ -16,8 +16,7 @@ from mgdd.cli.main import main
 from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
 from mgdd.guide import TimingMap
 from mgdd.io.table import write_traces
-from mgdd.throttle import SensorPair, Throttle
-from mgdd.throttle import simulate as simulate_throttle
+from mgdd.throttle import SensorPair, Throttle, simulate_throttle
 
 DATA = sorted((Path(mgdd.__file__).parent / "data").glob("*.csv"))
 
@@ -27,7 +26,7 @@ def throttle_run() -> xr.Dataset:
 
 
 def of_pressure(path: Path) -> xr.Dataset:
-    trace = datasets.load("hd_diesel_128x144")[0]
+    trace = datasets.read("hd_diesel_128x144")[0]
     io.write_csv(trace, path)
     return trace
 

@@ -7,7 +7,7 @@ import inspect
 import pickle
 import pkgutil
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +36,7 @@ from mgdd.signals import chirp
 from mgdd.studies import run_study
 from mgdd.surrogate import fit_response, fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
-from mgdd.throttle import Throttle
-from mgdd.throttle import simulate as simulate_throttle
+from mgdd.throttle import Throttle, simulate_throttle
 
 EXPERIMENT = 'kind = "experiment"\nformat = 1\ntask = "track"\nmode = "simulate"\n'
 
@@ -50,7 +49,7 @@ def log() -> xr.Dataset:
 
 @cache
 def cylinder_fit() -> Any:
-    traces = datasets.load("hd_diesel_128x144")[:2]
+    traces = datasets.read("hd_diesel_128x144")[:2]
     return identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
 
 
@@ -74,12 +73,12 @@ def response() -> Any:
 
 def timing() -> Any:
     family = identify.ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
-    traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     return identify.best_timing(traces, cylinder, family=family)[1]
 
 
 def tdc() -> Any:
-    traces, cylinder = datasets.load("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
+    traces, cylinder = datasets.read("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
     return identify.estimate_tdc(traces, cylinder, span_cad=0.5)
 
 
@@ -182,7 +181,7 @@ def test_figures_of_a_run_are_a_mapping_and_a_text() -> None:
     assert f"final_cad {summary['final_cad']:.6g} °CA aTDC" in run().summary().replace("\n  ", " ")
 
 
-# Every public figure: a result, or the Dataset that it takes where no class has it, and its other arguments.
+# Every public figure, and two more: a result, or the Dataset that it takes where no class has it, and its other arguments.
 DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "seeking": (run, ()),
     "map_cells": (lambda: MADE["CalibrationMap"](Path()), ()),
@@ -191,12 +190,15 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "response_diagnostics": (response, ()),
     "convergence": (lambda: run_study("sensor-delay", quick=True, figures=False), ()),
     "pressure": (lambda: Drawn(simulate("puma_single")), ()),
-    "log_pv": (lambda: Drawn(simulate("puma_single")), ()),
     "holding_duty": (lambda: MADE["ExcitationCheck"](Path()), ()),
+    "log_pv": (lambda: Drawn(simulate("puma_single")), ()),
     "sensors": (lambda: Drawn(EngineBench(seed=1).run([-6.0] * 20)), ()),
     "timing": (lambda: Drawn(mgdd.engine.timing_sweep("puma_single")), ()),
     "trade_off": (lambda: Drawn(mgdd.engine.timing_sweep("puma_single")), ("p_max_bar", "efficiency_gross")),
 }
+
+
+DRAWN_BY = {"response_diagnostics": response_diagnostics, "log_pv": partial(plot.pressure, log_pv=True)}
 
 
 class Drawn(Result):
@@ -212,7 +214,7 @@ def test_every_public_figure_is_here() -> None:
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_figure_takes_a_result_or_its_dataset_and_nothing_else(name: str) -> None:
-    draw = response_diagnostics if name == "response_diagnostics" else getattr(plot, name)
+    draw = DRAWN_BY.get(name) or getattr(plot, name)
     first, *_ = inspect.signature(draw).parameters.values()
     assert first.annotation == "xr.Dataset | Result"
     make, more = DRAWN[name]

@@ -240,7 +240,7 @@ def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(family, "fit_request", press)
     with pytest.raises(Interrupted, match="no model was finished") as stop:
-        best_timing(datasets.load("hd_diesel_128x144")[:1], HD)
+        best_timing(datasets.read("hd_diesel_128x144")[:1], HD)
     assert stop.value.partial is None
 
 
@@ -259,7 +259,7 @@ def test_ctrl_c_in_the_demo(
 def test_ctrl_c_in_the_report_of_a_calibration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trace = datasets.load("hd_diesel_128x144")[2]
+    trace = datasets.read("hd_diesel_128x144")[2]
     io.write_csv(trace, tmp_path / "one.csv")
     told = ["--speed-rpm", str(trace.attrs["speed_rpm"]), "--trapped-mass-g", str(trace.attrs["trapped_mass_g"])]
     monkeypatch.setattr(study, "run_study", lambda name, **given: run_study(name, **{**given, "progress": press_at(1)}))

@@ -15,7 +15,7 @@ from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.results.labels import check_labels
 from mgdd.studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
 from mgdd.studies.throttle_faults import CASES, SENSORS, run_case
-from mgdd.throttle import SensorFault, SensorPair, Throttle, simulate
+from mgdd.throttle import SensorFault, SensorPair, Throttle, simulate_throttle
 
 NORMAL, HOLDING, LIMITED, LIMP_HOME = range(4)
 TOLD = 2900  # sample of the acknowledgement
@@ -302,7 +302,7 @@ def test_faults_of_both_kinds_share_the_keyword_and_a_restart_goes_on_with_them(
 
 
 def test_a_sensor_fault_that_ends_is_forgotten_by_a_run():
-    run = simulate(Throttle(), 0.3, duration_s=0.6)
+    run = simulate_throttle(Throttle(), 0.3, duration_s=0.6)
     lasting = SensorPair().sense(run, faults=[SensorFault(kind="open_wire", sensor=1, from_s=0.1)])
     short = SensorPair().sense(run, faults=[SensorFault(kind="open_wire", sensor=1, from_s=0.1, until_s=0.25)])
     assert float(lasting["detected_s"]) == pytest.approx(0.2, abs=0.005)

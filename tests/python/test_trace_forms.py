@@ -19,7 +19,7 @@ from mgdd.io import write_csv
 from mgdd.io.pressure import as_trace, pressure_trace
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
-TRACE = datasets.load("hd_diesel_128x144")[0]
+TRACE = datasets.read("hd_diesel_128x144")[0]
 ANGLE, BAR = TRACE["crank_angle_cad"].to_numpy(), TRACE["pressure_bar"].to_numpy()
 TABLE = pd.DataFrame({"crank_angle_cad": ANGLE, "pressure_bar": BAR})
 

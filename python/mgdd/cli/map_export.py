@@ -96,7 +96,7 @@ def _maps(args: argparse.Namespace) -> list[CalibrationMap]:
         return [read_map(file, args.name, decimal=args.decimal) for file in args.files]
     if args.files:
         raise ParameterError(f"--advisor and {args.files[0]} contradict each other: give one")
-    data = datasets.load("advisor_engine_maps")[_ENGINES.index(args.advisor)]
+    data = datasets.read("advisor_engine_maps")[_ENGINES.index(args.advisor)]
     table = CalibrationMap.from_dataset(data, args.name or "bsfc_g_per_kwh", source="measured")
     said = {"from": "title", "origin": "source", "citation": "citation", "licence": "licence", "note": "note"}
     return [table.replaced(provenance={key: " ".join(str(data.attrs[name]).split()) for key, name in said.items()})]

@@ -14,7 +14,7 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.table import Place, read_table
 from mgdd.plot.style import drawn
 from mgdd.signals.even_grid import even_step
-from mgdd.throttle import simulate
+from mgdd.throttle import simulate_throttle
 from mgdd.throttle.simulation import step_summary
 
 __all__ = ["add"]
@@ -60,7 +60,7 @@ def _simulate(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
     throttle, preset = throttle_of(args)
-    run = simulate(
+    run = simulate_throttle(
         throttle,
         **(_constant(args) if args.input is None else _from_file(args)),
         start_deg=args.start_deg,

@@ -8,7 +8,7 @@ title use the figure's `suptitle`.
 from __future__ import annotations
 
 from mgdd.plot.convergence import convergence
-from mgdd.plot.cycle import log_pv, pressure
+from mgdd.plot.cycle import pressure
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
 from mgdd.plot.seeking import seeking
@@ -21,7 +21,6 @@ __all__ = [
     "convergence",
     "correlation_matrix",
     "holding_duty",
-    "log_pv",
     "map_cells",
     "map_contour",
     "pressure",

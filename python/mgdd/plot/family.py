@@ -51,7 +51,7 @@ def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes
     >>> from mgdd.plot.family import family_strip
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> row = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)[1]
+    >>> row = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[1]
     >>> family_strip(row).get_xlabel()
     'best CA50, no pressure limit [°CA aTDC]'
     """

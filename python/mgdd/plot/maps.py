@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["map_cells", "map_contour"]
 
-_MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.load"
+_MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.read"
 _COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
 # Beside a value in its cell; what is not named here needs no mark.
 _MARKS = {

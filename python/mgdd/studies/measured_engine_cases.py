@@ -87,7 +87,7 @@ class Case:
 def measured_records(study: str) -> xr.Dataset:
     """Load the records of the hydrogen-diesel engine; DataError where they are not at hand."""
     try:
-        return datasets.load("h2df_502")
+        return datasets.read("h2df_502")
     except FileNotFoundError as error:
         raise DataError(
             f"the study {study} needs the records of the hydrogen-diesel engine: {error.strerror}; the page "

@@ -111,7 +111,7 @@ def run_measured_engine_seek(
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.measured_engine_seek import run_measured_engine_seek
-    >>> if "h2df_502" in datasets.available():
+    >>> if "h2df_502" in datasets.names():
     ...     result = run_measured_engine_seek(seeds=1, quick=True, figures=False)
     ...     assert len(result.summary["rows"]) == 12
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mgdd import plot
@@ -231,7 +232,9 @@ def draw(
     out = {
         "Best timing by every member of the family, without a pressure limit": family_strips(timing),
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
-        "log p over log V with the polytropic slopes of compression and expansion": _grid(analyses, plot.log_pv),
+        "log p over log V with the polytropic slopes of compression and expansion": _grid(
+            analyses, partial(plot.pressure, log_pv=True)
+        ),
         f"Calibration, {main.name}": _grid(main.fit.loads, Load.plot),
     }
     for law, profile in profiles.items():

@@ -108,7 +108,7 @@ def run_model_validation(
     """
     draws = check_seeds(seeds, quick=quick, most=_QUICK_DRAWS)
     work = Parts(progress)
-    traces, cylinder = datasets.load(_ENGINE), presets.load(_ENGINE).cylinder
+    traces, cylinder = datasets.read(_ENGINE), presets.load(_ENGINE).cylinder
     done = work((law.name, partial(validate_law, law, traces, cylinder, draws)) for law in LAWS)
     families = [] if quick else work([("family of models", partial(best_timing, traces, cylinder))])
     family = [row.free_ca50_cad for rows in families for row in rows]

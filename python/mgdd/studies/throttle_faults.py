@@ -17,7 +17,7 @@ from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import new_figure
 from mgdd.studies.throttle_cases import Baseline, baselines, controller_of, supervisor_of, throttle_of
-from mgdd.throttle import SensorFault, SensorPair, Throttle, holding_duty
+from mgdd.throttle import SensorFault, SensorPair, Throttle, characteristics
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,7 +138,7 @@ def _differ(run: FaultRun) -> float:
 def _stands(run: FaultRun) -> float:
     """Say when it stands 2 deg from the reference under a duty that would move a whole one there, for 20 ms [s]."""
     inside = np.clip(run.angle_deg, run.throttle.closed_deg, run.throttle.open_deg)
-    band = holding_duty(run.throttle, inside)
+    band = characteristics(run.throttle, inside)
     up = (run.reference_deg - run.angle_deg > 2.0) & (run.duty > band["duty_breakaway_up"].to_numpy())
     down = (run.reference_deg - run.angle_deg < -2.0) & (run.duty < band["duty_breakaway_down"].to_numpy())
     return _first_lasting(run, (up | down) & (run.speed_deg_per_s == 0.0))

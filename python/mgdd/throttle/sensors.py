@@ -100,7 +100,7 @@ class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core'
         Parameters
         ----------
         run : xarray.Dataset
-            ``angle_deg`` [deg] over even ``time_s`` [s], as `simulate` gives it.
+            ``angle_deg`` [deg] over even ``time_s`` [s], as `simulate_throttle` gives it.
         faults : sequence of SensorFault
             At most one per sensor.
         seed : int
@@ -128,15 +128,15 @@ class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core'
 
         Examples
         --------
-        >>> from mgdd.throttle import SensorFault, SensorPair, Throttle, simulate
-        >>> run = simulate(Throttle(), 0.3, duration_s=0.5)
+        >>> from mgdd.throttle import SensorFault, SensorPair, Throttle, simulate_throttle
+        >>> run = simulate_throttle(Throttle(), 0.3, duration_s=0.5)
         >>> seen = SensorPair().sense(run, faults=[SensorFault(kind="short_to_ground", sensor=2, from_s=0.1)])
         >>> round(float(seen["detected_s"]), 2)
         0.2
         """
         for name in ("time_s", "angle_deg"):
             if name not in run.variables:
-                raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate makes it")
+                raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate_throttle makes it")
         if seed < 0:
             raise ParameterError.of("seed", seed, ">= 0")
         time = run["time_s"].to_numpy()

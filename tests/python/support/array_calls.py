@@ -109,11 +109,11 @@ def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
 
 
 def swept(**options: Any) -> Any:
-    return throttle.simulate(throttle.Throttle(), **options)["angle_deg"].to_numpy()
+    return throttle.simulate_throttle(throttle.Throttle(), **options)["angle_deg"].to_numpy()
 
 
 def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
-    return throttle.simulate(
+    return throttle.simulate_throttle(
         throttle.Throttle(), duty, time_s=time, start_deg=start, supply_v=supply, airflow_torque_nm=air
     )["angle_deg"].to_numpy()
 
@@ -267,10 +267,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda pedal, speed: CHAIN.steady(pedal, speed)["opening_deg"].to_numpy(), (OPEN, 2000.0 + OPEN),
     ),
     "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, initial_state={"angle_deg": 8.0})[1], (DUTY[:20],)),
-    "throttle.holding_duty": (
-        lambda a: throttle.holding_duty(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
+    "throttle.characteristics": (
+        lambda a: throttle.characteristics(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
     ),
-    "throttle.simulate": (
+    "throttle.simulate_throttle": (
         lambda u, t, v, m: swept(duty=u, time_s=t, supply_v=v, airflow_torque_nm=m),
         (DUTY, TIME, 12.0 + DUTY, 0.01 * DUTY),
     ),
@@ -278,7 +278,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
 
 # Models take columns by name; what is not exported takes arrays all the same.
 MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
-    "throttle.simulate, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
+    "throttle.simulate_throttle, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
     "signals.even_grid.even_step": (even_step, (TIME,)),
     **{f"throttle.DemandChain.{name}": (getattr(CHAIN, name), (OPEN,)) for name in ("area_mm2", "angle_of_area_deg")},
     **{

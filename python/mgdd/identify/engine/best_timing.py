@@ -86,7 +86,7 @@ def best_timing(
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)])  # wall heat 0.5, 1.0 and 1.5
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)
+    >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
     >>> [(member.member.wall_heat_scale, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
     [(0.5, 4), (1.0, 7), (1.5, 10)]
     """

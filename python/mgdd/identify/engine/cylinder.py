@@ -105,7 +105,7 @@ def fit_cylinder(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> fit = fit_cylinder(traces, cylinder, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
     >>> fit.report.success
     True

@@ -134,7 +134,7 @@ class Member:
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)[0].best.member.law
+    >>> best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[0].best.member.law
     'double_wiebe'
     """
 

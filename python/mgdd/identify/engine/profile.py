@@ -64,7 +64,7 @@ class WallHeatProfile(Result):
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> wall_heat_profile(fit_cylinder(traces, cylinder)).identifiable
     False
     """
@@ -136,7 +136,7 @@ def wall_heat_profile(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> profile = wall_heat_profile(fit_cylinder(traces, cylinder), scales=[0.5, 1.0])
     >>> profile.dataset["rmse_percent"].dims
     ('wall_heat_scale',)

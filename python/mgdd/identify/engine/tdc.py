@@ -61,7 +61,7 @@ class TdcEstimate(Result):
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import estimate_tdc
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144"), cylinder, span_cad=1.0)
+    >>> found = estimate_tdc(datasets.read("hd_diesel_128x144"), cylinder, span_cad=1.0)
     >>> found.suspect
     False
     """
@@ -166,7 +166,7 @@ def estimate_tdc(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import estimate_tdc
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
     >>> found = estimate_tdc(traces, cylinder, span_cad=1.0)
     >>> found.low_cad < 0.0 < found.high_cad
     True

@@ -121,7 +121,7 @@ class BestTiming(Result):
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[0.5, 1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)
+    >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
     >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
     ([5, 8], 8)
     """

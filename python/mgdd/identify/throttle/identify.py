@@ -91,9 +91,9 @@ def identify_throttle(
     >>> from mgdd.identify import identify_throttle
     >>> from mgdd.signals import chirp
     >>> from mgdd.io import throttle_log
-    >>> from mgdd.throttle import Throttle, simulate
+    >>> from mgdd.throttle import Throttle, simulate_throttle
     >>> signal = chirp(3.0, offset=0.15, amplitude=0.2)
-    >>> run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    >>> run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
     >>> from mgdd.optimize import FitOptions
     >>> log = throttle_log(run["time_s"], run["duty"], run["angle_deg"])
     >>> fit = identify_throttle(log, options=FitOptions(n_starts=2))

@@ -138,8 +138,8 @@ def drive_inverse_dynamics(
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
-    >>> if "emps" in datasets.available():
-    ...     found = drive_inverse_dynamics(datasets.load("emps")[0], directional=False)
+    >>> if "emps" in datasets.names():
+    ...     found = drive_inverse_dynamics(datasets.read("emps")[0], directional=False)
     ...     assert round(found["mass_kg"], 1) == 95.1
     """
     from scipy.signal import butter, filtfilt
@@ -190,8 +190,8 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics
-    >>> if "emps" in datasets.available():
-    ...     train, test = datasets.load("emps")
+    >>> if "emps" in datasets.names():
+    ...     train, test = datasets.read("emps")
     ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
     ...     assert drive_free_run(slide, test).size == 24821
     """
@@ -219,7 +219,7 @@ def fit_drive(
     ----------
     record : xarray.Dataset
         ``drive_v`` [V], ``position_m`` [m] over an evenly spaced ``time_s`` [s], and ``force_n_per_v``, as
-        `mgdd.datasets.load` returns ``emps``.
+        `mgdd.datasets.read` returns ``emps``.
     friction : str
         ``coulomb``: viscous and Coulomb friction and an offset; ``directional``: another viscous friction in each
         direction; ``stiction``: that, and more friction at rest than in motion; ``stribeck``: the same with a gradual

@@ -126,7 +126,7 @@ def run_identification_benchmarks(
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.identification_benchmarks import run_identification_benchmarks
-    >>> if "cascaded_tanks" in datasets.available():
+    >>> if "cascaded_tanks" in datasets.names():
     ...     result = run_identification_benchmarks(quick=True, figures=False)
     ...     assert {"set", "train", "test"} <= set(result.summary["rows"][0])
     """
@@ -138,7 +138,7 @@ def run_identification_benchmarks(
     parts, missing, reason = [], [], ""
     for name, make in makers.items():
         try:
-            train, test = datasets.load(name)
+            train, test = datasets.read(name)
         except FileNotFoundError as error:
             missing.append(name)
             reason = str(error.strerror)

@@ -186,8 +186,8 @@ class WienerHammersteinFit(Fit):
     >>> from mgdd import datasets
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
-    >>> if "wh2009" in datasets.available():
-    ...     some = datasets.load("wh2009")[0].isel(time_s=slice(0, 5000))
+    >>> if "wh2009" in datasets.names():
+    ...     some = datasets.read("wh2009")[0].isel(time_s=slice(0, 5000))
     ...     options = FitOptions(max_iterations=10)
     ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, options=options)
     ...     assert fit.train.rmse <= fit.linear.rmse
@@ -228,8 +228,8 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
-    >>> if "wh2009" in datasets.available():
-    ...     assert fit_linear(datasets.load("wh2009")[0], order=2, iterations=3).rmse > 0.04
+    >>> if "wh2009" in datasets.names():
+    ...     assert fit_linear(datasets.read("wh2009")[0], order=2, iterations=3).rmse > 0.04
     """
     if not 1 <= order <= 10:
         raise ParameterError.of("order", order, "in [1, 10]")
