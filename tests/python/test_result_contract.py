@@ -181,7 +181,7 @@ def test_figures_of_a_run_are_a_mapping_and_a_text() -> None:
     assert f"final_cad {summary['final_cad']:.6g} °CA aTDC" in run().summary().replace("\n  ", " ")
 
 
-# Every public figure, and two more: a result, or the Dataset that it takes where no class has it, and its other arguments.
+# Every public figure and two more: a result, or the Dataset that it takes where no class has it; other arguments.
 DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "seeking": (run, ()),
     "map_cells": (lambda: MADE["CalibrationMap"](Path()), ()),

@@ -13,7 +13,7 @@ from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
-from mgdd.maps import CalibrationMap, read_map, write_dcm, write_map
+from mgdd.maps import CalibrationMap, read_map, write_map
 
 if TYPE_CHECKING:
     from mgdd.guide import TimingMap
@@ -68,7 +68,7 @@ def _export(args: argparse.Namespace) -> None:
     if args.guide_map:
         _write_guide(maps[0].to_timing_map(), args)
     elif into_dcm:
-        write_dcm(dict(zip(names, maps, strict=True)), args.output)
+        write_map(dict(zip(names, maps, strict=True)), args.output)
     else:
         write_map(maps[0], args.output)
     wrote(args.output)

@@ -22,7 +22,7 @@ from mgdd.io.binary_files import read_netcdf
 from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import read_conditions, read_points
 from mgdd.loop import Reference
-from mgdd.maps import CalibrationMap, read_dcm, read_map, write_dcm, write_map
+from mgdd.maps import CalibrationMap, read_dcm, read_map, write_map
 from mgdd.optimize import BoundedSeeking, Limit, Seeker
 from mgdd.rig import (  # fmt: skip
     Experiment,
@@ -124,7 +124,7 @@ def _exchanges(path: Path) -> None:
 
 def _dcm(path: Path) -> None:
     table = CalibrationMap({"fuel_mg": [6, 20, 33.5]}, [-1.25, -4, -6], name="soc_cad")
-    write_dcm({"SocBase": table}, path, values={"idle_rpm": (850.0, "rpm")})
+    write_map({"SocBase": table}, path, values={"idle_rpm": (850.0, "rpm")})
 
 
 @cache
