@@ -38,9 +38,9 @@ from mgdd.sweep import sweep
 from mgdd.throttle import (
     DemandChain,
     PseudoWiener,
-    SensorFault,
     SensorPair,
     Throttle,
+    ThrottleFault,
     characteristics,
     simulate_throttle,
 )
@@ -230,7 +230,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.SensorPair.sense": lambda _: SensorPair().sense(
-        simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[SensorFault(kind="open_wire", sensor=2)]
+        simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[ThrottleFault(kind="open_wire", sensor=2)]
     ),
     "throttle.simulate_throttle": lambda _: [
         simulate_throttle(Throttle(), 0.3, duration_s=0.2, start_deg=start) for start in (None, [0.0, 20.0])

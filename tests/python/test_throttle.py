@@ -11,9 +11,9 @@ from mgdd import presets
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results.labels import check_labels, labelled_dataset
 from mgdd.throttle import (
-    SensorFault,
     SensorPair,
     Throttle,
+    ThrottleFault,
     characteristics,
     simulate_throttle,
 )
@@ -333,7 +333,7 @@ def test_healthy_sensors_follow_the_plate(sweep):
     ("kind", "size"), [("open_wire", 0.0), ("short_to_ground", 0.0), ("short_to_supply", 0.0), ("offset", 0.25)]
 )
 def test_faults_are_detected_in_200_ms(sweep, kind, size, sensor):
-    seen = SensorPair().sense(sweep, faults=[SensorFault(kind=kind, sensor=sensor, from_s=0.4, size=size)])
+    seen = SensorPair().sense(sweep, faults=[ThrottleFault(kind=kind, sensor=sensor, from_s=0.4, size=size)])
     assert float(seen["detected_s"]) <= 0.2 + 1e-9
     assert bool(seen["fault"][-1])
     assert not seen["fault"][:400].any()
@@ -344,7 +344,7 @@ def test_small_faults_stay_unseen(sweep):
     for angle, failing in ((70.0, False), (85.0, True)):
         still = sweep.assign(angle_deg=sweep["angle_deg"] * 0.0 + angle)
         still["angle_deg"].attrs = sweep["angle_deg"].attrs
-        seen = SensorPair().sense(still, faults=[SensorFault(kind="gain", size=0.05)])
+        seen = SensorPair().sense(still, faults=[ThrottleFault(kind="gain", size=0.05)])
         assert bool(seen["fault"].any()) == failing
 
 
@@ -352,16 +352,20 @@ def test_bad_sensors_and_faults_are_refused(sweep):
     for bad, message in (
         ({"kind": "rust"}, "kind = 'rust': must be one of open_wire"),
         ({"kind": "stuck", "sensor": 3}, "sensor = 3: must be 1 or 2"),
-        ({"kind": "stuck", "size": 1.0}, "size = 1: goes with kind 'offset'"),
-        ({"kind": "offset"}, "size = 0: goes with kind 'offset'"),
+        ({"kind": "stuck", "size": 1.0}, "size = 1: must be given with 'offset'"),
+        ({"kind": "offset"}, "size = None: must be given with 'offset'"),
+        ({"kind": "offset", "size": 0.0}, "size = 0: must be given with 'offset'"),
+        ({"kind": "jammed", "sensor": 1}, "sensor = 1: must be left out with 'jammed'"),
     ):
         with pytest.raises(ParameterError, match=message):
-            SensorFault(**bad)
-    stuck = SensorFault(kind="stuck")
+            ThrottleFault(**bad)
+    stuck = ThrottleFault(kind="stuck")
     with pytest.raises(ParameterError, match="sensor 1 has two"):
         SensorPair().sense(sweep, faults=[stuck, stuck])
+    with pytest.raises(ParameterError, match="jammed is not a fault of a sensor: give it to mgdd.loop.VirtualThrottle"):
+        SensorPair().sense(sweep, faults=[ThrottleFault(kind="jammed")])
     with pytest.raises(ParameterError, match="from_s = -1 s"):
-        SensorPair().sense(sweep, faults=[SensorFault(kind="stuck", from_s=-1.0)])
+        SensorPair().sense(sweep, faults=[ThrottleFault(kind="stuck", from_s=-1.0)])
     with pytest.raises(ParameterError, match="seed = -1"):
         SensorPair().sense(sweep, seed=-1)
     with pytest.raises(DataError, match="run has no variable 'angle_deg'"):

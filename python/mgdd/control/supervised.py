@@ -39,7 +39,8 @@ class SupervisedController:
     Examples
     --------
     >>> from mgdd.control import Pid, SupervisedController
-    >>> from mgdd.loop import ThrottleFault, VirtualThrottle
+    >>> from mgdd.loop import VirtualThrottle
+    >>> from mgdd.throttle import ThrottleFault
     >>> lost = ThrottleFault(kind="missing_sample", from_s=0.3, until_s=0.5)
     >>> plant = VirtualThrottle(inputs=("duty", "bridge_open"), faults=[lost], seed=1)
     >>> loop = SupervisedController(Pid())

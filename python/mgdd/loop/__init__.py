@@ -19,7 +19,6 @@ from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
-from mgdd.loop.throttle_faults import ThrottleFault
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
@@ -33,7 +32,6 @@ __all__ = [
     "Reference",
     "SensorDynamics",
     "SurrogatePlant",
-    "ThrottleFault",
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",

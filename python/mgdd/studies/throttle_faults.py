@@ -12,12 +12,12 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.control import Pid, SupervisedController, ThrottleSupervisor
-from mgdd.loop import ThrottleFault, VirtualThrottle
+from mgdd.loop import VirtualThrottle
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import new_figure
 from mgdd.studies.throttle_cases import Baseline, baselines, controller_of, supervisor_of, throttle_of
-from mgdd.throttle import SensorFault, SensorPair, Throttle, characteristics
+from mgdd.throttle import SensorPair, Throttle, ThrottleFault, characteristics
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +62,7 @@ class FaultCase:
     """One scenario: what the supervisor must report, faults of the plant, and the mode that it must go to."""
 
     reason: str
-    faults: tuple[SensorFault | ThrottleFault, ...] = ()
+    faults: tuple[ThrottleFault, ...] = ()
     mode: str = "limp_home"
     reference_deg: Callable[[float], float] = field(default=_opens, repr=False, kw_only=True)  # of the time [s]
     # From when on the supervisor can see the fault [s], or that of a run.
@@ -153,8 +153,8 @@ def _throttle(kind: str, from_s: float = ONSET_S, **more: float) -> tuple[Thrott
     return (ThrottleFault(kind=kind, from_s=from_s, **({"until_s": REPAIR_S} | more)),)
 
 
-def _sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[SensorFault, ...]:
-    return (SensorFault(kind=kind, sensor=sensor, from_s=ONSET_S, until_s=_SENSOR_END_S, size=size),)
+def _sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[ThrottleFault, ...]:
+    return (ThrottleFault(kind=kind, sensor=sensor, from_s=ONSET_S, until_s=_SENSOR_END_S, size=size),)
 
 
 _MOVING = ONSET_S + 0.015  # the plate is on its way

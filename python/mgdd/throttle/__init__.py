@@ -9,18 +9,19 @@ from __future__ import annotations
 from mgdd._core.throttle import PedalMap, Throttle
 from mgdd.throttle.characteristics import characteristics
 from mgdd.throttle.demand import DemandChain
+from mgdd.throttle.faults import ThrottleFault
 from mgdd.throttle.interop import to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
-from mgdd.throttle.sensors import SensorFault, SensorPair
+from mgdd.throttle.sensors import SensorPair
 from mgdd.throttle.simulation import simulate_throttle
 
 __all__ = [
     "DemandChain",
     "PedalMap",
     "PseudoWiener",
-    "SensorFault",
     "SensorPair",
     "Throttle",
+    "ThrottleFault",
     "characteristics",
     "simulate_throttle",
     "to_iosystem",

@@ -11,13 +11,13 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, ThrottleFault, VirtualThrottle
+from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.rig.can.fault_text import fault_of
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.throttle import SensorFault
+from mgdd.throttle import ThrottleFault
 
 __all__ = ["TruthLog", "node_of", "parent_watch", "run_node"]
 
@@ -91,8 +91,7 @@ def node_of(
     signal_map : SignalMap
         With the input ``duty`` it is a throttle, with ``soc_cad`` an engine bench.
     faults : sequence of str
-        Of a throttle, as ``KIND:KEY=VALUE,...`` with the kinds of `mgdd.loop.ThrottleFault` and
-        `mgdd.throttle.SensorFault` and their keys.
+        Of a throttle, as ``KIND:KEY=VALUE,...`` with the kinds and keys of `mgdd.throttle.ThrottleFault`.
     seed : int
         Of its noise.
     sample_s : float, optional
@@ -208,6 +207,6 @@ def parent_watch() -> Callable[[], bool]:
     return lambda: os.getppid() == parent
 
 
-def _plant_fault(text: str) -> ThrottleFault | SensorFault:
+def _plant_fault(text: str) -> ThrottleFault:
     kind, given = fault_of(text, _FAULT_KEYS)
-    return SensorFault(kind=kind, **given) if "sensor" in given else ThrottleFault(kind=kind, **given)
+    return ThrottleFault(kind=kind, **given)
