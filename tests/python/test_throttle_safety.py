@@ -264,9 +264,9 @@ def test_every_setting_has_unit_bounds_and_meaning_and_refuses_by_name():
 
 
 def test_faults_are_refused_by_name():
-    with pytest.raises(ParameterError, match="kind = 'stiff': must be one of open_wire, .*, jammed, jammed_at"):
+    with pytest.raises(ParameterError, match=r"kind = 'stiff': must be one of open_wire, .*, jammed, jammed_at"):
         ThrottleFault(kind="stiff")
-    with pytest.raises(ParameterError, match="size = None: must be given with .*'jammed_at'"):
+    with pytest.raises(ParameterError, match=r"size = None: must be given with .*'jammed_at'"):
         ThrottleFault(kind="supply_sag")
     with pytest.raises(ParameterError, match="size"):
         ThrottleFault(kind="jammed", size=3.0)

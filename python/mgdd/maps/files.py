@@ -84,12 +84,13 @@ def write_map(
     """
     ending = _ending(path)
     several = isinstance(table, list | tuple) or (isinstance(table, Mapping) and not hasattr(table, "data_vars"))
+    maps: Any = table if several else [map_of(table)]
     if ending == ".dcm":
-        write_dcm(table if several else [map_of(table)], path, values=values)
+        write_dcm(maps, path, values=values)
         return
     if several or values:
         raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file")
-    table = map_of(table)
+    (table,) = maps
     if ending == ".nc":
         write_netcdf(table.to_dataset(), path)
     else:

@@ -149,8 +149,10 @@ def _unsprung(run: FaultRun) -> float:
     return _first_lasting(run, (run.duty < 0.0) & (np.abs(run.speed_deg_per_s) < SLOW_DEG_PER_S))
 
 
-def _throttle(kind: str, from_s: float = ONSET_S, **more: float) -> tuple[ThrottleFault, ...]:
-    return (ThrottleFault(kind=kind, from_s=from_s, **({"until_s": REPAIR_S} | more)),)
+def _throttle(
+    kind: str, from_s: float = ONSET_S, until_s: float = REPAIR_S, size: float | None = None
+) -> tuple[ThrottleFault, ...]:
+    return (ThrottleFault(kind=kind, from_s=from_s, until_s=until_s, size=size),)
 
 
 def _sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[ThrottleFault, ...]:

@@ -93,9 +93,7 @@ def fault_pair(faults: Sequence[ThrottleFault]) -> list[tuple[str, float, float,
     per_sensor: list[tuple[str, float, float, float | None]] = [("none", 0.0, 0.0, None), ("none", 0.0, 0.0, None)]
     for fault in faults:
         if fault.sensor is None:
-            raise ParameterError(
-                f"faults: {fault.kind} is not a fault of a sensor: give it to mgdd.loop.VirtualThrottle"
-            )
+            raise ParameterError(f"faults: {fault.kind} is not a fault of a sensor: mgdd.loop.VirtualThrottle takes it")
         if per_sensor[fault.sensor - 1][0] != "none":
             raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
         per_sensor[fault.sensor - 1] = fault.to_core()

@@ -69,7 +69,7 @@ def best_timing(
     Returns
     -------
     list of BestTiming
-        One per trace.
+        One per trace; ``best`` of a trace without a plausible model raises `mgdd.errors.ConvergenceError`.
 
     Raises
     ------
@@ -186,7 +186,6 @@ def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
     return BestTiming(
         file=file,
         members=answers,
-        best=min(kept, key=lambda answer: answer.member.score, default=None),
         **{name: span(name) for name in RANGED},
     )
 
@@ -205,12 +204,12 @@ def doubts_of(rows: Sequence[BestTiming], tdc: TdcEstimate | None = None) -> lis
     """Say what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
     out = [str(finding) for finding in headline_of(rows).fit.findings]
     for row in rows:
-        ends = sum(answer.plausible and answer.at_bound for answer in row.members)
+        ends = sum(answer.at_bound for answer in row.plausible)
         if ends:
             out.append(
                 f"{row.file}: the best timing of {ends} plausible model(s) lies at the end of the searched range: "
                 "widen bounds_cad, or suspect TDC"
             )
-        if row.best is None:
+        if not row.plausible:
             out.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
     return out + (tdc.doubts() if tdc is not None else [])
