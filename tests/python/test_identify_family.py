@@ -102,9 +102,7 @@ def test_without_a_plausible_model_there_is_no_answer() -> None:
     narrow = ModelFamily(burn_shapes=["wiebe"], gammas=[("constant", 1.30)], wall_heat_scales=[1.0], imep_percent=0.01)
     (row,) = best_timing([measured(*LOADS[0])], PRESET.cylinder, family=narrow)
     assert row.plausible == ()
-    with pytest.raises(
-        ConvergenceError, match=r"no model of the family is plausible; wiebe, linear .*: closed IMEP .*; suspect"
-    ):
+    with pytest.raises(ConvergenceError, match=r"is plausible; wiebe, linear .*: closed IMEP .*; suspect"):
         _ = row.best
     assert all(math.isnan(end) for end in (*row.soc_cad, *row.free_ca50_cad, *row.gain_percent))
     assert all(answer.why_not for answer in row.members)

@@ -27,7 +27,7 @@ from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_csv
-from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, track, track_many
+from mgdd.loop import EngineBench, ThrottleFault, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import check_labels
@@ -40,7 +40,6 @@ from mgdd.throttle import (
     PseudoWiener,
     SensorPair,
     Throttle,
-    ThrottleFault,
     characteristics,
     simulate_throttle,
 )

@@ -11,11 +11,10 @@ import pytest
 from bus_node import ETB
 from mgdd.cli import main
 from mgdd.errors import RigError
-from mgdd.loop import VirtualThrottle
+from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import CanRig, GatedThrottle, SafetyEnvelope, SafetyGate, VirtualNode
 from mgdd.rig.can.local_bus import LocalBus
-from mgdd.throttle import ThrottleFault
 from rig_hazards import LIMP_HOME_DEG, NODE_HAZARDS, ONSET, OVER, SAMPLE_MS, NodeLoop
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from mgdd import presets
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.loop import ThrottleFault
 from mgdd.results.labels import check_labels, labelled_dataset
 from mgdd.throttle import (
     SensorPair,
     Throttle,
-    ThrottleFault,
     characteristics,
     simulate_throttle,
 )

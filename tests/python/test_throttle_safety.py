@@ -11,11 +11,11 @@ import pytest
 
 from mgdd.control import Pid, SlidingMode, SupervisedController, ThrottleSupervisor
 from mgdd.errors import ParameterError
-from mgdd.loop import VirtualThrottle
+from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.results.labels import check_labels
 from mgdd.studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
 from mgdd.studies.throttle_faults import CASES, SENSORS, run_case
-from mgdd.throttle import SensorPair, Throttle, ThrottleFault, simulate_throttle
+from mgdd.throttle import SensorPair, Throttle, simulate_throttle
 
 NORMAL, HOLDING, LIMITED, LIMP_HOME = range(4)
 TOLD = 2900  # sample of the acknowledgement

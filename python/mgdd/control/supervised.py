@@ -39,8 +39,7 @@ class SupervisedController:
     Examples
     --------
     >>> from mgdd.control import Pid, SupervisedController
-    >>> from mgdd.loop import VirtualThrottle
-    >>> from mgdd.throttle import ThrottleFault
+    >>> from mgdd.loop import ThrottleFault, VirtualThrottle
     >>> lost = ThrottleFault(kind="missing_sample", from_s=0.3, until_s=0.5)
     >>> plant = VirtualThrottle(inputs=("duty", "bridge_open"), faults=[lost], seed=1)
     >>> loop = SupervisedController(Pid())

@@ -23,6 +23,7 @@ from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
 from mgdd.loop.virtual_throttle import VirtualThrottle
+from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
     "EngineBench",
@@ -32,6 +33,7 @@ __all__ = [
     "Reference",
     "SensorDynamics",
     "SurrogatePlant",
+    "ThrottleFault",
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",

@@ -8,8 +8,8 @@ from mgdd import _core
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets.meant import ThrottleLike, throttle_of
-from mgdd.throttle import SensorPair, Throttle, ThrottleFault
-from mgdd.throttle.faults import fault_pair
+from mgdd.throttle import SensorPair, Throttle
+from mgdd.throttle.faults import ThrottleFault, fault_pair
 
 __all__ = ["VirtualThrottle"]
 

@@ -90,11 +90,11 @@ def write_map(
         return
     if several or values:
         raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file")
-    (table,) = maps
+    (own,) = maps
     if ending == ".nc":
-        write_netcdf(table.to_dataset(), path)
+        write_netcdf(own.to_dataset(), path)
     else:
-        write_whole_text(path, csv_of_map(table) if ending == ".csv" else _json_of(table))
+        write_whole_text(path, csv_of_map(own) if ending == ".csv" else _json_of(own))
 
 
 def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: str = ".") -> CalibrationMap:

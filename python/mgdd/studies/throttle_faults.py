@@ -12,12 +12,12 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.control import Pid, SupervisedController, ThrottleSupervisor
-from mgdd.loop import VirtualThrottle
+from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import new_figure
 from mgdd.studies.throttle_cases import Baseline, baselines, controller_of, supervisor_of, throttle_of
-from mgdd.throttle import SensorPair, Throttle, ThrottleFault, characteristics
+from mgdd.throttle import SensorPair, Throttle, characteristics
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,6 @@ from __future__ import annotations
 from mgdd._core.throttle import PedalMap, Throttle
 from mgdd.throttle.characteristics import characteristics
 from mgdd.throttle.demand import DemandChain
-from mgdd.throttle.faults import ThrottleFault
 from mgdd.throttle.interop import to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 from mgdd.throttle.sensors import SensorPair
@@ -21,7 +20,6 @@ __all__ = [
     "PseudoWiener",
     "SensorPair",
     "Throttle",
-    "ThrottleFault",
     "characteristics",
     "simulate_throttle",
     "to_iosystem",

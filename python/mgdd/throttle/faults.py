@@ -45,14 +45,13 @@ class ThrottleFault:
     ------
     mgdd.errors.ParameterError
         No such kind or sensor, a sensor or size for a kind that has none, or no size for one that needs it.
-        `SensorPair.sense` and `mgdd.loop.VirtualThrottle` refuse a time or size outside its domain.
+        `mgdd.throttle.SensorPair.sense` and `mgdd.loop.VirtualThrottle` refuse a time or size outside its domain.
 
     Examples
     --------
-    >>> from mgdd.throttle import ThrottleFault
+    >>> from mgdd.loop import ThrottleFault, VirtualThrottle
     >>> ThrottleFault(kind="offset", sensor=2, size=0.25).from_s
     0.0
-    >>> from mgdd.loop import VirtualThrottle
     >>> plant = VirtualThrottle(faults=[ThrottleFault(kind="jammed_at", size=20.0)])
     >>> for _ in range(200):
     ...     plant.apply({"duty": 0.6})

@@ -82,7 +82,8 @@ class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core'
 
         Examples
         --------
-        >>> from mgdd.throttle import SensorPair, Throttle, ThrottleFault, simulate_throttle
+        >>> from mgdd.loop import ThrottleFault
+        >>> from mgdd.throttle import SensorPair, Throttle, simulate_throttle
         >>> run = simulate_throttle(Throttle(), 0.3, duration_s=0.5)
         >>> seen = SensorPair().sense(run, faults=[ThrottleFault(kind="short_to_ground", sensor=2, from_s=0.1)])
         >>> round(float(seen["detected_s"]), 2)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mgdd.control import Pid
-from mgdd.loop import VirtualThrottle
+from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import SafetyEnvelope, SafetyGate, SignalMap
 from mgdd.rig.can.frame import changed
@@ -17,7 +17,6 @@ from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.gated import facts_of
 from mgdd.rig.realtime import Frame
-from mgdd.throttle import ThrottleFault
 
 ONSET, OVER = 600, 1500  # samples: the hazard sets in, and ends
 LIMP_HOME_DEG = 8.0

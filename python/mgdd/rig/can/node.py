@@ -11,13 +11,12 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, VirtualThrottle
+from mgdd.loop import EngineBench, ThrottleFault, VirtualThrottle
 from mgdd.rig.can.fault_text import fault_of
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.throttle import ThrottleFault
 
 __all__ = ["TruthLog", "node_of", "parent_watch", "run_node"]
 
@@ -91,7 +90,7 @@ def node_of(
     signal_map : SignalMap
         With the input ``duty`` it is a throttle, with ``soc_cad`` an engine bench.
     faults : sequence of str
-        Of a throttle, as ``KIND:KEY=VALUE,...`` with the kinds and keys of `mgdd.throttle.ThrottleFault`.
+        Of a throttle, as ``KIND:KEY=VALUE,...`` with the kinds and keys of `mgdd.loop.ThrottleFault`.
     seed : int
         Of its noise.
     sample_s : float, optional
