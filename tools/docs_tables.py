@@ -90,7 +90,7 @@ def online_calibration() -> Rows:
     rows = {}
     for label, off, told_late_cad in (
         ("nothing", {}, 0.0),
-        ("timing told 0.5 °CA late", {}, 0.5),
+        ("timing given 0.5 °CA late", {}, 0.5),
         ("TDC read 0.5 °CA late", {"tdc_error_cad": 0.5}, 0.0),
         ("pressure 1 % high", {"pressure_gain_error": 0.01}, 0.0),
         ("pegging 0.1 bar high", {"pressure_offset_bar": 0.1}, 0.0),

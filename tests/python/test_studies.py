@@ -20,7 +20,7 @@ from mgdd.report import write_report
 from mgdd.results.labels import check_labels
 from mgdd.studies import run_study
 from mgdd.studies.base import StudyResult
-from study_cache import quick_study
+from study_cache import quick_study, sources
 
 HD = presets.load("hd_diesel_128x144").cylinder
 
@@ -105,6 +105,11 @@ def test_what_a_plausibility_check_leaves_is_what_was_published(result: StudyRes
         assert found[key] == pytest.approx(angles, abs=0.6), key
 
 
+def test_a_kept_study_depends_on_every_module() -> None:
+    files = {"/".join(file.parts[-3:]) for file in sources()}
+    assert {"mgdd/studies/base.py", "mgdd/engine/cycle.py", "mgdd/presets/P1.toml"} <= files
+
+
 def test_dataset_is_labelled(result: StudyResult) -> None:
     check_labels(result.dataset)
     assert result.dataset.sizes == {"law": 5, "file": 4}
@@ -115,7 +120,7 @@ def test_page_is_self_contained(result: StudyResult, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert not re.search(r"(src|href)=[\"'](?!data:)", text)
     assert text.count("data:image/png;base64,") == len(result.figures) == 7
-    assert "What to distrust" in text
+    assert "Limitations found" in text
     assert "not identifiable" in text
     summary = json.loads((tmp_path / "report" / "summary.json").read_text(encoding="utf-8"))
     assert summary == json.loads(json.dumps(result.summary))

@@ -258,7 +258,7 @@ class RecedingHorizon:
         self._core.start(numbers.tolist(), applied)
 
     def applied(self, value: float) -> None:
-        """Tell what acted instead of the last result, where it differs: the next change counts from it.
+        """Give what acted instead of the last result, where it differs: the next change counts from it.
 
         Parameters
         ----------

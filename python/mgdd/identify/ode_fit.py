@@ -92,7 +92,7 @@ def fit_ode(
     sigma : float
         Noise level in the unit of the output; the residual is divided by it.
     options : FitOptions, optional
-        1 start, 100 trial steps and a tolerance of 1e-9 where nothing else is said; more starts come from a Latin
+        1 start, 100 trial steps and a tolerance of 1e-9 by default; more starts come from a Latin
         hypercube (seed 0) between the bounds, which must then be finite.
     executor, workers
         As in `mgdd.parallel.map_items`, for the starts: one after the other if left out. Python takes turns in threads,

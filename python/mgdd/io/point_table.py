@@ -156,7 +156,7 @@ def _place(name: str, own: Sequence[str], origin: str) -> int:
 
 
 def _label(name: str, said: str | None, where: str) -> Label:
-    """Give the unit that is said, which must be that of the name where the name says one."""
+    """Return the given unit, which must be that of the name where the name has one."""
     known = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
     if said in (None, "", "-", "1"):
         return known

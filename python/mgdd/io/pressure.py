@@ -149,7 +149,7 @@ def read_pressure(
     speed_rpm : float, optional
         Engine speed [rpm], which turns a time into an angle: first angle + 6 n t; stored as ``attrs["speed_rpm"]``. Of
         a record of two cycles and more the period is compared with it: what differs by at most 1 % is corrected and
-        told, more is refused.
+        reported, more is refused.
     gain_bar_per_v, offset_bar : float, optional
         For a pressure in volts: bar per volt, and bar at 0 V. Without `offset_bar` the pressure is relative.
     delimiter : str, optional

@@ -1,4 +1,4 @@
-"""Is a response model to be believed: left-out points, residuals over order and fit, normal scores, and cuts."""
+"""Diagnostics of a response model: left-out points, residuals over order and fit, normal scores, and cuts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NEEDED = (
 
 
 def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw what tells a good response model from a bad one: four panels of residuals, and a cut along each factor.
+    """Draw the diagnostics of a response model: four panels of residuals, and a cut along each factor.
 
     Parameters
     ----------

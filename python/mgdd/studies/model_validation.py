@@ -201,7 +201,7 @@ def _sd_interval(name: str, values: NDArray[np.float64]) -> dict[str, float | No
 
 
 def _coverage(own: Validated) -> dict[str, Any]:
-    """Tell how often stated intervals hold the truth, over parameters that are not at a bound."""
+    """Give how often stated intervals hold the truth, over parameters that are not at a bound."""
     row: dict[str, Any] = {"law": own.law.name, "wall_heat_scale": own.fit.model.wall_heat_scale}
     truth, known = own.fit.report.values, np.isfinite(own.fit.report.stderr)
     row["parameters"] = int(known.sum())

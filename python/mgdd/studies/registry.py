@@ -44,7 +44,7 @@ _STUDIES = {
     "from-design-to-map": _Study(
         "a timing map by design of experiments: its cost, its losses, other engines, and what a guide makes of it", 2
     ),
-    "torque-demand": _Study("how far the torque follows the pedal through the throttle, and what loses it", 2),
+    "torque-demand": _Study("how far the torque follows the pedal through the throttle, and causes of the error", 2),
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
     ),

@@ -69,7 +69,7 @@ class PolynomialBasis:
 @described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
-    """Where a surrogate may be believed: a box of quantiles, and leverage no higher than records in it have.
+    """Where a surrogate is valid: a box of quantiles, and leverage no higher than records in it have.
 
     Parameters
     ----------

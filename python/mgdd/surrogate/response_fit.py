@@ -1,4 +1,4 @@
-"""Fit a model of one response over the factors of a design, and say how far it may be believed."""
+"""Fit a model of one response over the factors of a design, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def fit_response(
     Returns
     -------
     ResponseFit
-        ``model.predict`` gives mean, interval and what is extrapolated; ``findings`` say what to distrust: codes
+        ``model.predict`` gives mean, interval and what is extrapolated; ``findings`` list the limitations: codes
         ``outlier``, ``few_points``, ``high_leverage``, ``poor_prediction``, ``overfitted``, ``heteroscedastic``,
         ``structured``, ``lack_of_fit`` and ``no_hull``. Clean data show an outlier in one of twenty sets, each other
         pattern in one of a hundred.

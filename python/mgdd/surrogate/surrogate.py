@@ -39,7 +39,7 @@ class EngineSurrogate(Parameters):
     signals : mapping of str to SignalModel
         By name.
     support : Support
-        Where the surfaces may be believed.
+        Where the surfaces are valid.
     medians : mapping of str to float
         Median of each input over the records: where a prediction stands unless given otherwise.
     input_labels : mapping of str to Label

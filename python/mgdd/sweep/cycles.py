@@ -94,7 +94,7 @@ def sweep(
     mgdd.errors.WorkerLostError
         As in `mgdd.parallel.map_items`; ``partial`` is a Dataset as after Ctrl-C.
     mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the whole Dataset, in which ``finished`` tells the cycles that were simulated; the others
+        Ctrl-C; ``partial`` is the whole Dataset, in which ``finished`` marks the cycles that were simulated; the others
         are NaN.
 
     Examples

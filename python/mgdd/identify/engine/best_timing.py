@@ -61,8 +61,7 @@ def best_timing(
     limits : mapping of str to float, or sequence of Limit, optional
         Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
-        Searched range of SOC, as in `mgdd.engine.find_optimum`; where nothing is said it reaches 5 °CA beyond the
-        fitted timing.
+        Searched range of SOC, as in `mgdd.engine.find_optimum`; by default it reaches 5 °CA beyond the fitted timing.
     progress : callable, optional
         Called with a short text after each fit.
 

@@ -1,4 +1,4 @@
-"""What a calibration must be distrusted for."""
+"""Limitations of a calibration."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def wall_heat_profile(
         Scales to refit at, in [0, 2.5]; the fitted one and both ends are added.
     widths : mapping, optional
         How far ``gamma`` [-], ``pegging_bar`` [bar] and ``tdc_cad`` [°CA] may be off, each >= 0: 0.03, 0.1 and 0.3
-        where nothing is said, 0 for one that is known. A gamma that was free in the fit is not moved.
+        by default, 0 for one that is known. A gamma that was free in the fit is not moved.
     progress : callable, optional
         Called with a short text before each refit.
 

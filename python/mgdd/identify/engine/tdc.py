@@ -46,7 +46,7 @@ class TdcEstimate(Result):
         What the angles are too large by: where they have firing TDC [°CA]. ``tdc_offset_cad=`` of
         `mgdd.io.read_pressure` takes it off.
     low_cad, high_cad : float
-        Range of offsets that the traces do not tell apart [°CA].
+        Range of offsets that the traces do not separate [°CA].
     method : {"motored peak", "residual of the calibration"}
         How it was found.
     loss_angle_cad : tuple of float

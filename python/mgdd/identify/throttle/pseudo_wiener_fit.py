@@ -71,7 +71,7 @@ def fit_pseudo_wiener(
         limp-home; ``map``: what the static map turns into the first angle; ``best``: whichever fits better.
     options : FitOptions, optional
         9 searches per delay of PW-R and 16 of the others (per delay and start rule of the lags), seed 1 of their Latin
-        hypercube, and 150 trial steps per search where nothing else is said.
+        hypercube, and 150 trial steps per search by default.
 
     Returns
     -------

@@ -130,7 +130,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
         initial_state : mapping of str to float, or sequence of float, optional
             Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; at rest without.
         options : FitOptions, optional
-            A tolerance of 1e-9 of the last stage where nothing else is said; the other options have no effect here and
+            A tolerance of 1e-9 of the last stage by default; the other options have no effect here and
             are refused.
         lanes : bool
             Several starts at once; False takes one after the other and gives the same numbers.

@@ -53,7 +53,7 @@ class ThrottleValidation(Result):
     free_run : xarray.Dataset
         ``duty``, ``angle_deg``, ``model_deg`` and ``residual_deg`` over ``time_s``.
     findings : tuple of Finding
-        What to distrust, what the log does not identify, and which excitation would.
+        Limitations found, what the log does not identify, and which excitation would.
     source : str
         Name of the log.
 

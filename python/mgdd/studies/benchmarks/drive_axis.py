@@ -229,7 +229,7 @@ def fit_drive(
     start_values : mapping of str to float, optional
         First start, by parameter name; without it the inverse dynamics give it (`drive_inverse_dynamics`).
     options : FitOptions, optional
-        48 starts, scattered with seed 1, 60 trial steps per start and a tolerance of 1e-6 where nothing else is said.
+        48 starts, scattered with seed 1, 60 trial steps per start and a tolerance of 1e-6 by default.
 
     Returns
     -------

@@ -166,7 +166,7 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
         above a datum, overflow in part into the lower tank, delay of the pump; ``grey_box_free_exponent``: the upper
         outflow by a power too.
     options : FitOptions, optional
-        4 starts, scattered with seed 1, 200 trial steps per start and a tolerance of 1e-9 where nothing else is said;
+        4 starts, scattered with seed 1, 200 trial steps per start and a tolerance of 1e-9 by default;
         the best by the error on this record is taken.
 
     Returns

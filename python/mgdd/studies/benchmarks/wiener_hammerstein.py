@@ -288,7 +288,7 @@ def fit_wiener_hammerstein(
     scan_samples : int
         Samples used until one partition has won.
     options : FitOptions, optional
-        30 trial steps and a tolerance of 1e-7 of the last fit where nothing else is said; the other options have no
+        30 trial steps and a tolerance of 1e-7 of the last fit by default; the other options have no
         effect here and are refused.
 
     Returns
