@@ -50,11 +50,11 @@ def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = 
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.response import response_diagnostics
     >>> from mgdd.surrogate import fit_response
     >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
     >>> fit = fit_response(line, "imep_bar", degree=1)
-    >>> [panel.get_xlabel() for panel in plot.response_diagnostics(fit.diagnostics).figure.axes][-1]
+    >>> [panel.get_xlabel() for panel in response_diagnostics(fit.diagnostics).figure.axes][-1]
     'fuel [mg]'
     """
     diagnostics = require("diagnostics", diagnostics, _NEEDED, "mgdd.surrogate.fit_response")

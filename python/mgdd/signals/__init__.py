@@ -1,4 +1,4 @@
-"""Sampled signals, whatever the plant: the one check of an even grid, quality figures, tests of residuals, excitation.
+"""Sampled signals, whatever the plant: excitation signals, and the quality figure of a fit.
 
 Numbers in, numbers out; units are those of the caller.
 """
