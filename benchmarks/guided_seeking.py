@@ -130,7 +130,7 @@ def rows_for(field: SeekingMap) -> list[Row]:
             Row(f"tuned: {method.replace('_', ' ')}", tuned(method), must_arrive=True)
             for method in ("batch", "moving_average", "spsa")
         ),
-        Row("golden section, noise told", driven(golden), must_arrive=True),
+        Row("golden section, noise given", driven(golden), must_arrive=True),
         *found,
     ]
 

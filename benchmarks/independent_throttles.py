@@ -31,7 +31,8 @@ from typing import Any
 from support import machine
 
 from mgdd.errors import Error
-from mgdd.identify import FirstPrincipleModel, identify_throttle
+from mgdd.identify import identify_throttle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.free_run import free_run, quality_of
 from mgdd.io import throttle_log
 

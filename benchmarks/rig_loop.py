@@ -19,9 +19,11 @@ from typing import Any
 
 from support import machine
 
+from mgdd._core.rig import protect
 from mgdd.control import GuidedPredictive, Pid, SlidingMode
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import E2eSettings, Frame, LoopMessage, RealtimeLoop, RingTransport, SafetyEnvelope, SignalLayout, protect
+from mgdd.rig import SafetyEnvelope
+from mgdd.rig.realtime import E2eSettings, Frame, LoopMessage, RealtimeLoop, RingTransport, SignalLayout
 
 KINDS = {"guided": GuidedPredictive, "pid": Pid, "sliding": SlidingMode}
 DUTY = SignalLayout(start=16, length=16, raw_type="signed", scale=5e-5)

@@ -56,10 +56,6 @@ shutil.rmtree(HERE / "generated", ignore_errors=True)  # a page of a name that i
 
 # --- reference ----------------------------------------------------------------------------------------------
 autosummary_generate = True
-# Classes whose members stand partly in a base that is not public.
-autosummary_context = {
-    "with_inherited": {f"mgdd.rig.{name}" for name in ("ActuatorGuard", "RecordingRig", "ReplayRig", "SimulatedRig")}
-}
 autodoc_typehints = "none"  # the docstrings name type, shape and unit
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False

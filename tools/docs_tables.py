@@ -33,6 +33,7 @@ from tables_of_model import (
 
 from mgdd import engine
 from mgdd.engine import Cylinder, OperatingPoint, simulate
+from mgdd.engine.cycle import convergence as step_error
 from mgdd.guide import OnlineCalibration
 from mgdd.loop import EngineBench
 from mgdd.studies import guided_transients as plane_study
@@ -89,7 +90,7 @@ def online_calibration() -> Rows:
     rows = {}
     for label, off, told_late_cad in (
         ("nothing", {}, 0.0),
-        ("timing told 0.5 °CA late", {}, 0.5),
+        ("timing given 0.5 °CA late", {}, 0.5),
         ("TDC read 0.5 °CA late", {"tdc_error_cad": 0.5}, 0.0),
         ("pressure 1 % high", {"pressure_gain_error": 0.01}, 0.0),
         ("pegging 0.1 bar high", {"pressure_offset_bar": 0.1}, 0.0),
@@ -213,7 +214,7 @@ NUMBERS: Mapping[str, Callable[[], float]] = {
     "efficiency_gross": lambda: float(simulate(*single(), soc_cad=-6.0)["efficiency_gross"]),
     "lagged_motored_work_j": lambda: integrators()["`tan2018_lagged`"][1],
     "step_error_imep_percent": lambda: (
-        100.0 * float(np.abs(engine.convergence(*single())["error"].sel(indicator="imep_gross_bar")) / 9.627)
+        100.0 * float(np.abs(step_error(*single())["error"].sel(indicator="imep_gross_bar")) / 9.627)
     ),
 }
 

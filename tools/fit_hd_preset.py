@@ -15,7 +15,7 @@ import numpy as np
 from mgdd import datasets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.identify import fit_cylinder
-from mgdd.presets import Preset
+from mgdd.presets.preset import Preset
 
 OUT = Path(__file__).parents[1] / "python" / "mgdd" / "presets" / "hd_diesel_128x144.toml"
 DATA = "LibICE-post (Ramognino), tutorial data, commit c1bc6acc"
@@ -37,7 +37,7 @@ def main() -> None:
         gamma_model="linear",
         wall_heat_scale=0.5,
     )
-    fit = fit_cylinder(datasets.load("hd_diesel_128x144"), base, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
+    fit = fit_cylinder(datasets.read("hd_diesel_128x144"), base, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
     heat = np.array([load.fuel_heat_j for load in fit.loads])
     duration = np.array([load.burn_duration_cad for load in fit.loads])
     fuel = heat / base.lower_heating_value_mj_per_kg

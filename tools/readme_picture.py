@@ -77,7 +77,7 @@ def main() -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     row = best_timing(traces, cylinder)[LOAD]
     if row.best is None:
         raise SystemExit("no plausible model: there is nothing to draw")

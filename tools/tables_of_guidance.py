@@ -9,7 +9,7 @@ import numpy as np
 from tables_of_measured_traces import measured
 
 from mgdd.studies.guide_cases import SpeedLoadPlane
-from mgdd.studies.ignition_cases import TRUTHS, told_laws
+from mgdd.studies.ignition_cases import TRUTHS, assumed_laws
 from mgdd.studies.ignition_delay import Plane, plane_of, plane_row, slope_row
 from mgdd.studies.model_validation import stage_rows, validate_law
 from mgdd.studies.validation_fits import LAWS, STAGES
@@ -23,7 +23,7 @@ __all__ = ["ignition_plane", "ignition_slopes", "model_stages"]
 @cache
 def _planes() -> tuple[Plane, ...]:
     plane = SpeedLoadPlane()
-    return tuple(plane_of(truth, told, plane) for truth in TRUTHS for told in told_laws(truth))
+    return tuple(plane_of(truth, assumed, plane) for truth in TRUTHS for assumed in assumed_laws(truth))
 
 
 def ignition_plane() -> Rows:
@@ -31,16 +31,16 @@ def ignition_plane() -> Rows:
     names += ("lost_trimmed_p95", "cells_without_ignition", "cells_without_ignition_trimmed")
     rows = {}
     for plane in _planes():
-        if plane.truth != plane.told:
+        if plane.truth != plane.assumed:
             row = {**plane_row(plane), "to_learn": -plane.trim_cad}
-            rows[f"{plane.truth} {plane.told}"] = [float(row[name]) for name in names]
+            rows[f"{plane.truth} {plane.assumed}"] = [float(row[name]) for name in names]
     return rows
 
 
 def ignition_slopes() -> Rows:
     names = ("delay_smallest_cad", "delay_median_cad", "delay_largest_cad", "slope_p10", "slope_median", "slope_p90")
     names += ("curvature_ratio_median", "cells_out_of_reach")
-    own = [plane for plane in _planes() if plane.truth == plane.told]
+    own = [plane for plane in _planes() if plane.truth == plane.assumed]
     return {plane.truth: [float(slope_row(plane)[name]) for name in names] for plane in own}
 
 

@@ -28,7 +28,7 @@ _LOADS = ("25 %", "50 %", "75 %", "100 %")
 
 @cache
 def measured() -> tuple[list[Any], Cylinder]:
-    return datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    return datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
 
 
 @cache

@@ -8,6 +8,7 @@ from typing import Any
 
 from mgdd import engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
+from mgdd.engine.cycle import convergence as step_error
 from mgdd.io import pressure_trace
 from mgdd.results.labels import ANGLE, VARIABLES
 
@@ -105,7 +106,7 @@ def optimum() -> Rows:
 
 def convergence() -> Rows:
     names = ("imep_gross_bar", "efficiency_gross", "p_max_bar", "t_max_k", "heat_loss_j")
-    table = engine.convergence(*single()).sel(indicator=list(names))
+    table = step_error(*single()).sel(indicator=list(names))
     columns = [table[name].to_numpy() for name in ("value", "error", "order")]
     return {f"`{name}`": [float(c[k]) for c in columns] for k, name in enumerate(names)}
 

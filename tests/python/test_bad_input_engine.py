@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 
 from mgdd import _core
-from mgdd.engine import (
-    Cylinder,
-    NoxProxy,
-    OperatingPoint,
-    analyze,
-    convergence,
-    ignition_delay,
-    simulate,
-    timing_sweep,
-)
+from mgdd.engine import Cylinder, NoxProxy, OperatingPoint, analyze, ignition_delay, simulate, timing_sweep
+from mgdd.engine.cycle import convergence
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.identify import fit_cylinder
 from mgdd.io import pressure_trace

@@ -23,9 +23,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], str]:
     """The four measured traces as a user would have them: one file each, and a table of conditions."""
     folder = tmp_path_factory.mktemp("traces")
     names, rows = [], ["file,speed_rpm,trapped_mass_g,soi_cad"]
-    for trace in datasets.load("hd_diesel_128x144"):
+    for trace in datasets.read("hd_diesel_128x144"):
         file = folder / f"{trace.attrs['file']}.csv"
-        io.write_pressure(trace, file)
+        io.write_csv(trace, file)
         names.append(str(file))
         a = trace.attrs
         rows.append(f"{file.name},{a['speed_rpm']},{a['trapped_mass_g']},{a['soi_cad']}")
@@ -120,7 +120,7 @@ def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.Captu
     motored = simulate(Cylinder(wall_heat_scale=0.0), OperatingPoint(fuel_mg=0.0))
     shifted = io.pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values - 0.2, name="shifted")
     file = tmp_path / "shifted.csv"
-    io.write_pressure(shifted, file)
+    io.write_csv(shifted, file)
     out = run_json(capsys, "engine", "analyze", str(file), "--pegging", "two_point", "--pegging-exponent", "1.37")
     assert out["pegging_bar"] == pytest.approx(0.2, abs=0.005)
 
@@ -235,7 +235,7 @@ def test_bad_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "empty" in refused(capsys, "engine", "analyze", str(empty))
     assert "nowhere.csv" in refused(capsys, "engine", "analyze", "nowhere.csv")
     pascal = tmp_path / "pascal.csv"
-    trace = datasets.load("hd_diesel_128x144")[0]
+    trace = datasets.read("hd_diesel_128x144")[0]
     pascal.write_text(
         "\n".join(
             f"{a} {p * 1e5}" for a, p in zip(trace["crank_angle_cad"].values, trace["pressure_bar"].values, strict=True)
@@ -248,7 +248,7 @@ def test_bad_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_angles_before_tdc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    trace, turned = datasets.load("hd_diesel_128x144")[0], tmp_path / "turned.csv"
+    trace, turned = datasets.read("hd_diesel_128x144")[0], tmp_path / "turned.csv"
     columns = trace["crank_angle_cad"].values.tolist(), trace["pressure_bar"].values.tolist()
     turned.write_text("".join(f"{-a!r} {p!r}\n" for a, p in zip(*columns, strict=True)))
     assert refused(capsys, "engine", "analyze", str(turned), *HD).rstrip().endswith("pass --before-tdc")
@@ -278,7 +278,7 @@ def test_a_short_trace_is_told_and_still_reported(
 ) -> None:
     trace = io.read_pressure(files[0][1]).sel(crank_angle_cad=slice(-90.0, 50.0))
     short = tmp_path / "short.csv"
-    io.write_pressure(trace, short)
+    io.write_csv(trace, short)
     assert "trapped_mass_g" in refused(capsys, "engine", "calibrate", str(short), *HD)
     out = run_json(
         capsys,

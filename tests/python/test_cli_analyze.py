@@ -18,7 +18,7 @@ HD = ("--preset", "hd_diesel_128x144")
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("trace") / "a50.csv"
-    io.write_pressure(datasets.load("hd_diesel_128x144")[1], path)
+    io.write_csv(datasets.read("hd_diesel_128x144")[1], path)
     return str(path)
 
 
@@ -103,7 +103,7 @@ def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.Capt
 
 @pytest.mark.slow
 def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    trace = datasets.load("hd_diesel_128x144")[1]
+    trace = datasets.read("hd_diesel_128x144")[1]
     angle, pressure = trace["crank_angle_cad"].values + 3.0, trace["pressure_bar"].values
     late = tmp_path / "late.csv"
     np.savetxt(late, np.column_stack([angle, pressure]), delimiter=",", header="angle,p_bar", comments="", fmt="%.17g")

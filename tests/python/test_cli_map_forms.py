@@ -94,10 +94,10 @@ def test_a_seeker_takes_the_map_as_its_guide(ending: str, here: Path, capsys: py
 
 
 def test_a_measured_engine_becomes_a_map(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    if "advisor_engine_maps" not in datasets.available():
+    if "advisor_engine_maps" not in datasets.names():
         pytest.skip("advisor_engine_maps is not in MGDD_DATA_DIR")
     told = ran(capsys, "map", "export", "--advisor", "mercedes", "--name", "nox_g_per_kwh", "-o", "nox.json")
-    data = datasets.load("advisor_engine_maps")[1]
+    data = datasets.read("advisor_engine_maps")[1]
     found = read_map(here / "nox.json")
     np.testing.assert_array_equal(found.values, data["nox_g_per_kwh"])
     assert found.unit == "g/kWh"

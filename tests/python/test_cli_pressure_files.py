@@ -13,7 +13,7 @@ from mgdd.cli import main
 from mgdd.results.labels import ANGLE
 
 HD = ("--preset", "hd_diesel_128x144")
-TRACE = datasets.load("hd_diesel_128x144")[1]
+TRACE = datasets.read("hd_diesel_128x144")[1]
 CLOSED, BAR = TRACE[ANGLE].to_numpy(), TRACE["pressure_bar"].to_numpy()
 # CA50 of the plain file, as the data set documents it in test_engine_trace.
 CA50 = 6.9

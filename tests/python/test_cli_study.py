@@ -11,7 +11,8 @@ import pytest
 from mgdd.cli import main
 from mgdd.cli.output import show
 from mgdd.cli.study import rows_table
-from mgdd.studies import available_studies, sensor_delay
+from mgdd.studies import sensor_delay
+from mgdd.studies.registry import available_studies
 
 
 def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[str, str]:

@@ -11,7 +11,7 @@ import pytest
 
 from mgdd import identify, io, signals
 from mgdd.cli import main
-from mgdd.throttle import Throttle, simulate
+from mgdd.throttle import Throttle, simulate_throttle
 
 KINDS = ("pw_r", "first_principle")
 
@@ -32,7 +32,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> st
 
 
 def measured(signal: Any, name: str, seed: int) -> Any:
-    run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
     noise = 0.03 * np.random.default_rng(seed).standard_normal(run.sizes["time_s"])
     return io.throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise, name=name)
 
@@ -44,7 +44,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     train = measured(signals.chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0), "train", 1)
     test = measured(signals.amplitude_random_steps(3.0, offset=0.0, amplitude=0.33), "test", 2)
     for name, log in (("train", train), ("test", test)):
-        io.write_throttle_log(log, folder / f"{name}.csv")
+        io.write_csv(log, folder / f"{name}.csv")
     return str(folder / "train.csv"), str(folder / "test.csv")
 
 
@@ -176,7 +176,7 @@ def test_bad_logs_and_files_are_refused(
         capsys, "throttle", "identify", files[0], "--duty", "angle_deg", "--angle", "duty"
     )
     above = measured(signals.chirp(3.0, offset=0.15, amplitude=0.15), "above", 3)
-    io.write_throttle_log(above, tmp_path / "above.csv")
+    io.write_csv(above, tmp_path / "above.csv")
     said = refused(capsys, "throttle", "identify", str(tmp_path / "above.csv"), "--two-sided")
     assert "below limp-home" in said
     assert "fit one side with --two-sided left out" in said

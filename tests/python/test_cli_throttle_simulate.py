@@ -10,7 +10,7 @@ import pytest
 
 from mgdd import io, presets
 from mgdd.cli import main
-from mgdd.throttle import simulate
+from mgdd.throttle import simulate_throttle
 from mgdd.throttle.simulation import step_summary
 
 COMMAND = ("throttle", "simulate")
@@ -37,7 +37,7 @@ def table(path: Path, text: str) -> str:
 
 def test_a_step_prints_the_summary_of_the_library(capsys: pytest.CaptureFixture[str]) -> None:
     out = run_json(capsys, "--preset", "P1", "--duty", "1", "--duration-s", "0.3")
-    run = simulate(presets.load("P1").throttle, 1.0, duration_s=0.3)
+    run = simulate_throttle(presets.load("P1").throttle, 1.0, duration_s=0.3)
     assert {name: out[name] for name in step_summary(run)} == step_summary(run)
     assert out["t10_s"] == pytest.approx(0.019, abs=0.002)
     assert out["t90_s"] == pytest.approx(0.078, abs=0.002)
@@ -53,7 +53,7 @@ def test_options_reach_the_plant(capsys: pytest.CaptureFixture[str]) -> None:
     )  # fmt: skip
     out = run_json(capsys, *argv)
     throttle = presets.load("P2").throttle.replace(coulomb_nm=0.09, friction="stiction")
-    run = simulate(
+    run = simulate_throttle(
         throttle, 0.0, start_deg=90.0, bridge="open", duration_s=0.4, sample_s=0.002, step_s=0.0005,
         supply_v=14.0, airflow_torque_nm=-0.05,
     )  # fmt: skip
@@ -77,7 +77,7 @@ def test_a_file_drives_the_run_and_the_run_becomes_a_file(tmp_path, capsys: pyte
     file = table(tmp_path / "in.csv", f"time_s,duty,supply_v,airflow_torque_nm\ns,-,V,N m\n{rows}\n")
     output, figure = tmp_path / "out.csv", tmp_path / "out.png"
     out = run_json(capsys, "--input", file, "--output", str(output), "--figure", str(figure))
-    run = simulate(
+    run = simulate_throttle(
         presets.load("P1").throttle, duty, time_s=time, supply_v=14.4, airflow_torque_nm=-0.1
     )  # fmt: skip
     assert out["final_angle_deg"] == float(run["angle_deg"][-1])

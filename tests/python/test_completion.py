@@ -32,6 +32,12 @@ def test_every_public_name_has_a_signature(name: str) -> None:
             assert isinstance(inspect.signature(thing), inspect.Signature), each
 
 
+def test_public_names_are_few_and_none_stands_twice() -> None:
+    names = [each for name in PACKAGES for each in package(name).__all__]
+    assert len(names) <= 150, "unexport or merge a name before one is added"
+    assert sorted(names) == sorted(set(names))
+
+
 def test_a_class_of_the_core_shows_names_and_defaults_and_describes_them() -> None:
     from mgdd.control import Pid
     from mgdd.loop import EngineBench

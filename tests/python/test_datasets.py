@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from mgdd import datasets
-from mgdd.datasets.origins import ORIGINS, Origin
+from mgdd.datasets.files import path
+from mgdd.datasets.origins import ORIGINS, Origin, fetch
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
 from mgdd.results.labels import ANGLE, check_labels
@@ -32,14 +33,14 @@ def alone(monkeypatch):
 @pytest.fixture
 def source():
     try:
-        return datasets.path("libice_hd_diesel", "pExpA25").parent
+        return path("libice_hd_diesel", "pExpA25").parent
     except FileNotFoundError as reason:
         pytest.skip(str(reason))
 
 
 @pytest.mark.usefixtures("alone")
 def test_the_four_traces():
-    traces = datasets.load("hd_diesel_128x144")
+    traces = datasets.read("hd_diesel_128x144")
     assert [trace.attrs["load_percent"] for trace in traces] == [25, 50, 75, 100]
     assert [trace.attrs["trapped_mass_g"] for trace in traces] == [3.0858, 4.13863, 5.39428, 6.193]
     assert [trace.attrs["soi_cad"] for trace in traces] == [-5.06, -4.73, -4.75, -2.00]
@@ -60,7 +61,7 @@ def test_indicated_work_of_the_traces():
     swept = np.pi / 4.0 * bore**2 * 2.0 * crank
     lift = rod + crank - crank * np.cos(phi) - np.sqrt(rod**2 - (crank * np.sin(phi)) ** 2)
     volume = swept / (ratio - 1.0) + np.pi / 4.0 * bore**2 * lift
-    pascal = [1e5 * trace["pressure_bar"].to_numpy() for trace in datasets.load("hd_diesel_128x144")]
+    pascal = [1e5 * trace["pressure_bar"].to_numpy() for trace in datasets.read("hd_diesel_128x144")]
     work = [float(np.sum(0.5 * (p[1:] + p[:-1]) * np.diff(volume))) for p in pascal]
     np.testing.assert_allclose(work, [1331.6, 2540.1, 3737.3, 4857.5], atol=0.05)
 
@@ -76,7 +77,7 @@ def test_the_source_gives_the_same_bytes(root, source, tmp_path):
 @pytest.mark.parametrize("load", [25, 50, 75, 100])
 def test_the_conversion_is_exact(source, load):
     original = read_pressure(source / f"pExpA{load}", pressure_unit="Pa")
-    packaged = next(t for t in datasets.load("hd_diesel_128x144") if t.attrs["load_percent"] == load)
+    packaged = next(t for t in datasets.read("hd_diesel_128x144") if t.attrs["load_percent"] == load)
     np.testing.assert_array_equal(original["pressure_bar"], packaged["pressure_bar"])
 
 
@@ -92,10 +93,10 @@ def test_the_converter_refuses_and_writes_nothing(root, tmp_path):
 
 @pytest.mark.usefixtures("alone")
 def test_licence_and_citation_travel_with_the_data():
-    licence = datasets.path(NAME, f"{NAME}_LICENSE.txt").read_text(encoding="ascii")
+    licence = path(NAME, f"{NAME}_LICENSE.txt").read_text(encoding="ascii")
     assert licence.startswith("Copyright (c) 2018 The Python Packaging Authority")
     assert "Permission is hereby granted, free of charge" in licence
-    source = datasets.path(NAME, f"{NAME}_SOURCE.txt").read_text(encoding="ascii")
+    source = path(NAME, f"{NAME}_SOURCE.txt").read_text(encoding="ascii")
     assert "https://github.com/RamogninoF/LibICE-post" in source
     assert "Licence: MIT" in source
 
@@ -103,10 +104,10 @@ def test_licence_and_citation_travel_with_the_data():
 def test_the_data_folder_comes_first(monkeypatch, tmp_path):
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     own = tmp_path / NAME / FILES[0]
-    assert datasets.path(NAME, FILES[0]) != own
+    assert path(NAME, FILES[0]) != own
     own.parent.mkdir()
     own.write_text("mine")
-    assert datasets.path(NAME, FILES[0]) == own
+    assert path(NAME, FILES[0]) == own
 
 
 def test_only_what_a_reader_reads_is_available(monkeypatch, tmp_path):
@@ -114,28 +115,28 @@ def test_only_what_a_reader_reads_is_available(monkeypatch, tmp_path):
     (tmp_path / "bench_7").mkdir()
     (tmp_path / "emps").mkdir()
     (tmp_path / "emps" / "DATA_EMPS.mat").write_text("one of its two files")
-    assert datasets.available() == (NAME,)
+    assert datasets.names() == (NAME,)
     (tmp_path / "emps" / "DATA_EMPS_PULSES.mat").write_text("the other")
-    assert datasets.available() == ("emps", NAME)
+    assert datasets.names() == ("emps", NAME)
 
 
 def test_a_data_folder_that_is_not_there_is_no_obstacle(monkeypatch, tmp_path):
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "nowhere"))
-    assert datasets.available() == (NAME,)
-    assert datasets.path(NAME, FILES[0]).is_file()
+    assert datasets.names() == (NAME,)
+    assert path(NAME, FILES[0]).is_file()
 
 
 def test_both_places_are_named(monkeypatch, tmp_path):
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     with pytest.raises(FileNotFoundError, match=r"no file 'x\.csv' of data set 'moon'") as caught:
-        datasets.path("moon", "x.csv")
+        path("moon", "x.csv")
     message = str(caught.value)
     assert str(tmp_path / "moon" / "x.csv") in message
     assert "and the package (" in message
     assert "set MGDD_DATA_DIR to a folder that holds moon/x.csv" in message
     monkeypatch.delenv("MGDD_DATA_DIR")
     with pytest.raises(FileNotFoundError, match=r"MGDD_DATA_DIR is not set, and the package \(.*\) lacks it"):
-        datasets.path("moon", "x.csv")
+        path("moon", "x.csv")
 
 
 @pytest.mark.usefixtures("alone")
@@ -144,14 +145,14 @@ def test_a_changed_packaged_file_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "_PACKAGE", tmp_path)
     found = hashlib.sha256(b"tampered").hexdigest()
     with pytest.raises(DataError, match=f"SHA-256 is {found}, shipped was .*: the file was changed; reinstall"):
-        datasets.path(NAME, FILES[0])
+        path(NAME, FILES[0])
 
 
 def test_an_unknown_set_and_an_option_of_another_are_refused():
     with pytest.raises(ParameterError, match="data set 'moon': must be one of advisor_engine_maps, cascaded_tanks"):
-        datasets.load("moon")
+        datasets.read("moon")
     with pytest.raises(ParameterError, match="only 'h2df_502' has them"):
-        datasets.load(NAME, mask_held=False)
+        datasets.read(NAME, mask_held=False)
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -192,42 +193,54 @@ def served(tmp_path, monkeypatch):
 
 
 def test_a_set_is_fetched_once_and_found(served, tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"or fetch it: mgdd\.datasets\.fetch\('moon'\)"):
-        datasets.path("moon", "a.csv")
-    assert datasets.available() == (NAME,)
-    folder = datasets.fetch("moon")
+    with pytest.raises(FileNotFoundError, match=r"or fetch it: mgdd\.datasets\.read\('moon', fetch=True\)"):
+        path("moon", "a.csv")
+    assert datasets.names() == (NAME,)
+    folder = fetch("moon")
     assert folder == tmp_path / "cache" / "moon"
-    assert datasets.path("moon", "a.csv").read_bytes() == b"t,u\n0,1\n"
-    assert datasets.available() == (NAME, "moon")
+    assert path("moon", "a.csv").read_bytes() == b"t,u\n0,1\n"
+    assert datasets.names() == (NAME, "moon")
     for file in served.iterdir():
         file.unlink()
-    assert datasets.fetch("moon") == folder
+    assert fetch("moon") == folder
     own = tmp_path / "own" / "moon" / "a.csv"
     own.parent.mkdir(parents=True)
     own.write_text("mine")
-    assert datasets.path("moon", "a.csv") == own
+    assert path("moon", "a.csv") == own
+
+
+def test_only_what_is_missing_is_fetched(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(sys.modules["mgdd.datasets.origins"], "fetch", asked.append)
+    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
+    monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path))
+    assert len(datasets.read(NAME, fetch=True)) == 4
+    assert asked == []
+    with pytest.raises(FileNotFoundError, match=r"read\('emps', fetch=True\)"):
+        datasets.read("emps", fetch=True)
+    assert asked == ["emps"]
 
 
 def test_another_file_is_refused_and_a_right_one_follows(served):
     good = (served / "b.csv").read_bytes()
     (served / "b.csv").write_bytes(b"changed")
     with pytest.raises(DataError, match=r"b\.csv: is not the known file"):
-        datasets.fetch("moon")
-    assert "moon" not in datasets.available()
+        fetch("moon")
+    assert "moon" not in datasets.names()
     (served / "b.csv").unlink()
     with pytest.raises(DataError, match=r"b\.csv: cannot be fetched: .*put the file into \$MGDD_DATA_DIR/moon by hand"):
-        datasets.fetch("moon")
+        fetch("moon")
     (served / "b.csv").write_bytes(good)
-    datasets.fetch("moon")
-    assert "moon" in datasets.available()
+    fetch("moon")
+    assert "moon" in datasets.names()
 
 
 @pytest.mark.usefixtures("served")
 def test_without_pooch_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pooch", None)
     with pytest.raises(ImportError, match=r"pip install 'mgdd\[datasets\]'"):
-        datasets.fetch("moon")
-    assert datasets.available() == (NAME,)
+        fetch("moon")
+    assert datasets.names() == (NAME,)
 
 
 @pytest.mark.parametrize(("name", "file"), [(name, file) for name, files in ORIGINS.items() for file in files])

@@ -14,27 +14,23 @@ import pytest
 from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
 from mgdd.guide import FeedForward, ModelOptimum, OnlineCalibration, TimingMap
-from mgdd.identify import (
-    FirstPrincipleModel,
-    OdeModel,
-    SmoothThrottle,
-    check_excitation,
-    fit_cylinder,
-    fit_first_principle,
-    validate_throttle,
-)
+from mgdd.identify import OdeModel, check_excitation, fit_cylinder, validate_throttle
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.loop import EngineBench, SensorDynamics, SurrogatePlant, run_seeker
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
-from mgdd.presets import Preset
+from mgdd.presets.preset import Preset
 from mgdd.results.describe import Row, as_html, as_text, rows_of
 from mgdd.results.units import unit_of
 from mgdd.signals import chirp
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
-from mgdd.surrogate import fit_surrogate, random_step_records
-from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate_throttle
 
 
 def objects() -> dict[str, Callable[[], Any]]:
@@ -43,7 +39,7 @@ def objects() -> dict[str, Callable[[], Any]]:
 
     def log() -> Any:
         signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
-        run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+        run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
     example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
@@ -94,7 +90,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(
-            datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder
+            datasets.read("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder
         ),
     }
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mgdd import _core, datasets, io, presets
-from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, find_optimum, sensitivities, simulate
+from mgdd.engine import Cylinder, OperatingPoint, analyze, find_optimum, sensitivities, simulate
+from mgdd.engine.cycle import convergence
 from mgdd.errors import ConvergenceError, DataError, ParameterError, ShapeError
 from mgdd.identify import ModelFamily, best_timing, fit_cylinder, wall_heat_profile
 from mgdd.optimize import FitOptions
@@ -125,7 +126,7 @@ def test_gil_is_free_while_the_core_computes() -> None:
 
 
 def test_profile_follows_the_fit_and_never_invents_its_range() -> None:
-    trace = datasets.load("hd_diesel_128x144")[1:2]
+    trace = datasets.read("hd_diesel_128x144")[1:2]
     fit = fit_cylinder(trace, HD, free=["soc_cad", "burn_duration_cad", "fuel_heat_j", "wiebe_m", "wall_heat_scale"])
     profile = wall_heat_profile(fit, scales=[0.5])
     scales = profile.dataset["wall_heat_scale"].values
@@ -137,7 +138,7 @@ def test_profile_follows_the_fit_and_never_invents_its_range() -> None:
 
 
 def test_profile_of_an_unfinished_fit_says_so() -> None:
-    trace = datasets.load("hd_diesel_128x144")[1:2]
+    trace = datasets.read("hd_diesel_128x144")[1:2]
     bad = fit_cylinder(
         trace, HD.replace(burn_shape="double_wiebe", gamma_model="constant"), options=FitOptions(max_iterations=2)
     )
@@ -150,7 +151,7 @@ def test_profile_of_an_unfinished_fit_says_so() -> None:
 
 
 def test_start_is_checked_before_the_fit() -> None:
-    trace = datasets.load("hd_diesel_128x144")[1:2]
+    trace = datasets.read("hd_diesel_128x144")[1:2]
     with pytest.raises(ParameterError, match=r"start of second_fraction\[pressure_a50_bar\] = 5: must be in \[0, 1\]"):
         fit_cylinder(trace, HD, start_values=[{"second_fraction": 5.0}])
     with pytest.raises(ParameterError, match="fuel_heat_j"):
@@ -161,7 +162,7 @@ def test_start_is_checked_before_the_fit() -> None:
 
 
 def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
-    whole = datasets.load("hd_diesel_128x144")[1]
+    whole = datasets.read("hd_diesel_128x144")[1]
     part = io.pressure_trace(whole["crank_angle_cad"].values[83:-63], whole["pressure_bar"].values[83:-63], name="part")
     assert "spans" in analyze(part, HD).attrs["warnings"]
     with pytest.raises(DataError, match=r"'part' starts at -60.*trapped_mass_g"):
@@ -174,7 +175,7 @@ def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
 
 
 def test_a_spike_is_told() -> None:
-    whole = datasets.load("hd_diesel_128x144")[1]
+    whole = datasets.read("hd_diesel_128x144")[1]
     pressure = whole["pressure_bar"].values.copy()
     assert analyze(whole, HD).attrs["warnings"] == ""
     pressure[100] += 90.0
@@ -185,8 +186,8 @@ def test_a_spike_is_told() -> None:
 def test_best_timing_refuses_a_wrong_limit_before_any_fit() -> None:
     seen: list[str] = []
     with pytest.raises(ParameterError, match="'pmax' is not an indicator"):
-        best_timing(datasets.load("hd_diesel_128x144")[:1], HD, limits={"pmax": 90.0}, progress=seen.append)
+        best_timing(datasets.read("hd_diesel_128x144")[:1], HD, limits={"pmax": 90.0}, progress=seen.append)
     assert seen == []
-    (row,) = best_timing(datasets.load("hd_diesel_128x144")[:1], HD, bounds_cad=(-1.0, 2.0), family=FEW)
+    (row,) = best_timing(datasets.read("hd_diesel_128x144")[:1], HD, bounds_cad=(-1.0, 2.0), family=FEW)
     assert all(-1.0 <= answer.free_soc_cad <= 2.0 for answer in row.members)
     assert any(answer.at_bound for answer in row.members)

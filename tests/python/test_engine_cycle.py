@@ -17,12 +17,12 @@ from mgdd.engine import (
     NoxProxy,
     OperatingPoint,
     analyze,
-    convergence,
     find_optimum,
     ignition_delay,
     simulate,
     timing_sweep,
 )
+from mgdd.engine.cycle import convergence
 from mgdd.results.labels import check_labels
 
 R = 8.314462618

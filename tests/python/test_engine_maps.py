@@ -20,9 +20,9 @@ HEAD = "speed_rpm,torque_Nm,fuel_g_s,nox_g_s,pm_g_s,hc_g_s,co_g_s,exh_temp_C,exh
 
 @pytest.fixture(scope="module")
 def engines() -> tuple[xr.Dataset, xr.Dataset]:
-    if NAME not in datasets.available():
+    if NAME not in datasets.names():
         pytest.skip(f"MGDD_DATA_DIR holds no folder {NAME}")
-    return datasets.load("advisor_engine_maps")
+    return datasets.read("advisor_engine_maps")
 
 
 def small(folder: Path, *rows: str) -> Path:

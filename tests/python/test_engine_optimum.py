@@ -139,7 +139,7 @@ def test_a_motored_point_has_no_optimum():
 
 def test_the_best_timing_of_the_measured_engine_depends_on_the_unknown_wall_heat():
     # The published figures maximise closed work; gains in % at full load, without a pressure limit.
-    cylinder, traces = presets.load("hd_diesel_128x144").cylinder, datasets.load("hd_diesel_128x144")
+    cylinder, traces = presets.load("hd_diesel_128x144").cylinder, datasets.read("hd_diesel_128x144")
     published = {0.0: (-9.8, -18.3, 5.9), 0.5: (-5.9, -13.9, 2.8), 1.0: (-3.7, -11.2, 1.2)}
     for scale, (light, full, gain) in published.items():
         free = ["soc_cad", "burn_duration_cad", "fuel_heat_j"]

@@ -129,7 +129,7 @@ FIGURES = [  # p_max, its angle, n_c, n_e, work, IMEP, CA50, net heat, CA50 with
 def test_measured_traces_give_their_published_figures(load):
     cylinder, trace, own = (
         presets.load("hd_diesel_128x144").cylinder,
-        datasets.load("hd_diesel_128x144")[load],
+        datasets.read("hd_diesel_128x144")[load],
         FIGURES[load],
     )
     back = analyze(trace, cylinder)
@@ -178,7 +178,7 @@ def test_noise_hardly_moves_work_and_middle():
 
 
 def test_a_missing_mass_comes_from_the_state_at_ivc():
-    cylinder, trace = presets.load("hd_diesel_128x144").cylinder, datasets.load("hd_diesel_128x144")[2]
+    cylinder, trace = presets.load("hd_diesel_128x144").cylinder, datasets.read("hd_diesel_128x144")[2]
     stated = analyze(trace, cylinder)
     assert float(stated.trapped_mass_g) == trace.attrs["trapped_mass_g"]
     assert stated.attrs["mass_source"] == "given"
@@ -205,7 +205,7 @@ def test_a_simulation_takes_the_temperature_at_ivc_too():
 
 @pytest.mark.parametrize(("factor", "unit"), [(1e-3, "not kg"), (1e3, "not mg")])
 def test_a_mass_in_another_unit_is_refused(factor, unit):
-    cylinder, trace = presets.load("hd_diesel_128x144").cylinder, datasets.load("hd_diesel_128x144")[0]
+    cylinder, trace = presets.load("hd_diesel_128x144").cylinder, datasets.read("hd_diesel_128x144")[0]
     with pytest.raises(ParameterError, match=f"trapped_mass_g = .*{unit}") as caught:
         analyze(trace.assign_attrs(trapped_mass_g=3.0858 * factor), cylinder)
     assert caught.value.field == "trapped_mass_g"
@@ -310,7 +310,7 @@ def test_a_stated_intake_pressure_is_held_against_the_trace():
 
 
 def test_conditions_come_from_the_trace_before_the_point():
-    trace = datasets.load("hd_diesel_128x144")[0]
+    trace = datasets.read("hd_diesel_128x144")[0]
     cylinder = presets.load("hd_diesel_128x144").cylinder
     here = analyze(trace, cylinder)
     there = analyze(trace, cylinder, point=OperatingPoint(speed_rpm=5000.0, trapped_mass_g=1.0))

@@ -77,4 +77,4 @@ def test_the_stated_brake_work_shows_a_wrong_gain():
 
 def test_the_measured_traces_are_not_doubted():
     cylinder = presets.load("hd_diesel_128x144").cylinder
-    assert [analyze(t, cylinder, quiet=True).attrs["warnings"] for t in datasets.load("hd_diesel_128x144")] == [""] * 4
+    assert [analyze(t, cylinder, quiet=True).attrs["warnings"] for t in datasets.read("hd_diesel_128x144")] == [""] * 4

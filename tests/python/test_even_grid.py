@@ -16,7 +16,10 @@ from scipy.signal import lfilter
 
 from mgdd import identify
 from mgdd.errors import DataError, ShapeError
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.n_step import n_step_rms
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.labels import labelled_dataset
@@ -24,7 +27,7 @@ from mgdd.signals.even_grid import check_count, common_step, even_step
 from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
-from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate_throttle
 
 STEP = 1e-3
 ONCE = FitOptions(n_starts=1, max_iterations=1)
@@ -76,13 +79,13 @@ def lag(_: float, x: Any, u: Any, p: Any) -> Any:
 
 USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "throttle_log": lambda time: throttle_log(time, DUTY, ANGLE),
-    "simulate": lambda time: simulate(Throttle(), DUTY, time_s=time),
+    "simulate": lambda time: simulate_throttle(Throttle(), DUTY, time_s=time),
     "sense": lambda time: SensorPair().sense(log(time)),
     "pseudo-Wiener run": lambda time: MODEL.simulate(log(time)),
     "pseudo-Wiener prediction": lambda time: MODEL.predict(log(time), 5),
-    "first-principle run": lambda time: identify.FirstPrincipleModel().simulate(log(time)),
-    "fit_first_principle": lambda time: identify.fit_first_principle(log(time), options=ONCE),
-    "fit_pseudo_wiener": lambda time: identify.fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
+    "first-principle run": lambda time: FirstPrincipleModel().simulate(log(time)),
+    "fit_first_principle": lambda time: fit_first_principle(log(time), options=ONCE),
+    "fit_pseudo_wiener": lambda time: fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
     "identify_throttle": lambda time: identify.identify_throttle(log(time), options=FitOptions(n_starts=1)),
     "validate_throttle": lambda time: identify.validate_throttle(MODEL, log(time)),
     "n_step_rms": lambda time: n_step_rms(MODEL, log(time)),
@@ -128,7 +131,9 @@ def test_a_rate_without_a_decimal_step_is_not_rounded() -> None:
     time = np.arange(100_000) / 51_200.0
     assert even_step(time) == pytest.approx(1.0 / 51_200.0, rel=1e-12)
     third = np.arange(4000) / 3000.0
-    assert simulate(Throttle(), np.full(4000, 0.2), time_s=third, step_s=1.0 / 9000.0)["angle_deg"].size == 4000
+    assert (
+        simulate_throttle(Throttle(), np.full(4000, 0.2), time_s=third, step_s=1.0 / 9000.0)["angle_deg"].size == 4000
+    )
 
 
 def test_slow_drift_of_the_clock_is_uneven_too() -> None:

@@ -11,7 +11,7 @@ from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import check_excitation, design_excitation
 from mgdd.identify.throttle.excitation_design import EXCITATIONS
 from mgdd.signals import chirp, triangle
-from mgdd.throttle import Throttle, characteristics, simulate
+from mgdd.throttle import Throttle, characteristics, simulate_throttle
 
 P1 = Throttle()
 STIFF = Throttle(
@@ -27,7 +27,7 @@ def test_designed_signals_move_the_plate_inside_its_limits(throttle: Throttle, k
     signal, check = design_excitation(kind, throttle, side=side)
     assert check.passed
     assert min(check.content.travel_open_deg, check.content.travel_closed_deg) > 5.0
-    angle = simulate(throttle, signal["duty"], time_s=signal["time_s"])["angle_deg"].to_numpy()
+    angle = simulate_throttle(throttle, signal["duty"], time_s=signal["time_s"])["angle_deg"].to_numpy()
     np.testing.assert_array_equal(check.prediction["angle_deg"], angle)
     assert angle.min() >= -0.5
     assert angle.max() <= 90.5
@@ -88,7 +88,7 @@ def test_the_check_of_the_plant_says_what_stays_open() -> None:
 
 def test_a_check_knows_the_current_of_the_plant() -> None:
     check = check_excitation(chirp(offset=0.15, amplitude=0.20), P1, angle_window_deg=(-0.5, 90.5))
-    run: Any = simulate(P1, check.prediction["duty"], time_s=check.prediction["time_s"])
+    run: Any = simulate_throttle(P1, check.prediction["duty"], time_s=check.prediction["time_s"])
     assert check.peak_current_a == float(np.abs(run["current_a"]).max())
     assert check.rms_current_a == pytest.approx(float(np.sqrt((run["current_a"] ** 2).mean())), rel=1e-12)
 

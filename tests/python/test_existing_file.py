@@ -12,11 +12,12 @@ from mgdd import io, presets
 from mgdd.cli.main import main
 from mgdd.identify import load_throttle_model
 from mgdd.io.parameters import ParameterFile
+from mgdd.io.point_table import read_conditions
 from mgdd.optimize import Seeker
 
 READERS: dict[str, tuple[Callable[[Path], Any], str, str]] = {
     "pressure": (io.read_pressure, "mean.csv", "maen.csv"),
-    "conditions": (io.read_conditions, "conditions.csv", "condition.csv"),
+    "conditions": (read_conditions, "conditions.csv", "condition.csv"),
     "log": (io.read_throttle_log, "chirp.csv", "chrip.csv"),
     "MATLAB log": (io.read_throttle_log, "chirp.mat", "chrip.mat"),
     "parameters": (ParameterFile.read, "lag.toml", "lagg.toml"),

@@ -14,18 +14,16 @@ from matplotlib.figure import Figure
 
 from mgdd import datasets, presets
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import (
-    FirstPrincipleModel,
-    SmoothThrottle,
-    fit_cylinder,
-    fit_first_principle,
-    fit_ode,
-    identify_throttle,
-)
+from mgdd.identify import fit_cylinder, fit_ode, identify_throttle
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.optimize.fit_options import fit_options
-from mgdd.results import Finding, Fit, Model
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality
+from mgdd.results.model import Model
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.throttle import PseudoWiener
 
@@ -51,7 +49,7 @@ def fits() -> dict[str, Fit]:
         "first_principle": fit_first_principle(log(), test=log(), options=once),
         "pw_r": identify_throttle(log(), test=log(), limp_home_deg=8.0, options=once),
         "ode": fit_ode(lag, record, **start),
-        "cylinder": fit_cylinder(datasets.load("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),
+        "cylinder": fit_cylinder(datasets.read("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),
     }
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from mgdd import _core
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
-from mgdd.identify import OdeModel, SmoothThrottle, fit_ode
+from mgdd.identify import OdeModel, fit_ode
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions
 
 

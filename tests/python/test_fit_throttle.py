@@ -7,16 +7,13 @@ import pytest
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import (
-    FirstPrincipleModel,
-    SmoothThrottle,
-    fit_first_principle,
-)
-from mgdd.identify.throttle.first_principle_model import TYPICAL
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import regression_start
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.results import Model
+from mgdd.results.model import Model
 
 TRUTH = {
     "tau_s": 0.0197,

@@ -13,13 +13,8 @@ from mgdd.engine import OperatingPoint
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import FeedForward
 from mgdd.loop import EngineBench, run_seeker
-from mgdd.optimize import (
-    ComponentLag,
-    ExtremumSeeking,
-    Limit,
-    Optimum,
-    Spsa,
-)
+from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Spsa
+from mgdd.optimize.optimum import Optimum
 
 SPACE: dict[str, Any] = {"start": -20.0, "lower": -30.0, "upper": 10.0}
 

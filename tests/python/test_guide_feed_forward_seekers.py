@@ -13,16 +13,8 @@ import numpy as np
 import pytest
 
 from mgdd.guide import FeedForward
-from mgdd.optimize import (
-    BoundedSeeking,
-    ExtremumSeeking,
-    GoldenSection,
-    GradientDescent,
-    Limit,
-    NewtonSeeking,
-    Optimum,
-    Spsa,
-)
+from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, Limit, NewtonSeeking, Spsa
+from mgdd.optimize.optimum import Optimum
 
 SPACE: dict[str, Any] = {"start": -20.0, "lower": -30.0, "upper": 10.0}
 SEEKERS: dict[str, Callable[..., Any]] = {

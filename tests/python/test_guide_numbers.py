@@ -13,7 +13,8 @@ import pytest
 from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
 from mgdd.guide import FeedForward, ModelOptimum
-from mgdd.optimize import ExtremumSeeking, Optimum
+from mgdd.optimize import ExtremumSeeking
+from mgdd.optimize.optimum import Optimum
 
 CYLINDER = presets.load("puma_single", kind="engine").cylinder
 SEEDS, SETTLED, AFTER, JUDGED = 24, 600, 800, 200

@@ -158,7 +158,7 @@ def test_an_engine_that_is_not_quite_the_guide_is_in_the_interval(
 @pytest.mark.parametrize("method", ["gauss_newton", "recursive", "extremum_seeking"])
 def test_a_measured_trace_does_not_determine_the_wall_heat(method: str) -> None:
     preset = presets.load("hd_diesel_128x144")
-    for record in datasets.load("hd_diesel_128x144"):
+    for record in datasets.read("hd_diesel_128x144"):
         load = fit_cylinder([record], preset.cylinder).loads[0]
         angle, pressure = record["crank_angle_cad"].values, record["pressure_bar"].values
         closed = {"ivc_cad": float(np.ceil(angle[0])), "evo_cad": float(np.floor(angle[-1])), "wall_heat_scale": 0.5}

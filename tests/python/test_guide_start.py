@@ -14,7 +14,8 @@ from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
 from mgdd.loop import EngineBench, run_seeker
-from mgdd.optimize import ExtremumSeeking, NewtonSeeking, Optimum, Seeker, Spsa
+from mgdd.optimize import ExtremumSeeking, NewtonSeeking, Seeker, Spsa
+from mgdd.optimize.optimum import Optimum
 
 START_CAD, GUIDE_CAD, PLANT_BEST_CAD = -18.0, -1.53, -5.63
 SPACE: dict[str, Any] = {"start": START_CAD, "lower": -30.0, "upper": 10.0}

@@ -12,6 +12,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from mgdd import _core, datasets
+from mgdd.datasets.files import path
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import FitOptions
 from mgdd.results import Fit
@@ -23,7 +24,7 @@ from mgdd.studies.benchmarks.wiener_hammerstein import WienerHammersteinFit, fit
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {
-    name: pytest.mark.skipif(name not in datasets.available(), reason=f"MGDD_DATA_DIR holds no folder {name}")
+    name: pytest.mark.skipif(name not in datasets.names(), reason=f"MGDD_DATA_DIR holds no folder {name}")
     for name in SETS
 }
 SLIDE = {"mass_kg": 90.0, "viscous_ns_per_m": 200.0, "coulomb_n": 21.0, "offset_n": 1.0}
@@ -215,7 +216,7 @@ def test_missing_sets_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MGDD_DATA_DIR", raising=False)
     for name in ("emps", "cascaded_tanks", "wh2009"):
         with pytest.raises(FileNotFoundError, match="MGDD_DATA_DIR"):
-            datasets.load(name)
+            datasets.read(name)
     with pytest.raises(DataError, match="at least one of emps, cascaded_tanks, wh2009"):
         run_study("identification-benchmarks", quick=True)
 
@@ -226,15 +227,15 @@ def test_a_file_that_is_another_is_refused(tmp_path: Path, monkeypatch: pytest.M
     file = tmp_path / "wh2009" / "WienerHammerBenchmark.csv"
     file.write_text("a,b\n1,2\n")
     with pytest.raises(DataError, match="uBenchMark, yBenchMark were expected"):
-        datasets.load("wh2009")
+        datasets.read("wh2009")
     file.write_text('"uBenchMark","yBenchMark",\n1,2,\n1,2,\n')
     with pytest.raises(DataError, match="needs 184000"):
-        datasets.load("wh2009")
+        datasets.read("wh2009")
 
 
 @needs["emps"]
 def test_emps_inverse_dynamics_and_free_run() -> None:
-    train, test = datasets.load("emps")
+    train, test = datasets.read("emps")
     found = drive_inverse_dynamics(train, directional=False)
     # Figures of an independent inverse-dynamics fit with the same filter.
     assert found["mass_kg"] == pytest.approx(95.138, abs=0.1)
@@ -251,7 +252,7 @@ def test_emps_inverse_dynamics_and_free_run() -> None:
 
 @needs["cascaded_tanks"]
 def test_cascaded_tanks_from_the_stated_window() -> None:
-    train, test = datasets.load("cascaded_tanks")
+    train, test = datasets.read("cascaded_tanks")
     fit = fit_two_tanks(train)
     assert fit.train.rmse == pytest.approx(0.1537, abs=5e-4)
     assert fit.report.rmse == pytest.approx(fit.train.rmse, rel=1e-9)
@@ -267,7 +268,7 @@ def test_cascaded_tanks_from_the_stated_window() -> None:
 @pytest.mark.slow
 @needs["wh2009"]
 def test_the_circuit_below_a_millivolt() -> None:
-    train, test = datasets.load("wh2009")
+    train, test = datasets.read("wh2009")
     assert (train.sizes["time_s"], test.sizes["time_s"]) == (100_000, 78_800)
     fit = fit_wiener_hammerstein(train.isel(time_s=slice(0, 20_000)), scan_samples=8000, follow=8)
     error = (fit.model.simulate(test)["output_v"] - test["output_v"]).to_numpy()[50:]
@@ -278,7 +279,7 @@ def test_the_circuit_below_a_millivolt() -> None:
 
 @needs["cascaded_tanks"]
 def test_study_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    source = datasets.path("cascaded_tanks", "dataBenchmark.csv")
+    source = path("cascaded_tanks", "dataBenchmark.csv")
     (tmp_path / "cascaded_tanks").symlink_to(source.parent)
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     result = run_study("identification-benchmarks", quick=True)

@@ -46,7 +46,7 @@ def plant(noise_bar=0.0, seed=0):
 
 @functools.cache
 def measured(law):
-    return fit_cylinder(datasets.load("hd_diesel_128x144"), HD.replace(**LAWS[law]), bounds=ANY_START)
+    return fit_cylinder(datasets.read("hd_diesel_128x144"), HD.replace(**LAWS[law]), bounds=ANY_START)
 
 
 @functools.cache
@@ -122,7 +122,7 @@ def test_measured_traces_meet_the_reference_fits(root):
     lines = (root / "tests/data/engine_golden.csv").read_text().splitlines()
     rows = [line.split(",") for line in lines if ",fit_" in line]
     assert len(rows) > 30
-    with_mass, fits, wrong = datasets.load("hd_diesel_128x144"), {}, []
+    with_mass, fits, wrong = datasets.read("hd_diesel_128x144"), {}, []
     # Without a mass the point's temperature and the cylinder's volumetric efficiency give the charge.
     without = [t.drop_attrs().assign_attrs(file=t.file, speed_rpm=1200.0) for t in with_mass]
     for text, name, value, tolerance in rows:

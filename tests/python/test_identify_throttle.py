@@ -14,15 +14,15 @@ from mgdd.identify import identify_throttle, load_throttle_model, validate_throt
 from mgdd.io import throttle_log
 from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import FitOptions
-from mgdd.results import Model
+from mgdd.results.model import Model
 from mgdd.signals import amplitude_random_steps, chirp, triangle
-from mgdd.throttle import PseudoWiener, Throttle, simulate
+from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle
 
 P1 = Throttle()
 
 
 def measured(signal: Any, name: str, seed: int) -> Any:
-    run = simulate(P1, signal["duty"], time_s=signal["time_s"])
+    run = simulate_throttle(P1, signal["duty"], time_s=signal["time_s"])
     noise = 0.03 * np.random.default_rng(seed).standard_normal(run.sizes["time_s"])
     return throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise, name=name)
 
@@ -77,7 +77,7 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
 @pytest.mark.slow
 def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
     signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
-    run = simulate(P1, signal["duty"], time_s=signal["time_s"])  # 1 ms of lag, worth 0.08 deg RMS
+    run = simulate_throttle(P1, signal["duty"], time_s=signal["time_s"])  # 1 ms of lag, worth 0.08 deg RMS
     noise = np.random.default_rng(1).standard_normal(run.sizes["time_s"])
     for noise_deg, kept in ((0.03, True), (0.7, False)):
         log = throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise_deg * noise)

@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError
-from mgdd.identify import FirstPrincipleModel, identify_throttle, load_throttle_model
+from mgdd.identify import identify_throttle, load_throttle_model
 from mgdd.identify.throttle.block_losses import block_losses, certainly_less
 from mgdd.identify.throttle.delay_report import with_delay
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.noise_ceiling import noise_of
 from mgdd.io import throttle_log
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import PseudoWiener, Throttle, simulate
+from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle
 
 sys.path.append(str(Path(__file__).parent / "support"))
 from throttle_bodies import draw_body, make_logs
@@ -214,7 +215,7 @@ def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
 
 def test_a_short_noise_free_log_keeps_the_lag_of_the_motor_and_no_delay() -> None:
     signal = chirp(2.0, offset=0.02, amplitude=0.3)
-    run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
     fit = identify_throttle(throttle_log(run["time_s"], run["duty"], run["angle_deg"]), options=FitOptions(n_starts=1))
     assert fit.parameters["delay_samples"] == 0.0
     assert fit.parameters["electrical_s"] == pytest.approx(1e-3, rel=0.1)
@@ -257,7 +258,7 @@ def test_a_long_delay_is_found_and_its_controller_takes_it(delay: int) -> None:
     rng, time = np.random.default_rng(3), np.arange(4000) * 1e-3
     duty = np.repeat(rng.uniform(-0.6, 0.9, 25), 160)
     late = np.concatenate([np.full(delay, duty[0]), duty[:-delay]])
-    angle = simulate(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
+    angle = simulate_throttle(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
     log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
     fit = identify_throttle(log, options=FitOptions(n_starts=1))
     assert fit.kind == "first_principle"
@@ -279,7 +280,7 @@ def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(
     rng, time = np.random.default_rng(3), np.arange(4000) * 1e-3
     duty = np.repeat(rng.uniform(-0.6, 0.9, 25), 160)
     late = np.concatenate([np.full(delay, duty[0]), duty[:-delay]])
-    angle = simulate(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
+    angle = simulate_throttle(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
     log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
     fit = identify_throttle(log, "first_principle", delay_samples=tried, options=FitOptions(n_starts=1))
     assert fit.parameters["delay_samples"] == (tried[-1] if end == "longest" else tried[0])

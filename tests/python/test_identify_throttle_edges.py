@@ -12,19 +12,20 @@ import xarray as xr
 from mgdd import presets
 from mgdd.cli import main
 from mgdd.errors import ParameterError
-from mgdd.identify import FirstPrincipleModel, design_excitation, identify_throttle, validate_throttle
+from mgdd.identify import design_excitation, identify_throttle, validate_throttle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.limp_home import doubts
-from mgdd.io import throttle_log, write_throttle_log
+from mgdd.io import throttle_log, write_csv
 from mgdd.optimize import FitOptions
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import Throttle, characteristics, simulate
+from mgdd.throttle import Throttle, characteristics, simulate_throttle
 
 NOISE_DEG = 0.03
 
 
 def measured(throttle: Throttle, duty: np.ndarray, *, start_deg: float | None = None, delay: int = 0) -> xr.Dataset:
     acting = np.concatenate([np.full(delay, duty[0]), duty[: duty.size - delay]])
-    run = simulate(throttle, acting, start_deg=start_deg)
+    run = simulate_throttle(throttle, acting, start_deg=start_deg)
     noise = np.random.default_rng(3).normal(0.0, NOISE_DEG, duty.size)
     return throttle_log(run["time_s"].to_numpy(), duty, run["angle_deg"].to_numpy() + noise)
 
@@ -42,7 +43,7 @@ def p1() -> Throttle:
 def test_a_coarser_log_is_fitted_and_validated(p1: Throttle, tmp_path: Path, every: int) -> None:
     log = measured(p1, swing()).isel(time_s=slice(None, None, every))
     file, out = tmp_path / "log.csv", tmp_path / "fit.toml"
-    write_throttle_log(log, file)
+    write_csv(log, file)
     assert main(["throttle", "identify", str(file), "--output", str(out)]) == 0
     assert main(["throttle", "validate", str(out), str(file), "--json", "--output", str(tmp_path / "v.json")]) == 0
     report = validate_throttle(FirstPrincipleModel(), log)

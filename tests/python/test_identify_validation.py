@@ -12,14 +12,16 @@ from hypothesis.extra.numpy import arrays
 
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.n_step import n_step_rms
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.signals.metrics import mse
+from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
 from mgdd.signals.model import RunInputs, SampledModel
-from mgdd.throttle import Throttle, simulate
+from mgdd.throttle import Throttle, simulate_throttle
 
 TIME = np.arange(6000) * 1e-3
 RNG = np.random.default_rng(7)
@@ -33,8 +35,8 @@ def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> No
     assert signals.nrmse_fit_percent(y, y) == 100.0
     assert signals.nrmse_fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
     assert signals.nrmse_fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
-    assert signals.vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
-    assert signals.rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
+    assert vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
+    assert rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
     assert mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
 
 
@@ -43,7 +45,7 @@ def test_the_metrics_exactly() -> None:
     assert abs(signals.nrmse_fit_percent(y, y) - 100.0) <= 1e-12
     assert abs(signals.nrmse_fit_percent(y, np.full_like(y, y.mean()))) <= 1e-12
     assert signals.nrmse_fit_percent(y, -y) < 0.0
-    assert abs(signals.vaf_percent(y, y + 3.0) - 100.0) <= 1e-12
+    assert abs(vaf_percent(y, y + 3.0) - 100.0) <= 1e-12
     assert signals.nrmse_fit_percent(y, y + 3.0) < 0.0
 
 
@@ -51,7 +53,7 @@ def test_the_metrics_refuse_what_has_no_answer() -> None:
     with pytest.raises(DataError, match="constant"):
         signals.nrmse_fit_percent(np.ones(5), np.ones(5))
     with pytest.raises(DataError, match="second signal, sample 2: nan"):
-        signals.rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
+        rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
     with pytest.raises(ShapeError, match="must be equal"):
         mse(np.zeros(4), np.zeros(5))
     with pytest.raises(ShapeError, match="not empty"):
@@ -63,7 +65,7 @@ def test_white_residuals_pass_as_often_as_they_should() -> None:
     passed, inside = 0, []
     for _ in range(200):
         noise = rng.standard_normal((2, 1500))
-        tests = signals.residual_tests(noise[0], noise[1])
+        tests = residual_tests(noise[0], noise[1])
         passed += tests.white
         inside += [tests.share_white, tests.share_independent]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.01)
@@ -73,9 +75,9 @@ def test_white_residuals_pass_as_often_as_they_should() -> None:
 def test_memory_and_what_the_input_explains_are_found() -> None:
     noise = RNG.standard_normal((2, 4000))
     slow = np.convolve(noise[0], [1.0, 0.8, 0.4])[:4000]
-    assert not signals.residual_tests(slow, noise[1]).white
+    assert not residual_tests(slow, noise[1]).white
     driven = noise[0] + 0.3 * np.roll(noise[1], 5)
-    tests = signals.residual_tests(driven, noise[1])
+    tests = residual_tests(driven, noise[1])
     assert tests.share_independent < 1.0
     assert int(np.argmax(np.abs(tests.correlations["cross_correlation"].to_numpy()))) + 1 == 5
     assert float(tests.correlations["cross_correlation"][4]) == pytest.approx(0.3 / np.hypot(1.0, 0.3), abs=0.05)
@@ -84,13 +86,13 @@ def test_memory_and_what_the_input_explains_are_found() -> None:
 
 def test_residual_tests_refuse_too_little() -> None:
     with pytest.raises(DataError, match="100 samples"):
-        signals.residual_tests(np.arange(99.0), np.arange(99.0))
+        residual_tests(np.arange(99.0), np.arange(99.0))
     with pytest.raises(DataError, match="residual is constant"):
-        signals.residual_tests(np.ones(200), np.arange(200.0))
+        residual_tests(np.ones(200), np.arange(200.0))
     with pytest.raises(DataError, match="duty is constant"):
-        signals.residual_tests(np.arange(200.0), np.ones(200))
+        residual_tests(np.arange(200.0), np.ones(200))
     with pytest.raises(ParameterError, match="lags = 0"):
-        signals.residual_tests(np.arange(200.0), np.arange(200.0), lags=0)
+        residual_tests(np.arange(200.0), np.arange(200.0), lags=0)
 
 
 def log(angle: np.ndarray | None = None, duty: np.ndarray | None = None) -> Any:
@@ -283,14 +285,15 @@ def test_a_fit_in_percent_has_one_definition(how: str) -> None:
     train, test = (
         throttle_log(run["time_s"], run["duty"], run["angle_deg"] + 0.03 * rng.standard_normal(run.sizes["time_s"]))
         for run in (
-            simulate(Throttle(), signals.chirp(4.0, offset=0.15, amplitude=swing)["duty"]) for swing in (0.2, 0.15)
+            simulate_throttle(Throttle(), signals.chirp(4.0, offset=0.15, amplitude=swing)["duty"])
+            for swing in (0.2, 0.15)
         )
     )
     once = FitOptions(n_starts=1)
     fits = {
         "identify_throttle": lambda: identify.identify_throttle(train, test=test, options=once),
-        "fit_first_principle": lambda: identify.fit_first_principle(train, test=test, options=once),
-        "fit_pseudo_wiener": lambda: identify.fit_pseudo_wiener(train, limp_home_deg=8.0, options=once),
+        "fit_first_principle": lambda: fit_first_principle(train, test=test, options=once),
+        "fit_pseudo_wiener": lambda: fit_pseudo_wiener(train, limp_home_deg=8.0, options=once),
     }
     fit = fits[how]()
     assert fit.train == identify.validate_throttle(fit.model, train).quality

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.io import pressure_trace, read_conditions, read_pressure, write_pressure
+from mgdd.io import pressure_trace, read_pressure, write_csv
+from mgdd.io.point_table import read_conditions
 from mgdd.io.pressure_checks import check_trace
 from mgdd.results.labels import ANGLE, check_labels
 
@@ -95,7 +96,7 @@ def test_write_then_read_is_exact(tmp_path_factory, values, step, start):
     pressure = np.array(values)
     pressure[np.argmin(np.abs(angle))] = 100.0  # somewhere near TDC it must look like an engine
     trace = pressure_trace(angle, pressure, name="trace.csv")
-    write_pressure(trace, path)
+    write_csv(trace, path)
     assert read_pressure(path).identical(trace)
 
 
@@ -278,9 +279,9 @@ def test_a_refused_write_leaves_the_old_file(file):
     path = file("old")
     trace = pressure_trace(ANGLES, BAR)
     with pytest.raises(DataError, match="highest pressure"):
-        write_pressure(trace.assign(pressure_bar=trace["pressure_bar"] * 0.0), path)
-    with pytest.raises(DataError, match=r"no pressure_bar\(crank_angle_cad\): make one with mgdd.io.pressure_trace"):
-        write_pressure(trace.drop_vars("pressure_bar"), path)
+        write_csv(trace.assign(pressure_bar=trace["pressure_bar"] * 0.0), path)
+    with pytest.raises(DataError, match=r"no pressure_bar\(crank_angle_cad\) and no time_s: make a trace with"):
+        write_csv(trace.drop_vars("pressure_bar"), path)
     assert path.read_text() == "old"
 
 

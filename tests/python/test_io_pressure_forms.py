@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from mgdd import datasets
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ShapeError
-from mgdd.io import pressure_trace, read_pressure, write_pressure
+from mgdd.io import pressure_trace, read_pressure, write_csv
 from mgdd.io.column_names import heading
 from mgdd.io.pressure_checks import to_bar
 from mgdd.results.labels import ANGLE, check_labels
 
 Array = NDArray[np.float64]
-MEASURED = datasets.load("hd_diesel_128x144")
+MEASURED = datasets.read("hd_diesel_128x144")
 CLOSED, BAR = MEASURED[1][ANGLE].to_numpy(), MEASURED[1]["pressure_bar"].to_numpy()
 # Five whole cycles: the measured closed part of one load, each 1 % higher than the last, gas exchange at 2 bar and,
 # later, 2.2 bar, so that neither cycles nor halves of them look alike.
@@ -455,9 +455,9 @@ def test_many_cycles_are_written_and_read_bit_by_bit(
     noise = np.random.default_rng(seed).normal(0.0, 0.5, (count, angle.size))
     trace = pressure_trace(angle, 60.0 - 0.02 * angle**2 + noise, name="cycles.csv")
     path = tmp_path_factory.mktemp("cycles") / "cycles.csv"
-    write_pressure(trace, path)
+    write_csv(trace, path)
     assert read_pressure(path).identical(trace)
-    write_pressure(trace.transpose(), path)
+    write_csv(trace.transpose(), path)
     assert read_pressure(path).identical(trace)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io import read_throttle_log, throttle_log, write_throttle_log
+from mgdd.io import read_throttle_log, throttle_log, write_csv
 from mgdd.io.throttle_checks import check_sides, check_throttle_log
 
 TIME = np.arange(1200) * 1e-3
@@ -46,7 +46,7 @@ def test_arrays_are_copied_and_labelled() -> None:
 def test_csv_round_trip_is_bit_exact(tmp_path: Path) -> None:
     made = log(np.arange(1200) / 1.7e3 + 17.1, current_a=DUTY * 8.0, supply_v=np.full(1200, 13.8), name="log.csv")
     for dataset in (made, made.drop_vars("supply_v")):
-        write_throttle_log(dataset, tmp_path / "log.csv")
+        write_csv(dataset, tmp_path / "log.csv")
         assert read_throttle_log(tmp_path / "log.csv").identical(dataset)
 
 
@@ -54,7 +54,7 @@ def test_a_refused_log_leaves_the_file(file: Path) -> None:
     before = file.read_bytes()
     bad = log().assign(duty=("time_s", DUTY * 9.0, log()["duty"].attrs))
     with pytest.raises(DataError, match="beyond ±1"):
-        write_throttle_log(bad, file)
+        write_csv(bad, file)
     assert file.read_bytes() == before
 
 

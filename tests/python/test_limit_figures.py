@@ -23,7 +23,8 @@ from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
-from mgdd.surrogate import fit_surrogate, random_step_records
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
 
 SPACE = {"start": -20.0, "lower": -30.0, "upper": 10.0}
 

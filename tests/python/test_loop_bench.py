@@ -15,7 +15,8 @@ from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performanc
 from mgdd.errors import ParameterError, RigError, ShapeError
 from mgdd.loop import EngineBench, Measurement, SensorDynamics
 from mgdd.results.labels import check_labels
-from mgdd.rig import Rig, SimulatedRig
+from mgdd.rig import SimulatedRig
+from mgdd.rig.base import Rig
 
 QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
 SILENT = SensorDynamics(delay_s=3.0, lag_s=2.0)

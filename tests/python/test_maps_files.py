@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from map_cases import FUEL, SPEED, sweep, timing_table
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.io.files import write_whole
-from mgdd.maps import CalibrationMap, optimize_map, read_dcm, read_map, smooth_map, write_dcm, write_map
+from mgdd.maps import CalibrationMap, optimize_map, read_dcm, read_map, smooth_map, write_map
 
 FOREIGN = Path(__file__).parents[1] / "data" / "foreign.dcm"
 
@@ -54,7 +54,7 @@ def whole(table: CalibrationMap) -> CalibrationMap:
 def test_a_dcm_file_gives_axes_values_and_units_back(tmp_path: Path) -> None:
     table = whole(curve())
     other = CalibrationMap({"speed_rpm": SPEED, "fuel_mg": FUEL}, np.arange(15.0).reshape(3, 5) / 3.0, name="torque_nm")
-    write_dcm([table, other], tmp_path / "all.dcm", values={"idle_rpm": (850.0, "rpm")})
+    write_map([table, other], tmp_path / "all.dcm", values={"idle_rpm": (850.0, "rpm")})
     back = read_dcm(tmp_path / "all.dcm")
     assert list(back.maps) == ["soc_cad", "torque_nm"]
     np.testing.assert_array_equal(back.maps["torque_nm"].values, other.values)
@@ -156,7 +156,7 @@ def test_the_layout_of_other_tools_is_read() -> None:
 
 def test_labels_and_axes_that_no_map_can_be_called_cost_nothing_else(tmp_path: Path) -> None:
     file = tmp_path / "tool.dcm"
-    write_dcm({"Soc-Warm/2": whole(curve()), "SocBase": whole(curve())}, file)
+    write_map({"Soc-Warm/2": whole(curve()), "SocBase": whole(curve())}, file)
     text = file.read_text(encoding="utf-8").replace("*SSTX   fuel_mg", "*SSTX   m fuel / 2", 1)
     head, tail = text.rsplit("*SSTX   fuel_mg", 1)
     file.write_text(f"{head}*SSTX   fuel quantity (mg){tail}", encoding="utf-8")
@@ -192,7 +192,7 @@ def test_a_reader_of_other_hands_reads_ours_and_we_read_what_it_writes(tmp_path:
     pytest.importorskip("dcmReader", reason="dcmreader is not installed: see the group test")
     best = optimize_map(sweep(), "efficiency_gross", provenance={"from": 'the "closed form"'})
     one, two = tmp_path / "ours.dcm", tmp_path / "theirs.dcm"
-    write_dcm({"SocBase": best, "SocWarm": curve()}, one, values={"N_Idle": (850.5, "1/min")})
+    write_map({"SocBase": best, "SocWarm": curve()}, one, values={"N_Idle": (850.5, "1/min")})
     run = subprocess.run([sys.executable, "-c", READER, str(one), str(two)], check=True, capture_output=True, text=True)
     found = json.loads(run.stdout)
     assert found["values"] == {"N_Idle": [850.5, "1/min"]}
@@ -338,11 +338,14 @@ def test_what_cannot_be_written_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no quotes"):
         write_map(quoted, tmp_path / "map.dcm")
     with pytest.raises(DataError, match="twice"):
-        write_dcm([curve(), curve()], tmp_path / "map.dcm")
+        write_map([curve(), curve()], tmp_path / "map.dcm")
     with pytest.raises(DataError, match="value idle = nan"):
-        write_dcm([], tmp_path / "map.dcm", values={"idle": (np.nan, "rpm")})
+        write_map([], tmp_path / "map.dcm", values={"idle": (np.nan, "rpm")})
     with pytest.raises(ParameterError, match=r"map\.xls: a map is written to and read from \.csv"):
         write_map(curve(), tmp_path / "map.xls")
+    for several in ({"table": [curve(), curve()]}, {"table": curve(), "values": {"idle": (850.0, "rpm")}}):
+        with pytest.raises(ParameterError, match=r"holds one map; several, and single values, go into a \.dcm file"):
+            write_map(**several, path=tmp_path / "map.csv")
     with pytest.raises(FileNotFoundError):
         read_map(tmp_path / "map.csv")
     assert list(tmp_path.iterdir()) == []

@@ -16,8 +16,9 @@ import pytest
 
 from file_mutants import judged, mutant_of_bytes, mutant_of_text
 from map_cases import timing_table
-from mgdd.identify import FirstPrincipleModel, load_throttle_model
-from mgdd.io import read_conditions
+from mgdd.identify import load_throttle_model
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.io.point_table import read_conditions
 from mgdd.maps import CalibrationMap, read_map, write_map
 from mgdd.maps.cells import MapTask
 from mgdd.results.units import attribute_units

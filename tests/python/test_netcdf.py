@@ -19,18 +19,23 @@ from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
-from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
+from mgdd.engine import Cylinder, OperatingPoint, analyze, sensitivities, simulate, timing_sweep
+from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
-from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
-from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, track, track_many
+from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_csv
+from mgdd.loop import EngineBench, ThrottleFault, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
-from mgdd.results import FitReport
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import check_labels
-from mgdd.rig import RingTransport, SimulatedRig
+from mgdd.rig import SimulatedRig
+from mgdd.rig.realtime import RingTransport
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.sweep import sweep
-from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
-from mgdd.throttle import simulate as simulate_throttle
+from mgdd.throttle import DemandChain, PseudoWiener, SensorPair, Throttle, characteristics, simulate_throttle
 from realtime_loops import make_loop
 from study_cache import quick_study
 
@@ -45,12 +50,12 @@ def log() -> xr.Dataset:
 
 
 def written_log(folder: Path) -> xr.Dataset:
-    write_throttle_log(log(), folder / "log.csv")
+    write_csv(log(), folder / "log.csv")
     return read_throttle_log(folder / "log.csv")
 
 
 def pressures(folder: Path) -> xr.Dataset:
-    trace = datasets.load("hd_diesel_128x144")[0]
+    trace = datasets.read("hd_diesel_128x144")[0]
     columns = np.column_stack([trace["crank_angle_cad"], trace["pressure_bar"]])
     np.savetxt(folder / "trace.csv", columns, delimiter=",")
     return read_pressure(folder / "trace.csv")
@@ -101,12 +106,12 @@ def taught() -> OnlineCalibration:
 
 
 def validation() -> ThrottleValidation:
-    model = identify.FirstPrincipleModel()
+    model = FirstPrincipleModel()
     return identify.validate_throttle(model, log())
 
 
-def of_records() -> surrogate.EngineSurrogate:
-    return surrogate.fit_surrogate(surrogate.random_step_records(1500))
+def of_records() -> EngineSurrogate:
+    return surrogate.fit_surrogate(random_step_records(1500))
 
 
 def planned(**options: Any) -> xr.Dataset:
@@ -136,7 +141,7 @@ def loop_samples() -> xr.Dataset:
 
 
 def wall_heat() -> xr.Dataset:
-    traces = datasets.load("hd_diesel_128x144")[:2]
+    traces = datasets.read("hd_diesel_128x144")[:2]
     fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
     return identify.wall_heat_profile(fit, scales=[0.5, 1.0]).dataset
 
@@ -146,7 +151,7 @@ def report() -> FitReport:
 
 
 def fitted_load() -> xr.Dataset:
-    fit = identify.fit_cylinder(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
+    fit = identify.fit_cylinder(datasets.read("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
     return fit.loads[0].overlay
 
 
@@ -154,8 +159,8 @@ SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", 
 NEEDS = ("advisor_engine_maps", "cascaded_tanks", "emps", "h2df_502", "wh2009")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
-    "datasets.load": lambda _: datasets.load("hd_diesel_128x144"),
-    **{f"datasets.load.{name}": lambda _, n=name: datasets.load(n) for name in NEEDS},
+    "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
+    **{f"datasets.read.{name}": lambda _, n=name: datasets.read(n) for name in NEEDS},
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
     "engine.convergence": lambda _: convergence(Cylinder(), POINT),
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),
@@ -181,17 +186,17 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "results.FitReport.dataset": lambda _: report().dataset,
-    "results.Fit.dataset": lambda _: identify.fit_first_principle(
+    "results.Fit.dataset": lambda _: fit_first_principle(
         log(), options=optimize.FitOptions(n_starts=1)
     ).dataset,
-    "results.Fit.run": lambda _: identify.fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
+    "results.Fit.run": lambda _: fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "guide.FeedForward.history": lambda _: guided().history,
     "guide.GuidedEngine.history": lambda _: guided_engine().history,
     "guide.OnlineCalibration.history": lambda _: taught().history,
     "guide.TimingMap.to_dataset": lambda _: TimingMap({"fuel_mg": [6.0, 20.0]}, -5.0).to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
-    "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),
+    "surrogate.random_step_records": lambda _: random_step_records(50),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
     "io.read_pressure": pressures,
     "io.read_throttle_log": written_log,
@@ -217,11 +222,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     ],
     "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),
-    "throttle.holding_duty": lambda _: holding_duty(Throttle()),
     "throttle.SensorPair.sense": lambda _: SensorPair().sense(
-        simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[SensorFault(kind="open_wire", sensor=2)]
+        simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[ThrottleFault(kind="open_wire", sensor=2)]
     ),
-    "throttle.simulate": lambda _: [
+    "throttle.simulate_throttle": lambda _: [
         simulate_throttle(Throttle(), 0.3, duration_s=0.2, start_deg=start) for start in (None, [0.0, 20.0])
     ],
 }  # fmt: skip
@@ -259,7 +263,7 @@ def test_every_public_source_of_a_dataset_is_here() -> None:
 @pytest.mark.parametrize("source", sorted(MADE))
 def test_written_and_read_back(source: str, tmp_path: Path) -> None:
     needed = source.rpartition(".")[2]
-    if needed in NEEDS and needed not in datasets.available():
+    if needed in NEEDS and needed not in datasets.names():
         pytest.skip(f"MGDD_DATA_DIR holds no folder {needed}")
     made = MADE[source](tmp_path)
     for dataset in [made] if isinstance(made, xr.Dataset) else made:

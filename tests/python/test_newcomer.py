@@ -19,7 +19,7 @@ DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * (0.5 * TIME + 0.6 * TIME**2))
 
 
 def frame() -> pd.DataFrame:
-    return mgdd.throttle.simulate("P1", DUTY, time_s=TIME).to_dataframe()
+    return mgdd.throttle.simulate_throttle("P1", DUTY, time_s=TIME).to_dataframe()
 
 
 def test_simulate_a_preset_by_name_at_a_speed() -> None:
@@ -32,8 +32,8 @@ def test_simulate_a_preset_by_name_at_a_speed() -> None:
         mgdd.engine.simulate(preset.cylinder, preset.point.replace(speed_rpm=1200)),
     ):
         xr.testing.assert_identical(run, other)
-    throttle = mgdd.throttle.simulate("P1", 0.6)
-    xr.testing.assert_identical(throttle, mgdd.throttle.simulate(mgdd.presets.load("P1"), 0.6))
+    throttle = mgdd.throttle.simulate_throttle("P1", 0.6)
+    xr.testing.assert_identical(throttle, mgdd.throttle.simulate_throttle(mgdd.presets.load("P1"), 0.6))
 
 
 def test_plot_it() -> None:
@@ -48,7 +48,7 @@ def test_sweep_two_inputs_and_fit_a_response() -> None:
     assert fit.success
     assert fit.residual.shape == (12,)
     assert fit.covariance.shape == (len(fit.report.names),) * 2
-    mgdd.plot.response_diagnostics(fit)
+    fit.plot()
     at = fit.model.predict({"speed_rpm": [1200.0], "soc_cad": [-6.0]})
     assert 5.0 < float(at["mean"][0]) < 15.0
 
@@ -99,7 +99,7 @@ def test_look_a_map_up_at_a_point() -> None:
 
 
 def test_track_a_step_with_a_fitted_model() -> None:
-    fit = mgdd.identify.fit_first_principle(frame(), options=mgdd.optimize.FitOptions(n_starts=1))
+    fit = mgdd.identify.identify_throttle(frame(), "first_principle", options=mgdd.optimize.FitOptions(n_starts=1))
     controller = mgdd.loop.tuned_controller("guided", fit)
     run = mgdd.loop.track(controller, mgdd.loop.Reference.step(20, 60), throttle="P1")
     assert float(run["settling_ms"]) < 200.0
@@ -117,7 +117,7 @@ def test_save_and_load_each_result(tmp_path: Path) -> None:
     table = mgdd.maps.CalibrationMap({"fuel_mg": [10, 20]}, [1.0, 2.0], name="soc_cad")
     mgdd.maps.write_map(table, tmp_path / "map.csv")
     assert mgdd.maps.read_map(tmp_path / "map.csv") == table
-    fit = mgdd.identify.fit_first_principle(frame(), options=mgdd.optimize.FitOptions(n_starts=1))
+    fit = mgdd.identify.identify_throttle(frame(), "first_principle", options=mgdd.optimize.FitOptions(n_starts=1))
     (tmp_path / "throttle.toml").write_text(fit.to_toml(), encoding="utf-8")
     assert mgdd.identify.load_throttle_model(tmp_path / "throttle.toml") == fit.model
 
@@ -157,8 +157,8 @@ def test_a_model_takes_a_signal_in_any_form(form: str) -> None:
     given = {**SIGNALS, **ARRAYS}[form]()
     xr.testing.assert_identical(model.simulate(given), model.simulate(SIGNALS["mapping"]()))
     if form in SIGNALS:
-        wanted = mgdd.throttle.simulate("P1", DUTY, time_s=TIME)
-        xr.testing.assert_identical(mgdd.throttle.simulate("P1", given), wanted)
+        wanted = mgdd.throttle.simulate_throttle("P1", DUTY, time_s=TIME)
+        xr.testing.assert_identical(mgdd.throttle.simulate_throttle("P1", given), wanted)
         assert mgdd.identify.check_excitation(given, "P1").passed
 
 
@@ -170,7 +170,7 @@ def test_a_signal_without_its_time_is_refused(given: Any) -> None:
 
 def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
     with pytest.raises(mgdd.errors.DataError, match="log have no duty: needed are time_s, duty, angle_deg; given are"):
-        mgdd.identify.fit_first_principle(frame().rename(columns={"duty": "u"}))
+        mgdd.identify.identify_throttle(frame().rename(columns={"duty": "u"}))
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
         (lambda: mgdd.engine.simulate("P1"), "preset 'P1' is a throttle, not an engine"),
         (lambda: mgdd.engine.simulate(3.0), "cylinder = 3.0: must be a Cylinder, a preset, or the name of one"),
         (lambda: mgdd.engine.simulate("puma_single", 1200), r"point = 1200: must be an OperatingPoint.*'speed_rpm'"),
-        (lambda: mgdd.throttle.simulate("puma_single", 0.5), "is an engine, not a throttle"),
+        (lambda: mgdd.throttle.simulate_throttle("puma_single", 0.5), "is an engine, not a throttle"),
         (lambda: mgdd.loop.VirtualThrottle(3.0), "throttle = 3.0: must be a Throttle, a preset, or the name of one"),
         (lambda: mgdd.loop.EngineBench(3.0), "engine = 3.0: must be a Cylinder"),
         (lambda: mgdd.maps.write_map(3.0, "a.csv"), "table = 3.0: must be a CalibrationMap"),
@@ -194,7 +194,7 @@ def test_a_wrong_guess_is_told_the_right_one(wrong: Callable[[], Any], match: st
 
 def test_a_signal_keeps_its_own_time() -> None:
     signal = xr.DataArray(DUTY, {"time_s": 2.0 * TIME}, ["time_s"])
-    np.testing.assert_array_equal(mgdd.throttle.simulate("P1", signal)["time_s"], 2.0 * TIME)
+    np.testing.assert_array_equal(mgdd.throttle.simulate_throttle("P1", signal)["time_s"], 2.0 * TIME)
     wanted = xr.DataArray([20.0, 21.0, 22.0], {"time_s": [0.0, 2e-3, 4e-3]}, ["time_s"])
     run = mgdd.loop.track(mgdd.control.Pid(sample_s=2e-3), wanted)
     np.testing.assert_allclose(run["time_s"], wanted["time_s"], rtol=1e-12)

@@ -14,7 +14,7 @@ from scipy import optimize as scipy_optimize
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.optimize import least_squares
-from mgdd.results import FitReport
+from mgdd.results.fit_report import FitReport
 
 OPTIONS = (
     "max_iterations",

@@ -18,16 +18,19 @@ from mgdd import _core, presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
-from mgdd.identify.throttle.first_principle_model import TYPICAL
+from mgdd.identify import OdeModel, load_throttle_model
+from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.loop import SurrogatePlant
-from mgdd.presets import Preset
+from mgdd.presets.preset import Preset
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
-from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
-from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate_throttle
 
 TIME = 1e-3 * np.arange(300)
 DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))
@@ -199,7 +202,7 @@ def test_a_throttle_preset_simulates_bit_for_bit_after_a_file(values: dict[str, 
     )
     again = Preset.from_toml(preset.to_toml())
     assert again.records == preset.records
-    runs = [simulate(one.throttle, 0.3, duration_s=0.1)["angle_deg"].to_numpy() for one in (preset, again)]
+    runs = [simulate_throttle(one.throttle, 0.3, duration_s=0.1)["angle_deg"].to_numpy() for one in (preset, again)]
     np.testing.assert_array_equal(*runs)
 
 
@@ -219,7 +222,7 @@ def test_a_sensor_pair_comes_back() -> None:
     pair = SensorPair(closed_v=0.4, span_v=4.1, adc_bits=10, noise_v=0.01, lag_s=1e-3, debounce_s=0.1)
     again = SensorPair.from_toml(pair.to_toml())
     assert again == pair
-    run = simulate(Throttle(), 0.3, duration_s=0.2)
+    run = simulate_throttle(Throttle(), 0.3, duration_s=0.2)
     np.testing.assert_array_equal(pair.sense(run)["first_v"], again.sense(run)["first_v"])
     with pytest.raises(ParameterError, match=r"adc_bits: value = 10\.5: must be a whole number"):
         SensorPair.from_toml(pair.to_toml().replace("value = 10,", "value = 10.5,"))

@@ -16,8 +16,7 @@ from mgdd.cli.main import main
 from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
 from mgdd.guide import TimingMap
 from mgdd.io.table import write_traces
-from mgdd.throttle import SensorPair, Throttle
-from mgdd.throttle import simulate as simulate_throttle
+from mgdd.throttle import SensorPair, Throttle, simulate_throttle
 
 DATA = sorted((Path(mgdd.__file__).parent / "data").glob("*.csv"))
 
@@ -27,15 +26,15 @@ def throttle_run() -> xr.Dataset:
 
 
 def of_pressure(path: Path) -> xr.Dataset:
-    trace = datasets.load("hd_diesel_128x144")[0]
-    io.write_pressure(trace, path)
+    trace = datasets.read("hd_diesel_128x144")[0]
+    io.write_csv(trace, path)
     return trace
 
 
 def of_log(path: Path) -> xr.Dataset:
     run = throttle_run()
     log = io.throttle_log(run["time_s"], run["duty"], run["angle_deg"], current_a=run["current_a"])
-    io.write_throttle_log(log, path)
+    io.write_csv(log, path)
     return log
 
 
@@ -58,8 +57,8 @@ def of_map(path: Path) -> xr.Dataset:
 
 WRITERS = {
     "timing map": of_map,
-    "write_pressure": of_pressure,
-    "write_throttle_log": of_log,
+    "write_csv, trace": of_pressure,
+    "write_csv, log": of_log,
     "cycle": of_traces(lambda: simulate(Cylinder(), OperatingPoint())),
     "throttle": of_traces(throttle_run),
     "flags and NaN": of_traces(lambda: SensorPair().sense(throttle_run())),

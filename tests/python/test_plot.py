@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import partial
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -117,8 +118,8 @@ PLOTS = {
     "learning": (learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
-    "pressure of a measurement": (plot.pressure, lambda: datasets.load("hd_diesel_128x144")[3]),
-    "log p-V": (plot.log_pv, analysed),
+    "pressure of a measurement": (plot.pressure, lambda: datasets.read("hd_diesel_128x144")[3]),
+    "log p-V": (partial(plot.pressure, log_pv=True), analysed),
     "overlay": (calibration_overlay, overlay),
     "profile": (wall_heat_profile, profile),
     "timing": (plot.timing, sweep),
@@ -223,13 +224,13 @@ def test_pressure_of_an_analysis_has_net_and_gross():
 
 
 def test_pressure_of_a_measurement_is_named_and_alone():
-    ax = plot.pressure(datasets.load("hd_diesel_128x144")[0])
+    ax = plot.pressure(datasets.read("hd_diesel_128x144")[0])
     assert entries(ax) == ["cylinder pressure, pressure_a25_bar"]
     assert ax.figure.axes == [ax]
 
 
 def test_log_pv_slopes():
-    ax = plot.log_pv(analysed())
+    ax = plot.pressure(analysed(), log_pv=True)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     np.testing.assert_array_equal(line(ax, "cylinder pressure").get_data(), [LITRE, BAR])
     fitted = {
@@ -239,13 +240,13 @@ def test_log_pv_slopes():
     for label, exponent in fitted.items():
         volume, bar = line(ax, label).get_data()
         assert -np.diff(np.log(bar)) / np.diff(np.log(volume)) == pytest.approx(exponent)
-    without = plot.log_pv(analysed().drop_vars(["n_compression", "n_expansion"]))
+    without = plot.pressure(analysed().drop_vars(["n_compression", "n_expansion"]), log_pv=True)
     assert len(without.get_lines()) == 1
 
 
 def test_a_pure_polytrope_lies_on_its_slope():
     data = analysed().assign(pressure_bar=(ANGLE, 3.0 * LITRE**-1.35, analysed()["pressure_bar"].attrs))
-    volume, bar = line(plot.log_pv(data), "compression n = 1.350 (−100 to −40 °CA aTDC)").get_data()
+    volume, bar = line(plot.pressure(data, log_pv=True), "compression n = 1.350 (−100 to −40 °CA aTDC)").get_data()
     np.testing.assert_allclose(bar, 3.0 * volume**-1.35, rtol=1e-12)
 
 
@@ -306,7 +307,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
     ("function", "dataset", "variable", "maker"),
     [
         (plot.pressure, simulated, "pressure_bar", "mgdd.io.read_pressure or mgdd.engine.simulate"),
-        (plot.log_pv, simulated, "volume_l", "mgdd.engine.analyze or mgdd.engine.simulate"),
+        (partial(plot.pressure, log_pv=True), simulated, "volume_l", "mgdd.engine.analyze or mgdd.engine.simulate"),
         (calibration_overlay, overlay, "residual_bar", "mgdd.identify.fit_cylinder"),
         (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
@@ -334,7 +335,7 @@ def test_values_that_cannot_be_drawn_are_refused():
     relative = analysed().assign(pressure_bar=analysed()["pressure_bar"] - 5.0)
     relative["pressure_bar"].attrs = analysed()["pressure_bar"].attrs
     with pytest.raises(DataError, match=r"pressure_bar = .* at -120 °CA aTDC: a logarithm needs > 0; peg"):
-        plot.log_pv(relative)
+        plot.pressure(relative, log_pv=True)
     with pytest.raises(DataError, match=r"soc_cad has shape \(2,\): at least three timings"):
         plot.timing(sweep().isel(soc_cad=slice(2)))
     with pytest.raises(DataError, match="rmse_percent has dimensions"):

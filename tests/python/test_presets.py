@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
-from mgdd.presets import Preset
+from mgdd.presets.preset import Preset
 from mgdd.throttle import Throttle
 
 RECORDS = (Cylinder, OperatingPoint, Throttle)

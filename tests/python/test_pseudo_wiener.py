@@ -11,10 +11,11 @@ import pytest
 import xarray as xr
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import OnlineUpdate, fit_pseudo_wiener
+from mgdd.identify import OnlineUpdate
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results import Model
-from mgdd.studies import StudyResult
+from mgdd.results.model import Model
+from mgdd.studies.base import StudyResult
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3

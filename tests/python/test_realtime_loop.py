@@ -14,7 +14,7 @@ import pytest
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import ParameterError, RigError
 from mgdd.results.labels import check_labels
-from mgdd.rig import LoopMessage, RingTransport
+from mgdd.rig.realtime import LoopMessage, RingTransport
 from realtime_loops import becomes, driving, go, make_loop
 from throttle_node import ANGLE, PERIOD_S, SENSORS, STATUS, ThrottleNode, patient_envelope
 

@@ -15,7 +15,8 @@ from typing import Any
 import pytest
 
 from mgdd.errors import ParameterError, RigError
-from mgdd.rig import BusBridge, Frame, RingTransport, SocketCanTransport
+from mgdd.rig.can.bus_bridge import BusBridge
+from mgdd.rig.realtime import Frame, RingTransport, SocketCanTransport
 from realtime_loops import becomes, go, make_loop
 from throttle_node import ThrottleNode, patient_envelope
 

@@ -15,7 +15,8 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.report import write_report
 from mgdd.results.labels import labelled_dataset
-from mgdd.studies import StudyResult, available_studies
+from mgdd.studies.base import StudyResult
+from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import Section, Table
 
 NEEDS = {"measured-engine-seek": "h2df_502", "identification-benchmarks": "cascaded_tanks"}
@@ -51,7 +52,7 @@ DEAR = {
     "name", [pytest.param(name, marks=pytest.mark.slow if name in DEAR else []) for name in available_studies()]
 )
 def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Callable[..., StudyResult]) -> None:
-    if name in NEEDS and NEEDS[name] not in datasets.available():
+    if name in NEEDS and NEEDS[name] not in datasets.names():
         pytest.skip(f"the data set {NEEDS[name]} is not at hand")
     result = quick_study(name)
     file = write_report(result, tmp_path / "deep" / "page")

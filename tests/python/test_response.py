@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 from scipy.stats import t
 
-from mgdd import plot
 from mgdd.design import design_points
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.plot.response import response_diagnostics
 from mgdd.results import Fit
 from mgdd.results.labels import check_labels
 from mgdd.surrogate import ResponseModel, fit_response
@@ -295,7 +295,7 @@ def test_a_figure_marks_outliers_and_takes_given_axes():
     y[5] += 1.0
     data = fit_response(PLAN, y).diagnostics
     figure, axes = plt.subplots(1, 2, figsize=(12, 8))
-    drawn = plot.response_diagnostics(data, ax=axes[1])
+    drawn = response_diagnostics(data, ax=axes[1])
     assert drawn is axes[1]
     odd = next(line for line in figure.axes[2].lines if line.get_label() == "outlier")
     assert odd.get_xdata().tolist() == [5]
@@ -303,9 +303,9 @@ def test_a_figure_marks_outliers_and_takes_given_axes():
     cut = figure.axes[-1].lines[0]
     np.testing.assert_array_equal(cut.get_ydata(), data["cut_mean"].values[2])
     free = plt.figure().add_axes((0.1, 0.1, 0.8, 0.8))
-    assert plot.response_diagnostics(data, ax=free) is free
+    assert response_diagnostics(data, ax=free) is free
     with pytest.raises(DataError, match="no variable 'left_out'"):
-        plot.response_diagnostics(data.drop_vars("left_out"))
+        response_diagnostics(data.drop_vars("left_out"))
 
 
 def test_a_polynomial_is_the_same_after_a_file():

@@ -17,9 +17,11 @@ import pytest
 from bus_node import ETB, LONG_S, commands, is_safe, node, rig_on
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, Frame, SignalMap
+from mgdd.rig import CanRig, SignalMap
 from mgdd.rig.can.link import Punctual, Sender
 from mgdd.rig.can.modes import key_line, may_be_real
+from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.realtime import Frame
 from user_buses import write_bus
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")

@@ -11,9 +11,11 @@ from bus_node import ETB, node, rig_on
 from mgdd._core.rig import Frame
 from mgdd.errors import DataError, RigError
 from mgdd.loop import Measurement, VirtualThrottle
-from mgdd.rig import CanRig, Recorder, RecordingRig, ReplayRig, Rig, RigRecord, SignalMap
+from mgdd.rig import CanRig, Recorder, RecordingRig, ReplayRig, SignalMap
+from mgdd.rig.base import Rig
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.replay_bus import ReplayBus
+from mgdd.rig.exchange import RigRecord
 
 
 def answers(rig: Rig, duties: list[float]) -> list[Measurement]:

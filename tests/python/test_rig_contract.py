@@ -12,8 +12,12 @@ import pytest
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import EngineBench, Measurement, Plant, SurrogatePlant, VirtualThrottle
-from mgdd.rig import CanRig, RecordingRig, ReplayRig, Rig, RigRecord, SimulatedRig
-from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
+from mgdd.rig import CanRig, RecordingRig, ReplayRig, SimulatedRig
+from mgdd.rig.base import Rig
+from mgdd.rig.exchange import RigRecord
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")

@@ -16,23 +16,14 @@ from mgdd.cli import main
 from mgdd.control import Pid
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import (
-    Experiment,
-    Frame,
-    RealtimeLoop,
-    RingTransport,
-    SafetyEnvelope,
-    SignalMap,
-    check_experiment,
-    read_record,
-    run_experiment,
-)
+from mgdd.rig import Experiment, SafetyEnvelope, SignalMap, read_record, run_experiment
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.node_core import NodeCore, node_plant
-from mgdd.rig.experiment import core_track
+from mgdd.rig.experiment import check_experiment, core_track
 from mgdd.rig.experiment.core_track import WatchedBus
 from mgdd.rig.experiment.stand import Cycle
+from mgdd.rig.realtime import Frame, RealtimeLoop, RingTransport
 from patient_bench import patient_experiment
 from realtime_loops import becomes
 from user_buses import dbc_of, write_bus

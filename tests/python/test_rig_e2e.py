@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mgdd._core.rig import crc8
+from mgdd._core.rig import E2eCheck, crc8, protect
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.rig import E2eCheck, E2eSettings, protect
+from mgdd.rig.realtime import E2eSettings
 
 ODD = E2eSettings(
     crc=(0x2F, 0x5A, 0xA5),

@@ -18,10 +18,11 @@ import xarray as xr
 
 from mgdd._core.loop import tracking_figures
 from mgdd.errors import DataError, ParameterError, RigError
-from mgdd.identify import FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
-from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, recorded, run_experiment
+from mgdd.rig import Experiment, SafetyEnvelope, read_record, recorded, run_experiment
+from mgdd.rig.experiment import check_experiment
 from mgdd.rig.experiment.stand import Cycle
 from mgdd.rig.experiment.tasks import TrackPlan
 

@@ -12,8 +12,9 @@ import xarray as xr
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Frame, Recorder, export_record, read_record
+from mgdd.rig import Recorder, export_record, read_record
 from mgdd.rig.can.python_can import frame_of, message_of
+from mgdd.rig.realtime import Frame
 
 CLASSIC = [
     Frame(id=0x120, data=bytes(range(8)), monotonic_ns=1_000_000_000),

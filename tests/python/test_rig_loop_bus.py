@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 
 from mgdd.errors import RigError
-from mgdd.rig import CanTransport, Frame, Recorder, SignalMap, read_record
+from mgdd.rig import Recorder, SignalMap, read_record
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.replay_bus import RecordedBus
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment import core_track
 from mgdd.rig.experiment.core_track import SocketBus, WatchedBus
+from mgdd.rig.realtime import Frame
 from realtime_loops import becomes
 
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")

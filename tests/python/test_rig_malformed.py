@@ -15,10 +15,13 @@ import pytest
 from hub_thread import bus_of, running_hub
 from mgdd.errors import DataError, RigError
 from mgdd.loop import EngineBench
-from mgdd.rig import BusBridge, CanRig, CanTransport, Frame, RingTransport
+from mgdd.rig import CanRig
+from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.python_can import frame_of
+from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.realtime import Frame, RingTransport
 from user_buses import dbc_of, write_bus
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")

@@ -15,7 +15,8 @@ from mgdd.control import Pid
 from mgdd.errors import RigError
 from mgdd.loop import EngineBench, Measurement, Reference, VirtualThrottle, run_seeker
 from mgdd.optimize import ExtremumSeeking
-from mgdd.rig import CanRig, Rig, VirtualNode
+from mgdd.rig import CanRig, VirtualNode
+from mgdd.rig.base import Rig
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")

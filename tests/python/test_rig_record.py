@@ -19,7 +19,9 @@ from hypothesis import strategies as st
 from mgdd._core.rig import RecordReader
 from mgdd.errors import DataError, ParameterError, RigError, ShapeError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Frame, Recorder, RigRecord, export_record, read_record, repair_record
+from mgdd.rig import Recorder, export_record, read_record, repair_record
+from mgdd.rig.exchange import RigRecord
+from mgdd.rig.realtime import Frame
 from recorded_rig import FRAMES, independent, write
 from sample_files import sample_file
 
@@ -181,7 +183,7 @@ def test_refused_frames() -> None:
 
 WRITER = """
 import sys
-from mgdd.rig import Frame, Recorder
+from mgdd.rig.realtime import Frame; from mgdd.rig import Recorder
 record = Recorder(sys.argv[1])
 i = 0
 while True:
@@ -220,7 +222,7 @@ def test_a_killed_process_loses_at_most_the_record_it_was_writing(tmp_path: Path
 FULL = """
 import resource, sys
 from mgdd.errors import RigError
-from mgdd.rig import Frame, Recorder, read_record
+from mgdd.rig.realtime import Frame; from mgdd.rig import Recorder, read_record
 record = Recorder(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (3000, resource.RLIM_INFINITY))
 written = 0

@@ -25,7 +25,8 @@ from mgdd.optimize import (
     Spsa,
 )
 from mgdd.results.labels import check_labels
-from mgdd.rig import Rig, SimulatedRig
+from mgdd.rig import SimulatedRig
+from mgdd.rig.base import Rig
 
 CYCLES = 700
 NAMES = ["p_max_bar", "dp_max_bar_per_cad", "cov_imep_percent"]

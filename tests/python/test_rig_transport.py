@@ -15,10 +15,10 @@ import pytest
 from hub_thread import bus_of, running_hub
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
-from mgdd.rig import CanTransport
 from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.python_can import STILL_S, Reception
+from mgdd.rig.can.transport import CanTransport
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")

@@ -12,15 +12,7 @@ import pytest
 
 from mgdd.guide import Curve, CurveSeeking, FeedForward
 from mgdd.loop import Measurement, run_seeker
-from mgdd.optimize import (
-    BoundedSeeking,
-    ExtremumSeeking,
-    GoldenSection,
-    GradientDescent,
-    NewtonSeeking,
-    Seeker,
-    Spsa,
-)
+from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, NewtonSeeking, Seeker, Spsa
 
 SPACE: dict[str, Any] = {"start": -5.0, "lower": -20.0, "upper": 20.0}
 CURVE = Curve.parabola(curvature=-0.06, best=0.0, reach=60.0)

@@ -18,8 +18,9 @@ from mgdd.identify import best_timing
 from mgdd.identify.engine import family
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult, run_study
-from study_cache import quick_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
+from study_cache import quick_study, sources
 
 HD = presets.load("hd_diesel_128x144").cylinder
 
@@ -104,6 +105,11 @@ def test_what_a_plausibility_check_leaves_is_what_was_published(result: StudyRes
         assert found[key] == pytest.approx(angles, abs=0.6), key
 
 
+def test_a_kept_study_depends_on_every_module() -> None:
+    files = {"/".join(file.parts[-3:]) for file in sources()}
+    assert {"mgdd/studies/base.py", "mgdd/engine/cycle.py", "mgdd/presets/P1.toml"} <= files
+
+
 def test_dataset_is_labelled(result: StudyResult) -> None:
     check_labels(result.dataset)
     assert result.dataset.sizes == {"law": 5, "file": 4}
@@ -114,7 +120,7 @@ def test_page_is_self_contained(result: StudyResult, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert not re.search(r"(src|href)=[\"'](?!data:)", text)
     assert text.count("data:image/png;base64,") == len(result.figures) == 7
-    assert "What to distrust" in text
+    assert "Limitations found" in text
     assert "not identifiable" in text
     summary = json.loads((tmp_path / "report" / "summary.json").read_text(encoding="utf-8"))
     assert summary == json.loads(json.dumps(result.summary))
@@ -239,7 +245,7 @@ def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(family, "fit_request", press)
     with pytest.raises(Interrupted, match="no model was finished") as stop:
-        best_timing(datasets.load("hd_diesel_128x144")[:1], HD)
+        best_timing(datasets.read("hd_diesel_128x144")[:1], HD)
     assert stop.value.partial is None
 
 
@@ -258,8 +264,8 @@ def test_ctrl_c_in_the_demo(
 def test_ctrl_c_in_the_report_of_a_calibration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trace = datasets.load("hd_diesel_128x144")[2]
-    io.write_pressure(trace, tmp_path / "one.csv")
+    trace = datasets.read("hd_diesel_128x144")[2]
+    io.write_csv(trace, tmp_path / "one.csv")
     told = ["--speed-rpm", str(trace.attrs["speed_rpm"]), "--trapped-mass-g", str(trace.attrs["trapped_mass_g"])]
     monkeypatch.setattr(study, "run_study", lambda name, **given: run_study(name, **{**given, "progress": press_at(1)}))
     command = ["engine", "calibrate", str(tmp_path / "one.csv"), "--preset", "hd_diesel_128x144", *told]

@@ -12,7 +12,9 @@ import pytest
 
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult, available_studies, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
+from mgdd.studies.registry import available_studies
 
 
 @pytest.fixture(scope="module")

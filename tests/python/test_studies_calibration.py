@@ -14,7 +14,7 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.guide import ModelOptimum
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.calibrated_guide_cases import (
     BURN,
     HEAT,

@@ -13,7 +13,7 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guide_accuracy import HARD, HardCase, run_hard
 from mgdd.studies.guide_cases import (
     GUIDES,
@@ -168,7 +168,7 @@ def test_accuracy_few_seeds(accuracy: StudyResult) -> None:
 def test_trouble_few_seeds(accuracy: StudyResult) -> None:
     rows = {row["trouble"]: row for row in accuracy.summary["trouble"]}
     assert list(rows) == [case.name for case in HARD]
-    for name in ("J late, delay known", "J late, delay told 4 short", "J late, delay told 4 long"):
+    for name in ("J late, delay known", "J late, delay given 4 short", "J late, delay given 4 long"):
         assert rows[name]["median_first"] <= 45.0
     assert all((row["median_back"] is not None) == name.startswith("jump") for name, row in rows.items())
 

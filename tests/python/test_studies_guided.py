@@ -12,14 +12,13 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
-from mgdd.studies import StudyResult, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guided import LimitedRuns, limited_parts
 from mgdd.studies.measured_engine_cases import measured_guide
 from mgdd.surrogate import fit_surrogate
 
-needs_records = pytest.mark.skipif(
-    "h2df_502" not in datasets.available(), reason="MGDD_DATA_DIR holds no folder h2df_502"
-)
+needs_records = pytest.mark.skipif("h2df_502" not in datasets.names(), reason="MGDD_DATA_DIR holds no folder h2df_502")
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +82,7 @@ def test_a_rough_model_of_another_engine_and_fuel_guides_the_measured_one(real: 
 def test_under_a_limit_the_curve_arrives_first_and_stays_below_as_often(real: StudyResult) -> None:
     own = rows(real)
     assert own["unguided"].get("above_share") is None
-    best = fit_surrogate(datasets.load("h2df_502")).find_optimum({"imep_bar": 1.0}, {"mprr": 5.0})
+    best = fit_surrogate(datasets.read("h2df_502")).find_optimum({"imep_bar": 1.0}, {"mprr": 5.0})
     none, curve = own["unguided, margin 0 sd"], own["curve, margin 0 sd"]
     for row in (none, curve):
         assert row["limited_optimum_cad"] == pytest.approx(best["soi_cad"])
@@ -101,8 +100,8 @@ def test_under_a_limit_the_curve_arrives_first_and_stays_below_as_often(real: St
 
 @needs_records
 def test_the_guide_knows_where_the_pressure_rises_not_how_much() -> None:
-    guide = measured_guide(datasets.load("h2df_502"))
-    surface = fit_surrogate(datasets.load("h2df_502")).predict([-6.0, -2.0, 2.0])
+    guide = measured_guide(datasets.read("h2df_502"))
+    surface = fit_surrogate(datasets.read("h2df_502")).predict([-6.0, -2.0, 2.0])
     measured, said = surface["mprr"].to_numpy(), [float(guide.pressure_rise(soi)) for soi in (-6.0, -2.0, 2.0)]
     assert (np.diff(measured) < 0.0).all()
     assert (np.diff(said) < 0.0).all()
@@ -112,7 +111,7 @@ def test_the_guide_knows_where_the_pressure_rises_not_how_much() -> None:
 
 @needs_records
 def test_what_is_above_the_limit_is_no_gain() -> None:
-    parts = dict(limited_parts(datasets.load("h2df_502"), 2, 150))
+    parts = dict(limited_parts(datasets.read("h2df_502"), 2, 150))
     run = parts["limited: curve, slope of the limit learnt, margin 0 sd"]()
     assert run.above.any()
     assert run.lost[run.above].max() < 1e-3

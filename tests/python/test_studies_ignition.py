@@ -11,9 +11,9 @@ import pytest
 from mgdd.engine import OperatingPoint, ignition_delay
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
-from mgdd.studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, told_laws
+from mgdd.studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, assumed_laws
 from mgdd.studies.ignition_delay import plane_of
 
 WATSON, WOLFER, HARDENBERG = TRUTHS
@@ -25,8 +25,8 @@ def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
     return quick_study("ignition-delay")
 
 
-def told(truth: DelayLaw, name: str) -> DelayLaw:
-    return next(law for law in told_laws(truth) if law.name == name)
+def assumed(truth: DelayLaw, name: str) -> DelayLaw:
+    return next(law for law in assumed_laws(truth) if law.name == name)
 
 
 def test_a_guide_that_is_told_the_truth_asks_for_the_best_combustion() -> None:
@@ -47,12 +47,12 @@ def test_the_curvature_over_the_injection_is_that_of_its_curve() -> None:
 
 def test_the_measured_delays_make_the_polynomial_and_the_constant() -> None:
     for truth in TRUTHS:
-        polynomial = told(truth, "polynomial of 1500 rpm").cylinder
+        polynomial = assumed(truth, "polynomial of 1500 rpm").cylinder
         for soi in MEASURED_SOI_CAD.tolist():
             own = ignition_delay(truth.cylinder, MEASURED_AT, soi_cad=soi).delay_cad
             assert ignition_delay(polynomial, MEASURED_AT, soi_cad=soi).delay_cad == pytest.approx(own, abs=0.7)
         for name in ("constant of 1500 rpm", "polynomial of 1500 rpm"):
-            right, said = (InjectionGuide(law).timing(MEASURED_AT).soi_cad for law in (truth, told(truth, name)))
+            right, said = (InjectionGuide(law).timing(MEASURED_AT).soi_cad for law in (truth, assumed(truth, name)))
             assert said == pytest.approx(right, abs=0.15), (truth.name, name)
 
 
@@ -68,11 +68,11 @@ def test_a_constant_delay_is_a_shift_of_the_input() -> None:
 def test_the_trim_of_a_point_cancels_every_error_there() -> None:
     own = SpeedLoadPlane([MEASURED_AT.speed_rpm], [MEASURED_AT.fuel_mg])
     for truth in TRUTHS:
-        for law in told_laws(truth):
+        for law in assumed_laws(truth):
             plane = plane_of(truth, law, own)
             assert plane.soi_error_cad[0, 0] == pytest.approx(-plane.trim_cad, abs=1e-12), law.name
             assert plane.lost_trimmed[0, 0] == pytest.approx(0.0, abs=1e-3), law.name
-    bare = plane_of(WATSON, told(WATSON, "no delay"), own)
+    bare = plane_of(WATSON, assumed(WATSON, "no delay"), own)
     assert bare.trim_cad == pytest.approx(-ignition_delay(PLANT, MEASURED_AT, soi_cad=-10.3).delay_cad, abs=0.05)
 
 
@@ -85,7 +85,7 @@ def test_what_a_cell_loses_is_what_the_bench_loses() -> None:
     lost = best.value - float(bench.steady_map([burns])["j"][0])
     assert plane.lost[0, 0] == pytest.approx(lost, abs=2e-3)
     assert lost > 0.1
-    assert plane.soi_error_cad[0, 0] > 3.0  # told of too short a delay, it injects too late
+    assert plane.soi_error_cad[0, 0] > 3.0  # with too short a delay it injects too late
 
 
 def test_an_injection_that_does_not_ignite_counts_apart() -> None:
@@ -98,7 +98,7 @@ def test_an_injection_that_does_not_ignite_counts_apart() -> None:
 
 
 def test_few_cells(result: StudyResult) -> None:
-    rows = {(row["truth"], row["told"]): row for row in result.summary["rows"]}
+    rows = {(row["truth"], row["assumed"]): row for row in result.summary["rows"]}
     assert len(rows) == 18
     for (truth, law), row in rows.items():
         assert row["lost_mean"] >= 0.0
@@ -113,7 +113,7 @@ def test_few_cells(result: StudyResult) -> None:
 
 
 def test_few_seeds(result: StudyResult) -> None:
-    runs = {(row["form"], row["told"]): row for row in result.summary["runs"]}
+    runs = {(row["form"], row["assumed"]): row for row in result.summary["runs"]}
     assert len(runs) == 12
     assert runs["feed-forward", "no delay"]["start_lost"] > 3.0 * runs["feed-forward", "Watson"]["start_lost"]
     assert runs["curve", "no delay"]["start_lost"] < 0.5 * runs["feed-forward", "no delay"]["start_lost"]

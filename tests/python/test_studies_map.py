@@ -14,8 +14,9 @@ import pytest
 
 from mgdd.errors import Interrupted
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult, from_design_to_map, run_study
 from mgdd.studies import design_to_map_engine as drives
+from mgdd.studies import from_design_to_map, run_study
+from mgdd.studies.base import StudyResult
 from mgdd.studies.design_to_map_engine import CELLS, ENGINES, MIDDLES, Truth
 from mgdd.studies.design_to_map_steps import PROCESS, SETTLING, STAGES, Case, Made, make_map
 from mgdd.studies.from_design_to_map import Maps, effort_row, loss_parts, part_rows

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.throttle_cases import throttle_of
 from mgdd.studies.throttle_tracking import (
     CASES,

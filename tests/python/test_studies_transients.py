@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.guide_cases import SpeedLoadPlane
 from mgdd.studies.guided_transients import Plane, plane_row, run_plane
 

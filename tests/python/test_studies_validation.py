@@ -15,7 +15,7 @@ from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
 from mgdd.results.labels import ANGLE, check_labels
-from mgdd.studies import StudyResult
+from mgdd.studies.base import StudyResult
 from mgdd.studies.validation_fits import LAWS, Burn, Law, best_slopes, burns_of, meet, redraw
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
@@ -46,7 +46,7 @@ def noisy() -> CylinderFit:
 
 @functools.cache
 def measured() -> CylinderFit:
-    return LAWS[0].fit(datasets.load("hd_diesel_128x144"), CYLINDER)
+    return LAWS[0].fit(datasets.read("hd_diesel_128x144"), CYLINDER)
 
 
 def test_a_calibrated_model_meets_its_trace_as_the_fit_says() -> None:
@@ -82,7 +82,7 @@ def test_the_loss_is_that_of_the_curvature_near_the_best_timing() -> None:
 
 def test_slopes_say_how_far_the_best_timing_moves() -> None:
     law = LAWS[1]
-    fit = law.fit(datasets.load("hd_diesel_128x144"), CYLINDER)
+    fit = law.fit(datasets.read("hd_diesel_128x144"), CYLINDER)
     slopes = best_slopes(fit)
     names = list(fit.report.names)
     heat = names.index("wall_heat_scale")
@@ -112,7 +112,7 @@ def test_stated_intervals_hold_for_white_noise() -> None:
 
 
 def test_stated_intervals_do_not_hold_for_what_a_wrong_burn_law_leaves() -> None:
-    parameters, best = covered(SINGLE.fit(datasets.load("hd_diesel_128x144")[1:3], CYLINDER), 30.0)
+    parameters, best = covered(SINGLE.fit(datasets.read("hd_diesel_128x144")[1:3], CYLINDER), 30.0)
     assert parameters < 0.7
     assert best < 0.7
 

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from mgdd import datasets
+from mgdd.datasets.files import path
 from mgdd.errors import ConvergenceError, DataError, ParameterError
 from mgdd.loop import SurrogatePlant
 from mgdd.results.labels import check_labels
-from mgdd.surrogate import fit_surrogate, random_step_records
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
 AT = {"doi_main_ms": 0.42, "doi_h2_ms": 2.9, "p2m_us": 1200.0}
@@ -41,7 +43,7 @@ def exact():
 @pytest.fixture(scope="module")
 def cycles():
     try:
-        return datasets.load("h2df_502")
+        return datasets.read("h2df_502")
     except FileNotFoundError as reason:
         pytest.skip(str(reason))
 
@@ -344,7 +346,7 @@ def test_the_set_is_read_with_its_units_and_signs(cycles):
 
 
 def test_held_burn_angles_are_no_measurements(cycles):
-    raw = datasets.load("h2df_502", mask_held=False)
+    raw = datasets.read("h2df_502", mask_held=False)
     held = cycles["burn_angles_held"].to_numpy()
     assert held.sum() == 2962
     assert np.isnan(cycles["mfb50_cad"].to_numpy()[held]).all()
@@ -356,21 +358,21 @@ def test_held_burn_angles_are_no_measurements(cycles):
 
 @pytest.mark.usefixtures("cycles")
 def test_another_export_is_refused(monkeypatch, tmp_path):
-    original = datasets.path("h2df_502", "h2df_test502_cycles.csv")
+    original = path("h2df_502", "h2df_test502_cycles.csv")
     rows = original.read_text(encoding="ascii").splitlines()[:400]
     own = tmp_path / "h2df_502" / original.name
     own.parent.mkdir()
     own.write_text("\n".join(rows) + "\n")
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     with pytest.raises(DataError, match="the file is another export; pass checked=False"):
-        datasets.load("h2df_502")
-    assert datasets.load("h2df_502", checked=False).sizes["cycle"] == 399
+        datasets.read("h2df_502")
+    assert datasets.read("h2df_502", checked=False).sizes["cycle"] == 399
     own.write_text("\n".join([*rows[:50], *rows[51:]]) + "\n")
     with pytest.raises(DataError, match="cycle 52 follows 50: must count up by one"):
-        datasets.load("h2df_502", checked=False)
+        datasets.read("h2df_502", checked=False)
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "nowhere"))
     with pytest.raises(FileNotFoundError, match="set MGDD_DATA_DIR"):
-        datasets.load("h2df_502")
+        datasets.read("h2df_502")
 
 
 def test_quality_of_the_measured_surfaces(measured):

@@ -10,7 +10,7 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.signals import amplitude_random_steps
-from mgdd.throttle import PseudoWiener, Throttle, simulate, to_iosystem
+from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle, to_iosystem
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def test_the_response_is_our_simulation(throttle: Throttle) -> None:
     control = pytest.importorskip("control")
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
-    ours = simulate(throttle, duty, time_s=time, start_deg=20.0)["angle_deg"].to_numpy()
+    ours = simulate_throttle(throttle, duty, time_s=time, start_deg=20.0)["angle_deg"].to_numpy()
     system, start = to_iosystem(throttle, start_deg=20.0)
     response = control.input_output_response(system, time, duty, start)
     assert system.dt == 1e-3

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mgdd.identify import FirstPrincipleModel, fit_first_principle
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.nuisances import TYPICAL_SHARE, delay_weights
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions

@@ -15,17 +15,17 @@ from mgdd import datasets, presets
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ShapeError
 from mgdd.identify import fit_cylinder
-from mgdd.io import pressure_trace, write_pressure
-from mgdd.io.pressure import as_trace
+from mgdd.io import write_csv
+from mgdd.io.pressure import as_trace, pressure_trace
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
-TRACE = datasets.load("hd_diesel_128x144")[0]
+TRACE = datasets.read("hd_diesel_128x144")[0]
 ANGLE, BAR = TRACE["crank_angle_cad"].to_numpy(), TRACE["pressure_bar"].to_numpy()
 TABLE = pd.DataFrame({"crank_angle_cad": ANGLE, "pressure_bar": BAR})
 
 
 def written(folder: Path) -> Path:
-    write_pressure(TRACE, folder / "trace.csv")
+    write_csv(TRACE, folder / "trace.csv")
     return folder / "trace.csv"
 
 
@@ -63,7 +63,7 @@ CYCLES = pd.DataFrame(TWO.T, index=pd.Index(ANGLE, name="crank_angle_cad"), colu
 
 
 def several_written(folder: Path) -> Path:
-    write_pressure(pressure_trace(ANGLE, TWO), folder / "cycles.csv")
+    write_csv(pressure_trace(ANGLE, TWO), folder / "cycles.csv")
     return folder / "cycles.csv"
 
 

@@ -16,7 +16,7 @@ from mgdd import presets
 from mgdd.cli import main
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.loop import Reference, VirtualThrottle, track, track_many, tune_controller, tuned_controller
 from mgdd.loop.controller_families import FAMILIES, groups_of
 from mgdd.loop.track import FIGURES, sensors_of

@@ -14,8 +14,8 @@ import pytest
 
 from mgdd import _core
 from mgdd.errors import RigError
-from mgdd.rig import Experiment, SafetyEnvelope, SignalMap, check_experiment, read_record, run_experiment
-from mgdd.rig.experiment import core_track
+from mgdd.rig import Experiment, SafetyEnvelope, SignalMap, read_record, run_experiment
+from mgdd.rig.experiment import check_experiment, core_track
 from mgdd.rig.experiment.stand import Cycle
 from patient_bench import patient_experiment
 

@@ -14,9 +14,11 @@ import pytest
 
 from mgdd.errors import RigError
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, Frame, SignalMap, SocketCanTransport
+from mgdd.rig import CanRig, SignalMap
 from mgdd.rig.can.node import run_node
 from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.realtime import Frame, SocketCanTransport
 
 CHANNEL = "vcan0"
 BUS_OFF, CONTROLLER, RESTARTED = 0x40, 0x04, 0x100

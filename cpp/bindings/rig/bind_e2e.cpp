@@ -130,7 +130,7 @@ mgdd.errors.ParameterError
 
 Examples
 --------
->>> from mgdd.rig import E2eCheck, E2eSettings, protect
+>>> from mgdd._core.rig import E2eCheck, E2eSettings, protect
 >>> settings = E2eSettings(data_id=0x120)
 >>> check = E2eCheck(settings)
 >>> [check.push(protect(settings, counter, bytes(8))) for counter in (4, 5, 6)], check.valid
@@ -151,7 +151,7 @@ settings : E2eSettings
 
 Examples
 --------
->>> from mgdd.rig import E2eCheck, E2eSettings, protect
+>>> from mgdd._core.rig import E2eCheck, E2eSettings, protect
 >>> settings = E2eSettings(max_step=2)
 >>> check = E2eCheck(settings)
 >>> [check.push(protect(settings, counter, bytes(8))) for counter in (14, 0, 0, 5)]
@@ -182,7 +182,7 @@ void bind_e2e(py::module_& m) {
       .def("reset", &E2eCheck::reset, "Forget the last frame and the validity; the counts stay.");
 
   m.def("protect", &protected_payload, py::arg("settings"), py::arg("counter"), py::arg("payload"),
-        "Behind mgdd.rig.protect.");
+        "Puts counter and checksum into a payload.");
   m.def(
       "crc8",
       [](const py::bytes& data, const CrcArgument& crc) {

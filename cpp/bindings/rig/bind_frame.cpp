@@ -54,7 +54,7 @@ monotonic_ns, bus_ns : int
 
 Examples
 --------
->>> from mgdd.rig import Frame
+>>> from mgdd.rig.realtime import Frame
 >>> Frame(id=0x121, data=bytes(3), received=True).data
 b'\x00\x00\x00'
 )");

@@ -1,4 +1,4 @@
-// Binds rig/realtime_loop.hpp; behind mgdd.rig.RealtimeLoop.
+// Binds rig/realtime_loop.hpp; behind mgdd.rig.realtime.RealtimeLoop.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -180,7 +180,8 @@ void bind_realtime_loop(py::module_& m) {
   m.attr("send_results") = all_names(names<SendResult>());
   const ScheduleSettings schedule;
   const CycleSettings settings;
-  py::class_<RealtimeLoop>(m, "RealtimeLoop", "A controller in a thread of its own; behind mgdd.rig.RealtimeLoop.")
+  py::class_<RealtimeLoop>(m, "RealtimeLoop",
+                           "A controller in a thread of its own; behind mgdd.rig.realtime.RealtimeLoop.")
       .def(py::init([](const py::object& controller, const AnyTransport& transport, const SafetyEnvelope& envelope,
                        const MessageArgument& command, const std::vector<MessageArgument>& received, double period_s,
                        double initial_reference_deg, std::optional<double> reference_timeout_s, bool transmit,

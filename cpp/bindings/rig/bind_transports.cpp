@@ -90,7 +90,7 @@ SocketCanTransport : a CAN interface of Linux, without Python in between.
 
 Examples
 --------
->>> from mgdd.rig import Frame, RingTransport
+>>> from mgdd.rig.realtime import Frame, RingTransport
 >>> bus = RingTransport()
 >>> bus.feed(Frame(id=0x121, data=bytes(8)))
 True
@@ -172,7 +172,7 @@ RingTransport : any other adapter, through python-can.
 Examples
 --------
 >>> from mgdd.errors import RigError
->>> from mgdd.rig import SocketCanTransport
+>>> from mgdd.rig.realtime import SocketCanTransport
 >>> try:
 ...     bus = SocketCanTransport("no_such_can")
 ... except RigError:

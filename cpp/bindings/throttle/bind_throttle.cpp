@@ -159,10 +159,10 @@ void bind_throttle(py::module_& m) {
   bind_throttle_record(m);
   m.def("simulate", &simulate_one, py::arg("throttle"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
         py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"), py::arg("step_s"),
-        "One throttle over columns, from rest; behind mgdd.throttle.simulate.");
+        "One throttle over columns, from rest; behind mgdd.throttle.simulate_throttle.");
   m.def("simulate_many", &simulate_lanes, py::arg("throttles"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
         py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"), py::arg("step_s"),
-        "Many throttles under one input, in lanes; behind mgdd.throttle.simulate.");
+        "Many throttles under one input, in lanes; behind mgdd.throttle.simulate_throttle.");
   m.def("airflow_torque", &air_torque, py::arg("throttle"), py::arg("angle_deg"),
         "Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.");
 }

@@ -47,7 +47,7 @@ class E2eSettings:
     
     Examples
     --------
-    >>> from mgdd.rig import E2eCheck, E2eSettings, protect
+    >>> from mgdd._core.rig import E2eCheck, E2eSettings, protect
     >>> settings = E2eSettings(data_id=0x120)
     >>> check = E2eCheck(settings)
     >>> [check.push(protect(settings, counter, bytes(8))) for counter in (4, 5, 6)], check.valid
@@ -171,7 +171,7 @@ class E2eCheck:
     
     Examples
     --------
-    >>> from mgdd.rig import E2eCheck, E2eSettings, protect
+    >>> from mgdd._core.rig import E2eCheck, E2eSettings, protect
     >>> settings = E2eSettings(max_step=2)
     >>> check = E2eCheck(settings)
     >>> [check.push(protect(settings, counter, bytes(8))) for counter in (14, 0, 0, 5)]
@@ -345,7 +345,7 @@ class Frame:
     
     Examples
     --------
-    >>> from mgdd.rig import Frame
+    >>> from mgdd.rig.realtime import Frame
     >>> Frame(id=0x121, data=bytes(3), received=True).data
     b'\\x00\\x00\\x00'
     """
@@ -916,7 +916,7 @@ class RingTransport:
     
     Examples
     --------
-    >>> from mgdd.rig import Frame, RingTransport
+    >>> from mgdd.rig.realtime import Frame, RingTransport
     >>> bus = RingTransport()
     >>> bus.feed(Frame(id=0x121, data=bytes(8)))
     True
@@ -1017,7 +1017,7 @@ class SocketCanTransport:
     Examples
     --------
     >>> from mgdd.errors import RigError
-    >>> from mgdd.rig import SocketCanTransport
+    >>> from mgdd.rig.realtime import SocketCanTransport
     >>> try:
     ...     bus = SocketCanTransport("no_such_can")
     ... except RigError:
@@ -1086,7 +1086,7 @@ class SocketCanTransport:
         """
 class RealtimeLoop:
     """
-    A controller in a thread of its own; behind mgdd.rig.RealtimeLoop.
+    A controller in a thread of its own; behind mgdd.rig.realtime.RealtimeLoop.
     """
     def __init__(self, *, controller: typing.Any, transport: RingTransport | SocketCanTransport, envelope: SafetyEnvelope, command: tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None, typing.SupportsInt | typing.SupportsIndex | None]]], received: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None, typing.SupportsInt | typing.SupportsIndex | None]]]], period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, initial_reference_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, reference_timeout_s: typing.SupportsFloat | typing.SupportsIndex | None = None, transmit: bool = True, stop_frames: typing.SupportsInt | typing.SupportsIndex = 5, realtime: bool = True, priority: typing.SupportsInt | typing.SupportsIndex = 50, lock_memory: bool = True, sample_capacity: typing.SupportsInt | typing.SupportsIndex = 16384, queue_capacity: typing.SupportsInt | typing.SupportsIndex = 65536) -> None:
         ...
@@ -1169,7 +1169,7 @@ def error_classes(frame: Frame) -> list[str]:
     """
 def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
     """
-    Behind mgdd.rig.protect.
+    Puts counter and checksum into a payload.
     """
 def read_record(path: str) -> dict:
     """

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> None:
         "simd_used": _core.instruction_set(),
         "cores": os.cpu_count(),
         "presets": ", ".join(presets.available()),
-        "data_sets": ", ".join(datasets.available()),
+        "data_sets": ", ".join(datasets.names()),
     }
     required, extras = _requirements()
     report["installed"] = bool(required)

@@ -232,7 +232,7 @@ def _optimum_of_files(
     kept = "given limits kept" if limits else "no limit"
     parts = []
     for row in rows:
-        if row.best is None:
+        if not row.plausible:
             near = next(answer for answer in row.members if answer.member is main)
             parts.append(f"{row.file}\n  no plausible model; the nearest, {main.name}: {near.why_not}")
             continue
@@ -252,5 +252,5 @@ def _optimum_of_files(
     parts += ["what to distrust:\n" + "\n".join(f"  - {text}" for text in warnings)] if warnings else []
     payload = {"preset": preset, "law": main.name, "traces": [row.to_dict() for row in rows], "warnings": warnings}
     emit(args, payload, text="\n\n".join(parts))
-    if all(row.best is None for row in rows):
+    if not any(row.plausible for row in rows):
         raise ConvergenceError("no model of the family is plausible for any trace: see what each of them fails")

@@ -13,7 +13,7 @@ from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
-from mgdd.maps import CalibrationMap, read_map, write_dcm, write_map
+from mgdd.maps import CalibrationMap, read_map, write_map
 
 if TYPE_CHECKING:
     from mgdd.guide import TimingMap
@@ -68,7 +68,7 @@ def _export(args: argparse.Namespace) -> None:
     if args.guide_map:
         _write_guide(maps[0].to_timing_map(), args)
     elif into_dcm:
-        write_dcm(dict(zip(names, maps, strict=True)), args.output)
+        write_map(dict(zip(names, maps, strict=True)), args.output)
     else:
         write_map(maps[0], args.output)
     wrote(args.output)
@@ -96,7 +96,7 @@ def _maps(args: argparse.Namespace) -> list[CalibrationMap]:
         return [read_map(file, **READING.given(args)) for file in args.files]
     if args.files:
         raise ParameterError(f"--advisor and {args.files[0]} contradict each other: give one")
-    data = datasets.load("advisor_engine_maps")[_ENGINES.index(args.advisor)]
+    data = datasets.read("advisor_engine_maps")[_ENGINES.index(args.advisor)]
     table = CalibrationMap.from_dataset(data, args.name or "bsfc_g_per_kwh", source="measured")
     said = {"from": "title", "origin": "source", "citation": "citation", "licence": "licence", "note": "note"}
     return [table.replaced(provenance={key: " ".join(str(data.attrs[name]).split()) for key, name in said.items()})]

@@ -19,7 +19,7 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.files import write_whole_text
 from mgdd.io.point_table import POINT, input_names, read_points
-from mgdd.plot import response_diagnostics
+from mgdd.plot.response import response_diagnostics
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.surrogate import fit_response

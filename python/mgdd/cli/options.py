@@ -16,6 +16,7 @@ from mgdd.engine import analyze, simulate
 from mgdd.errors import ParameterError, hinted
 from mgdd.io import read_pressure
 from mgdd.io.point_table import CONDITIONS, conditions_of
+from mgdd.presets.preset import Preset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,7 +152,7 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     )  # fmt: skip
 
 
-def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, presets.Preset]:
+def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
     """Make cylinder and point from a preset and the options over it."""
     preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
     if args.preset is None and getattr(args, "files", None):

@@ -14,12 +14,13 @@ from mgdd.cli import rig_records, rig_run
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
-from mgdd.rig import CanTransport, Experiment, SafetyEnvelope, SignalMap
+from mgdd.rig import Experiment, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signals import noted_signals
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import simulated_plant
 from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test
 from mgdd.studies.sections import Table

@@ -12,8 +12,10 @@ from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, require_positive
 from mgdd.cli.output import check_output, emit, lines, wrote
 from mgdd.errors import DataError
-from mgdd.rig import CanTransport, Experiment, Recorder, check_experiment, export_record, run_experiment
+from mgdd.rig import Experiment, Recorder, export_record, run_experiment
 from mgdd.rig.can.replay_bus import RecordedBus
+from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.experiment import check_experiment
 
 __all__ = ["add", "add_bus"]
 

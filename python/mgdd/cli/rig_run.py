@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit, is_terminal, lines, wrote
-from mgdd.rig import CanRig, Experiment, check_experiment, run_experiment
+from mgdd.rig import CanRig, Experiment, run_experiment
 from mgdd.rig.can.modes import MODES
-from mgdd.rig.experiment import CheckedExperiment, ExperimentResult
+from mgdd.rig.experiment import CheckedExperiment, ExperimentResult, check_experiment
 
 if TYPE_CHECKING:
     from mgdd.rig.experiment.stand import Cycle

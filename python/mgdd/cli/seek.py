@@ -17,7 +17,7 @@ from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.loop import EngineBench
 from mgdd.loop.seek_limits import COV, SCATTER, limit_report
 from mgdd.loop.timing_search import TimingSearch, TimingSearchRun
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.plot.style import drawn
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.results.units import unit_attributes

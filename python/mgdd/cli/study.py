@@ -14,7 +14,9 @@ from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.errors import Interrupted, ParameterError, hinted
 from mgdd.parallel.pool import processes
 from mgdd.report import write_report
-from mgdd.studies import StudyResult, available_studies, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
+from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import Table, cells, column_names
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from mgdd.cli.from_library import Options
 from mgdd.cli.options import assignments
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io import read_throttle_log
+from mgdd.presets.preset import Preset
 from mgdd.throttle import Throttle
 
 __all__ = ["LOG", "add_preset", "add_throttle", "changes_of", "known_only", "preset_of", "throttle_of"]
@@ -40,7 +41,7 @@ def add_throttle(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def preset_of(args: argparse.Namespace) -> presets.Preset:
+def preset_of(args: argparse.Namespace) -> Preset:
     """Load the preset of a throttle; it refuses to be an engine when it is asked for its throttle."""
     return presets.load(args.preset or _DEFAULT_PRESET)
 

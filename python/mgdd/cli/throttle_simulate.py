@@ -14,15 +14,15 @@ from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
 from mgdd.plot.style import drawn
 from mgdd.plot.throttle_run import throttle_run
-from mgdd.throttle import simulate
+from mgdd.throttle import simulate_throttle
 from mgdd.throttle.duty_file import read_duty
 from mgdd.throttle.simulation import step_summary
 
 __all__ = ["add"]
 
-_TIME = Options(simulate, "duration_s", "sample_s")
-_SIGNALS = Options(simulate, "supply_v", "airflow_torque_nm")  # columns of the input beside time and duty, too
-_RUN = Options(simulate, "start_deg", "bridge", "step_s")
+_TIME = Options(simulate_throttle, "duration_s", "sample_s")
+_SIGNALS = Options(simulate_throttle, "supply_v", "airflow_torque_nm")  # columns of the input beside time and duty, too
+_RUN = Options(simulate_throttle, "start_deg", "bridge", "step_s")
 
 
 def add(verbs: Any) -> None:
@@ -59,7 +59,7 @@ def _simulate(args: argparse.Namespace) -> None:
         raise ParameterError(f"{as_option(next(iter(timed)))} goes with --duty: the times of --input are its own")
     else:
         given = read_duty(args.input, signals)
-    run = simulate(throttle, **given, **_RUN.given(args))
+    run = simulate_throttle(throttle, **given, **_RUN.given(args))
     payload = {
         "preset": preset,
         "duty": args.duty,

@@ -1,6 +1,6 @@
 """Controllers of a throttle plate, from model-guided prediction to PID, and a supervisor beside any of them.
 
-A controller is told a reference and a measured angle and answers with a duty, one sample at a time (``step``); it never
+A controller takes a reference and a measured angle and returns a duty, one sample at a time (``step``); it never
 holds a plant, so simulation, replay and the real throttle are the same loop. It never reads a clock: ``sample_s`` is a
 setting. ``state`` saves what a run needs to go on bit for bit. `SupervisedController` watches one of them and opens the
 bridge where it must.

@@ -1,12 +1,11 @@
-"""Public data by name: `load` reads a set from the folder MGDD_DATA_DIR, the package or what `fetch` has kept."""
+"""Public data by name: `read` looks for a set in the folder MGDD_DATA_DIR, the package and what was fetched before."""
 
 from __future__ import annotations
 
-from mgdd.datasets.files import available, path
-from mgdd.datasets.origins import fetch
-from mgdd.datasets.readers import load
+from mgdd.datasets.files import names
+from mgdd.datasets.readers import read
 
-__all__ = ["available", "fetch", "load", "path"]
+__all__ = ["names", "read"]
 
 
 def __dir__() -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from mgdd.datasets.origins import ORIGINS, fetched, find_fetched
 from mgdd.errors import DataError
 
-__all__ = ["ENGINE_MAPS", "FILES", "HD", "available", "path"]
+__all__ = ["ENGINE_MAPS", "FILES", "HD", "names", "path"]
 
 _VARIABLE = "MGDD_DATA_DIR"
 _PACKAGE = Path(__file__).parents[1] / "data"
@@ -27,7 +27,7 @@ _PACKAGED = {
     }
 }
 
-# The sets that `load` reads, and the files that each needs.
+# The sets that `read` reads, and the files that each needs.
 FILES: dict[str, tuple[str, ...]] = {
     ENGINE_MAPS: ("vw_1.9tdi_ornl_hot.csv", "mercedes_1.7_ornl_hot.csv"),
     "cascaded_tanks": ("dataBenchmark.csv",),
@@ -38,7 +38,7 @@ FILES: dict[str, tuple[str, ...]] = {
 }
 
 
-def available() -> tuple[str, ...]:
+def names() -> tuple[str, ...]:
     """Name the data sets that can be read now.
 
     Returns
@@ -49,7 +49,7 @@ def available() -> tuple[str, ...]:
     Examples
     --------
     >>> from mgdd import datasets
-    >>> "hd_diesel_128x144" in datasets.available()
+    >>> "hd_diesel_128x144" in datasets.names()
     True
     """
     folder = _data_dir()
@@ -62,12 +62,12 @@ def available() -> tuple[str, ...]:
 
 
 def path(name: str, file: str) -> Path:
-    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package, then what `fetch` has kept.
+    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package, then what was fetched.
 
     Parameters
     ----------
     name : str
-        The data set, see `available`.
+        The data set, see `names`.
     file : str
         The file in it.
 
@@ -85,8 +85,8 @@ def path(name: str, file: str) -> Path:
 
     Examples
     --------
-    >>> from mgdd import datasets
-    >>> datasets.path("hd_diesel_128x144", "hd_diesel_128x144_traces.csv").suffix
+    >>> from mgdd.datasets.files import path
+    >>> path("hd_diesel_128x144", "hd_diesel_128x144_traces.csv").suffix
     '.csv'
     """
     folder = _data_dir()
@@ -98,12 +98,12 @@ def path(name: str, file: str) -> Path:
     digest = _PACKAGED.get(name, {}).get(file)
     if digest is None or not packaged.is_file():
         first = f"looked for {folder / name / file}" if folder else f"{_VARIABLE} is not set"
-        fetching = f", or fetch it: mgdd.datasets.fetch({name!r})" if name in ORIGINS else ""
+        fetching = f", or fetch it: mgdd.datasets.read({name!r}, fetch=True)" if name in ORIGINS else ""
         raise FileNotFoundError(
             errno.ENOENT,
             f"no file {file!r} of data set {name!r}: {first}, and the package ({_PACKAGE}) lacks it; "
             f"set {_VARIABLE} to a folder that holds {name}/{file}{fetching}; "
-            f"data sets at hand: {', '.join(available())}",
+            f"data sets at hand: {', '.join(names())}",
         )
     found = hashlib.sha256(packaged.read_bytes()).hexdigest()
     if found != digest:

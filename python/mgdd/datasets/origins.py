@@ -81,7 +81,7 @@ def fetch(name: str) -> Path:
 
     Examples
     --------
-    >>> from mgdd.datasets import fetch
+    >>> from mgdd.datasets.origins import fetch
     >>> fetch("h2df_502")
     Traceback (most recent call last):
         ...

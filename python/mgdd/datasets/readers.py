@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
+from mgdd.datasets import origins
 from mgdd.datasets.engine_maps import engine_map
-from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, path
+from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, names, path
 from mgdd.errors import DataError, ParameterError
-from mgdd.io import read_conditions, read_pressure
+from mgdd.io import read_pressure
+from mgdd.io.point_table import read_conditions
 from mgdd.io.table import read_table
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import check_count
@@ -19,7 +21,7 @@ from mgdd.signals.even_grid import check_count
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["load"]
+__all__ = ["read"]
 
 _H2DF_SHA256 = "482b1cd0ce7e6389d8872f547d6fb05f7f63df9715eb6de1e76d7c066dada39c"
 _CAD = "°CA aTDC"
@@ -65,20 +67,26 @@ _BURN_ANGLES = ("mfb10_cad", "mfb50_cad", "mfb90_cad")
 
 
 @overload
-def load(name: Literal["hd_diesel_128x144"]) -> list[xr.Dataset]: ...
+def read(name: Literal["hd_diesel_128x144"], *, fetch: bool = ...) -> list[xr.Dataset]: ...
 @overload
-def load(name: Literal["h2df_502"], *, checked: bool = ..., mask_held: bool = ...) -> xr.Dataset: ...
+def read(name: Literal["h2df_502"], *, fetch: bool = ..., checked: bool = ..., mask_held: bool = ...) -> xr.Dataset: ...
 @overload
-def load(name: Literal["advisor_engine_maps", "cascaded_tanks", "emps", "wh2009"]) -> tuple[xr.Dataset, xr.Dataset]: ...
-def load(
-    name: str, *, checked: bool = True, mask_held: bool = True
+def read(
+    name: Literal["advisor_engine_maps", "cascaded_tanks", "emps", "wh2009"], *, fetch: bool = ...
+) -> tuple[xr.Dataset, xr.Dataset]: ...
+def read(
+    name: str, *, fetch: bool = False, checked: bool = True, mask_held: bool = True
 ) -> xr.Dataset | list[xr.Dataset] | tuple[xr.Dataset, xr.Dataset]:
-    """Load a data set by its name.
+    """Read a data set by its name.
 
     Parameters
     ----------
     name : {"hd_diesel_128x144", "h2df_502", "advisor_engine_maps", "emps", "cascaded_tanks", "wh2009"}
-        The first is in the package; the others belong into ``$MGDD_DATA_DIR/NAME``, and `fetch` gets the last three.
+        The first is in the package; the others belong into ``$MGDD_DATA_DIR/NAME``, or `fetch` gets the last three.
+    fetch : bool
+        Download a set that is not at hand from its public address, check it and keep it, in ``MGDD_CACHE_DIR`` if that
+        is set, else in the cache folder of the user; it needs the package pooch. Nothing is downloaded without it. The
+        attributes of the records name the terms of the data.
     checked : bool
         Of ``h2df_502``: refuse a file whose SHA-256 is not that of the export described on the page "A measured
         engine"; False reads an export of your own with the same columns.
@@ -111,11 +119,11 @@ def load(
     Raises
     ------
     FileNotFoundError
-        As in `path`, which says where the files belong.
+        The set is in none of these places; the message says where its files belong.
     mgdd.errors.ParameterError
-        An unknown name, or an option of another set.
+        An unknown name, an option of another set, or a set without a public address to fetch.
     mgdd.errors.DataError
-        A changed file, missing columns or samples.
+        A changed file, missing columns or samples; a file that cannot be fetched.
 
     References
     ----------
@@ -136,12 +144,14 @@ def load(
     Examples
     --------
     >>> from mgdd import datasets
-    >>> traces = datasets.load("hd_diesel_128x144")
+    >>> traces = datasets.read("hd_diesel_128x144")
     >>> [round(float(trace["pressure_bar"].max()), 1) for trace in traces]
     [126.5, 183.5, 230.4, 233.2]
     >>> traces[0].attrs["soi_cad"]
     -5.06
     """
+    if fetch and name not in names():
+        origins.fetch(name)
     if name == "h2df_502":
         return _h2df_cycles(checked=checked, mask_held=mask_held)
     if name not in FILES:

@@ -6,7 +6,7 @@ Crank angles are °CA aTDC (firing TDC = 0, compression negative) throughout.
 from __future__ import annotations
 
 from mgdd._core.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
-from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
+from mgdd.engine.cycle import sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import ignition_delay
 from mgdd.engine.nox import fit_nox_proxy
 from mgdd.engine.optimum import find_optimum
@@ -21,7 +21,6 @@ __all__ = [
     "PerformanceTerm",
     "SoftSensor",
     "analyze",
-    "convergence",
     "find_optimum",
     "fit_nox_proxy",
     "ignition_delay",

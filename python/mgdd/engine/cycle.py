@@ -283,7 +283,8 @@ def convergence(
 
     Examples
     --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, convergence
+    >>> from mgdd.engine import Cylinder, OperatingPoint
+    >>> from mgdd.engine.cycle import convergence
     >>> c = convergence(Cylinder(), OperatingPoint())
     >>> abs(float(c["error"].sel(indicator="efficiency_gross"))) < 2e-4
     True

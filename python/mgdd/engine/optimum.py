@@ -12,8 +12,7 @@ from mgdd._arguments import require_plain
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError, hinted
-from mgdd.optimize import Optimum
-from mgdd.optimize.optimum import limits_of
+from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 
 __all__ = ["find_optimum"]
@@ -61,7 +60,7 @@ def find_optimum(
 
     Returns
     -------
-    mgdd.optimize.Optimum
+    Optimum
         Input ``soc_cad``; further every indicator, for example ``ca50_cad`` and ``efficiency_gross``. The curvature is
         taken over ±3 CAD.
 

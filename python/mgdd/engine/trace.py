@@ -142,7 +142,7 @@ def analyze(
     >>> from mgdd import datasets, presets
     >>> from mgdd.engine import analyze
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> for trace in datasets.load("hd_diesel_128x144"):
+    >>> for trace in datasets.read("hd_diesel_128x144"):
     ...     print(round(float(analyze(trace, cylinder)["ca50_cad"]), 1))
     5.0
     6.9

@@ -45,8 +45,8 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     delay_cycles, lag_cycles : float
         Transport delay and time constant between the plant and J [cycles].
     delay_uncertainty : int
-        Cycles by which the delay may be shorter or longer than told, at most 20; the property ``delay_cycles`` says
-        which one the readings show. 0 takes the delay as told.
+        Cycles by which the delay may be shorter or longer than given, at most 20; the property ``delay_cycles`` says
+        which one the readings show. 0 takes the delay as given.
     hand_over : bool
         Whether a guide that keeps failing is given up for plain extremum seeking.
     maximize : bool

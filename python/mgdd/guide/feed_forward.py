@@ -14,8 +14,8 @@ from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.guide.conditions import change_between, numbers_of
 from mgdd.guide.guided import TOLD, Column, Guided
-from mgdd.optimize import Optimum, Seeker
-from mgdd.optimize.seeker import rebuilt
+from mgdd.optimize.optimum import Optimum
+from mgdd.optimize.seeker import Seeker, rebuilt
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +37,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
 
     ``at(point)`` says at which operating point the next cycle runs, ``ask()`` and ``tell(J)`` are those of a seeker. At
     a new operating point the estimate moves as far as the guide's optimum does, times the trust in the guide, and the
-    trim stays. Trust is measured: after such a move J is read at the old place and at the new one, and the two tell
+    trim stays. Trust is measured: after such a move J is read at the old place and at the new one, and the two show
     which share of the move was right. A calibration of the guide at the same point never moves what is applied: the
     trim takes the opposite step.
 
@@ -48,7 +48,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
         Golden section searches its whole bracket at every new point and gains nothing from a guide.
     guide : callable, optional
         ``guide(point)`` gives the optimum of the model there: a number, one number per input, or an
-        `mgdd.optimize.Optimum`, whose ``curvature`` then must be in the unit of J; None where the point lies outside
+        `Optimum`, whose ``curvature`` then must be in the unit of J; None where the point lies outside
         of what the guide knows. Without a guide every call is that of the seeker, bit for bit.
     trust : float
         Trust in the guide before its first test, in [0, 1].
@@ -173,7 +173,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
 
     @property
     def point(self) -> dict[str, float] | None:
-        """Numbers of the operating point that `at` was told last; None before the first."""
+        """Numbers of the operating point given to `at` last; None before the first."""
         return None if self._point is None else dict(self._point)
 
     def recalibrated(self) -> None:
@@ -252,7 +252,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
     def history(self) -> xr.Dataset:
         """What came from the guide and what from the trim, cycle by cycle.
 
-        Dimensions `cycle` and `input`; variables before the cycle was told: ``guide_optimum``, ``feed_forward``,
+        Dimensions `cycle` and `input`; variables before the result of the cycle: ``guide_optimum``, ``feed_forward``,
         ``trim`` and ``estimate``, ``applied`` in the cycle (cycle, input), ``trust`` (0 to 1), ``testing`` (1: the old
         place, 2: the new one), ``point`` (operating points so far), ``objective`` (NaN where the cycle misfired) and
         ``misfire``. What is not known yet is NaN. Built anew on every access.
@@ -294,7 +294,7 @@ def _settling_of(seeker: Any) -> int:
 
 
 def _numbers_said(said: Any) -> tuple[list[float], list[float]]:
-    """Give the optimum and, where it is known, the curvature of what a guide said."""
+    """Give the optimum and, where it is known, the curvature of a guide's answer."""
     if isinstance(said, Optimum):
         bend = [said.curvature] if len(said.inputs) == 1 and said.curvature < 0.0 else []
         return [float(value) for value in said.inputs.values()], bend

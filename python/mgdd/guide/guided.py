@@ -1,4 +1,4 @@
-"""What a feed-forward and a guided engine share in Python: told cycles as data, settings, text and pickles."""
+"""What a feed-forward and a guided engine share in Python: finished cycles as data, settings, text and pickles."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ TOLD = {"objective": Column("unit of J", "objective J"), "misfire": Column("-", 
 
 
 class Guided(SeekerFindings, _CoreGuided):
-    """A seeker with a guide that keeps every told cycle.
+    """A seeker with a guide that keeps every finished cycle.
 
-    A subclass sets `_columns`: what `_standing` gives before a cycle is told, then what was applied, then `TOLD`. Its
-    ``__init__`` sets the attributes below.
+    A subclass sets `_columns`: what `_standing` gives before the result of a cycle, then what was applied, then `TOLD`.
+    Its ``__init__`` sets the attributes below.
     """
 
     _columns: ClassVar[Mapping[str, Column]]
@@ -103,7 +103,7 @@ class Guided(SeekerFindings, _CoreGuided):
 
     @contextmanager
     def _recorded(self, objective: Any, misfire: bool, applied: Any) -> Iterator[None]:
-        """Keep the cycle that is told inside, unless it is refused."""
+        """Keep the cycle whose result is given inside, unless it is refused."""
         before = (self.cycle, *self._standing().values())
         yield
         done = self.applied if applied is None else np.array(applied, np.float64)

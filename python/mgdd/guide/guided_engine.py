@@ -55,7 +55,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
         Standard deviation of one reading, for the trust in a feed-forward [unit of J]; learnt without.
     keep_start : bool
         Begin at the seeker's own start, or where it stands if it has run; by itself a run begins at the model's best
-        timing. The trim takes the distance; a `CurveSeeking` believes the model from the second cycle on.
+        timing. The trim takes the distance; a `CurveSeeking` uses the model from the second cycle on.
 
     Raises
     ------
@@ -147,7 +147,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
         Returns
         -------
         {"followed", "refused"}
-            ``refused``: the model has no answer there; what it said last stands, and it is asked again in the next
+            ``refused``: the model has no answer there; its last answer stands, and it is asked again in the next
             cycle.
 
         Raises
@@ -193,7 +193,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
     def history(self) -> xr.Dataset:
         """What came from the guide, what from the trim, and the trust, cycle by cycle.
 
-        Over ``cycle``, before each was told: ``guide_cad``, ``feed_forward_cad``, ``trim_cad``, ``estimate_cad``,
+        Over ``cycle``, before the result of each: ``guide_cad``, ``feed_forward_cad``, ``trim_cad``, ``estimate_cad``,
         ``estimate_sd_cad`` (NaN where the seeker states none), ``trust``, ``wall_heat_scale`` of the guide; in the
         cycle ``applied_cad``, ``objective`` (NaN where it misfired) and ``misfire`` (0 or 1). Built anew on every
         access.

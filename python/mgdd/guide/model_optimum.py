@@ -10,7 +10,7 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance
 from mgdd._core.guide import Curve
 from mgdd.errors import ParameterError
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, core_rows
 
@@ -109,7 +109,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
         Returns
         -------
-        mgdd.optimize.Optimum or None
+        Optimum or None
             Input ``soc_cad``, value and curvature in the unit of the performance, in ``values`` the ``iterations`` of
             the ascent; None where the model has no optimum, as of a motored point.
 

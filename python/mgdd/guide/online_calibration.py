@@ -63,7 +63,7 @@ class OnlineCalibration:
     forgetting : float
         Weight that a window keeps in the next one, in [0, 1]; ``recursive`` only.
     soc_scatter_cad : float
-        Scatter of the true start of combustion about the told one from cycle to cycle [°CA]: it blurs the mean
+        Scatter of the true start of combustion about the given one from cycle to cycle [°CA]: it blurs the mean
         pressure, and differs from window to window. 0 where the start of combustion is measured.
     jump_factor : float
         A cycle whose residual is so many times the usual one is left out; three in a row start anew.
@@ -202,7 +202,7 @@ class OnlineCalibration:
 
     @property
     def verdicts(self) -> dict[str, ParameterVerdict]:
-        """What to believe of each adapted parameter."""
+        """What the data determine of each adapted parameter."""
         values, errors = self._core.values, self._core.errors
         return {
             name: ParameterVerdict(

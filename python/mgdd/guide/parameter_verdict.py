@@ -1,4 +1,4 @@
-"""What to believe of one parameter of an online calibration."""
+"""What the data determine of one parameter of an online calibration."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from mgdd.guide.conditions import numbers_of
 from mgdd.guide.map_forms import MapForms
 from mgdd.guide.map_table import SETTINGS
 from mgdd.guide.settled import settled_estimate
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import Result
 

@@ -16,29 +16,21 @@ from mgdd.identify.ode_fit import fit_ode
 from mgdd.identify.ode_model import OdeModel
 from mgdd.identify.throttle.excitation_check import check_excitation
 from mgdd.identify.throttle.excitation_design import design_excitation
-from mgdd.identify.throttle.first_principle import fit_first_principle
-from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.fits import load_throttle_model
 from mgdd.identify.throttle.identify import identify_throttle
 from mgdd.identify.throttle.online_update import OnlineUpdate
-from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
-from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
-    "FirstPrincipleModel",
     "ModelFamily",
     "OdeModel",
     "OnlineUpdate",
-    "SmoothThrottle",
     "best_timing",
     "check_excitation",
     "design_excitation",
     "estimate_tdc",
     "fit_cylinder",
-    "fit_first_principle",
     "fit_ode",
-    "fit_pseudo_wiener",
     "identify_throttle",
     "load_throttle_model",
     "validate_throttle",

@@ -16,7 +16,8 @@ from mgdd.optimize import least_squares
 from mgdd.optimize.fit_options import FitOptions, Resolved, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run, quality_of
 from mgdd.parallel.pool import MakesExecutor
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
+from mgdd.results.fit_report import FitReport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of
 
@@ -91,7 +92,7 @@ def fit_ode(
     sigma : float
         Noise level in the unit of the output; the residual is divided by it.
     options : FitOptions, optional
-        1 start, 100 trial steps and a tolerance of 1e-9 where nothing else is said; more starts come from a Latin
+        1 start, 100 trial steps and a tolerance of 1e-9 by default; more starts come from a Latin
         hypercube (seed 0) between the bounds, which must then be finite.
     executor, workers
         As in `mgdd.parallel.map_items`, for the starts: one after the other if left out. Python takes turns in threads,

@@ -10,8 +10,8 @@ from mgdd import _core
 from mgdd.errors import Interrupted, WorkerLostError
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor
-from mgdd.results import FitReport
 from mgdd.results.fit import ARRIVED
+from mgdd.results.fit_report import FitReport
 
 __all__ = ["rank", "search_starts", "spread_starts"]
 

@@ -66,7 +66,7 @@ _CYLINDER = re.compile(r"(?:cyl\w*?|zyl\w*?)[\s_.\-#]*(\d+)")
 
 
 class Heading(NamedTuple):
-    """What is known of a column, None where nothing is said.
+    """What is known of a column, None where nothing is given.
 
     `other` is a unit of another quantity, `strange` one that no list here knows, `unclear` a text that may be one: only
     who reads the file can tell.

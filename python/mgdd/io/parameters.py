@@ -132,7 +132,7 @@ class ParameterFile:
     tables : mapping of str to mapping of str to Entry
         The values by table and key.
     notes : mapping of str to str, number or list
-        What is said about them: ``name``, ``title``, ``source``, ...
+        Notes on them: ``name``, ``title``, ``source``, ...
     origin : str
         The file, for messages; not compared.
 

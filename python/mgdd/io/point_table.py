@@ -159,7 +159,7 @@ def _place(name: str, own: Sequence[str], origin: str) -> int:
 
 
 def _label(name: str, said: str | None, where: str) -> Label:
-    """Give the unit that is said, which must be that of the name where the name says one."""
+    """Return the given unit, which must be that of the name where the name has one."""
     known = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
     if said in (None, "", "-", "1"):
         return known
@@ -226,7 +226,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> from mgdd.io import read_conditions
+    >>> from mgdd.io.point_table import read_conditions
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder) / "conditions.csv"
     ...     _ = file.write_text("file,speed_rpm,soi_cad\nmean.csv,1200,-5.06\n")

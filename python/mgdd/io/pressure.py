@@ -11,10 +11,10 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import Heading, heading
-from mgdd.io.pressure_checks import check_trace, pair
+from mgdd.io.pressure_checks import pair
 from mgdd.io.pressure_file import Reading, checked, cycles_of, odd_shape
-from mgdd.io.table import read_table, write_columns
-from mgdd.results.labels import ANGLE, check_labels, labelled_dataset
+from mgdd.io.table import read_table
+from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,6 @@ __all__ = [
     "one_cycle",
     "pressure_trace",
     "read_pressure",
-    "write_pressure",
 ]
 
 CYCLE = "cycle"
@@ -150,7 +149,7 @@ def read_pressure(
     speed_rpm : float, optional
         Engine speed [rpm], which turns a time into an angle: first angle + 6 n t; stored as ``attrs["speed_rpm"]``. Of
         a record of two cycles and more the period is compared with it: what differs by at most 1 % is corrected and
-        told, more is refused.
+        reported, more is refused.
     gain_bar_per_v : float, optional
         For a pressure in volts: bar per volt of the charge amplifier.
     offset_bar : float, optional
@@ -207,44 +206,6 @@ def read_pressure(
     if speed is not None:
         attrs["speed_rpm"] = float(speed)
     return _dataset(angle, pressure, attrs)
-
-
-def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a trace as CSV that `read_pressure` reads back bit by bit.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        With ``pressure_bar(crank_angle_cad)`` or ``pressure_bar(cycle, crank_angle_cad)``, which becomes a column per
-        cycle, counted from 1; other variables and attributes are not written.
-    path : path-like
-        The file; an existing one is replaced once the Dataset has passed its checks.
-
-    Raises
-    ------
-    DataError
-        No ``pressure_bar`` over ``crank_angle_cad``, missing units, and all of `check_trace`.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import numpy as np
-    >>> from mgdd.io import pressure_trace, read_pressure, write_pressure
-    >>> angle = np.arange(-30.0, 31.0)
-    >>> trace = pressure_trace(angle, 60.0 - 0.01 * angle**2)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "mean.csv"
-    ...     write_pressure(trace, file)
-    ...     read_pressure(file).equals(trace)
-    True
-    """
-    if "pressure_bar" not in dataset or set(dataset["pressure_bar"].dims) not in ({ANGLE}, {CYCLE, ANGLE}):
-        raise DataError(f"dataset has no pressure_bar({ANGLE}): make one with mgdd.io.pressure_trace")
-    check_labels(dataset[["pressure_bar"]])
-    measured = dataset["pressure_bar"].transpose(..., ANGLE)
-    angle, pressure = check_trace(measured[ANGLE].to_numpy(), measured.to_numpy(), source="dataset")
-    names = ["pressure_bar"] if pressure.ndim == 1 else [f"pressure_bar_{k + 1}" for k in range(len(pressure))]
-    write_columns({ANGLE: angle, **dict(zip(names, np.atleast_2d(pressure), strict=True))}, path)
 
 
 def _dataset(angle: NDArray[np.float64], pressure: NDArray[np.float64], attrs: dict[str, str | float]) -> xr.Dataset:

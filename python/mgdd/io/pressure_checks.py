@@ -180,7 +180,7 @@ def check_trace(
     ------
     DataError
         Fewer than 20 samples, NaN or infinity, unsorted or repeated angles, a step above 1.5 times the median
-        step, angles in another convention or unit, a pressure that cannot be in the unit said.
+        step, angles in another convention or unit, a pressure that cannot be in the given unit.
     ShapeError
         Arrays that are not equally long.
 

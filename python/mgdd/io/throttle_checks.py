@@ -180,7 +180,7 @@ def check_signals(
     angle_unit: str = "deg",
     travel_deg: float = 90.0,
 ) -> None:
-    """Refuse a duty or an angle that cannot be one, in the units said; both are converted already."""
+    """Refuse a duty or an angle that cannot be one, in the given units; both are converted already."""
     raw_duty = duty * 100.0 if duty_unit == "%" else duty
     raw_angle = {"rad": np.deg2rad(angle), "%": angle * 100.0 / travel_deg}.get(angle_unit, angle)
     _check_exchanged(raw_duty, raw_angle, duty_unit, place)

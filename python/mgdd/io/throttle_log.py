@@ -13,8 +13,8 @@ from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.io.binary_files import read_mat
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
 from mgdd.io.files import existing_file
-from mgdd.io.table import Place, TextTable, read_table, write_columns
-from mgdd.io.throttle_checks import check_even, check_samples, check_signals, check_throttle_log
+from mgdd.io.table import Place, TextTable, read_table
+from mgdd.io.throttle_checks import check_even, check_samples, check_signals
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["read_throttle_log", "throttle_log", "write_throttle_log"]
+__all__ = ["read_throttle_log", "throttle_log"]
 
 # The first unit of each column is taken where nothing is said.
 _UNITS = {
@@ -186,39 +186,6 @@ def read_throttle_log(
         angle_unit=units["angle_deg"],
         travel_deg=travel_deg,
     )
-
-
-def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a log as plain CSV that `read_throttle_log` reads back bit by bit.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        As `read_throttle_log` gives it; other variables are not written.
-    path : path-like
-        The file; an existing one is replaced once the log has passed its checks.
-
-    Raises
-    ------
-    DataError
-        As in `throttle_log`.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import numpy as np
-    >>> from mgdd.io import read_throttle_log, throttle_log, write_throttle_log
-    >>> time = np.arange(1000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "log.csv"
-    ...     write_throttle_log(log, file)
-    ...     read_throttle_log(file).equals(log)
-    True
-    """
-    check_throttle_log(log)
-    names = ["time_s", "duty", "angle_deg", *(name for name in _OPTIONAL if name in log)]
-    write_columns({name: log[name].to_numpy() for name in names}, path)
 
 
 def _column(key: str, values: ArrayLike, name: str) -> NDArray[np.float64]:

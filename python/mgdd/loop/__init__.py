@@ -19,11 +19,11 @@ from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
-from mgdd.loop.throttle_faults import ThrottleFault
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
 from mgdd.loop.virtual_throttle import VirtualThrottle
+from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
     "EngineBench",

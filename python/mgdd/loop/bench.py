@@ -13,8 +13,8 @@ from mgdd.errors import ParameterError, RigError, hinted
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.loop.steady import find_optimum, steady_map
-from mgdd.optimize import Limit, Optimum
-from mgdd.optimize.optimum import limit_names_of
+from mgdd.optimize import Limit
+from mgdd.optimize.optimum import Optimum, limit_names_of
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.describe import as_html, rows_of
 
@@ -263,7 +263,7 @@ class EngineBench(_core.loop.EngineBench):
 
         Returns
         -------
-        mgdd.optimize.Optimum
+        Optimum
             Input ``soc_cad``, to about 0.001 CAD; objective ``j``. ``values`` holds the indicators there and, for every
             limited one, ``scatter_NAME``: the standard deviation from cycle to cycle that the scatter of SOC causes, to
             first order, in its unit. The curvature is taken over ±3 CAD at the free optimum.

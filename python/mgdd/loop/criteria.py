@@ -39,7 +39,7 @@ class LoopCriteria:
         Per limit, the value above which a cycle counts for ``exceeded_fraction``, for example the limit and a margin
         for its scatter; the summary repeats it as ``exceed_above_NAME``.
     limits : mapping of str to float, or sequence of Limit, optional
-        Limits of which the summary tells ``worst_NAME``, ``above_fraction_NAME`` and so on, without any margin; those
+        Limits of which the summary gives ``worst_NAME``, ``above_fraction_NAME`` and so on, without any margin; those
         of the seeker if left out.
 
     Raises

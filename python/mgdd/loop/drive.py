@@ -64,7 +64,7 @@ def simulate_drive(
     Parameters
     ----------
     chain : DemandChain
-        What the controller believes: it turns pedal and speed into the reference of the plate.
+        The chain of the controller, from pedal and speed to the reference of the plate.
     pedal_percent : array_like, shape (n,)
         Pedal at every sample [%], 0 to 100.
     speed_rpm : float or array_like, shape (n,)
@@ -75,7 +75,7 @@ def simulate_drive(
     throttle : Throttle, Preset, str or path-like, optional
         The throttle; the preset ``P1`` if left out.
     engine : DemandChain, optional
-        The engine as it is: throttle flow, manifold and torque; as the controller believes if left out.
+        The engine as it is: throttle flow, manifold and torque; as in the controller if left out.
     measured_pressure : bool
         Whether the chain gets the manifold pressure; without it the opening follows from the wanted one.
     air_torque : bool

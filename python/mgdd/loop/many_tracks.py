@@ -72,7 +72,7 @@ def track_many(
     mgdd.errors.WorkerLostError
         As in `mgdd.parallel.map_items`; ``partial`` is a Dataset as after Ctrl-C.
     mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the whole Dataset, in which ``finished`` tells the runs that came to their end; the
+        Ctrl-C; ``partial`` is the whole Dataset, in which ``finished`` marks the runs that came to their end; the
         others are NaN.
 
     Examples

@@ -74,7 +74,7 @@ class Measurement:
 class Plant(Protocol):
     """Takes inputs by name, gives back what was measured.
 
-    `EngineBench`, `SurrogatePlant`, `VirtualThrottle` and every `mgdd.rig.Rig` are plants; a class of your own with
+    `EngineBench`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; a class of your own with
     these members is one too.
 
     Examples

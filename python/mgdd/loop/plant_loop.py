@@ -64,7 +64,7 @@ class LoopRun(Result):
         cycles from ``judged_from`` on above any of the thresholds ``exceed_above_NAME``.
     interrupted : bool
         Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
-    findings : tuple of mgdd.results.Finding
+    findings : tuple of Finding
         What the seeker holds against the run at its end, as its ``findings``: inputs that make the plant fail.
 
     Examples

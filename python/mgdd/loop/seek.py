@@ -30,11 +30,11 @@ def run_seeker(
 ) -> LoopRun:
     """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
 
-    Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is told as such. A new operating point
-    restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after the
-    first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither point
-    and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` the loop runs in
-    the core without the GIL; one ask and tell at a time from Python gives the same trajectory, bit for bit.
+    Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is reported as such. A new operating
+    point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
+    the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
+    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` the loop
+    runs in the core without the GIL; one ask and tell at a time from Python gives the same trajectory, bit for bit.
 
     Parameters
     ----------

@@ -13,7 +13,8 @@ from mgdd.errors import ParameterError, argument
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.seek_task import Task, amplitude_of, make_seeker
-from mgdd.optimize import Limit, Optimum
+from mgdd.optimize import Limit
+from mgdd.optimize.optimum import Optimum
 
 if TYPE_CHECKING:
     import xarray as xr

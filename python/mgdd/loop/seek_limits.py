@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.loop.limit_figures import FIGURES, NOISE_FREE
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.loop.seek_task import Task, amplitude_of
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 
 __all__ = ["COV", "COV_CYCLES", "SCATTER", "choose_start", "doubts_of", "limit_report"]
 

@@ -14,7 +14,8 @@ from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
     from mgdd.loop.bench import EngineBench
-    from mgdd.optimize import Optimum, Seeker
+    from mgdd.optimize import Seeker
+    from mgdd.optimize.optimum import Optimum
 
 __all__ = ["Task", "amplitude_of", "default_cycles", "make_seeker"]
 

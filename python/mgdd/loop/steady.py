@@ -11,8 +11,7 @@ from mgdd._core.loop import EngineBench
 from mgdd._core.optimize import Limit
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError
-from mgdd.optimize import Optimum
-from mgdd.optimize.optimum import limits_of
+from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.optimize.optimum import limit_names_of
 from mgdd.results.describe import described
-from mgdd.surrogate import EngineSurrogate
 from mgdd.surrogate.signal_model import decay_of
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,7 +63,8 @@ class SurrogatePlant:
     Examples
     --------
     >>> from mgdd.loop import SurrogatePlant
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> from mgdd.surrogate import fit_surrogate
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> surrogate = fit_surrogate(random_step_records(1500))
     >>> plant = SurrogatePlant(surrogate, "imep_bar", limits=["mprr"], residuals=False)
     >>> reading = plant.step(-4.0)

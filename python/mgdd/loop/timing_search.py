@@ -20,7 +20,7 @@ from mgdd.loop.seek import run_seeker
 from mgdd.loop.seek_guides import CURVES, Guidance, guidance_of, guided_seeker, late_loss, with_start
 from mgdd.loop.seek_limits import COV, COV_CYCLES, choose_start, doubts_of
 from mgdd.loop.seek_task import Task, default_cycles, make_seeker
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 
 __all__ = ["TimingSearch", "TimingSearchRun"]
 

@@ -201,7 +201,7 @@ def reference_of(given: Any) -> Reference:
 def plant_of(
     throttle: ThrottleLike | None, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
 ) -> VirtualThrottle:
-    """Give the plant at rest at the first angle of the reference, inside its travel, if nothing else is said."""
+    """Give the plant at rest at the first angle of the reference, inside its travel, by default."""
     body = Throttle() if throttle is None else throttle_of(throttle)
     start = float(np.clip(reference.angle_deg[0], body.closed_deg, body.open_deg)) if start_deg is None else start_deg
     return VirtualThrottle(body, sensors=sensors, start_deg=start, sample_s=reference.sample_s, seed=seed)

@@ -101,7 +101,7 @@ def tuned_with_doubts(
 
 
 def require_known_delay(kind: str, sample_s: float, delay_samples: int) -> None:
-    """Raise ParameterError where a kind that cannot know a delay is told one that its shipped numbers do not bear."""
+    """Raise ParameterError where a kind that cannot know a delay is given one that its shipped numbers do not bear."""
     family = family_of(kind)
     if delay_samples <= 0 or family.knows_delay or _dead_s(sample_s, delay_samples) <= family.longest_dead_s:
         return

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from mgdd import _core
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
-from mgdd.loop.throttle_faults import ThrottleFault
 from mgdd.presets.meant import ThrottleLike, throttle_of
-from mgdd.throttle import SensorFault, SensorPair, Throttle
-from mgdd.throttle.sensors import fault_pair
+from mgdd.throttle import SensorPair, Throttle
+from mgdd.throttle.faults import ThrottleFault, fault_pair
 
 __all__ = ["VirtualThrottle"]
 
@@ -29,7 +28,7 @@ class VirtualThrottle:
         stay at 0 and at the supply of the throttle. While ``bridge_open`` is not 0 no current flows, whatever the duty.
     sensors : SensorPair, optional
         As in `mgdd.throttle.SensorPair.sense`.
-    faults : sequence of SensorFault and ThrottleFault
+    faults : sequence of ThrottleFault
         At most one per sensor, and 32 of plate, springs, supply and measurement.
     start_deg : float, optional
         Angle at the start, at rest [deg]; limp-home if left out.
@@ -62,7 +61,7 @@ class VirtualThrottle:
         *,
         inputs: Sequence[str] = ("duty",),
         sensors: SensorPair | None = None,
-        faults: Sequence[SensorFault | ThrottleFault] = (),
+        faults: Sequence[ThrottleFault] = (),
         start_deg: float | None = None,
         sample_s: float = 1e-3,
         step_s: float = 1e-4,
@@ -82,8 +81,8 @@ class VirtualThrottle:
         self._core = _core.loop.VirtualThrottle(
             throttle=self.throttle,
             sensors=sensors or SensorPair(),
-            faults=fault_pair([fault for fault in faults if not isinstance(fault, ThrottleFault)]),
-            plant_faults=[fault.to_core() for fault in faults if isinstance(fault, ThrottleFault)],
+            faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
+            plant_faults=[fault.to_core() for fault in faults if fault.sensor is None],
             sample_s=sample_s,
             step_s=step_s,
             start_deg=self.start_deg,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.compare import apply_map, compare_maps
-from mgdd.maps.dcm_files import read_dcm, write_dcm
+from mgdd.maps.dcm_files import read_dcm
 from mgdd.maps.files import read_map, write_map
 from mgdd.maps.optimum import optimize_map
 from mgdd.maps.smoothing import smooth_map
@@ -17,7 +17,6 @@ __all__ = [
     "read_dcm",
     "read_map",
     "smooth_map",
-    "write_dcm",
     "write_map",
 ]
 

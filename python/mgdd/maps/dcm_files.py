@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.errors import DataError, Error, argument
 from mgdd.io.files import read_plain_text, write_whole_text
-from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cells import can_be_name, spoken_name
 from mgdd.maps.dcm import DcmBlock, dcm_blocks, dcm_text
 from mgdd.results.units import attribute_units, unit_of
@@ -59,56 +59,9 @@ def write_dcm(
     *,
     values: Mapping[str, tuple[float, str]] | None = None,
 ) -> None:
-    """Write maps and single values to one DCM file, for calibration tools.
-
-    Parameters
-    ----------
-    maps : sequence or mapping of CalibrationMap
-        In their order; the keys of a mapping are the names of the labels, else those of the maps. The first axis is x.
-        Source, support and standard deviation of the cells have no place in this format; the provenance becomes
-        comments.
-    path : path-like
-        The file; an existing one is replaced in one step.
-    values : mapping of str to (float, str), optional
-        Single values with their units.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        A cell without a value, a text with a quote, a name twice. Nothing is written then.
-    OSError
-        The file cannot be written.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.maps import CalibrationMap, read_dcm, write_dcm
-    >>> soc = CalibrationMap({"fuel_mg": [6, 20]}, [-1, -4], name="soc_cad")
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "engine.dcm"
-    ...     write_dcm({"SocBase": soc}, file, values={"idle_rpm": (850.0, "rpm")})
-    ...     print(file.read_text(encoding="utf-8"), end="")
-    ...     read_dcm(file).values
-    <BLANKLINE>
-    KONSERVIERUNG_FORMAT 2.0
-    <BLANKLINE>
-    FESTWERT idle_rpm
-       LANGNAME      "idle"
-       EINHEIT_W     "rpm"
-       WERT          850.0
-    END
-    <BLANKLINE>
-    KENNLINIE SocBase 2
-       LANGNAME      "start of combustion"
-       EINHEIT_X     "mg"
-       EINHEIT_W     "°CA aTDC"
-    *SSTX   fuel_mg
-       ST/X          6.0   20.0
-       WERT          -1.0   -4.0
-    END
-    {'idle_rpm': (850.0, 'rpm')}
-    """
-    named = [*(maps.items() if isinstance(maps, Mapping) else ((table.name, table) for table in maps))]
+    """Write maps and single values to one DCM file; see `mgdd.maps.write_map`."""
+    given = [map_of(table) for table in (maps.values() if isinstance(maps, Mapping) else maps)]
+    named = [*zip(maps if isinstance(maps, Mapping) else [table.name for table in given], given, strict=True)]
     blocks = []
     for name, (number, unit) in (values or {}).items():
         if not np.isfinite(number):
@@ -150,9 +103,32 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
 
     Examples
     --------
-    See `write_dcm`.
-
-    >>> from mgdd.maps import read_dcm
+    >>> import pathlib, tempfile
+    >>> from mgdd.maps import CalibrationMap, read_dcm, write_map
+    >>> soc = CalibrationMap({"fuel_mg": [6, 20]}, [-1, -4], name="soc_cad")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "engine.dcm"
+    ...     write_map({"SocBase": soc}, file, values={"idle_rpm": (850.0, "rpm")})
+    ...     print(file.read_text(encoding="utf-8"), end="")
+    ...     read_dcm(file).values
+    <BLANKLINE>
+    KONSERVIERUNG_FORMAT 2.0
+    <BLANKLINE>
+    FESTWERT idle_rpm
+       LANGNAME      "idle"
+       EINHEIT_W     "rpm"
+       WERT          850.0
+    END
+    <BLANKLINE>
+    KENNLINIE SocBase 2
+       LANGNAME      "start of combustion"
+       EINHEIT_X     "mg"
+       EINHEIT_W     "°CA aTDC"
+    *SSTX   fuel_mg
+       ST/X          6.0   20.0
+       WERT          -1.0   -4.0
+    END
+    {'idle_rpm': (850.0, 'rpm')}
     >>> try:
     ...     read_dcm("no_such_file.dcm")
     ... except FileNotFoundError as error:

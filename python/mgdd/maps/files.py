@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     import xarray as xr
 
@@ -28,24 +30,32 @@ _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".nc")
 
 
-def write_map(table: CalibrationMap | xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a map in the form that the ending of the file says.
+def write_map(
+    table: CalibrationMap | xr.Dataset | Sequence[CalibrationMap] | Mapping[str, CalibrationMap],
+    path: str | os.PathLike[str],
+    *,
+    values: Mapping[str, tuple[float, str]] | None = None,
+) -> None:
+    """Write a map in the form that the ending of the file says; a DCM file holds several, and single values.
 
     Parameters
     ----------
     table : CalibrationMap, or the Dataset of one
-        The map.
+        The map. For a DCM file also a sequence of maps, or a mapping of the names of their labels to them.
     path : path-like
         ``.csv``: a grid with units that a spreadsheet shows as it is; ``.json`` and ``.nc`` (netCDF): these three hold
-        everything. ``.dcm``: axes, values, units and long name, for calibration tools. An existing file is replaced in
-        one step.
+        everything. ``.dcm``: axes (the first is x), values, units and long name, for calibration tools; the provenance
+        becomes comments, and source, support and standard deviation of the cells have no place. An existing file is
+        replaced in one step.
+    values : mapping of str to (float, str), optional
+        Single values with their units, for a DCM file.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        Another ending.
+        Another ending, or several maps or values for a file that holds one map.
     mgdd.errors.DataError
-        A cell without a value, in a DCM file. Nothing is written then.
+        In a DCM file a cell without a value, a text with a quote, a name twice. Nothing is written then.
     OSError
         The file cannot be written; one that was there is as before.
 
@@ -72,14 +82,19 @@ def write_map(table: CalibrationMap | xr.Dataset, path: str | os.PathLike[str]) 
     end
     True
     """
-    table = map_of(table)
     ending = _ending(path)
+    several = isinstance(table, list | tuple) or (isinstance(table, Mapping) and not hasattr(table, "data_vars"))
+    maps: Any = table if several else [map_of(table)]
     if ending == ".dcm":
-        write_dcm([table], path)
-    elif ending == ".nc":
-        write_netcdf(table.to_dataset(), path)
+        write_dcm(maps, path, values=values)
+        return
+    if several or values:
+        raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file")
+    (own,) = maps
+    if ending == ".nc":
+        write_netcdf(own.to_dataset(), path)
     else:
-        write_whole_text(path, csv_of_map(table) if ending == ".csv" else _json_of(table))
+        write_whole_text(path, csv_of_map(own) if ending == ".csv" else _json_of(own))
 
 
 def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: str = ".") -> CalibrationMap:

@@ -4,7 +4,7 @@ A seeker proposes an input (``ask``) and accepts what was measured there (``tell
 never holds a plant, so simulation, replay and the test bench are the same loop. `tune` chooses amplitude, period
 and gain from noise and curvature, `measure_map` reads those off measurements, ``run`` of a seeker closes the loop on a
 function. `IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares` is
-the Levenberg-Marquardt search behind every fit, which answers with a `mgdd.results.FitReport`.
+the Levenberg-Marquardt search behind every fit, which answers with a `FitReport`.
 
 Examples
 --------
@@ -38,7 +38,6 @@ from mgdd.optimize.fit_options import FitOptions
 from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import least_squares
 from mgdd.optimize.measured_map import measure_map
-from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.seeker import Seeker
 from mgdd.optimize.tuning import tune
 
@@ -52,7 +51,6 @@ __all__ = [
     "IterativeLearning",
     "Limit",
     "NewtonSeeking",
-    "Optimum",
     "Seeker",
     "Spsa",
     "least_squares",

@@ -144,7 +144,7 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
 
 
 class GoldenSection(Seeker, _core.optimize.GoldenSection):
-    """Golden-section search of one input that believes a comparison only beyond the noise.
+    """Golden-section search of one input that trusts a comparison only beyond the noise.
 
     Two inner points are measured in turns until their means differ by more than noise; if inconclusive, both ends are
     trimmed. When the bracket is as small as the noise allows, the search goes on as triples around the vertex of a
@@ -157,11 +157,11 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     lower, upper : float
         The bracket, finite; also the bounds of the applied input.
     noise_sd : float
-        Standard deviation of one measurement of J; 0 believes every comparison.
+        Standard deviation of one measurement of J; 0 trusts every comparison.
     significance : float
         Standard errors that decide a comparison.
     samples_max : int
-        Measurements of each inner point before a draw.
+        Measurements of each inner point before it counts as inconclusive.
     tolerance : float
         Width of the bracket at which a noise-free search ends, in the unit of the input, > 0.
     maximize : bool

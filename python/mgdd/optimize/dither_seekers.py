@@ -35,7 +35,7 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     gain : float or array_like, optional
         Adaptation gain, per input [unit of the input per unit of J]. Without, it is made of `curvature` or, where that
         is not given either, of first readings: start, above, start, below it by `amplitude`, per input, six times,
-        before the search begins; so any unit of J does. The property `gain` tells it. `tune` gives a better one.
+        before the search begins; so any unit of J does. The property `gain` shows it. `tune` gives a better one.
     rate : float or array_like, optional
         Largest change of the estimate per cycle, per input; amplitude/period in batches (once per period) and
         3 amplitude/period otherwise.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from mgdd.results import FitReport
+    from mgdd.results.fit_report import FitReport
 
 __all__ = ["draw_run", "fit_of", "fit_run", "quality_of"]
 

@@ -89,8 +89,8 @@ class ConvergenceReport(NumbersResult):
 class IterativeLearning:
     """Learn the input trajectory of a task that is repeated trial by trial.
 
-    Ask for the input of the trial, apply it, tell the error ``e = r - y``; sample t of both belongs to the same
-    instant. The input reaches the error after m samples (`relative_degree`). Only the last ``N - m`` errors
+    Ask for the input of the trial, apply it, return the error ``e = r - y`` (`tell`); sample t of both belongs to the
+    same instant. The input reaches the error after m samples (`relative_degree`). Only the last ``N - m`` errors
     count; the last m inputs, which act after the trial, repeat the last learned one.
 
     Parameters
@@ -238,7 +238,7 @@ class IterativeLearning:
         Raises
         ------
         mgdd.errors.ParameterError
-            The trial has not been asked for, or has been told already.
+            The trial has not been asked for, or its error was given already.
         mgdd.errors.ShapeError
             Not one error per sample.
         mgdd.errors.DataError

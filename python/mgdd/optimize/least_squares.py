@@ -8,7 +8,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.results import FitReport
+from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

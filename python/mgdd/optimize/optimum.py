@@ -49,7 +49,8 @@ class Optimum(NumbersResult):
 
     Examples
     --------
-    >>> from mgdd.optimize import Limit, Optimum
+    >>> from mgdd.optimize import Limit
+    >>> from mgdd.optimize.optimum import Optimum
     >>> best = Optimum(inputs={"soc_cad": -3.1}, objective="efficiency_gross", value=0.56,
     ...                limits=(Limit("p_max_bar", 95.0),), active_limits=("p_max_bar",))
     >>> best["soc_cad"]

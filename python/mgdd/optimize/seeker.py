@@ -151,13 +151,13 @@ class Seeker(SeekerFindings, _CoreSeeker):
 
     @property
     def history(self) -> xr.Dataset:
-        """What was applied and told, cycle by cycle.
+        """What was applied and measured, cycle by cycle.
 
-        Dimensions `cycle` and `input`; variables `applied` (as asked, where ``tell`` was not told ``applied``) and
-        `estimate` (before the cycle was told), both (cycle, input) in the unit of the input, `objective` (J as told,
-        components summed; NaN where the cycle misfired) and `misfire` (0 or 1). With limits also dimension `limit`, and
-        over (cycle, limit) `limits` as told and `limit_states` after the cycle (0 free, 1 active, 2 infeasible). Built
-        anew on every access.
+        Dimensions `cycle` and `input`; variables `applied` (as asked, where ``tell`` got no ``applied``) and
+        `estimate` (before the result of the cycle), both (cycle, input) in the unit of the input, `objective` (J as
+        given, components summed; NaN where the cycle misfired) and `misfire` (0 or 1). With limits also dimension
+        `limit`, and over (cycle, limit) `limits` as given and `limit_states` after the cycle (0 free, 1 active, 2
+        infeasible). Built anew on every access.
         """
         columns = self._history_columns()
         names, over, unit = self.limit_names, ("cycle", "limit"), "unit of the limit"

@@ -246,9 +246,9 @@ def tune(
         the echo by at most 60 deg. A fifth of their sum and 2 at least where there is one, else 0. 0 asks for the
         shortest period; then an error of a quarter of the period makes the seeker run away.
     rms : float, optional
-        Wished error of the estimate once arrived [unit of the input]; 0.2 L.
+        Specified error of the estimate after arrival [unit of the input]; 0.2 L.
     cycles : float, optional
-        Wished cycles to arrive; 50, more where a lag asks for it.
+        Specified cycles to arrive; 50, more where a lag asks for it.
     distance, arrival : float, optional
         Error at the start, and what counts as arrived [unit of the input]; 5 L and 0.45 L.
     amplitude_max : float, optional

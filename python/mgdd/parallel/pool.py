@@ -67,7 +67,7 @@ class Pool:
         return isinstance(self._executor, ProcessPoolExecutor)
 
     def renew(self) -> bool:
-        """Replace a broken executor; False where nobody knows how it is made."""
+        """Replace a broken executor; False where it is unknown how it is made."""
         if self._make is None:
             return False
         self._executor.shutdown(wait=False)
@@ -112,7 +112,7 @@ def cores() -> int:
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Let calls within take one core where nothing else is said: the other workers have the others."""
+    """Let calls within take one core by default: the other workers have the others."""
     token = _single.set(True)
     try:
         yield

@@ -8,10 +8,9 @@ title use the figure's `suptitle`.
 from __future__ import annotations
 
 from mgdd.plot.convergence import convergence
-from mgdd.plot.cycle import log_pv, pressure
+from mgdd.plot.cycle import pressure
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
-from mgdd.plot.response import response_diagnostics
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import holding_duty
@@ -22,11 +21,9 @@ __all__ = [
     "convergence",
     "correlation_matrix",
     "holding_duty",
-    "log_pv",
     "map_cells",
     "map_contour",
     "pressure",
-    "response_diagnostics",
     "seeking",
     "sensors",
     "timing",

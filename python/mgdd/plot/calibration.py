@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["calibration_overlay", "tdc_scan", "wall_heat_profile"]
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["convergence"]
 

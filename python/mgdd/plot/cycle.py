@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
-__all__ = ["log_pv", "pressure"]
+__all__ = ["pressure"]
 
 _RATES = {
     "heat_release_j_per_cad": ("-.", ORANGE),
@@ -29,8 +29,8 @@ _WINDOWS = {"n_compression": (-100.0, -40.0), "n_expansion": (60.0, 120.0)}
 _SLOPE_STYLES = {"n_compression": ("o--", BLUE), "n_expansion": ("s-.", ORANGE)}
 
 
-def pressure(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw pressure over crank angle, with what the Dataset knows of heat release and motoring.
+def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | None = None) -> Axes:
+    """Draw pressure over crank angle, with heat release and motoring where known; or over volume, both logarithmic.
 
     Parameters
     ----------
@@ -38,6 +38,10 @@ def pressure(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
         ``pressure_bar(crank_angle_cad)`` [bar, °CA aTDC] of a measured trace, of `mgdd.engine.simulate` or of
         `mgdd.engine.analyze`. Heat release rates [J/°CA] go to a twin axis,
         ``motored_pressure_bar`` is dashed.
+    log_pv : bool
+        Over ``volume_l`` [L] instead, which `mgdd.engine.analyze` and `mgdd.engine.simulate` give, on logarithmic axes.
+        ``n_compression`` and ``n_expansion`` [-], where present, are drawn as lines through the mean of their windows
+        (-100 to -40 and 60 to 120 °CA aTDC).
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -49,15 +53,21 @@ def pressure(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     Raises
     ------
     DataError
-        No ``pressure_bar``, or a variable without unit.
+        No ``pressure_bar``, or a variable without unit; over volume a pressure that is not positive (a trace before
+        pegging).
 
     Examples
     --------
     >>> from mgdd import datasets, plot
-    >>> ax = plot.pressure(datasets.load("hd_diesel_128x144")[0])
+    >>> from mgdd.engine import simulate
+    >>> ax = plot.pressure(datasets.read("hd_diesel_128x144")[0])
     >>> ax.get_xlabel()
     'crank angle [°CA aTDC]'
+    >>> plot.pressure(simulate("puma_single"), log_pv=True).get_xlabel()
+    'cylinder volume [L]'
     """
+    if log_pv:
+        return _log_pv(dataset, ax)
     optional, made_by = ("motored_pressure_bar", *_RATES), "mgdd.io.read_pressure or mgdd.engine.simulate"
     dataset = require("dataset", dataset, (ANGLE, "pressure_bar"), made_by, optional)
     rates = [name for name in _RATES if name in dataset]
@@ -78,35 +88,8 @@ def pressure(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     return finished(ax, dataset, ANGLE, "pressure_bar", lines, grid=False)
 
 
-def log_pv(dataset: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw pressure over volume on logarithmic axes, with the fitted polytropic slopes.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset or Result
-        ``pressure_bar`` [bar] and ``volume_l`` [L] over ``crank_angle_cad``, as `mgdd.engine.analyze` and
-        `mgdd.engine.simulate` give. ``n_compression`` and ``n_expansion`` [-], where present, are drawn as
-        lines through the mean of their windows (-100 to -40 and 60 to 120 °CA aTDC).
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes, both scales logarithmic.
-
-    Raises
-    ------
-    DataError
-        A variable is missing, or a pressure is not positive (a trace before pegging).
-
-    Examples
-    --------
-    >>> from mgdd import plot
-    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
-    >>> plot.log_pv(simulate(Cylinder(), OperatingPoint())).get_xlabel()
-    'cylinder volume [L]'
-    """
+def _log_pv(dataset: xr.Dataset | Result, ax: Axes | None) -> Axes:
+    """Draw pressure over volume on logarithmic axes, with the fitted polytropic slopes."""
     needed = (ANGLE, "pressure_bar", "volume_l")
     dataset = require("dataset", dataset, needed, "mgdd.engine.analyze or mgdd.engine.simulate")
     angle = dataset[ANGLE].to_numpy()

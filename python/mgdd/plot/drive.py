@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["drive"]
 

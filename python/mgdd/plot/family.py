@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["family_strip", "family_strips"]
 
@@ -51,7 +51,7 @@ def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes
     >>> from mgdd.plot.family import family_strip
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> row = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)[1]
+    >>> row = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[1]
     >>> family_strip(row).get_xlabel()
     'best CA50, no pressure limit [°CA aTDC]'
     """

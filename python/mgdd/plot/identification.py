@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Rectangle
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["correlation_matrix", "error_growth", "residual_correlation"]
 
@@ -82,7 +82,7 @@ def residual_correlation(correlations: xr.Dataset | Result, *, ax: Axes | None =
     ----------
     correlations : xarray.Dataset or Result
         ``autocorrelation`` and ``cross_correlation`` over ``lag`` and the number ``limit``, as
-        `mgdd.signals.residual_tests` gives it in ``correlations``.
+        `mgdd.identify.validate_throttle` gives it in ``tests.correlations``.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it gives its lower half away. None makes a figure.
 
@@ -110,7 +110,7 @@ def residual_correlation(correlations: xr.Dataset | Result, *, ax: Axes | None =
     'lag [samples]'
     """
     names = ("autocorrelation", "cross_correlation")
-    correlations = require("correlations", correlations, ("lag", *names, "limit"), "mgdd.signals.residual_tests")
+    correlations = require("correlations", correlations, ("lag", *names, "limit"), "mgdd.identify.validate_throttle")
     ax = new_axes(ax, height=4.4)
     panels = divide(ax, (1.0, 1.0))
     lag, limit = correlations["lag"].to_numpy(), float(correlations["limit"])
@@ -140,7 +140,7 @@ def correlation_matrix(correlation: xr.Dataset | Result, *, ax: Axes | None = No
     ----------
     correlation : xarray.Dataset or Result
         ``correlation`` [-] over ``parameter`` and ``other``, the names; NaN for a parameter at a bound. As
-        `mgdd.results.FitReport.to_dataset` gives it.
+        the ``to_dataset`` of a fit's report gives it.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["map_cells", "map_contour"]
 
-_MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.load"
+_MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.read"
 _COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
 # Beside a value in its cell; what is not named here needs no mark.
 _MARKS = {

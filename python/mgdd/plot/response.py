@@ -1,4 +1,4 @@
-"""Is a response model to be believed: left-out points, residuals over order and fit, normal scores, and cuts."""
+"""Diagnostics of a response model: left-out points, residuals over order and fit, normal scores, and cuts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import SubplotSpec
     from numpy.typing import NDArray
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["response_diagnostics"]
 
@@ -28,7 +28,7 @@ _NEEDED = (
 
 
 def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw what tells a good response model from a bad one: four panels of residuals, and a cut along each factor.
+    """Draw the diagnostics of a response model: four panels of residuals, and a cut along each factor.
 
     Parameters
     ----------
@@ -50,11 +50,11 @@ def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = 
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.response import response_diagnostics
     >>> from mgdd.surrogate import fit_response
     >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
     >>> fit = fit_response(line, "imep_bar", degree=1)
-    >>> [panel.get_xlabel() for panel in plot.response_diagnostics(fit.diagnostics).figure.axes][-1]
+    >>> [panel.get_xlabel() for panel in response_diagnostics(fit.diagnostics).figure.axes][-1]
     'fuel [mg]'
     """
     diagnostics = require("diagnostics", diagnostics, _NEEDED, "mgdd.surrogate.fit_response")

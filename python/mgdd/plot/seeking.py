@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["seeking"]
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = [
     "BLACK",

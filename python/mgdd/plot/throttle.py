@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["free_run", "holding_duty"]
 
@@ -47,9 +47,9 @@ def holding_duty(log: xr.Dataset | Result, *, limp_home_deg: float | None = None
     --------
     >>> from mgdd import plot
     >>> from mgdd.signals import triangle
-    >>> from mgdd.throttle import Throttle, simulate
+    >>> from mgdd.throttle import Throttle, simulate_throttle
     >>> ramp = triangle(8.0, offset=0.15, amplitude=0.2, frequency_hz=0.125)
-    >>> plot.holding_duty(simulate(Throttle(), ramp["duty"], time_s=ramp["time_s"])).get_xlabel()
+    >>> plot.holding_duty(simulate_throttle(Throttle(), ramp["duty"], time_s=ramp["time_s"])).get_xlabel()
     'plate angle [deg]'
     """
     log = require("log", log, ("time_s", "duty", "angle_deg"), _MADE_BY, ("model_deg",))

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["air_flow", "rate_dependence"]
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["throttle_run"]
 
@@ -25,7 +25,8 @@ def throttle_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     ----------
     run : xarray.Dataset or Result
         ``angle_deg`` [deg] and ``duty`` [-] over ``time_s`` [s], and ``current_a`` [A] if there, as
-        `mgdd.throttle.simulate` or `mgdd.io.read_throttle_log` gives them. Attribute ``limp_home_deg`` is marked.
+        `mgdd.throttle.simulate_throttle` or `mgdd.io.read_throttle_log` gives them. Attribute ``limp_home_deg`` is
+        marked.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it gives its lower half to the panels. None makes a figure.
 
@@ -42,11 +43,11 @@ def throttle_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd.plot.throttle_run import throttle_run
-    >>> from mgdd.throttle import Throttle, simulate
-    >>> throttle_run(simulate(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
+    >>> from mgdd.throttle import Throttle, simulate_throttle
+    >>> throttle_run(simulate_throttle(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
     'plate angle [deg]'
     """
-    run = require("run", run, ("time_s", "angle_deg", "duty"), "mgdd.throttle.simulate", ("current_a",))
+    run = require("run", run, ("time_s", "angle_deg", "duty"), "mgdd.throttle.simulate_throttle", ("current_a",))
     panels = [(name, color) for name, color in _PANELS if name in run]
     ax = new_axes(ax, height=4.8)
     time = run["time_s"].to_numpy()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
-    from mgdd.results import Result
+    from mgdd.results.result import Result
 
 __all__ = ["timing"]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mgdd.presets.preset import Preset, available, load
+from mgdd.presets.preset import available, load
 
-__all__ = ["Preset", "available", "load"]
+__all__ = ["available", "load"]
 
 
 def __dir__() -> list[str]:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
 from mgdd.results.labels import to_jsonable
-from mgdd.studies import available_studies
+from mgdd.studies.registry import available_studies
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mgdd.studies import StudyResult
+    from mgdd.studies.base import StudyResult
     from mgdd.studies.sections import Section
 
 __all__ = ["write_report"]
@@ -29,7 +29,7 @@ def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-rep
 
     Parameters
     ----------
-    result : mgdd.studies.StudyResult
+    result : StudyResult
         Of any study.
     folder : path-like
         Made if missing; the two files in it are replaced.

@@ -5,18 +5,10 @@ Nothing stands here without a unit: a Dataset refuses a variable that does not s
 
 from __future__ import annotations
 
-from mgdd.results.finding import Finding
 from mgdd.results.fit import Fit
-from mgdd.results.fit_report import FitReport
-from mgdd.results.model import Model
-from mgdd.results.result import Result
 
 __all__ = [
-    "Finding",
     "Fit",
-    "FitReport",
-    "Model",
-    "Result",
 ]
 
 

@@ -17,7 +17,7 @@ __all__ = ["Finding", "classified", "findings_html", "unique"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One reason to distrust a result, or what data leave open; programs test the code, people read the text.
+    """One limitation of a result, or what the data do not determine; programs test the code, people read the text.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Finding:
 
     Examples
     --------
-    >>> from mgdd.results import Finding
+    >>> from mgdd.results.finding import Finding
     >>> found = Finding("one_way", (), "the plate only opens", "add a triangle across limp-home")
     >>> found.code, str(found)
     ('one_way', 'the plate only opens; add a triangle across limp-home')

@@ -83,7 +83,7 @@ class Fit(Result):
     checked_by : str
         How `train` and `test` were computed where it was not a free run, for example ``"leave-one-out"``.
     findings : tuple of Finding
-        What to distrust, and which measurement would settle it.
+        Limitations found, and which measurement would resolve them.
     unidentifiable : tuple of str
         Parameters that the data do not determine.
     source : str

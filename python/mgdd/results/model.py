@@ -21,7 +21,7 @@ class Model(Protocol):
 
     Examples
     --------
-    >>> from mgdd.results import Model
+    >>> from mgdd.results.model import Model
     >>> from mgdd.throttle import PseudoWiener
     >>> isinstance(PseudoWiener("pw_r"), Model), isinstance(3.0, Model)
     (True, False)

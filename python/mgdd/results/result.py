@@ -54,7 +54,7 @@ class Result:
     Examples
     --------
     >>> from mgdd.engine import find_optimum
-    >>> from mgdd.results import Result
+    >>> from mgdd.results.result import Result
     >>> best = find_optimum("puma_single")
     >>> isinstance(best, Result), round(float(best.dataset["soc_cad"]), 1)
     (True, -5.6)

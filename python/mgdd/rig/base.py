@@ -21,7 +21,8 @@ class Rig(Plant, Protocol):
     Examples
     --------
     >>> from mgdd.loop import EngineBench
-    >>> from mgdd.rig import Rig, SimulatedRig
+    >>> from mgdd.rig.base import Rig
+    >>> from mgdd.rig import SimulatedRig
     >>> isinstance(SimulatedRig(EngineBench()), Rig), isinstance(EngineBench(), Rig)
     (True, False)
     """

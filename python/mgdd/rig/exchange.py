@@ -44,7 +44,8 @@ class RigRecord:
     Examples
     --------
     >>> from mgdd.loop import EngineBench
-    >>> from mgdd.rig import RecordingRig, RigRecord, SimulatedRig
+    >>> from mgdd.rig import RecordingRig, SimulatedRig
+    >>> from mgdd.rig.exchange import RigRecord
     >>> with RecordingRig(SimulatedRig(EngineBench())) as rig:
     ...     rig.apply({"soc_cad": -6.0})
     ...     measured = rig.measure()

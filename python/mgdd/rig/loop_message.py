@@ -1,4 +1,4 @@
-"""The messages that a real-time loop sends and receives, and the protection of a payload."""
+"""The messages that a real-time loop sends and receives."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mgdd._core import rig as core
 from mgdd._core.rig import E2eSettings, SignalLayout
 
-__all__ = ["LoopMessage", "protect"]
+__all__ = ["LoopMessage"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +39,7 @@ class LoopMessage:
 
     Examples
     --------
-    >>> from mgdd.rig import E2eSettings, LoopMessage, SignalLayout
+    >>> from mgdd.rig.realtime import E2eSettings, LoopMessage, SignalLayout
     >>> duty = SignalLayout(start=16, length=16, raw_type="signed", scale=5e-5)
     >>> enable = SignalLayout(start=32, length=1)
     >>> command = LoopMessage(
@@ -68,31 +67,3 @@ class LoopMessage:
         signals += [("fixed", layout, float(number), None, None) for layout, number in self.fixed]
         signals += [("fixed", layout, float(driven), float(open_), None) for layout, driven, open_ in self.switched]
         return (self.can_id, self.extended, self.size, self.protection, signals)
-
-
-def protect(settings: core.E2eSettings, counter: int, payload: bytes | bytearray | memoryview) -> bytes:
-    """Give a payload with its alive counter and CRC.
-
-    Parameters
-    ----------
-    settings : E2eSettings
-        Places, CRC and data identifier.
-    counter : int
-        Alive counter of this frame, 0 to ``counter_modulus - 1``; ``settings.next_counter`` gives the one that follows.
-    payload : bytes
-        ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A counter outside of the modulus.
-    mgdd.errors.ShapeError
-        A payload of another length.
-
-    Examples
-    --------
-    >>> from mgdd.rig import E2eSettings, protect
-    >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
-    '3a05112233445566'
-    """
-    return core.protect(settings, counter, payload)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from mgdd import _core
-from mgdd._core.rig import RingTransport, SocketCanTransport
+from mgdd._core.rig import E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport
 from mgdd.errors import ParameterError, RigError
 from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.rig.loop_message import LoopMessage
@@ -20,7 +20,15 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["RealtimeLoop"]
+__all__ = [
+    "E2eSettings",
+    "Frame",
+    "LoopMessage",
+    "RealtimeLoop",
+    "RingTransport",
+    "SignalLayout",
+    "SocketCanTransport",
+]
 
 _PAUSE_S = 0.002
 _LABELS: Mapping[str, tuple[str, str]] = {
@@ -109,7 +117,9 @@ class RealtimeLoop:
     Examples
     --------
     >>> from mgdd.control import Pid
-    >>> from mgdd.rig import LoopMessage, RealtimeLoop, RingTransport, SafetyEnvelope, SignalLayout
+    >>> from mgdd.rig import SafetyEnvelope
+    >>> from mgdd.rig.realtime import RealtimeLoop
+    >>> from mgdd.rig.realtime import LoopMessage, RingTransport, SignalLayout
     >>> duty = SignalLayout(start=0, length=16, raw_type="signed", scale=5e-5)
     >>> measured = {
     ...     "angle_deg": SignalLayout(start=0, length=16, scale=0.01),

@@ -1,4 +1,4 @@
-"""Sampled signals, whatever the plant: the one check of an even grid, quality figures, tests of residuals, excitation.
+"""Sampled signals, whatever the plant: excitation signals, and the quality figure of a fit.
 
 Numbers in, numbers out; units are those of the caller.
 """
@@ -6,7 +6,7 @@ Numbers in, numbers out; units are those of the caller.
 from __future__ import annotations
 
 from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
-from mgdd.signals.metrics import nrmse_fit_percent, residual_tests, rmse, vaf_percent
+from mgdd.signals.metrics import nrmse_fit_percent
 
 __all__ = [
     "amplitude_random_steps",
@@ -14,11 +14,8 @@ __all__ = [
     "multisine",
     "nrmse_fit_percent",
     "prbs",
-    "residual_tests",
-    "rmse",
     "staircase",
     "triangle",
-    "vaf_percent",
 ]
 
 

@@ -71,7 +71,7 @@ def vaf_percent(measured: ArrayLike, model: ArrayLike) -> float:
 
     Examples
     --------
-    >>> from mgdd.signals import vaf_percent
+    >>> from mgdd.signals.metrics import vaf_percent
     >>> vaf_percent([1.0, 2.0, 3.0], [11.0, 12.0, 13.0])
     100.0
     """
@@ -128,7 +128,7 @@ def rmse(measured: ArrayLike, model: ArrayLike) -> float:
 
     Examples
     --------
-    >>> from mgdd.signals import rmse
+    >>> from mgdd.signals.metrics import rmse
     >>> rmse([1.0, 2.0], [4.0, -1.0])
     3.0
     """
@@ -160,7 +160,7 @@ class ResidualTests(Result):
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.signals import residual_tests
+    >>> from mgdd.signals.metrics import residual_tests
     >>> noise = np.random.default_rng(0).standard_normal((2, 4000))
     >>> residual_tests(np.cumsum(noise[0]), noise[1]).white
     False
@@ -212,7 +212,7 @@ def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> R
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.signals import residual_tests
+    >>> from mgdd.signals.metrics import residual_tests
     >>> noise = np.random.default_rng(0).standard_normal((2, 4000))
     >>> tests = residual_tests(noise[0], noise[1])
     >>> tests.share_white >= 0.88, round(tests.limit, 3)

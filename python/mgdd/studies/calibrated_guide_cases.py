@@ -168,7 +168,7 @@ class Refit(NamedTuple):
 
 
 def refits_of(bench: EngineBench, recipe: Recipe, start_cad: float, cycles: int) -> list[Refit]:
-    """Run, and beside every calibration that reaches the seeker tell a twin the same reading without pressure."""
+    """Run, and beside every calibration that reaches the seeker give a twin the same reading without pressure."""
     engine, twin = (_begun(recipe, start_cad, bench.point) for _ in range(2))
     found = []
     for k in range(cycles + 1):

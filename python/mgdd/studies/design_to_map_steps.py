@@ -60,7 +60,7 @@ class Measured:
 
 
 def screen() -> FeasibleRegion:
-    """Where the bench may be driven, by what is believed of the engine before anything was measured."""
+    """Where the bench may be driven, by the prior model of the engine."""
 
     def indicators(columns: dict[str, Array]) -> dict[str, Array]:
         told = {**columns, "intake_pressure_kpa": intake_kpa(columns["fuel_mg"])}

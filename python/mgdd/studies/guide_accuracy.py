@@ -236,7 +236,7 @@ _BY_NAME = {guide.name: guide for guide in GUIDES}
 
 @dataclass(frozen=True, kw_only=True)
 class HardCase:
-    """A trouble, the curve that guides (a parabola at -10 without a name) and what the seeker is told of a delay."""
+    """A trouble, the curve that guides (a parabola at -10 without a name) and the delay given to the seeker."""
 
     name: str
     guide: str | None = "wall heat +30 %"
@@ -272,8 +272,8 @@ HARD: tuple[HardCase, ...] = (
     HardCase(name="jump by -6 CAD, wall heat +30 %", jump_cad=-6.0),
     HardCase(name="jump by 6 CAD, adiabatic", guide="adiabatic", jump_cad=6.0),
     HardCase(name="J late, delay known", start_cad=-20.0, told_delay=38.0, reading_noise_percent=0.25),
-    HardCase(name="J late, delay told 4 short", start_cad=-20.0, told_delay=34.0, reading_noise_percent=0.25),
-    HardCase(name="J late, delay told 4 long", start_cad=-20.0, told_delay=42.0, reading_noise_percent=0.25),
+    HardCase(name="J late, delay given 4 short", start_cad=-20.0, told_delay=34.0, reading_noise_percent=0.25),
+    HardCase(name="J late, delay given 4 long", start_cad=-20.0, told_delay=42.0, reading_noise_percent=0.25),
     HardCase(name="J late, noise before the lag only", start_cad=-20.0, told_delay=38.0),
     HardCase(name="cliff behind the optimum, wall heat +30 %", start_cad=-20.0, cliff=True),
     HardCase(name="cliff behind the optimum, from its steep side", start_cad=0.0, cliff=True),
@@ -350,7 +350,7 @@ def hard_bars(done: list[Hard]) -> list[dict[str, Any]]:
         ("jump: back within 2 CAD, 95th percentile [cycles]", values("back_95_percent", lambda c: c.jump_cad), 25.0),
         ("J late: first within 1 CAD, median [cycles]", values("median_first", lambda c: c.told_delay == _DELAY), 45.0),
         (
-            "J late, delay told ±4: lost runs [%]",
+            "J late, delay given ±4: lost runs [%]",
             values("lost_runs_percent", lambda c: c.told_delay in (34.0, 42.0)), 0.0,
         ),
         (

@@ -13,7 +13,8 @@ from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
 from mgdd.loop import EngineBench
-from mgdd.optimize import ExtremumSeeking, Optimum
+from mgdd.optimize import ExtremumSeeking
+from mgdd.optimize.optimum import Optimum
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -39,7 +40,7 @@ _GRID_STEP_CAD = 0.05
 
 @dataclass(frozen=True)
 class Guide:
-    """A cycle model that is wrong in what it is told of the engine."""
+    """A cycle model with wrong parameters of the engine."""
 
     name: str
     cylinder: Cylinder
@@ -124,7 +125,7 @@ def trimmed(guide: Callable[[OperatingPoint], Optimum] | None) -> FeedForward:
 
 
 def curve_seeker(curve: Curve, *, start: float | None = None, delay: float = 0.0, lag: float = 0.0) -> CurveSeeking:
-    """Make a seeker by the curve with default settings; it starts at the curve's best input if nothing is said."""
+    """Make a seeker by the curve with default settings; it starts at the curve's best input by default."""
     return CurveSeeking(
         start=curve.best if start is None else start, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], curve=curve,
         delay_cycles=delay, lag_cycles=lag,
@@ -205,11 +206,11 @@ def drive(
     Parameters
     ----------
     bench, seeker, cycles
-        All seekers but a bare curve are told every operating point.
+        All seekers but a bare curve get every operating point.
     curve_at : callable, optional
         Draws the curve of a new operating point, for a bare curve.
     late_by_cad : callable, optional
-        By how much combustion starts later than asked for, by cycle [°CA]; nobody tells the seeker.
+        By how much combustion starts later than asked for, by cycle [°CA]; unknown to the seeker.
     soc_of : callable, optional
         Start of combustion of an injection at an operating point: the seeker then steers the injection.
     beyond : callable, optional

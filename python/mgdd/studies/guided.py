@@ -27,7 +27,8 @@ from mgdd.studies.statistics import (
     with_interval,
     with_median_interval,
 )
-from mgdd.surrogate import EngineSurrogate, fit_surrogate
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -107,7 +107,7 @@ def run_guided_start_up(
     cycles, no clip) starts; unguided it starts at -20 °CA aTDC. As a curve, it says how J bends, and curve-guided
     seeking with default settings finds where the curve stands, from the guide's optimum and from a far start. The
     engine is ``puma_single`` with 0.25 points of efficiency noise; with the curve also 0.3 °CA of scatter, and neither
-    noise, scatter nor curvature is told.
+    noise, scatter nor curvature is given.
 
     Parameters
     ----------

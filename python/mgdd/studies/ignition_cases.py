@@ -1,4 +1,4 @@
-"""Correlations of the ignition delay, the plant that follows one of them, and the guide that is told another."""
+"""Correlations of the ignition delay, the plant that follows one of them, and the guide that assumes another."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from mgdd.engine import Cylinder, OperatingPoint, ignition_delay
 from mgdd.engine.ignition import Timing
 from mgdd.guide import Curve, ModelOptimum
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.studies.guide_cases import BOUNDS_CAD, PLANT
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["MEASURED_AT", "SOI_CAD", "TRUTHS", "DelayLaw", "InjectionGuide", "told_laws"]
+__all__ = ["MEASURED_AT", "SOI_CAD", "TRUTHS", "DelayLaw", "InjectionGuide", "assumed_laws"]
 
 SOI_CAD = np.linspace(-60.0, 20.0, 321)  # what `ignition_delay` takes
 MEASURED_AT = OperatingPoint(speed_rpm=1500.0, fuel_mg=20.0)
@@ -61,8 +61,8 @@ TRUTHS = tuple(
 )
 
 
-def told_laws(truth: DelayLaw) -> tuple[DelayLaw, ...]:
-    """List what a guide may be told: every correlation, and what measurements of this truth at one speed give."""
+def assumed_laws(truth: DelayLaw) -> tuple[DelayLaw, ...]:
+    """List what a guide may assume: every correlation, and what measurements of this truth at one speed give."""
     delay = truth.soc(MEASURED_AT) - SOI_CAD
     c2, c1, c0 = np.polyfit(MEASURED_SOI_CAD, np.interp(MEASURED_SOI_CAD, SOI_CAD, delay), 2).tolist()
     best = truth.injection(MEASURED_AT, _best_soc(PLANT, MEASURED_AT)["soc_cad"])
@@ -86,27 +86,27 @@ def _best_soc(cylinder: Cylinder, point: OperatingPoint) -> Optimum:
 
 @dataclass(frozen=True)
 class InjectionGuide:
-    """The plant's own cycle model, right in all but the ignition delay that it is told: best SOC, turned into SOI."""
+    """The plant's own cycle model, right in all but the ignition delay that it assumes: best SOC, turned into SOI."""
 
-    told: DelayLaw
+    assumed: DelayLaw
 
     @property
     def name(self) -> str:
-        """What it is told."""
-        return self.told.name
+        """Name of the correlation that it assumes."""
+        return self.assumed.name
 
     def best_soc(self, point: OperatingPoint) -> Optimum:
         """Give the best SOC of the model, on which all guides agree."""
         return _best_soc(PLANT, point)
 
     def timing(self, point: OperatingPoint) -> Timing:
-        """Give the best SOI, by the correlation that it is told."""
-        return self.told.injection(point, self.best_soc(point)["soc_cad"])
+        """Give the best SOI, by the correlation that it assumes."""
+        return self.assumed.injection(point, self.best_soc(point)["soc_cad"])
 
     def __call__(self, point: OperatingPoint) -> Optimum:
         """Give the best SOI as a `FeedForward` asks for it."""
         best, soi = self.best_soc(point), self.timing(point).soi_cad
-        bend = best.curvature * self.told.slope(point, soi) ** 2
+        bend = best.curvature * self.assumed.slope(point, soi) ** 2
         return Optimum(inputs={"soi_cad": soi}, objective="performance", value=best.value, curvature=bend)
 
     def curve(self, point: OperatingPoint) -> Curve:
@@ -114,6 +114,6 @@ class InjectionGuide:
         over_soc = ModelOptimum(PLANT, bounds_cad=BOUNDS_CAD).curve(point)
         if over_soc is None:
             raise ArithmeticError(f"the model has no curve at {point}")
-        soc = self.told.soc(point)
+        soc = self.assumed.soc(point)
         known = np.isfinite(soc) & (soc >= over_soc.lower) & (soc <= over_soc.upper)
         return Curve(SOI_CAD[known], over_soc(soc[known]))

@@ -16,7 +16,7 @@ from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import legend_outside, names_of, new_figure, numbered_plane
 from mgdd.studies.guide_cases import SpeedLoadPlane, SteadyMap, drive, trimmed
-from mgdd.studies.ignition_cases import MEASURED_AT, SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, told_laws
+from mgdd.studies.ignition_cases import MEASURED_AT, SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, assumed_laws
 from mgdd.studies.statistics import OF_SEEDS, band_variables, first_within, with_interval, with_median_interval
 
 if TYPE_CHECKING:
@@ -36,14 +36,14 @@ _INTAKE = {"warmer_20_k": ("intake_temperature_k", 20.0), "boost_less_15_kpa": (
 
 @dataclass(frozen=True, kw_only=True)
 class Plane:
-    """One truth and one told correlation over the speed-load plane, cell by cell.
+    """One truth and one assumed correlation over the speed-load plane, cell by cell.
 
-    ``soi_error_cad``: told less right injection; ``lost`` and ``lost_trimmed``: J lost [points], infinite where nothing
-    ignites; trimmed by the error that was learnt at `MEASURED_AT`.
+    ``soi_error_cad``: injection by the guide less the right one; ``lost`` and ``lost_trimmed``: J lost [points],
+    infinite where nothing ignites; trimmed by the error that was learnt at `MEASURED_AT`.
     """
 
     truth: str
-    told: str
+    assumed: str
     clipped: NDArray[np.bool_]
     delay_cad: NDArray[np.float64]
     slope: NDArray[np.float64]
@@ -56,7 +56,7 @@ class Plane:
 @dataclass(frozen=True, kw_only=True)
 class _Runs:
     form: str
-    told: str
+    assumed: str
     estimate: NDArray[np.float64]
     lost: NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def run_ignition_delay(
     """Turn the best SOC of a right cycle model into SOI by a wrong correlation, and see what that costs.
 
     Deterministic part, on 8 x 8 cells from 900 to 3000 rpm and 6 to 40 mg at constant intake: one of three correlations
-    is the truth, and the guide is told it, another one, a polynomial through delays measured at 1500 rpm, their
+    is the truth, and the guide assumes it, another one, a polynomial through delays measured at 1500 rpm, their
     value at the best timing, or nothing. Then a run: the truth is Watson's, the guide starts at 1500 rpm and 20 mg, and
     steps in cycle 300 to 2100 rpm and 16 mg; extremum seeking with feed-forward, and curve-guided seeking, both in SOI.
 
@@ -83,9 +83,9 @@ def run_ignition_delay(
     Returns
     -------
     StudyResult
-        Rows ``truth told ...``: errors of the told injection [°CA], of what the trim of one point leaves, and J lost
-        [points]. ``summary["slopes"]``: delay and dSOC/dSOI at the right injection. ``summary["intake"]``: the same
-        when the intake is not as told. ``summary["runs"]``: J lost [points x cycles] and cycles to 1 °CA.
+        Rows ``truth assumed ...``: errors of the guide's injection [°CA], of what the trim of one point leaves, and J
+        lost [points]. ``summary["slopes"]``: delay and dSOC/dSOI at the right injection. ``summary["intake"]``: the
+        same when the intake is not as given. ``summary["runs"]``: J lost [points x cycles] and cycles to 1 °CA.
 
     References
     ----------
@@ -95,7 +95,7 @@ def run_ignition_delay(
     --------
     >>> from mgdd.studies.ignition_delay import run_ignition_delay
     >>> rows = run_ignition_delay(seeds=1, quick=True, figures=False).summary["rows"]
-    >>> [row["lost_mean"] for row in rows if row["truth"] == row["told"]]
+    >>> [row["lost_mean"] for row in rows if row["truth"] == row["assumed"]]
     [0.0, 0.0, 0.0]
     """
     seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
@@ -103,26 +103,26 @@ def run_ignition_delay(
     work.progress("maps of the plane")
     plane = SpeedLoadPlane.of(quick=quick)
     planes = work(
-        (f"{truth.name}, told {told.name}", partial(plane_of, truth, told, plane))
-        for truth in TRUTHS for told in told_laws(truth)
+        (f"{truth.name}, assumed {assumed.name}", partial(plane_of, truth, assumed, plane))
+        for truth in TRUTHS for assumed in assumed_laws(truth)
     )  # fmt: skip
     runs = work(
-        (f"{form}, told {told.name}", partial(_runs, form, told, seeds))
-        for form in ("feed-forward", "curve") for told in told_laws(TRUTHS[0])
+        (f"{form}, assumed {assumed.name}", partial(_runs, form, assumed, seeds))
+        for form in ("feed-forward", "curve") for assumed in assumed_laws(TRUTHS[0])
     )  # fmt: skip
     return work.finish(
         "ignition-delay", _dataset(planes, runs, plane), _draw if figures else None,
         seeds=seeds,
         rows=[plane_row(plane) for plane in planes],
-        slopes=[slope_row(plane) for plane in planes if plane.truth == plane.told],
+        slopes=[slope_row(plane) for plane in planes if plane.truth == plane.assumed],
         intake=[_intake_row(law) for law in TRUTHS],
         runs=[_run_row(run) for run in runs],
     )  # fmt: skip
 
 
-def plane_of(truth: DelayLaw, told: DelayLaw, plane: SpeedLoadPlane) -> Plane:
-    """Compare told with right injection in every cell."""
-    right, guide = InjectionGuide(truth), InjectionGuide(told)
+def plane_of(truth: DelayLaw, assumed: DelayLaw, plane: SpeedLoadPlane) -> Plane:
+    """Compare the guide's with the right injection in every cell."""
+    right, guide = InjectionGuide(truth), InjectionGuide(assumed)
     trim = right.timing(MEASURED_AT).soi_cad - guide.timing(MEASURED_AT).soi_cad
     shape = (len(plane.speeds), len(plane.fuels))
     error, lost, trimmed_lost, delay, slope = (np.empty(shape) for _ in range(5))
@@ -135,7 +135,7 @@ def plane_of(truth: DelayLaw, told: DelayLaw, plane: SpeedLoadPlane) -> Plane:
         lost[at] = _lost(truth, own, point, said.soi_cad, best.soi_cad)
         trimmed_lost[at] = _lost(truth, own, point, said.soi_cad + trim, best.soi_cad)
     return Plane(
-        truth=truth.name, told=told.name, clipped=clipped, delay_cad=delay, slope=slope, soi_error_cad=error,
+        truth=truth.name, assumed=assumed.name, clipped=clipped, delay_cad=delay, slope=slope, soi_error_cad=error,
         trim_cad=trim, lost=lost, lost_trimmed=trimmed_lost,
     )  # fmt: skip
 
@@ -161,7 +161,7 @@ def plane_row(plane: Plane) -> dict[str, Any]:
 
     return {
         "truth": plane.truth,
-        "told": plane.told,
+        "assumed": plane.assumed,
         "cells": plane.lost.size,
         "soi_error_median_cad": float(np.median(np.abs(plane.soi_error_cad))),
         "soi_error_largest_cad": float(np.abs(plane.soi_error_cad).max()),
@@ -189,19 +189,19 @@ def slope_row(plane: Plane) -> dict[str, Any]:
 
 
 def _intake_row(law: DelayLaw) -> dict[str, Any]:
-    """Tell how the right injection at `MEASURED_AT` moves with the intake, and how much of it is the optimum's move."""
+    """Give how the right injection at `MEASURED_AT` moves with the intake, and how much of it is the optimum's move."""
     guide = InjectionGuide(law)
     row: dict[str, Any] = {"truth": law.name}
-    told = guide.timing(MEASURED_AT)
+    assumed = guide.timing(MEASURED_AT)
     for name, (field, by) in _INTAKE.items():
         point = MEASURED_AT.replace(**{field: getattr(MEASURED_AT, field) + by})
-        row[f"soi_move_{name}_cad"] = guide.timing(point).soi_cad - told.soi_cad
-        row[f"soc_move_{name}_cad"] = guide.timing(point).soc_cad - told.soc_cad
+        row[f"soi_move_{name}_cad"] = guide.timing(point).soi_cad - assumed.soi_cad
+        row[f"soc_move_{name}_cad"] = guide.timing(point).soc_cad - assumed.soc_cad
     return row
 
 
-def _runs(form: str, told: DelayLaw, seeds: int) -> _Runs:
-    truth, guide = TRUTHS[0], InjectionGuide(told)
+def _runs(form: str, assumed: DelayLaw, seeds: int) -> _Runs:
+    truth, guide = TRUTHS[0], InjectionGuide(assumed)
     points = (MEASURED_AT, AFTER)
     maps = [SteadyMap.of(EngineBench(point=point)) for point in points]
     estimates, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
@@ -217,7 +217,7 @@ def _runs(form: str, told: DelayLaw, seeds: int) -> _Runs:
         lost[seed] = np.concatenate(
             [own.lost(part) for own, part in zip(maps, np.split(run.applied, [_STEP_AT]), strict=True)]
         )
-    return _Runs(form=form, told=told.name, estimate=estimates, lost=lost)
+    return _Runs(form=form, assumed=assumed.name, estimate=estimates, lost=lost)
 
 
 def _best_soi(point: OperatingPoint) -> float:
@@ -230,7 +230,7 @@ def _run_row(run: _Runs) -> dict[str, Any]:
     steps = [first_within(own[_STEP_AT:], after, 1.0) for own in run.estimate]
     return {
         "form": run.form,
-        "told": run.told,
+        "assumed": run.assumed,
         **with_median_interval("start_cycles_to_1_cad", starts),
         **with_interval("start_lost", run.lost[:, :_START_CYCLES].sum(axis=1)),
         **with_median_interval("step_cycles_to_1_cad", steps),
@@ -243,14 +243,16 @@ def _dataset(planes: list[Plane], runs: list[_Runs], plane: SpeedLoadPlane) -> x
     cad, dims = "°CA aTDC", ("pair", "speed_rpm", "fuel_mg")
     laws = [law.soc(MEASURED_AT) - SOI_CAD for law in TRUTHS]
     variables: dict[str, tuple[Any, ...]] = {
-        "pair": ("pair", [f"{own.truth}, told {own.told}" for own in planes], "-", "truth and told correlation"),
+        "pair": (
+            "pair", [f"{own.truth}, assumed {own.assumed}" for own in planes], "-", "truth and assumed correlation",
+        ),
         "speed_rpm": ("speed_rpm", plane.speeds, "rpm", "engine speed"),
         "fuel_mg": ("fuel_mg", plane.fuels, "mg", "fuel per cycle"),
-        "soi_error_cad": (dims, [own.soi_error_cad for own in planes], "°CA", "told less right start of injection"),
+        "soi_error_cad": (dims, [own.soi_error_cad for own in planes], "°CA", "start of injection, guide less right"),
         "left_error_cad": (
             dims, [own.soi_error_cad + own.trim_cad for own in planes], "°CA", "error that the trim leaves",
         ),
-        "lost": (dims, [own.lost for own in planes], "%", "J lost by the told injection"),
+        "lost": (dims, [own.lost for own in planes], "%", "J lost by the injection of the guide"),
         "lost_trimmed": (dims, [own.lost_trimmed for own in planes], "%", "J lost with the trim of one point"),
         "law": ("law", [law.name for law in TRUTHS], "-", "correlation"),
         "soi_cad": ("soi_cad", SOI_CAD),
@@ -261,7 +263,7 @@ def _dataset(planes: list[Plane], runs: list[_Runs], plane: SpeedLoadPlane) -> x
         best = np.repeat([_best_soi(MEASURED_AT), _best_soi(AFTER)], [_STEP_AT, _CYCLES - _STEP_AT])
         lost = [run.lost.mean(axis=0).reshape(-1, _BIN).mean(axis=1) for run in runs]
         variables |= {
-            "run": ("run", [f"{run.form}, {run.told}" for run in runs], "-", "form and told correlation"),
+            "run": ("run", [f"{run.form}, {run.assumed}" for run in runs], "-", "form and assumed correlation"),
             **band_variables("estimate_{}_cad", ("run", "cycle"), [run.estimate for run in runs], cad, OF_SEEDS),
             "middle_cycle": ("middle_cycle", np.arange(_BIN / 2, _CYCLES, _BIN), "-", "engine cycle"),
             "mean_lost": (("run", "middle_cycle"), lost, "%", "J lost per cycle, mean of the seeds and of 20 cycles"),
@@ -278,8 +280,8 @@ _SHOWN = ("Watson", "Hardenberg-Hase", "polynomial of 1500 rpm", "no delay")
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     out = {
         "Ignition delay over the start of injection at 1500 rpm, three correlations": _delays(dataset),
-        "Error of the told injection where Watson's correlation is true; the numbers are J lost [points] with the trim "
-        "of 1500 rpm and 20 mg": _draw_plane(dataset),
+        "Error of the guide's injection where Watson's correlation is true; the numbers are J lost [points] with the "
+        "trim of 1500 rpm and 20 mg": _draw_plane(dataset),
     }
     if "run" in dataset:
         out["Start and step by wrong correlations: median of the estimate, and J lost per cycle"] = _draw_runs(dataset)
@@ -302,7 +304,7 @@ def _delays(dataset: xr.Dataset) -> Figure:
 
 def _draw_plane(dataset: xr.Dataset) -> Figure:
     pairs = names_of(dataset, "pair")
-    wanted = [f"Watson, told {name}" for name in _MAPPED]
+    wanted = [f"Watson, assumed {name}" for name in _MAPPED]
     shown = [pairs.index(name) for name in wanted if name in pairs]
     figure = new_figure(12.5, 3.8)
     axes = figure.subplots(1, max(len(shown), 1), sharey=True, squeeze=False)[0]
@@ -313,11 +315,11 @@ def _draw_plane(dataset: xr.Dataset) -> Figure:
         mesh = numbered_plane(
             ax, speeds, fuels, error, numbers=left, white=abs(error) > 9.0, cmap="RdBu_r", span=(-15.0, 15.0)
         )
-        ax.set_title(pairs[at].partition("told ")[2], loc="left", fontsize="small")
+        ax.set_title(pairs[at].partition("assumed ")[2], loc="left", fontsize="small")
         ax.set_xlabel("speed [rpm]")
     axes[0].set_ylabel("fuel [mg]")
     if shown:
-        figure.colorbar(mesh, ax=list(axes), extend="both", label="told less right SOI [°CA]")
+        figure.colorbar(mesh, ax=list(axes), extend="both", label="SOI, guide less right [°CA]")
     return figure
 
 
@@ -333,7 +335,7 @@ def _draw_runs(dataset: xr.Dataset) -> Figure:
                 continue
             own = dataset.isel(run=runs.index(f"{form}, {name}"))
             dash, color = LINE_STYLES[at]
-            above.plot(cycle, own["estimate_median_cad"], linestyle=dash, color=color, label=f"told {name}")
+            above.plot(cycle, own["estimate_median_cad"], linestyle=dash, color=color, label=f"assumed {name}")
             below.plot(own["middle_cycle"], own["mean_lost"], linestyle=dash, color=color)
         above.plot(cycle, dataset["optimum_cad"], color=GREY, linewidth=1.0, label="right SOI")
         above.set_title(form, loc="left", fontsize="small")

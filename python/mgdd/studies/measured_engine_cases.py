@@ -21,14 +21,14 @@ from mgdd.optimize import (
     GoldenSection,
     Limit,
     NewtonSeeking,
-    Optimum,
     Seeker,
     Spsa,
     tune,
 )
 from mgdd.optimize.by_curvature import newton_settings
+from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.tuning import Tuning
-from mgdd.surrogate import EngineSurrogate
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +87,7 @@ class Case:
 def measured_records(study: str) -> xr.Dataset:
     """Load the records of the hydrogen-diesel engine; DataError where they are not at hand."""
     try:
-        return datasets.load("h2df_502")
+        return datasets.read("h2df_502")
     except FileNotFoundError as error:
         raise DataError(
             f"the study {study} needs the records of the hydrogen-diesel engine: {error.strerror}; the page "

@@ -37,7 +37,8 @@ from mgdd.studies.statistics import (
     with_interval,
     with_median_interval,
 )
-from mgdd.surrogate import EngineSurrogate, fit_surrogate
+from mgdd.surrogate import fit_surrogate
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,7 +111,7 @@ def run_measured_engine_seek(
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.measured_engine_seek import run_measured_engine_seek
-    >>> if "h2df_502" in datasets.available():
+    >>> if "h2df_502" in datasets.names():
     ...     result = run_measured_engine_seek(seeds=1, quick=True, figures=False)
     ...     assert len(result.summary["rows"]) == 12
     """

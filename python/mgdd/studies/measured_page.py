@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mgdd import plot
@@ -68,8 +69,8 @@ _MEMBERS = {
 }
 _TIMING_TEXT = (
     "{kept} of {n} models are plausible for at least one load. Each cell: the answer of the headline model, then the "
-    "range over all plausible ones. Where the range is wide, these traces do not tell the best timing: wall heat and "
-    "gamma stand in for each other. What to set is 'move by': later than measured if positive. CA50 is that of the "
+    "range over all plausible ones. Where the range is wide, these traces do not determine the best timing: wall heat "
+    "and gamma stand in for each other. What to set is 'move by': later than measured if positive. CA50 is that of the "
     "modelled burn, some tenths later than that of the net heat below. Own p_max is the highest measured sample, or "
     "the model's where that is higher at the measured timing. Gains are in closed-cycle work over the measured timing."
 )
@@ -101,7 +102,7 @@ def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tu
             ),
         ),
         Section(title="Best timing", text=_headline(s), table=_timing(s["best_timing"])),
-        Section(title="What to distrust", items=tuple(_distrust(s))),
+        Section(title="Limitations found", items=tuple(_distrust(s))),
         Section(title="Every member of the family", text=(_MEMBERS_TEXT,), table=_members(s["best_timing"])),
         Section(title="Every burn law, free to start before the injection", text=(_LAWS_TEXT,), table=_laws(s["laws"])),
         Section(
@@ -231,7 +232,9 @@ def draw(
     out = {
         "Best timing by every member of the family, without a pressure limit": family_strips(timing),
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
-        "log p over log V with the polytropic slopes of compression and expansion": _grid(analyses, plot.log_pv),
+        "log p over log V with the polytropic slopes of compression and expansion": _grid(
+            analyses, partial(plot.pressure, log_pv=True)
+        ),
         f"Calibration, {main.name}": _grid(main.fit.loads, Load.plot),
     }
     for law, profile in profiles.items():

@@ -85,7 +85,7 @@ def run_measured_traces(
     """
     preset = presets.load("hd_diesel_128x144")
     own = traces is None
-    traces = datasets.load("hd_diesel_128x144") if traces is None else list(traces)
+    traces = datasets.read("hd_diesel_128x144") if traces is None else list(traces)
     cylinder = cylinder or preset.cylinder
     point = point or preset.point
     progress("analyse the traces")

@@ -108,7 +108,7 @@ def run_model_validation(
     """
     draws = check_seeds(seeds, quick=quick, most=_QUICK_DRAWS)
     work = Parts(progress)
-    traces, cylinder = datasets.load(_ENGINE), presets.load(_ENGINE).cylinder
+    traces, cylinder = datasets.read(_ENGINE), presets.load(_ENGINE).cylinder
     done = work((law.name, partial(validate_law, law, traces, cylinder, draws)) for law in LAWS)
     families = [] if quick else work([("family of models", partial(best_timing, traces, cylinder))])
     family = [row.free_ca50_cad for rows in families for row in rows]
@@ -201,7 +201,7 @@ def _sd_interval(name: str, values: NDArray[np.float64]) -> dict[str, float | No
 
 
 def _coverage(own: Validated) -> dict[str, Any]:
-    """Tell how often stated intervals hold the truth, over parameters that are not at a bound."""
+    """Give how often stated intervals hold the truth, over parameters that are not at a bound."""
     row: dict[str, Any] = {"law": own.law.name, "wall_heat_scale": own.fit.model.wall_heat_scale}
     truth, known = own.fit.report.values, np.isfinite(own.fit.report.stderr)
     row["parameters"] = int(known.sum())

@@ -42,7 +42,7 @@ ENGINE_KNOWN = dict.fromkeys(
     ["compression_ratio_offset", "charge_temperature_offset_k", "wall_temperature_offset_k"], 0.0
 )
 _FACT_CAD, _TRIALS, _STEADY_CYCLES = -6.0, 200, 40
-# Shift of the wall heat by a timing told 0.5 CAD late, at these timings, found by an independent program.
+# Shift of the wall heat by a timing given 0.5 CAD late, at these timings, found by an independent program.
 _SHIFTS = {-10.0: 0.053, -6.0: 0.075, 0.0: 0.114}
 _SHIFT_MARGIN = 0.02
 
@@ -56,7 +56,7 @@ def calibration_facts() -> list[dict[str, Any]]:
     ]
     for soc, shift in _SHIFTS.items():
         early, late = (_told(soc, late) for late in (-0.5, 0.5))
-        text = f"shift of the wall heat by 0.5 CAD of told timing, at {soc:g} CAD"
+        text = f"shift of the wall heat by 0.5 CAD of given timing, at {soc:g} CAD"
         found.append((text, 0.5 * abs(late - early), shift, _SHIFT_MARGIN))
     return [dict(zip(("fact", "value", "expected", "margin"), row, strict=True)) for row in found]
 
@@ -88,7 +88,7 @@ def _seeking() -> tuple[float, float]:
 
 
 def _told(soc_cad: float, late_cad: float) -> float:
-    """Fit the wall heat alone where the timing is told wrong."""
+    """Fit the wall heat alone where the given timing is wrong."""
     bench = EngineBench(soc_scatter_cad=0.0)
     calibration = OnlineCalibration(WRONG, uncertainty=EXACT, soc_scatter_cad=0.0)
     for _ in range(_STEADY_CYCLES):
@@ -105,7 +105,7 @@ _GAIN = 0.98  # of the seeker: time constant 40 cycles at a curvature of -0.051 
 
 @dataclass(frozen=True, kw_only=True)
 class Way:
-    """One way to calibrate: a method, and what it is told."""
+    """One way to calibrate: a method, and what it is given."""
 
     name: str
     method: str
@@ -163,7 +163,7 @@ ERRORS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Taught:
-    """Runs of one way on one sensor, a row per seed: wall heat after every cycle, and what was said of it."""
+    """Runs of one way on one sensor, a row per seed: wall heat after every cycle, and the verdicts."""
 
     way: Way
     sensor: Sensor
@@ -182,7 +182,7 @@ def run_online_calibration(
 ) -> StudyResult:
     """Calibrate the wall heat of a cycle model from twice the truth while an engine seeks its best timing.
 
-    The engine is ``puma_single`` with 0.3 °CA of scatter that nobody measures. Extremum seeking moves the timing from
+    The engine is ``puma_single`` with 0.3 °CA of unmeasured scatter. Extremum seeking moves the timing from
     -12 °CA aTDC, every cycle is offered to `OnlineCalibration` with the timing that was asked for, and one update is
     made per cycle. Compression ratio and temperatures of the engine count as known. Three methods, and two more ways to
     use them: extremum seeking where the timing is measured, and Gauss-Newton that takes everything but the wall heat as

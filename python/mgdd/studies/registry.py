@@ -44,7 +44,7 @@ _STUDIES = {
     "from-design-to-map": _Study(
         "a timing map by design of experiments: its cost, its losses, other engines, and what a guide makes of it", 2
     ),
-    "torque-demand": _Study("how far the torque follows the pedal through the throttle, and what loses it", 2),
+    "torque-demand": _Study("how far the torque follows the pedal through the throttle, and causes of the error", 2),
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
     ),
@@ -71,7 +71,7 @@ def available_studies() -> dict[str, str]:
 
     Examples
     --------
-    >>> from mgdd.studies import available_studies
+    >>> from mgdd.studies.registry import available_studies
     >>> "sensor-delay" in available_studies()
     True
     """
@@ -94,7 +94,7 @@ def run_study(
     Parameters
     ----------
     name : str
-        One of `available_studies`.
+        One of the names that ``mgdd study`` lists, ``sensor-delay`` for example.
     seeds : int, optional
         Number of seeds behind every statistic, >= 1; the study's own number if left out.
     quick : bool

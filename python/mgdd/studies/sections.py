@@ -62,7 +62,7 @@ class Section:
     Examples
     --------
     >>> from mgdd.studies.sections import Section
-    >>> Section(title="What to distrust", items=("NOx is a proxy: read its trend only.",)).table is None
+    >>> Section(title="Limitations found", items=("NOx is a proxy: read its trend only.",)).table is None
     True
     """
 

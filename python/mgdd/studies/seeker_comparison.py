@@ -20,10 +20,10 @@ from mgdd.optimize import (
     GradientDescent,
     IterativeLearning,
     NewtonSeeking,
-    Optimum,
     Spsa,
     tune,
 )
+from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.tuning import Tuning
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset

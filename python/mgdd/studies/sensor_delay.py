@@ -11,8 +11,9 @@ import numpy as np
 
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
-from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
+from mgdd.optimize import ComponentLag, ExtremumSeeking
 from mgdd.optimize.by_curvature import approach_gain
+from mgdd.optimize.optimum import Optimum
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.units import unit_attributes

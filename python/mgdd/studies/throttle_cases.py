@@ -15,7 +15,7 @@ from mgdd.loop.controller_families import FAMILIES, Setup, groups_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.model import Model
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import Throttle, simulate
+from mgdd.throttle import Throttle, simulate_throttle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,7 +112,7 @@ def noisy_records(throttle: Throttle, noise: list[np.random.Generator]) -> dict[
     out = {}
     for name, signal, rng in zip(RECORDS, duties, noise, strict=True):
         time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
-        true = simulate(throttle, duty, time_s=time)["angle_deg"].to_numpy()
+        true = simulate_throttle(throttle, duty, time_s=time)["angle_deg"].to_numpy()
         noisy = true + NOISE_DEG * rng.standard_normal(true.size)
         out[name] = labelled_dataset(
             {

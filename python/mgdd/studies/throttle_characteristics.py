@@ -12,7 +12,7 @@ from mgdd import presets
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult
-from mgdd.throttle import Throttle, characteristics, holding_duty, simulate
+from mgdd.throttle import Throttle, characteristics, simulate_throttle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,8 +108,8 @@ def _row(
 
 def _ramp(throttle: Throttle) -> tuple[xr.Dataset, float]:
     """Ramp the duty up and down slowly; give the run and the duty between both passages of one angle."""
-    top = float(holding_duty(throttle, [throttle.open_deg])["duty_breakaway_up"][0]) + 0.05
-    bottom = float(holding_duty(throttle, [throttle.closed_deg])["duty_breakaway_down"][0]) - 0.05
+    top = float(characteristics(throttle, [throttle.open_deg])["duty_breakaway_up"][0]) + 0.05
+    bottom = float(characteristics(throttle, [throttle.closed_deg])["duty_breakaway_down"][0]) - 0.05
     sample = 0.01
     steps = [round(abs(way) / RAMP_PER_S / sample) for way in (top, top - bottom, bottom)]
     duty = np.concatenate(
@@ -119,7 +119,7 @@ def _ramp(throttle: Throttle) -> tuple[xr.Dataset, float]:
             np.linspace(bottom, 0.0, steps[2] + 1),
         ]
     )
-    run = simulate(throttle, duty, sample_s=sample)
+    run = simulate_throttle(throttle, duty, sample_s=sample)
     angle = run["angle_deg"].to_numpy()
     rising = int(np.argmax(angle >= WIDTH_AT_DEG))
     peak = int(np.argmax(duty))
@@ -132,18 +132,18 @@ def _loop(throttle: Throttle, frequency_hz: float) -> tuple[NDArray[np.float64],
     periods = max(3, math.ceil(3.0 * frequency_hz))
     time = np.arange(round(periods / frequency_hz / 1e-3) + 1) * 1e-3
     duty = OFFSET + AMPLITUDE * np.sin(2.0 * np.pi * frequency_hz * time)
-    run = simulate(throttle, duty, time_s=time)
+    run = simulate_throttle(throttle, duty, time_s=time)
     at = (periods - 1 + np.linspace(0.0, 1.0, _PHASES + 1)) / frequency_hz
     return np.interp(at, time, duty), np.interp(at, time, run["angle_deg"].to_numpy())
 
 
 def _air(throttle: Throttle, column: str) -> list[NDArray[np.float64]]:
     """Hold a constant duty at one angle, let air flow from a time on, and give the angle for each torque."""
-    duty = float(holding_duty(throttle, [AIR_ANGLE_DEG])[column][0])
+    duty = float(characteristics(throttle, [AIR_ANGLE_DEG])[column][0])
     time = np.arange(round(AIR_LENGTH_S / 1e-3) + 1) * 1e-3
     flows = time >= AIR_FROM_S
     return [
-        simulate(
+        simulate_throttle(
             throttle,
             np.full(time.size, duty),
             time_s=time,

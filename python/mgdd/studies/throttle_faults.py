@@ -17,7 +17,7 @@ from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import new_figure
 from mgdd.studies.throttle_cases import Baseline, baselines, controller_of, supervisor_of, throttle_of
-from mgdd.throttle import SensorFault, SensorPair, Throttle, holding_duty
+from mgdd.throttle import SensorPair, Throttle, characteristics
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +62,7 @@ class FaultCase:
     """One scenario: what the supervisor must report, faults of the plant, and the mode that it must go to."""
 
     reason: str
-    faults: tuple[SensorFault | ThrottleFault, ...] = ()
+    faults: tuple[ThrottleFault, ...] = ()
     mode: str = "limp_home"
     reference_deg: Callable[[float], float] = field(default=_opens, repr=False, kw_only=True)  # of the time [s]
     # From when on the supervisor can see the fault [s], or that of a run.
@@ -138,7 +138,7 @@ def _differ(run: FaultRun) -> float:
 def _stands(run: FaultRun) -> float:
     """Say when it stands 2 deg from the reference under a duty that would move a whole one there, for 20 ms [s]."""
     inside = np.clip(run.angle_deg, run.throttle.closed_deg, run.throttle.open_deg)
-    band = holding_duty(run.throttle, inside)
+    band = characteristics(run.throttle, inside)
     up = (run.reference_deg - run.angle_deg > 2.0) & (run.duty > band["duty_breakaway_up"].to_numpy())
     down = (run.reference_deg - run.angle_deg < -2.0) & (run.duty < band["duty_breakaway_down"].to_numpy())
     return _first_lasting(run, (up | down) & (run.speed_deg_per_s == 0.0))
@@ -149,12 +149,14 @@ def _unsprung(run: FaultRun) -> float:
     return _first_lasting(run, (run.duty < 0.0) & (np.abs(run.speed_deg_per_s) < SLOW_DEG_PER_S))
 
 
-def _throttle(kind: str, from_s: float = ONSET_S, **more: float) -> tuple[ThrottleFault, ...]:
-    return (ThrottleFault(kind=kind, from_s=from_s, **({"until_s": REPAIR_S} | more)),)
+def _throttle(
+    kind: str, from_s: float = ONSET_S, until_s: float = REPAIR_S, size: float | None = None
+) -> tuple[ThrottleFault, ...]:
+    return (ThrottleFault(kind=kind, from_s=from_s, until_s=until_s, size=size),)
 
 
-def _sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[SensorFault, ...]:
-    return (SensorFault(kind=kind, sensor=sensor, from_s=ONSET_S, until_s=_SENSOR_END_S, size=size),)
+def _sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[ThrottleFault, ...]:
+    return (ThrottleFault(kind=kind, sensor=sensor, from_s=ONSET_S, until_s=_SENSOR_END_S, size=size),)
 
 
 _MOVING = ONSET_S + 0.015  # the plate is on its way

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
-from mgdd.identify import fit_first_principle
+from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset

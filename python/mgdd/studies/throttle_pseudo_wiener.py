@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.errors import ParameterError
-from mgdd.identify import fit_pseudo_wiener
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
 from mgdd.results.labels import labelled_dataset
@@ -52,10 +52,10 @@ def run_throttle_pseudo_wiener(
     -------
     StudyResult
         Rows ``plant model lag_start fit_train_percent fit_chirp_percent fit_steps_percent ahead_5_ms_deg
-        ahead_20_ms_deg ahead_50_ms_deg starts hits``: free-run fits without the first 50 ms, and the RMS error against
-        the true angle of the prediction ``measured(k) + simulated(k + H) - simulated(k)`` on the validation chirp.
-        ``hits`` counts the searches that ended at the best fit. Every record starts at limp-home without duty, so
-        ``lag_start`` is *rest* in the first rows; *best* also lets the lags start from the first angle. The row
+        ahead_20_ms_deg ahead_50_ms_deg starts n_best``: free-run fits without the first 50 ms, and the RMS error
+        against the true angle of the prediction ``measured(k) + simulated(k + H) - simulated(k)`` on the validation
+        chirp. ``n_best`` counts the searches that ended at the best fit. Every record starts at limp-home without duty,
+        so ``lag_start`` is *rest* in the first rows; *best* also lets the lags start from the first angle. The row
         *persistence* predicts that nothing moves.
 
     References
@@ -84,7 +84,7 @@ def run_throttle_pseudo_wiener(
     for plant in dict.fromkeys(row["plant"] for row in rows):
         named = {"plant": plant, "model": "persistence", "lag_start": None}
         still = _columns(None, _ahead(_records(plant)["chirp"], None, HORIZONS))
-        rows.append({**named, **still, "starts": None, "hits": None})
+        rows.append({**named, **still, "starts": None, "n_best": None})
     return work.finish(
         "throttle-pseudo-wiener", _dataset(done), _draw if figures else None,
         seeds=0,
@@ -123,7 +123,7 @@ def _judge(plant: str, kind: str, rule: str, starts: int) -> tuple[dict[str, Any
         "lag_start": rule,
         **_columns(free, ahead),
         "starts": len(fit.start_rmse),
-        "hits": fit.n_best,
+        "n_best": fit.n_best,
     }
     extra = {
         "parameters": dict(fit.parameters),

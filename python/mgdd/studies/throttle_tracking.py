@@ -75,7 +75,7 @@ CASES: Mapping[str, Case] = {
     "bristles": Case("presliding (LuGre)", bristles=True),
     "air": Case("air torque -0.2 N m", air_nm=-0.2, controllers=tuple(FAMILIES)),
     "gusts": Case("gusty air, -0.1 N m with 0.03 N m rms up to 20 Hz", air_nm=-0.1, gusts_nm=0.03),
-    "late": Case("duty one sample later than told", late_samples=1),
+    "late": Case("duty one sample later than given", late_samples=1),
     "weights": Case(
         "plain form, weights and switching",
         controllers=("plain", "soft", "no overshoot", "side as measured", "one move"),

@@ -8,17 +8,13 @@ of an experiment, as `mgdd.design.design_points` plans one.
 from __future__ import annotations
 
 from mgdd.surrogate.fit import fit_surrogate
-from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.response_fit import fit_response
 from mgdd.surrogate.response_model import ResponseModel
-from mgdd.surrogate.surrogate import EngineSurrogate
 
 __all__ = [
-    "EngineSurrogate",
     "ResponseModel",
     "fit_response",
     "fit_surrogate",
-    "random_step_records",
 ]
 
 

@@ -92,7 +92,8 @@ def fit_surrogate(
 
     Examples
     --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> from mgdd.surrogate import fit_surrogate
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> surrogate = fit_surrogate(random_step_records(3000))
     >>> [signal.lag_cycles for signal in surrogate.signals.values()]
     [1, 1, 1, 3]

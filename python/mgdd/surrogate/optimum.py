@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError
-from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import Optimum
 from mgdd.surrogate.polynomial import Support
 
 if TYPE_CHECKING:

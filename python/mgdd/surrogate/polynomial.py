@@ -69,7 +69,7 @@ class PolynomialBasis:
 @described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
-    """Where a surrogate may be believed: a box of quantiles, and leverage no higher than records in it have.
+    """Where a surrogate is valid: a box of quantiles, and leverage no higher than records in it have.
 
     Parameters
     ----------
@@ -87,7 +87,8 @@ class Support:
 
     Examples
     --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> from mgdd.surrogate import fit_surrogate
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> support = fit_surrogate(random_step_records(1500)).support
     >>> support.inputs
     ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')

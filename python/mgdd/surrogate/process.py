@@ -11,8 +11,8 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.io.extras import import_extra
-from mgdd.results import FitReport
 from mgdd.results.finding import Finding
+from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -66,7 +66,7 @@ def random_step_records(cycles: int = 4000, *, seed: int = 0, noise: float = 1.0
 
     Examples
     --------
-    >>> from mgdd.surrogate import random_step_records
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> random_step_records(100)["nox_ppm"].dims
     ('cycle',)
     """

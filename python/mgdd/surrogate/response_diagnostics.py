@@ -1,4 +1,4 @@
-"""What to distrust in the fit of a response, and the points and cuts that a figure shows."""
+"""Limitations of the fit of a response, and the points and cuts that a figure shows."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def outlier_bound(n: int, freedom: float) -> float:
 def response_findings(
     model: ResponseModel, studentised: NDArray[np.float64], left_out: NDArray[np.float64]
 ) -> tuple[Finding, ...]:
-    """Return every reason to distrust the fit."""
+    """Return every limitation of the fit."""
     fitted, weight = model.surface.fitted()
     residual = model.values - fitted
     freedom = model.values.size - float(weight.sum())
@@ -149,7 +149,7 @@ def _curved(model: ResponseModel, residual: NDArray[np.float64], fitted: NDArray
     left = max(float(residual @ residual) - explained**2, 1e-300)
     freedom = model.surface.freedom - 1.0
     if 2.0 * t.sf(abs(explained) / np.sqrt(left / freedom), freedom) < _RARE:
-        text = "the residuals bend with the fitted value: the polynomial misses a curvature"
+        text = "the residuals curve with the fitted value: the polynomial misses a curvature"
         yield Finding(
             "structured", ("fitted",), text, "raise the degree, transform the response, or take a Gaussian process"
         )

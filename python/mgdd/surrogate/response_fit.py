@@ -1,4 +1,4 @@
-"""Fit a model of one response over the factors of a design, and say how far it may be believed."""
+"""Fit a model of one response over the factors of a design, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.io.point_table import flat_points, input_names
 from mgdd.optimize import least_squares
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.fit import FitQuality
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import Label, label_of
-from mgdd.signals import nrmse_fit_percent, rmse
+from mgdd.signals import nrmse_fit_percent
+from mgdd.signals.metrics import rmse
 from mgdd.surrogate.points import column_label, column_names, points_of
 from mgdd.surrogate.polynomial import PolynomialBasis, PolynomialSurface, choose_terms, support_of
 from mgdd.surrogate.process import ProcessSurface, fit_process
@@ -101,7 +103,7 @@ def fit_response(
     Returns
     -------
     ResponseFit
-        ``model.predict`` gives mean, interval and what is extrapolated; ``findings`` say what to distrust: codes
+        ``model.predict`` gives mean, interval and what is extrapolated; ``findings`` list the limitations: codes
         ``outlier``, ``few_points``, ``high_leverage``, ``poor_prediction``, ``overfitted``, ``heteroscedastic``,
         ``structured``, ``lack_of_fit`` and ``no_hull``. Clean data show an outlier in one of twenty sets, each other
         pattern in one of a hundred.

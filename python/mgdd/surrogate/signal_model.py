@@ -52,7 +52,8 @@ class SensorLag:
 
     Examples
     --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> from mgdd.surrogate import fit_surrogate
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> sensor = fit_surrogate(random_step_records(3000)).signals["nox_ppm"].sensor
     >>> sensor.delay_cycles, round(sensor.tau_cycles)
     (3, 6)
@@ -185,7 +186,8 @@ class SignalModel:
 
     Examples
     --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> from mgdd.surrogate import fit_surrogate
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> imep = fit_surrogate(random_step_records(1500)).signals["imep_bar"]
     >>> imep.lag_cycles, round(imep.residual_sd, 1)
     (1, 0.1)

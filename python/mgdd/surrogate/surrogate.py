@@ -12,8 +12,7 @@ import numpy as np
 from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
-from mgdd.optimize import Optimum
-from mgdd.optimize.optimum import limits_of
+from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
 from mgdd.surrogate.file import read_surrogate, surrogate_file
@@ -40,7 +39,7 @@ class EngineSurrogate(Parameters):
     signals : mapping of str to SignalModel
         By name.
     support : Support
-        Where the surfaces may be believed.
+        Where the surfaces are valid.
     medians : mapping of str to float
         Median of each input over the records: where a prediction stands unless given otherwise.
     input_labels : mapping of str to Label
@@ -54,7 +53,8 @@ class EngineSurrogate(Parameters):
 
     Examples
     --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> from mgdd.surrogate import fit_surrogate
+    >>> from mgdd.surrogate.random_steps import random_step_records
     >>> surrogate = fit_surrogate(random_step_records(1500))
     >>> surrogate.inputs
     ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')
@@ -105,7 +105,8 @@ class EngineSurrogate(Parameters):
 
         Examples
         --------
-        >>> from mgdd.surrogate import fit_surrogate, random_step_records
+        >>> from mgdd.surrogate import fit_surrogate
+        >>> from mgdd.surrogate.random_steps import random_step_records
         >>> surrogate = fit_surrogate(random_step_records(1500))
         >>> surrogate.predict([-4.0, 0.0, 40.0])["supported"].values.tolist()
         [True, True, False]
@@ -155,7 +156,7 @@ class EngineSurrogate(Parameters):
 
         Returns
         -------
-        mgdd.optimize.Optimum
+        Optimum
             Input ``soi_cad``; ``values`` holds every signal there, ``bounds`` the supported range around it, and
             ``at_bound`` says that the records, not the engine, hold it.
 
@@ -168,7 +169,8 @@ class EngineSurrogate(Parameters):
 
         Examples
         --------
-        >>> from mgdd.surrogate import fit_surrogate, random_step_records
+        >>> from mgdd.surrogate import fit_surrogate
+        >>> from mgdd.surrogate.random_steps import random_step_records
         >>> best = fit_surrogate(random_step_records(1500)).find_optimum("imep_bar", {"mprr": 5.0})
         >>> best.active_limits, best.at_bound
         (('mprr',), False)

@@ -88,7 +88,7 @@ def _batch(request: Request, columns: NDArray[np.float64], outputs: Sequence[str
 
 
 def _located(error: ParameterError, request: Request, columns: NDArray[np.float64]) -> ParameterError:
-    """Name the case of an error by its inputs: its row in a chunk tells nobody anything."""
+    """Name the case of an error by its inputs: its row in a chunk has no meaning to a caller."""
     match = re.match(r"case (\d+): ", str(error))
     if match is None:
         return error

@@ -18,7 +18,7 @@ from mgdd.errors import ParameterError, argument, did_you_mean, hand_over
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 from mgdd.results.labels import ANGLE, labelled_dataset
 from mgdd.sweep.batch import NOX, VOID, Request, angles_of, said, simulate_cases
 from mgdd.sweep.cases import Cases, cases_of
@@ -94,7 +94,7 @@ def sweep(
     mgdd.errors.WorkerLostError
         As in `mgdd.parallel.map_items`; ``partial`` is a Dataset as after Ctrl-C.
     mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the whole Dataset, in which ``finished`` tells the cycles that were simulated; the others
+        Ctrl-C; ``partial`` is the whole Dataset, in which ``finished`` marks the cycles that were simulated; the others
         are NaN.
 
     Examples

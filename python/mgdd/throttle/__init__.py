@@ -7,23 +7,21 @@ reconstruction from public sources, not the code behind the dissertation: see th
 from __future__ import annotations
 
 from mgdd._core.throttle import PedalMap, Throttle
-from mgdd.throttle.characteristics import characteristics, holding_duty
+from mgdd.throttle.characteristics import characteristics
 from mgdd.throttle.demand import DemandChain
 from mgdd.throttle.interop import to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
-from mgdd.throttle.sensors import SensorFault, SensorPair
-from mgdd.throttle.simulation import simulate
+from mgdd.throttle.sensors import SensorPair
+from mgdd.throttle.simulation import simulate_throttle
 
 __all__ = [
     "DemandChain",
     "PedalMap",
     "PseudoWiener",
-    "SensorFault",
     "SensorPair",
     "Throttle",
     "characteristics",
-    "holding_duty",
-    "simulate",
+    "simulate_throttle",
     "to_iosystem",
 ]
 

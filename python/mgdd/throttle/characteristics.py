@@ -17,19 +17,21 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["airflow_torque_nm", "characteristics", "holding_duty", "mass_flow_kg_per_s"]
+__all__ = ["airflow_torque_nm", "characteristics", "mass_flow_kg_per_s"]
 
 _DEG = math.radians(1.0)
 AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
 
 
-def characteristics(throttle: ThrottleLike) -> xr.Dataset:
-    """Give the groups of parameters that duty and angle identify, and the linear part on each side of limp-home.
+def characteristics(throttle: ThrottleLike, angle_deg: ArrayLike | None = None) -> xr.Dataset:
+    """Give the groups that duty and angle identify, the linear part on each side of limp-home, and the holding duty.
 
     Parameters
     ----------
     throttle : Throttle, Preset, str or path-like
-        Its parameters.
+        Its parameters; the modelled air flow (``pressure_drop_kpa``) counts in the holding duty.
+    angle_deg : array_like, shape (n,), optional
+        Angles of the holding duty [deg] within the travel; the travel in steps of about 0.25 deg if left out.
 
     Returns
     -------
@@ -39,11 +41,21 @@ def characteristics(throttle: ThrottleLike) -> xr.Dataset:
         ``stiction`` (torque over g), and ``spring_above_per_deg``, ``spring_below_per_deg`` [1/deg]. The linear part,
         without dry friction, preload and inductance, over ``side`` ("above", "below"): ``pole_real_per_s`` and
         ``pole_imag_rad_per_s`` over ``pole``, slow one first, ``gain_deg_per_duty``, ``natural_frequency_rad_per_s``
-        and ``damping_ratio`` [-]; without a spring the gain is infinite and the ratio is not a number.
+        and ``damping_ratio`` [-]; without a spring the gain is infinite and the ratio is not a number. Over
+        ``angle_deg``, in duty [-] and not clipped to 1: ``duty_spring``, which balances springs and air;
+        ``duty_rising`` and ``duty_falling``, at which the plate slides open and closed very slowly; and
+        ``duty_breakaway_up`` and ``duty_breakaway_down``, at which it leaves its rest.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An angle outside the travel or not finite.
 
     Notes
     -----
     Inertia, torque constant and resistance cannot be identified separately from duty and angle alone; the groups can.
+    The friction of slow sliding is the Coulomb level, with the forms ``stribeck`` and ``lugre`` the breakaway level;
+    the form ``tanh`` has no band at rest, its branches are those of a plate in motion.
 
     Examples
     --------
@@ -53,8 +65,12 @@ def characteristics(throttle: ThrottleLike) -> xr.Dataset:
     (0.0197, 0.1292, 0.0927)
     >>> c["pole_real_per_s"].sel(side="above").values.round(3).tolist()
     [-0.83, -49.929]
+    >>> curve = characteristics(Throttle(), [45.0])
+    >>> round(float(curve["duty_rising"][0] - curve["duty_falling"][0]), 4)
+    0.1854
     """
     throttle = throttle_of(throttle)
+    angle = _angles(throttle, angle_deg)
     stall, damping, inertia = throttle.stall_torque_nm, throttle.damping_nms_per_rad, throttle.inertia_kgm2
     plate = throttle.plate
     scalars = {
@@ -85,47 +101,14 @@ def characteristics(throttle: ThrottleLike) -> xr.Dataset:
             "gain_deg_per_duty": ("side", gain, "deg", "angle per unit duty at rest"),
             "natural_frequency_rad_per_s": ("side", np.sqrt(springs / inertia), "rad/s", "natural frequency"),
             "damping_ratio": ("side", ratio, "-", "damping ratio"),
+            "angle_deg": ("angle_deg", angle),
+            **_holding_duty(throttle, angle),
         }
     )
 
 
-def holding_duty(throttle: ThrottleLike, angle_deg: ArrayLike | None = None) -> xr.Dataset:
-    """Give the duty that holds the plate at an angle, with the band that friction leaves free.
-
-    Parameters
-    ----------
-    throttle : Throttle, Preset, str or path-like
-        Its parameters; the modelled air flow (``pressure_drop_kpa``) counts.
-    angle_deg : array_like, shape (n,), optional
-        Angles [deg] within the travel; the travel in steps of about 0.25 deg if left out.
-
-    Returns
-    -------
-    xarray.Dataset
-        Over ``angle_deg``, in duty [-] and not clipped to 1: ``duty_spring``, which balances springs and air;
-        ``duty_rising`` and ``duty_falling``, at which the plate slides open and closed very slowly; and
-        ``duty_breakaway_up`` and ``duty_breakaway_down``, at which it leaves its rest.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        An angle outside the travel or not finite.
-
-    Notes
-    -----
-    The friction of slow sliding is the Coulomb level, with the forms ``stribeck`` and ``lugre`` the breakaway level;
-    the form ``tanh`` has no band at rest, its branches are those of a plate in motion.
-
-    Examples
-    --------
-    >>> from mgdd.throttle import Throttle, holding_duty
-    >>> curve = holding_duty(Throttle(), [45.0])
-    >>> round(float(curve["duty_rising"][0] - curve["duty_falling"][0]), 4)
-    0.1854
-    """
-    throttle = throttle_of(throttle)
-    t = throttle
-    angle = _angles(t, angle_deg)
+def _holding_duty(t: Throttle, angle: NDArray[np.float64]) -> dict[str, tuple[object, ...]]:
+    """Give the duty that holds the plate, and the band that friction leaves free around it."""
     x = (angle - t.limp_home_deg) * _DEG
     above = x >= 0.0
     share = np.clip((angle - t.limp_home_deg) / t.preload_ramp_deg, -1.0, 1.0)
@@ -141,12 +124,7 @@ def holding_duty(throttle: ThrottleLike, angle_deg: ArrayLike | None = None) -> 
         "duty_breakaway_up": (balance + leave, "duty at which the plate leaves its rest to open"),
         "duty_breakaway_down": (balance - leave, "duty at which the plate leaves its rest to close"),
     }
-    return labelled_dataset(
-        {
-            "angle_deg": ("angle_deg", angle),
-            **{name: ("angle_deg", _duty_of(t, torque), "-", text) for name, (torque, text) in columns.items()},
-        }
-    )
+    return {name: ("angle_deg", _duty_of(t, torque), "-", text) for name, (torque, text) in columns.items()}
 
 
 def airflow_torque_nm(throttle: ThrottleLike, angle_deg: ArrayLike) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ class DemandChain(Parameters, _core.throttle.DemandChain):
 
     Keyword-only and immutable. The defaults are plausible for a naturally aspirated engine of 2 L with a throttle of
     60 mm; they are of no engine in particular. ``DemandChain.fields()`` lists bounds and defaults. The same class
-    serves as what a controller believes and as the engine that it acts on (`mgdd.loop.simulate_drive`).
+    serves as the model of a controller and as the engine that it acts on (`mgdd.loop.simulate_drive`).
 
     Parameters
     ----------

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["simulate", "step_summary"]
+__all__ = ["simulate_throttle", "step_summary"]
 
 _DEFAULT_DURATION_S = 1.0
 _MOST_SAMPLES = 5_000_000
 _MOVED_DEG = 0.01
 
 
-def simulate(
+def simulate_throttle(
     throttle: ThrottleLike | Sequence[ThrottleLike],
     duty: Any,
     *,
@@ -91,11 +91,12 @@ def simulate(
     Examples
     --------
     >>> from mgdd import presets
-    >>> from mgdd.throttle import simulate
-    >>> run = simulate(presets.load("P1").throttle, 0.6, duration_s=0.06)
+    >>> from mgdd.throttle import simulate_throttle
+    >>> run = simulate_throttle(presets.load("P1").throttle, 0.6, duration_s=0.06)
     >>> round(float(run["angle_deg"][-1]), 2)
     33.6
-    >>> runs = simulate(presets.load("P1").throttle, 0.0, duration_s=0.5, start_deg=[0.0, 30.0, 90.0], bridge="open")
+    >>> throttle = presets.load("P1").throttle
+    >>> runs = simulate_throttle(throttle, 0.0, duration_s=0.5, start_deg=[0.0, 30.0, 90.0], bridge="open")
     >>> runs["angle_deg"][:, -1].values.round(1).tolist()
     [7.9, 8.0, 7.9]
     """
@@ -149,7 +150,7 @@ def step_summary(run: xr.Dataset) -> dict[str, float]:
     Parameters
     ----------
     run : xarray.Dataset
-        ``angle_deg`` [deg] over ``time_s`` [s], from `simulate` or a log.
+        ``angle_deg`` [deg] over ``time_s`` [s], from `simulate_throttle` or a log.
 
     Returns
     -------
@@ -165,15 +166,15 @@ def step_summary(run: xr.Dataset) -> dict[str, float]:
 
     Examples
     --------
-    >>> from mgdd.throttle import Throttle, simulate
+    >>> from mgdd.throttle import Throttle, simulate_throttle
     >>> from mgdd.throttle.simulation import step_summary
-    >>> summary = step_summary(simulate(Throttle(), 1.0, duration_s=0.3))
+    >>> summary = step_summary(simulate_throttle(Throttle(), 1.0, duration_s=0.3))
     >>> round(summary["t10_s"], 3), round(summary["t90_s"], 3)
     (0.019, 0.078)
     """
     for name in ("time_s", "angle_deg"):
         if name not in run.variables:
-            raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate makes it")
+            raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate_throttle makes it")
     time, angle = run["time_s"].to_numpy(), run["angle_deg"].to_numpy()
     if angle.ndim != 1 or not angle.size:
         raise DataError(f"angle_deg has shape {angle.shape}: a summary is of one run with at least one sample")

@@ -12,12 +12,16 @@ import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
-from mgdd.rig import RigRecord, RingTransport
+from mgdd.rig.exchange import RigRecord
+from mgdd.rig.realtime import RingTransport
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.metrics import mse
+from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
+from mgdd.surrogate.random_steps import random_step_records
 from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 from realtime_loops import make_loop
@@ -29,14 +33,14 @@ TIME = np.arange(600) * 1e-3
 DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + 4.0 * TIME))
 MODEL = throttle.PseudoWiener("pw_r")
 ANGLE = MODEL.simulate({"time_s": TIME, "duty": DUTY})["angle_deg"].to_numpy()
-GROUPS, SMOOTH = identify.FirstPrincipleModel(), identify.SmoothThrottle()
+GROUPS, SMOOTH = FirstPrincipleModel(), SmoothThrottle()
 CRANK = np.arange(-90.0, 91.0)
 BAR = 40.0 * np.exp(-((CRANK / 40.0) ** 2)) + 1.0
 NOISE = np.random.default_rng(0).standard_normal(600)
 TEN = np.array(mgdd._core.identify.smooth_example)
 KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
 SOC = np.array([-8.0, -6.0, -4.0])
-RECORDS = surrogate.fit_surrogate(surrogate.random_step_records(1500))
+RECORDS = surrogate.fit_surrogate(random_step_records(1500))
 SWEEP = np.linspace(-3.0, 3.0, 40)
 OPEN = np.array([10.0, 30.0, 60.0])
 CHAIN = throttle.DemandChain()
@@ -106,11 +110,11 @@ def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
 
 
 def swept(**options: Any) -> Any:
-    return throttle.simulate(throttle.Throttle(), **options)["angle_deg"].to_numpy()
+    return throttle.simulate_throttle(throttle.Throttle(), **options)["angle_deg"].to_numpy()
 
 
 def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
-    return throttle.simulate(
+    return throttle.simulate_throttle(
         throttle.Throttle(), duty, time_s=time, start_deg=start, supply_v=supply, airflow_torque_nm=air
     )["angle_deg"].to_numpy()
 
@@ -187,7 +191,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "guide.TimingMap.of_guide": (mapped_by_guide, (FUEL,)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
-    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
@@ -195,8 +198,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
     "maps.CalibrationMap.__call__": (lambda x: table(FUEL, TIMING, 0.2)(fuel_mg=x), (OPEN,)),
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
-    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
-    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
     "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
     "loop.track": (
@@ -221,15 +222,9 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda x, y: optimize.measure_map(x, y).curvature, (SWEEP, -SWEEP**2),
     ),
     "signals.nrmse_fit_percent": (signals.nrmse_fit_percent, (ANGLE, ANGLE + NOISE)),
-    "signals.residual_tests": (lambda e, u: signals.residual_tests(e, u).share_white, (NOISE, DUTY)),
-    "signals.rmse": (signals.rmse, (ANGLE, ANGLE + NOISE)),
-    "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
     "surrogate.fit_response": (
         lambda fuel, imep: surrogate.fit_response({"fuel_mg": fuel}, imep, degree=1).diagnostics["left_out"].to_numpy(),
         (np.array([6.0, 13.0, 20.0, 30.0, 41.0]), np.array([1.1, 2.9, 6.1, 8.8, 12.1])),
-    ),
-    "surrogate.EngineSurrogate.predict": (
-        lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),
     "sweep.sweep": (
         lambda soc, fuel: sweep(Cylinder(), OperatingPoint(), {"soc_cad": soc, "fuel_mg": fuel})["t_max_k"].to_numpy(),
@@ -239,10 +234,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda pedal, speed: CHAIN.steady(pedal, speed)["opening_deg"].to_numpy(), (OPEN, 2000.0 + OPEN),
     ),
     "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, initial_state={"angle_deg": 8.0})[1], (DUTY[:20],)),
-    "throttle.holding_duty": (
-        lambda a: throttle.holding_duty(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
+    "throttle.characteristics": (
+        lambda a: throttle.characteristics(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
     ),
-    "throttle.simulate": (
+    "throttle.simulate_throttle": (
         lambda u, t, v, m: swept(duty=u, time_s=t, supply_v=v, airflow_torque_nm=m),
         (DUTY, TIME, 12.0 + DUTY, 0.01 * DUTY),
     ),
@@ -250,7 +245,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
 
 # Models take columns by name; what is not exported takes arrays all the same.
 MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
-    "throttle.simulate, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
+    "throttle.simulate_throttle, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
     "signals.even_grid.even_step": (even_step, (TIME,)),
     **{f"throttle.DemandChain.{name}": (getattr(CHAIN, name), (OPEN,)) for name in ("area_mm2", "angle_of_area_deg")},
     **{
@@ -270,6 +265,15 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "throttle.PseudoWiener.simulate": (run(MODEL), (TIME, DUTY)),
     "throttle.PseudoWiener.predict": (ahead(MODEL), (TIME, DUTY, ANGLE)),
     "io.pressure_checks.check_trace": (check_trace, (CRANK, BAR)),
+    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
+    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
+    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
+    "signals.residual_tests": (lambda e, u: residual_tests(e, u).share_white, (NOISE, DUTY)),
+    "signals.rmse": (rmse, (ANGLE, ANGLE + NOISE)),
+    "signals.vaf_percent": (vaf_percent, (ANGLE, ANGLE + NOISE)),
+    "surrogate.EngineSurrogate.predict": (
+        lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
+    ),
     "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
     "throttle.characteristics.mass_flow_kg_per_s": (
         lambda area, drop: mass_flow_kg_per_s(area_m2=area, pressure_drop_kpa=drop), (1e-6 * OPEN, 1.0 + OPEN),

@@ -9,9 +9,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from mgdd.rig import CanRig, CanTransport, SignalMap
+from mgdd.rig import CanRig, SignalMap
 from mgdd.rig.can.node import node_of, run_node
 from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.transport import CanTransport
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")

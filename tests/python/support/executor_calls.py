@@ -11,7 +11,9 @@ import xarray as xr
 import parallel_work as work
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.engine import OperatingPoint
-from mgdd.identify import SmoothThrottle, fit_first_principle, fit_ode
+from mgdd.identify import fit_ode
+from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.loop import (
     EngineBench,
     LoopCriteria,

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mgdd.control import Pid
-from mgdd.rig import RealtimeLoop, RingTransport
+from mgdd.rig.realtime import RealtimeLoop, RingTransport
 from throttle_node import COMMAND, MEASUREMENTS, PERIOD_S, ThrottleNode, patient_envelope
 
 

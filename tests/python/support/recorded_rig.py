@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from mgdd.rig import Frame, Recorder
+from mgdd.rig import Recorder
+from mgdd.rig.realtime import Frame
 
 FRAMES = [
     Frame(id=0x120, data=bytes(range(8)), monotonic_ns=5_000_000_000, bus_ns=1_700_000_000_000_000_123),

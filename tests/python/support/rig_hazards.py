@@ -10,12 +10,12 @@ from typing import Any
 from mgdd.control import Pid
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
-from mgdd.rig import Frame, SafetyEnvelope, SafetyGate, SignalMap
+from mgdd.rig import SafetyEnvelope, SafetyGate, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.gated import facts_of
-from mgdd.throttle import SensorFault
+from mgdd.rig.realtime import Frame
 
 ONSET, OVER = 600, 1500  # samples: the hazard sets in, and ends
 LIMP_HOME_DEG = 8.0
@@ -35,7 +35,7 @@ class Hazard:
     mode: str
     reason: str
     within: int  # samples from the onset to the open bridge; the gate sees a fault of the plate one later
-    faults: tuple[ThrottleFault | SensorFault, ...] = ()
+    faults: tuple[ThrottleFault, ...] = ()
     facts: Facts | Callable[[int], Facts] = field(default_factory=dict)  # over those of the plant
     duty: float | Callable[[int], float] | None = None  # in place of the controller's
     reference_deg: float | Callable[[int], float] = 40.0
@@ -47,8 +47,8 @@ def lasting(kind: str, size: float | None = None) -> tuple[ThrottleFault]:
     return (ThrottleFault(kind=kind, from_s=1e-3 * ONSET, until_s=1e-3 * OVER, size=size),)
 
 
-def of_sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[SensorFault]:
-    return (SensorFault(kind=kind, sensor=sensor, from_s=1e-3 * ONSET, until_s=1e-3 * OVER, size=size),)
+def of_sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[ThrottleFault]:
+    return (ThrottleFault(kind=kind, sensor=sensor, from_s=1e-3 * ONSET, until_s=1e-3 * OVER, size=size),)
 
 
 HAZARDS = {
@@ -145,7 +145,7 @@ class NodeHazard:
     mode: str
     reason: str
     within_ms: float  # from the onset to the open bridge
-    faults: tuple[ThrottleFault | SensorFault, ...] = ()
+    faults: tuple[ThrottleFault, ...] = ()
     arrives: Frames = lambda frame, _: [frame]
     duty: Callable[[float], float] | None = None  # by the milliseconds since the onset
     reference_deg: float = 40.0  # from the onset on

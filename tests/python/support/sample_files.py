@@ -14,25 +14,29 @@ from map_cases import timing_table
 from mgdd import io, presets
 from mgdd.design import design_points
 from mgdd.guide import TimingMap
-from mgdd.identify import FirstPrincipleModel, SmoothThrottle, load_throttle_model
+from mgdd.identify import load_throttle_model
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.parameters import ParameterFile
-from mgdd.io.point_table import read_points
+from mgdd.io.point_table import read_conditions, read_points
 from mgdd.loop import Reference
-from mgdd.maps import CalibrationMap, read_dcm, read_map, write_dcm, write_map
+from mgdd.maps import CalibrationMap, read_dcm, read_map, write_map
 from mgdd.optimize import BoundedSeeking, Limit, Seeker
-from mgdd.rig import (
+from mgdd.rig import (  # fmt: skip
     Experiment,
     Recorder,
-    RigRecord,
     SafetyEnvelope,
     SignalMap,
     export_record,
     read_record,
     repair_record,
-)  # fmt: skip
+)
 from mgdd.rig.can.dbc import DbcFile
-from mgdd.surrogate import EngineSurrogate, ResponseModel, fit_response, fit_surrogate, random_step_records
+from mgdd.rig.exchange import RigRecord  # fmt: skip
+from mgdd.surrogate import ResponseModel, fit_response, fit_surrogate
+from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import DemandChain, PseudoWiener, SensorPair
 from recorded_rig import write as write_record
 from user_buses import FOREIGN_MAP, write_foreign
@@ -120,7 +124,7 @@ def _exchanges(path: Path) -> None:
 
 def _dcm(path: Path) -> None:
     table = CalibrationMap({"fuel_mg": [6, 20, 33.5]}, [-1.25, -4, -6], name="soc_cad")
-    write_dcm({"SocBase": table}, path, values={"idle_rpm": (850.0, "rpm")})
+    write_map({"SocBase": table}, path, values={"idle_rpm": (850.0, "rpm")})
 
 
 @cache
@@ -146,7 +150,7 @@ def _export(path: Path) -> Any:
 SAMPLES: dict[str, Sample] = {
     "io.read_pressure": Sample(io.read_pressure, "csv", _pressure),
     "io.read_throttle_log": Sample(io.read_throttle_log, "csv", _log),
-    "io.read_conditions": Sample(io.read_conditions, "csv", _text(CONDITIONS)),
+    "io.read_conditions": Sample(read_conditions, "csv", _text(CONDITIONS)),
     "points": Sample(read_points, "csv", _text("speed_rpm,fuel [mg],note\n900,6.5,cold\n1500,20,warm\n")),
     "loop.Reference.parse": Sample(
         lambda path: Reference.parse(str(path)), "csv", _text("time_s,reference_deg\n0,10\n0.002,11\n0.004,12\n")

@@ -10,8 +10,9 @@ import select
 import sys
 import time
 
-from mgdd.rig import CanTransport, SignalMap
+from mgdd.rig import SignalMap
 from mgdd.rig.can.link import Sender
+from mgdd.rig.can.transport import CanTransport
 
 DUTY, PERIOD_S, SAFE_FRAMES = 0.3, 0.005, 12
 

@@ -17,7 +17,8 @@ from typing import Any
 
 import mgdd
 from mgdd import _core
-from mgdd.studies import StudyResult, run_study
+from mgdd.studies import run_study
+from mgdd.studies.base import StudyResult
 from mgdd.studies.registry import function_of
 
 ALL = Path(__file__).resolve().parents[3] / "build" / "studies"
@@ -38,13 +39,18 @@ QUICK: dict[str, dict[str, int]] = {
 }
 
 
+def sources() -> list[Path]:
+    """List the files that a result depends on; in a build of developers the folders of the package are links."""
+    package = Path(mgdd.__file__).resolve().parent
+    return sorted(file for ending in ("py", "toml", "csv") for file in package.rglob(f"*.{ending}"))
+
+
 @functools.cache
 def folder() -> Path:
     """Make the folder of this version, and forget old ones."""
     digest = hashlib.sha256(Path(_core.__file__).read_bytes())
-    package = Path(mgdd.__path__[0])
-    for file in sorted(file for ending in ("py", "toml", "csv") for file in package.rglob(f"*.{ending}")):
-        digest.update(f"{file.relative_to(package)}".encode() + file.read_bytes())
+    for file in sources():
+        digest.update(file.name.encode() + file.read_bytes())
     digest.update(f"{os.environ.get('MGDD_DATA_DIR')} {_core.instruction_set()}".encode())
     made = ALL / digest.hexdigest()[:16]
     made.mkdir(parents=True, exist_ok=True)

@@ -6,8 +6,10 @@ import threading
 from collections.abc import Callable
 from typing import Any, Self
 
+from mgdd._core.rig import E2eCheck, protect
 from mgdd.loop import VirtualThrottle
-from mgdd.rig import E2eCheck, E2eSettings, Frame, LoopMessage, RingTransport, SafetyEnvelope, SignalLayout, protect
+from mgdd.rig import SafetyEnvelope
+from mgdd.rig.realtime import E2eSettings, Frame, LoopMessage, RingTransport, SignalLayout
 
 PERIOD_S = 0.002
 ANGLE = SignalLayout(start=23, length=16, byte_order="big_endian", scale=0.01, offset=-5.0)

@@ -15,8 +15,7 @@ from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
 from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
-from mgdd.optimize import Optimum
-from mgdd.optimize.optimum import limits_of
+from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.presets.meant import CylinderLike, PointLike
 
 if TYPE_CHECKING:
@@ -61,15 +60,14 @@ def best_timing(
     limits : mapping of str to float, or sequence of Limit, optional
         Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
-        Searched range of SOC, as in `mgdd.engine.find_optimum`; where nothing is said it reaches 5 °CA beyond the
-        fitted timing.
+        Searched range of SOC, as in `mgdd.engine.find_optimum`; by default it reaches 5 °CA beyond the fitted timing.
     progress : callable, optional
         Called with a short text after each fit.
 
     Returns
     -------
     list of BestTiming
-        One per trace.
+        One per trace; ``best`` of a trace without a plausible model raises `mgdd.errors.ConvergenceError`.
 
     Raises
     ------
@@ -86,7 +84,7 @@ def best_timing(
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)])  # wall heat 0.5, 1.0 and 1.5
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)
+    >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
     >>> [(member.member.wall_heat_scale, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
     [(0.5, 4), (1.0, 7), (1.5, 10)]
     """
@@ -186,7 +184,6 @@ def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
     return BestTiming(
         file=file,
         members=answers,
-        best=min(kept, key=lambda answer: answer.member.score, default=None),
         **{name: span(name) for name in RANGED},
     )
 
@@ -205,12 +202,12 @@ def doubts_of(rows: Sequence[BestTiming], tdc: TdcEstimate | None = None) -> lis
     """Say what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
     out = [str(finding) for finding in headline_of(rows).fit.findings]
     for row in rows:
-        ends = sum(answer.plausible and answer.at_bound for answer in row.members)
+        ends = sum(answer.at_bound for answer in row.plausible)
         if ends:
             out.append(
                 f"{row.file}: the best timing of {ends} plausible model(s) lies at the end of the searched range: "
                 "widen bounds_cad, or suspect TDC"
             )
-        if row.best is None:
+        if not row.plausible:
             out.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
     return out + (tdc.doubts() if tdc is not None else [])

@@ -63,7 +63,7 @@ def compare_laws(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify.engine.burn_laws import compare_laws
-    >>> fits = compare_laws(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
+    >>> fits = compare_laws(datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
     >>> [fit.kind for fit in fits][:2]
     ['triangle, gamma 1.37', 'wiebe, gamma 1.37']
     """

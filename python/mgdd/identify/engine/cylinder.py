@@ -18,8 +18,8 @@ from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.presets.meant import CylinderLike, PointLike
-from mgdd.results import FitReport
 from mgdd.results.fit import FitQuality
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
@@ -62,11 +62,11 @@ def fit_cylinder(
         ``start_pressure_bar`` per trace where the first 30 °CA scatter by more than 1 %: one sample would scale all.
     fuel_heat_j : float or sequence of float, optional
         Known heat of the fuel, one for all traces or one each [J]; it is held. Left out, ``fuel_mg`` of the traces
-        says it where present, and it is fitted otherwise.
+        gives it where present, and it is fitted otherwise.
     bounds : mapping of str to pair, optional
         Lower and upper bound of a free parameter, ``NAME`` for all traces or ``NAME[file]`` for one; None leaves a side
-        open. Unless said here, a burn starts at the earliest at the injection or spark of its trace, and gamma stays in
-        1.15 to 1.45 (linear law at 300 K: 1.28 to 1.45).
+        open. Left out, a burn starts at the earliest at the injection or spark of its trace, and gamma stays in 1.15
+        to 1.45 (linear law at 300 K: 1.28 to 1.45).
     point : OperatingPoint, Preset or mapping of str to float, optional
         Conditions that a trace does not carry.
     start_values : sequence of mapping, optional
@@ -78,7 +78,7 @@ def fit_cylinder(
     integrator : str
         As in `mgdd.engine.simulate`.
     options : FitOptions, optional
-        200 trial steps of the search where nothing else is said; the other options have no effect here and are refused.
+        200 trial steps of the search by default; the other options have no effect here and are refused.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def fit_cylinder(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> fit = fit_cylinder(traces, cylinder, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
     >>> fit.report.success
     True

@@ -30,11 +30,11 @@ class ModelFamily:
         it, for all traces together. The law of the cylinder itself is always tried too.
     wall_heat_scales : sequence of float or None
         Scales of the textbook wall heat that are held [-]; None fits it, for all traces together. Gamma and wall heat
-        are not fitted at once: traces hardly tell them apart.
+        are not fitted at once: traces hardly separate them.
     wall_heat_range, gamma_range : tuple of float
         Plausible scales and gammas [-].
     wall_heat_prior : tuple of float
-        Mean and standard deviation of what is believed of the scale before the data [-]; it weighs in the choice of the
+        Mean and standard deviation of the prior of the scale [-]; it weighs in the choice of the
         best member.
     imep_percent : float
         Largest plausible error of the closed IMEP [%].
@@ -134,7 +134,7 @@ class Member:
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)[0].best.member.law
+    >>> best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[0].best.member.law
     'double_wiebe'
     """
 

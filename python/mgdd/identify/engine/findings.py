@@ -1,4 +1,4 @@
-"""What a calibration must be distrusted for."""
+"""Limitations of a calibration."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from mgdd._core.engine import OperatingPoint
 from mgdd.engine import analyze
 from mgdd.identify.engine.request import Request, earliest_burn_cad
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

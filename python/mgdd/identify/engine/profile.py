@@ -64,7 +64,7 @@ class WallHeatProfile(Result):
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> wall_heat_profile(fit_cylinder(traces, cylinder)).identifiable
     False
     """
@@ -118,7 +118,7 @@ def wall_heat_profile(
         Scales to refit at, in [0, 2.5]; the fitted one and both ends are added.
     widths : mapping, optional
         How far ``gamma`` [-], ``pegging_bar`` [bar] and ``tdc_cad`` [°CA] may be off, each >= 0: 0.03, 0.1 and 0.3
-        where nothing is said, 0 for one that is known. A gamma that was free in the fit is not moved.
+        by default, 0 for one that is known. A gamma that was free in the fit is not moved.
     progress : callable, optional
         Called with a short text before each refit.
 
@@ -136,7 +136,7 @@ def wall_heat_profile(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> profile = wall_heat_profile(fit_cylinder(traces, cylinder), scales=[0.5, 1.0])
     >>> profile.dataset["rmse_percent"].dims
     ('wall_heat_scale',)

@@ -58,7 +58,7 @@ class Load(Result):
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> fit = fit_cylinder(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
+    >>> fit = fit_cylinder(datasets.read("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
     >>> fit.loads[0].rmse_percent < 1.0
     True
     """
@@ -115,7 +115,7 @@ class CylinderFit(Fit):
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> fit = fit_cylinder(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
+    >>> fit = fit_cylinder(datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
     >>> fit.loads[1].rmse_percent < 1.0
     True
     >>> "wall_heat_scale" in fit.unidentifiable

@@ -113,7 +113,7 @@ class Request:
         return out
 
     def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[_core.identify.LoadBurn]:
-        """Give the start of each burn: from the trace's heat release, then what is said, then what is known."""
+        """Give the start of each burn: from the trace's heat release, then what is given, then what is known."""
         known = _core.identify.load_parameters()
         burns = []
         for index, trace in enumerate(measured):
@@ -205,7 +205,7 @@ def pegged(
 
 
 def default_free(cylinder: Cylinder) -> tuple[str, ...]:
-    """Name what `fit_cylinder` frees for a burn law when nothing is said."""
+    """Name what `fit_cylinder` frees for a burn law by default."""
     shape = SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ()
     return ("wall_heat_scale", *BURN_FIELDS, *shape)
 
@@ -262,7 +262,7 @@ def _known_heats(
     fuel_heat_j: float | Sequence[float | None] | None,
     free: Sequence[str] | None,
 ) -> tuple[float | None, ...]:
-    """Give the known fuel heat of each trace: said, or from its attribute ``fuel_mg``; all or none."""
+    """Give the known fuel heat of each trace: as given, or from its attribute ``fuel_mg``; all or none."""
     heats: tuple[float | None, ...]
     if fuel_heat_j is None:
         per_mg = cylinder.lower_heating_value_mj_per_kg

@@ -45,7 +45,7 @@ class TdcEstimate(Result):
         What the angles are too large by: where they have firing TDC [°CA]. ``tdc_offset_cad=`` of
         `mgdd.io.read_pressure` takes it off.
     low_cad, high_cad : float
-        Range of offsets that the traces do not tell apart [°CA].
+        Range of offsets that the traces do not separate [°CA].
     method : {"motored peak", "residual of the calibration"}
         How it was found.
     loss_angle_cad : tuple of float
@@ -60,7 +60,7 @@ class TdcEstimate(Result):
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import estimate_tdc
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144"), cylinder, span_cad=1.0)
+    >>> found = estimate_tdc(datasets.read("hd_diesel_128x144"), cylinder, span_cad=1.0)
     >>> found.suspect
     False
     """
@@ -171,7 +171,7 @@ def estimate_tdc(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import estimate_tdc
-    >>> traces, cylinder = datasets.load("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.read("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
     >>> found = estimate_tdc(traces, cylinder, span_cad=1.0)
     >>> found.low_cad < 0.0 < found.high_cad
     True

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from mgdd.errors import ConvergenceError
 from mgdd.identify.engine.family import Member
 from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset, named_label
@@ -108,8 +109,6 @@ class BestTiming(Result):
         Name of the trace.
     members : tuple of MemberTiming
         Every member's answer, in the order of the family.
-    best : MemberTiming or None
-        The plausible one with the least score; None if no member is plausible for this load.
     soc_cad, ca50_cad, shift_cad, gain_percent : tuple of float
         Lowest and highest answer of the plausible members, as in `MemberTiming`; NaN without any.
     free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
@@ -121,14 +120,13 @@ class BestTiming(Result):
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[0.5, 1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)
+    >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
     >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
     ([5, 8], 8)
     """
 
     file: str
     members: tuple[MemberTiming, ...] = field(repr=False)
-    best: MemberTiming | None
     soc_cad: tuple[float, float]
     ca50_cad: tuple[float, float]
     shift_cad: tuple[float, float]
@@ -139,13 +137,29 @@ class BestTiming(Result):
     free_gain_percent: tuple[float, float]
 
     @property
+    def plausible(self) -> tuple[MemberTiming, ...]:
+        """Answers of the members that are plausible for this load."""
+        return tuple(answer for answer in self.members if answer.plausible)
+
+    @property
+    def best(self) -> MemberTiming:
+        """The plausible answer with the least score; ConvergenceError where no member is plausible for this load."""
+        if not self.plausible:
+            near = min(self.members, key=lambda answer: answer.member.score)
+            raise ConvergenceError(
+                f"{self.file}: no model of the family is plausible; {near.member.name}: {near.why_not}; suspect "
+                "geometry, TDC, pegging, speed or trapped mass"
+            )
+        return min(self.plausible, key=lambda answer: answer.member.score)
+
+    @property
     def dataset(self) -> xr.Dataset:
         """Every member's answer over ``member``; attributes name the trace and the best member."""
         rows = [member.to_dict() for member in self.members]
         names = [name for name in (rows[0] if rows else ()) if name != "name"]
         columns = {name: ("member", [row[name] for row in rows], *_label(name)) for name in names}
         members = ("member", [row["name"] for row in rows], "-", "member of the family")
-        best = "" if self.best is None else self.best.member.name
+        best = self.best.member.name if self.plausible else ""
         return labelled_dataset({"member": members, **columns}, attrs={"file": self.file, "best": best})
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,7 +173,7 @@ class BestTiming(Result):
         return {
             "file": self.file,
             **{name: list(getattr(self, name)) for name in RANGED},
-            "best": None if self.best is None else self.best.to_dict(),
+            "best": self.best.to_dict() if self.plausible else None,
             "members": [member.to_dict() for member in self.members],
         }
 

@@ -35,7 +35,9 @@ from mgdd.identify.throttle.nuisances import (
 )
 from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.results import Finding, Fit, FitReport
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
+from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,7 +95,7 @@ def fit_groups(
     Raises
     ------
     DataError, ParameterError
-        As `mgdd.identify.fit_first_principle`.
+        As `fit_first_principle`.
 
     References
     ----------

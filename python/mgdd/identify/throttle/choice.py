@@ -14,14 +14,15 @@ from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import groups_problem
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results import Finding, Fit
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
 from mgdd.signals.metrics import nrmse_fit_percent
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mgdd.results import Model
+    from mgdd.results.model import Model
 
 __all__ = ["fit_auto"]
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.results import Finding, FitReport
+from mgdd.results.finding import Finding
+from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def with_delay(
     -------
     FitReport
         With `delay_samples` last; a delay that fits as well as the chosen one leaves a whole sample open. At the end of
-        what may be the error is NaN: how much further it goes, nobody has looked; those of lag and time constant, too.
+        what may be the error is NaN: the search did not go further; those of lag and time constant, too.
     """
     curvature = min(
         2.0 * n * math.log(other / rmse[delay]) / (at - delay) ** 2 for at, other in rmse.items() if at != delay

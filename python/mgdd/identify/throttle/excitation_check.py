@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.errors import ParameterError, argument
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import Result
 from mgdd.signals.even_grid import even_step

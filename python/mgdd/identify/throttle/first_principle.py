@@ -18,7 +18,9 @@ from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.parallel.pool import MakesExecutor, threads_of
-from mgdd.results import Finding, Fit, FitReport
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
+from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     import numpy as np
@@ -54,7 +56,7 @@ def fit_first_principle(
     per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
     the free run is then fitted in stages (dynamics, static groups, all), from several starts. A side of limp-home
     the log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or
-    torque constant the physical numbers are computed back (`FirstPrincipleModel.physical_parameters`) and said in
+    torque constant the physical numbers are computed back (`FirstPrincipleModel.physical_parameters`) and reported in
     `findings`.
 
     Parameters
@@ -75,12 +77,12 @@ def fit_first_principle(
         Mechanical stops [deg].
     options : FitOptions, optional
         4 starts, within a factor of 2 around the first, with seed 0, 60 trial steps per stage and a tolerance of 1e-10
-        of the last stage where nothing else is said.
+        of the last stage by default.
     executor, workers
         As in `mgdd.parallel.map_items`, for the starts: threads on all cores if left out. The fit does not depend on
         them.
     resistance_ohm, supply_v, inertia_kgm2, torque_constant_nm_per_a : float, optional
-        Known numbers, for `FirstPrincipleModel.physical_parameters`; their absence is said in `findings`.
+        Known numbers, for `FirstPrincipleModel.physical_parameters`; their absence is reported in `findings`.
 
     Returns
     -------
@@ -103,7 +105,8 @@ def fit_first_principle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, fit_first_principle
+    >>> from mgdd.identify.throttle.first_principle import fit_first_principle
+    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
     >>> from mgdd.optimize import FitOptions
     >>> time = 1e-3 * np.arange(4000)
     >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))
@@ -209,6 +212,6 @@ def _fit(starts: Sequence[Sequence[float]], how: Mapping[str, Any], threads: int
 def _one_by_one(
     starts: Sequence[Sequence[float]], *, how: Mapping[str, Any], angle: NDArray[np.float64]
 ) -> list[tuple[FitReport, list[float]]]:
-    """Search from each start by itself: the core tells all groups of the best one only."""
+    """Search from each start by itself: the core gives all groups of the best one only."""
     found = [_fit([start], how, 1) for start in starts]
     return [(FitReport.from_core(one["reports"][0], angle), list(one["values"])) for one in found]

@@ -87,7 +87,7 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
 
     Examples
     --------
-    >>> from mgdd.identify import FirstPrincipleModel
+    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
     >>> run = FirstPrincipleModel().simulate({"time_s": [0.0, 0.001, 0.002], "duty": [0.0, 0.0, 0.0]})
     >>> run["angle_deg"].values.tolist()
     [8.0, 8.0, 8.0]
@@ -205,7 +205,7 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
 
         Examples
         --------
-        >>> from mgdd.identify import FirstPrincipleModel
+        >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
         >>> found = FirstPrincipleModel().physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
         >>> round(found["torque_constant_nm_per_a"], 4)
         0.2291

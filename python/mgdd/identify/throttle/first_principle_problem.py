@@ -20,7 +20,7 @@ from mgdd.identify.throttle.first_principle_model import (
 )
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle
 from mgdd.identify.throttle.free_run import LOG_COLUMNS
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of
 

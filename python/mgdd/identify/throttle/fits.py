@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from mgdd.results import Fit, Model
+    from mgdd.results import Fit
+    from mgdd.results.model import Model
 
 __all__ = ["CHOICES", "KINDS", "PSEUDO_WIENER", "check_kind", "fit_kind", "load_throttle_model"]
 
@@ -83,7 +84,7 @@ def load_throttle_model(path: str | os.PathLike[str]) -> Model:
 
     Returns
     -------
-    mgdd.results.Model
+    Model
         Ready to simulate.
 
     Raises
@@ -98,7 +99,8 @@ def load_throttle_model(path: str | os.PathLike[str]) -> Model:
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> from mgdd.identify import FirstPrincipleModel, load_throttle_model
+    >>> from mgdd.identify import load_throttle_model
+    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder) / "fit.toml"
     ...     _ = file.write_text(FirstPrincipleModel().to_toml())

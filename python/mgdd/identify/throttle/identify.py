@@ -16,8 +16,8 @@ from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
 from mgdd.io.throttle_checks import check_sides, check_throttle_log
-from mgdd.results import Finding, Fit
-from mgdd.results.finding import unique
+from mgdd.results import Fit
+from mgdd.results.finding import Finding, unique
 from mgdd.results.fit import FitQuality
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ def identify_throttle(
     >>> from mgdd.identify import identify_throttle
     >>> from mgdd.signals import chirp
     >>> from mgdd.io import throttle_log
-    >>> from mgdd.throttle import Throttle, simulate
+    >>> from mgdd.throttle import Throttle, simulate_throttle
     >>> signal = chirp(3.0, offset=0.15, amplitude=0.2)
-    >>> run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    >>> run = simulate_throttle(Throttle(), signal["duty"], time_s=signal["time_s"])
     >>> from mgdd.optimize import FitOptions
     >>> log = throttle_log(run["time_s"], run["duty"], run["angle_deg"])
     >>> fit = identify_throttle(log, options=FitOptions(n_starts=2))

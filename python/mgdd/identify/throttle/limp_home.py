@@ -8,14 +8,14 @@ import numpy as np
 
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.free_run import source_of
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import xarray as xr
 
-    from mgdd.results import Model
+    from mgdd.results.model import Model
 
 __all__ = ["doubts", "read_off"]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.free_run import LOG_COLUMNS, discarded
-from mgdd.results import Model
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.model import Model
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
 from mgdd.signals.model import columns_of
@@ -58,7 +58,7 @@ def n_step_rms(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel
+    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
     >>> from mgdd.identify.throttle.n_step import n_step_rms
     >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
     >>> log = model.simulate({"time_s": time, "duty": 0.1 + 0.2 * np.sin(6.0 * time)})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.identify.throttle.first_principle_problem import GroupsProblem
-    from mgdd.results import FitReport
+    from mgdd.results.fit_report import FitReport
 
 __all__ = ["SHARE", "TYPICAL_SHARE", "delay_weights", "independent_values", "with_nuisances"]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.errors import ParameterError
 from mgdd.presets.meant import throttle_model_of
-from mgdd.throttle import Throttle, simulate
+from mgdd.throttle import Throttle, simulate_throttle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def prior_of(model: Any) -> Prior:
 
 def _of_throttle(throttle: Throttle) -> Prior:
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
-        result = simulate(throttle, duty, time_s=time, start_deg=start)
+        result = simulate_throttle(throttle, duty, time_s=time, start_deg=start)
         return _columns({name: result[name].to_numpy() for name in ("angle_deg", "current_a")}, time.size)
 
     plate = throttle.plate

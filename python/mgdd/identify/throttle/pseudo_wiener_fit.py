@@ -14,7 +14,9 @@ from mgdd.identify.throttle.delay_report import delay_at_end
 from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.results import Finding, Fit, FitReport
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
+from mgdd.results.fit_report import FitReport
 from mgdd.signals.even_grid import common_step
 from mgdd.throttle import PseudoWiener
 
@@ -69,7 +71,7 @@ def fit_pseudo_wiener(
         limp-home; ``map``: what the static map turns into the first angle; ``best``: whichever fits better.
     options : FitOptions, optional
         9 searches per delay of PW-R and 16 of the others (per delay and start rule of the lags), seed 1 of their Latin
-        hypercube, and 150 trial steps per search where nothing else is said.
+        hypercube, and 150 trial steps per search by default.
 
     Returns
     -------
@@ -91,7 +93,7 @@ def fit_pseudo_wiener(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import fit_pseudo_wiener
+    >>> from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.throttle import PseudoWiener
     >>> time = np.arange(4000) * 1e-3

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.results import Finding
+from mgdd.results.finding import Finding
 from mgdd.results.result import NumbersResult
 from mgdd.signals.even_grid import even_step
 

@@ -18,8 +18,9 @@ from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.parallel.pool import MakesExecutor
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.describe import described
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import VARIABLES
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of
@@ -54,7 +55,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import SmoothThrottle
+    >>> from mgdd.identify.throttle.smooth import SmoothThrottle
     >>> run = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(5), "duty": np.zeros(5)})
     >>> run["angle_deg"].values.round(3).tolist()
     [8.021, 8.021, 8.021, 8.021, 8.021]
@@ -129,7 +130,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
         initial_state : mapping of str to float, or sequence of float, optional
             Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; at rest without.
         options : FitOptions, optional
-            A tolerance of 1e-9 of the last stage where nothing else is said; the other options have no effect here and
+            A tolerance of 1e-9 of the last stage by default; the other options have no effect here and
             are refused.
         lanes : bool
             Several starts at once; False takes one after the other and gives the same numbers.
@@ -160,7 +161,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
         Examples
         --------
         >>> import numpy as np
-        >>> from mgdd.identify import SmoothThrottle
+        >>> from mgdd.identify.throttle.smooth import SmoothThrottle
         >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
         >>> time, truth = 1e-3 * np.arange(8000), np.array(list(SmoothThrottle().parameters.values()))
         >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})

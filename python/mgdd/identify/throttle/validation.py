@@ -15,8 +15,11 @@ from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io.throttle_checks import check_throttle_log
-from mgdd.results import Finding, Fit, FitReport, Model
+from mgdd.results import Fit
+from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality
+from mgdd.results.fit_report import FitReport
+from mgdd.results.model import Model
 from mgdd.results.result import Result, merged
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
@@ -50,7 +53,7 @@ class ThrottleValidation(Result):
     free_run : xarray.Dataset
         ``duty``, ``angle_deg``, ``model_deg`` and ``residual_deg`` over ``time_s``.
     findings : tuple of Finding
-        What to distrust, what the log does not identify, and which excitation would.
+        Limitations found, what the log does not identify, and which excitation would.
     source : str
         Name of the log.
 
@@ -196,7 +199,8 @@ def validate_throttle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, validate_throttle
+    >>> from mgdd.identify import validate_throttle
+    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
     >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
     >>> log = model.simulate({"time_s": time, "duty": 0.2 * np.sin(6.0 * time)})
     >>> validate_throttle(model, log).quality.nrmse_fit_percent

@@ -52,7 +52,8 @@ class BusBridge:
     Examples
     --------
     >>> import can
-    >>> from mgdd.rig import BusBridge, Frame, RingTransport
+    >>> from mgdd.rig.can.bus_bridge import BusBridge
+    >>> from mgdd.rig.realtime import Frame, RingTransport
     >>> transport = RingTransport()
     >>> with can.Bus(interface="virtual", channel="demo", ignore_config=True) as node:
     ...     with can.Bus(interface="virtual", channel="demo", ignore_config=True) as host, BusBridge(host, transport):

@@ -27,7 +27,7 @@ _EXACT = 2**53  # largest integer that a float64 holds with all smaller ones
 
 
 def loop_messages(signal_map: SignalMap) -> tuple[LoopMessage, list[LoopMessage]]:
-    """Give the command and the measurements of a map as a `mgdd.rig.RealtimeLoop` takes them.
+    """Give the command and the measurements of a map as a `RealtimeLoop` takes them.
 
     With an open bridge the loop sends the safe frame of the map, so it arms a node as `mgdd.rig.CanRig` does. Values
     that a loop has no place for are left out; a ParameterError says why it cannot serve a map.

@@ -17,7 +17,6 @@ from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.hub_faults import fault_of
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.throttle import SensorFault
 
 __all__ = ["LocalBus", "TruthLog", "node_of", "parent_watch", "run_node"]
 
@@ -117,9 +116,7 @@ def node_of(
     """Make the virtual plant of the inputs of a map, a throttle for ``duty``, an engine for ``soc_cad``."""
     names = signal_map.input_names
     if "duty" in names:
-        known: list[ThrottleFault | SensorFault] = []
-        for kind, given in (fault_of(text, _FAULT_KEYS) for text in faults):
-            known.append((SensorFault if "sensor" in given else ThrottleFault)(kind=kind, **given))
+        known = [ThrottleFault(kind=kind, **given) for kind, given in (fault_of(text, _FAULT_KEYS) for text in faults)]
         plant = VirtualThrottle(
             inputs=(*names, "bridge_open"),
             faults=known,

@@ -50,7 +50,7 @@ class CanTransport:
     Examples
     --------
     >>> from mgdd._core.rig import Frame
-    >>> from mgdd.rig import CanTransport
+    >>> from mgdd.rig.can.transport import CanTransport
     >>> with CanTransport("virtual", "doc") as one, CanTransport("virtual", "doc") as other:
     ...     one.send(Frame(id=0x120, data=bytes(8)))
     ...     received = other.receive(1.0)
@@ -93,7 +93,7 @@ class CanTransport:
 
         Examples
         --------
-        >>> from mgdd.rig import CanTransport
+        >>> from mgdd.rig.can.transport import CanTransport
         >>> CanTransport.parse("socketcand:can0?host=127.0.0.1&port=29536").options
         {'host': '127.0.0.1', 'port': 29536}
         """

@@ -154,7 +154,8 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
 
     Examples
     --------
-    >>> from mgdd.rig import Experiment, check_experiment
+    >>> from mgdd.rig import Experiment
+    >>> from mgdd.rig.experiment import check_experiment
     >>> text = '''
     ... kind = "experiment"
     ... format = 1

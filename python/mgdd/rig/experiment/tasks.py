@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from mgdd.loop.track import AngleController
     from mgdd.optimize import Seeker
-    from mgdd.presets import Preset
+    from mgdd.presets.preset import Preset
     from mgdd.throttle import Throttle
 
 __all__ = ["IdentifyPlan", "Outcome", "SeekPlan", "TrackPlan", "compared", "engine_named", "throttle_named"]

@@ -14,8 +14,9 @@ from mgdd.errors import ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.describe import described
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -137,8 +138,8 @@ def drive_inverse_dynamics(
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
-    >>> if "emps" in datasets.available():
-    ...     found = drive_inverse_dynamics(datasets.load("emps")[0], directional=False)
+    >>> if "emps" in datasets.names():
+    ...     found = drive_inverse_dynamics(datasets.read("emps")[0], directional=False)
     ...     assert round(found["mass_kg"], 1) == 95.1
     """
     from scipy.signal import butter, filtfilt
@@ -189,8 +190,8 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics
-    >>> if "emps" in datasets.available():
-    ...     train, test = datasets.load("emps")
+    >>> if "emps" in datasets.names():
+    ...     train, test = datasets.read("emps")
     ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
     ...     assert drive_free_run(slide, test).size == 24821
     """
@@ -218,7 +219,7 @@ def fit_drive(
     ----------
     record : xarray.Dataset
         ``drive_v`` [V], ``position_m`` [m] over an evenly spaced ``time_s`` [s], and ``force_n_per_v``, as
-        `mgdd.datasets.load` returns ``emps``.
+        `mgdd.datasets.read` returns ``emps``.
     friction : str
         ``coulomb``: viscous and Coulomb friction and an offset; ``directional``: another viscous friction in each
         direction; ``stiction``: that, and more friction at rest than in motion; ``stribeck``: the same with a gradual
@@ -228,7 +229,7 @@ def fit_drive(
     start_values : mapping of str to float, optional
         First start, by parameter name; without it the inverse dynamics give it (`drive_inverse_dynamics`).
     options : FitOptions, optional
-        48 starts, scattered with seed 1, 60 trial steps per start and a tolerance of 1e-6 where nothing else is said.
+        48 starts, scattered with seed 1, 60 trial steps per start and a tolerance of 1e-6 by default.
 
     Returns
     -------

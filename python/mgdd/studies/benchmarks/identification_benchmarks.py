@@ -15,7 +15,8 @@ from mgdd.optimize import FitOptions
 from mgdd.plot.measured import measured_and_model
 from mgdd.plot.style import residual_below
 from mgdd.results.labels import labelled_dataset
-from mgdd.signals import nrmse_fit_percent, rmse
+from mgdd.signals import nrmse_fit_percent
+from mgdd.signals.metrics import rmse
 from mgdd.studies.base import Parts, Progress, StudyResult
 from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
@@ -125,7 +126,7 @@ def run_identification_benchmarks(
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.identification_benchmarks import run_identification_benchmarks
-    >>> if "cascaded_tanks" in datasets.available():
+    >>> if "cascaded_tanks" in datasets.names():
     ...     result = run_identification_benchmarks(quick=True, figures=False)
     ...     assert {"set", "train", "test"} <= set(result.summary["rows"][0])
     """
@@ -137,7 +138,7 @@ def run_identification_benchmarks(
     parts, missing, reason = [], [], ""
     for name, make in makers.items():
         try:
-            train, test = datasets.load(name)
+            train, test = datasets.read(name)
         except FileNotFoundError as error:
             missing.append(name)
             reason = str(error.strerror)

@@ -14,8 +14,9 @@ from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.describe import described
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -165,7 +166,7 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
         above a datum, overflow in part into the lower tank, delay of the pump; ``grey_box_free_exponent``: the upper
         outflow by a power too.
     options : FitOptions, optional
-        4 starts, scattered with seed 1, 200 trial steps per start and a tolerance of 1e-9 where nothing else is said;
+        4 starts, scattered with seed 1, 200 trial steps per start and a tolerance of 1e-9 by default;
         the best by the error on this record is taken.
 
     Returns
@@ -191,8 +192,8 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
     >>> from mgdd import datasets
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
-    >>> if "cascaded_tanks" in datasets.available():
-    ...     fit = fit_two_tanks(datasets.load("cascaded_tanks")[0], options=FitOptions(n_starts=1))
+    >>> if "cascaded_tanks" in datasets.names():
+    ...     fit = fit_two_tanks(datasets.read("cascaded_tanks")[0], options=FitOptions(n_starts=1))
     ...     assert fit.train.rmse < 0.16
     """
     if form not in _FORMS:

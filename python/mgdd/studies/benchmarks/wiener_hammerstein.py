@@ -14,8 +14,9 @@ from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
-from mgdd.results import Fit, FitReport
+from mgdd.results import Fit
 from mgdd.results.describe import described
+from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -185,8 +186,8 @@ class WienerHammersteinFit(Fit):
     >>> from mgdd import datasets
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
-    >>> if "wh2009" in datasets.available():
-    ...     some = datasets.load("wh2009")[0].isel(time_s=slice(0, 5000))
+    >>> if "wh2009" in datasets.names():
+    ...     some = datasets.read("wh2009")[0].isel(time_s=slice(0, 5000))
     ...     options = FitOptions(max_iterations=10)
     ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, options=options)
     ...     assert fit.train.rmse <= fit.linear.rmse
@@ -227,8 +228,8 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     --------
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
-    >>> if "wh2009" in datasets.available():
-    ...     assert fit_linear(datasets.load("wh2009")[0], order=2, iterations=3).rmse > 0.04
+    >>> if "wh2009" in datasets.names():
+    ...     assert fit_linear(datasets.read("wh2009")[0], order=2, iterations=3).rmse > 0.04
     """
     if not 1 <= order <= 10:
         raise ParameterError.of("order", order, "in [1, 10]")
@@ -287,7 +288,7 @@ def fit_wiener_hammerstein(
     scan_samples : int
         Samples used until one partition has won.
     options : FitOptions, optional
-        30 trial steps and a tolerance of 1e-7 of the last fit where nothing else is said; the other options have no
+        30 trial steps and a tolerance of 1e-7 of the last fit by default; the other options have no
         effect here and are refused.
 
     Returns
