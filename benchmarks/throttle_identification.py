@@ -26,7 +26,7 @@ from scipy.optimize import least_squares
 from support import machine
 
 from mgdd import _core
-from mgdd.identify import SmoothThrottle
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions
 
 STEP_S, N, NOISE_DEG, TOLERANCE = 1e-3, 20_000, 0.05, 1e-9
