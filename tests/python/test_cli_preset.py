@@ -100,7 +100,7 @@ offer() {{
         ("mgdd eng", {"engine"}),
         ("mgdd preset ''", {"list", "show", "copy"}),
         ("mgdd engine simulate --so", {"--soc-cad", "--soi-cad"}),
-        ("mgdd engine simulate --integrator ''", {"trapezoid", "split", "seed", "euler"}),
+        ("mgdd engine simulate --integrator ''", {"trapezoid", "split", "tan2018_lagged", "euler"}),
         ("mgdd map fit t.nc --kind g", {"gaussian_process"}),
         ("mgdd engine simulate --preset scr", {"script.sh"}),
     ],

@@ -145,8 +145,14 @@ def run_node(
 ) -> None:
     """Serve an open bus until `keep_on`, asked once per sample and every 0.1 s of waiting, says no.
 
-    With `step` every complete command brings one sample, and time stands still between; else the node has its own
-    clock.
+    Parameters
+    ----------
+    core, bus, log, keep_on
+        The node, its bus, and where every sample is written.
+    step : bool
+        Every complete command brings one sample, and time stands still between; else the node has its own clock.
+    period_s : float, optional
+        Time between two samples [s]; the cycle of the trigger message if left out.
     """
     if step:
         _run_steps(core, bus, log, keep_on)
