@@ -178,7 +178,7 @@ def _head(name: str, dataset: xr.Dataset | None) -> str:
     if dataset is not None and name in dataset.variables:
         own = label_of(dataset[name])
         return _with_unit(own.long_name, own.units)
-    return _with_unit(name.replace("_", " "), unit_of(name))
+    return _with_unit(name.replace("_", " "), unit_of(name) if "_" in name else "-")  # a "bar" may be no pressure
 
 
 def _with_unit(text: str, unit: str) -> str:

@@ -43,7 +43,9 @@ def folder() -> Path:
     """Make the folder of this version, and forget old ones."""
     digest = hashlib.sha256(Path(_core.__file__).read_bytes())
     package = Path(mgdd.__path__[0])
-    for file in sorted(file for ending in ("py", "toml", "csv") for file in package.rglob(f"*.{ending}")):
+    # A build links to the sources: `Path.rglob` would not follow them.
+    files = (Path(place, name) for place, _, names in os.walk(package, followlinks=True) for name in names)
+    for file in sorted(file for file in files if file.suffix in (".py", ".toml", ".csv")):
         digest.update(f"{file.relative_to(package)}".encode() + file.read_bytes())
     digest.update(f"{os.environ.get('MGDD_DATA_DIR')} {_core.instruction_set()}".encode())
     made = ALL / digest.hexdigest()[:16]
