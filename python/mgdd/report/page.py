@@ -59,8 +59,7 @@ def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-rep
     """
     folder = Path(folder)
     page = _page(result)
-    summary = {**result.summary, "verdict": list(result.verdict)}
-    text = json.dumps(to_jsonable(summary), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(to_jsonable(result.summary), indent=2, ensure_ascii=False, allow_nan=False)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     (folder / "index.html").write_text(page, encoding="utf-8")

@@ -42,7 +42,8 @@ class StudyResult(Result):
         Figures by caption.
     summary : mapping
         Plain numbers and text, ready for JSON: at least ``study``, ``seeds`` (0 where nothing is random) and ``rows``,
-        a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries.
+        a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries. The verdict
+        joins it.
     sections : tuple of Section
         What a report of the study says, in order; made of the summary, the figures and the dataset where the study
         writes none itself.
@@ -71,6 +72,7 @@ class StudyResult(Result):
     def __post_init__(self) -> None:
         if not self.verdict:
             object.__setattr__(self, "verdict", verdict_of(self.name, self.summary))
+        object.__setattr__(self, "summary", Figures({**self.summary, "verdict": list(self.verdict)}))
         if not self.sections:
             object.__setattr__(self, "sections", standard_sections(self.summary, self.figures, self.dataset))
 

@@ -17,7 +17,7 @@ __all__ = ["Section", "Table", "as_number", "cells", "column_names", "standard_s
 
 _ENDS = ("_low", "_high")
 _INTERVAL = "Brackets: 95 % interval over seeds, of the mean or, for cycles, of the median."
-_SAID = ("study", "seeds", "rows", "interrupted", "mgdd")
+_SAID = ("study", "seeds", "rows", "interrupted", "mgdd", "verdict")
 
 
 @dataclass(frozen=True, kw_only=True)
