@@ -18,6 +18,7 @@ from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import StudyResult
 from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import Section, Table
+from mgdd.studies.verdicts import verdict_of
 
 NEEDS = {"measured-engine-seek": "h2df_502", "identification-benchmarks": "cascaded_tanks"}
 
@@ -60,7 +61,7 @@ def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Call
     text = file.read_text(encoding="utf-8")
     page = Page(text)
     assert page.open == []
-    assert all(source.startswith("data:image/png;base64,") for source in page.fetched)
+    assert all(source.startswith(("data:image/png;base64,", "#s")) for source in page.fetched)
     assert not re.search(r"https?://|url\(|@import", re.sub(r"base64,[A-Za-z0-9+/=]+", "", text.split("</style>")[0]))
     assert page.count["img"] == len(result.figures) > 0
     assert page.count["h1"] == 1
@@ -70,6 +71,13 @@ def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Call
         assert caption in html.unescape(text)
     summary = json.loads((file.parent / "summary.json").read_text(encoding="utf-8"))
     assert summary["study"] == name
+    # The answer comes first, and every long table is behind a fold.
+    assert result.verdict == tuple(summary["verdict"]) != ()
+    plain = html.unescape(text)
+    assert text.index("Verdict") < plain.index(result.verdict[0]) < text.index("<h2>") < text.index("<img")
+    assert not any("nan" in sentence or "None" in sentence for sentence in result.verdict)
+    assert page.count["details"] == page.count["table"]
+    assert text.count("<details open>") == sum(s.table is not None and len(s.table.rows) <= 8 for s in result.sections)
     assert len(summary["rows"]) == len(result.summary["rows"])
     assert page.count["tr"] > len(result.summary["rows"])
 
@@ -117,6 +125,29 @@ def test_standard_sections_say_rows_numbers_lists_and_interruption() -> None:
     fits = sections["Fits"].table
     assert fits is not None
     assert (fits.columns, fits.rows) == (("pressure RMSE, closed cycle [bar]",), (("–",),))
+
+
+def test_the_verdict_is_made_of_the_numbers() -> None:
+    best = {"shift_cad": 0.0, "gain_percent": 0.0, "free_shift_cad": 0.76, "free_gain_percent": 0.03}
+    row = {"file": "a50", "best": {**best, "free_p_max_bar": 240.0}, "shift_cad": [0.0, 0.0]}
+    summary = {"best_timing": [row | {"free_shift_cad": [-3.04, 2.86]}, {"file": "a25", "best": None}]}
+    free, none = verdict_of("measured-traces", summary)
+    assert free == (
+        "a50: leave the timing, gain 0.00 %, range +0.0 °CA, its own p_max kept; without that limit retard by 0.8 °CA "
+        "to a p_max of 240 bar, gain 0.03 %, range −3.0 to +2.9 °CA."
+    )
+    assert none == "a25: no plausible model, so no best timing."
+    best["shift_cad"] = 0.76
+    (same,) = verdict_of("measured-traces", {"best_timing": [row | {"best": best, "free_shift_cad": [-3.04, 2.86]}]})
+    assert same.startswith("a50: retard by 0.8 °CA, gain 0.03 %, range −3.0 to +2.9 °CA; its own p_max kept")
+    rows = [{"seeker": "a_b", "cycles_to_1_cad": 4.0, "j_lost": None}, {"seeker": "c", "cycles_to_1_cad": 1600.0}]
+    assert verdict_of("seeker-comparison", {"rows": [*rows, {"seeker": "d", "cycles_to_1_cad": None}]}) == (
+        "Cycles to within 1 °CA of the optimum: 4 (a b) to 1600 (c); not known or never reached in 1 of 3.",
+        "Loss of efficiency at the end: not known or never reached in all of 3.",
+    )
+    bars = [{"bar": "x", "limit": "at most 1", "met": False}, {"bar": "y", "limit": "none", "met": True}]
+    assert verdict_of("mine", {"bars": bars}) == ("1 of 2 bars are met; missed: x (wanted at most 1).",)
+    assert verdict_of("mine", {"rows": rows}) == verdict_of("guided", {"rows": []}) == ()
 
 
 def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

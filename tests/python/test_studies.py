@@ -118,7 +118,7 @@ def test_dataset_is_labelled(result: StudyResult) -> None:
 def test_page_is_self_contained(result: StudyResult, tmp_path: Path) -> None:
     page = write_report(result, tmp_path / "report")
     text = page.read_text(encoding="utf-8")
-    assert not re.search(r"(src|href)=[\"'](?!data:)", text)
+    assert not re.search(r"(src|href)=[\"'](?!data:|#s)", text)
     assert text.count("data:image/png;base64,") == len(result.figures) == 7
     assert "Limitations found" in text
     assert "not identifiable" in text

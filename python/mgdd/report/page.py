@@ -6,12 +6,17 @@ import base64
 import io
 import json
 import os
+import platform
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.registry import available_studies
+from mgdd.studies.sections import as_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +27,9 @@ if TYPE_CHECKING:
 __all__ = ["write_report"]
 
 _DPI = 110
+_VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
+_INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine", "records": "Records"}  # in a summary
+_SHORT = 8  # rows of a table that is not folded
 
 
 def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-report") -> Path:
@@ -68,10 +76,24 @@ def _page(result: StudyResult) -> str:
     return environment.get_template("page.html").render(
         title=title[:1].upper() + title[1:],
         style=style,
-        study=result.name,
-        version=__version__,
-        sections=[_section(section) for section in result.sections],
+        verdict=result.verdict,
+        interrupted=bool(result.summary.get("interrupted")),
+        facts=list(_facts(result)),
+        # What is seen at a glance stands before what is looked up.
+        sections=sorted(map(_section, result.sections), key=lambda section: not section["figures"]),
+        short=_SHORT,
     )
+
+
+def _facts(result: StudyResult) -> Iterator[tuple[str, str]]:
+    """Give date, inputs and versions behind a page."""
+    yield "Written", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, study {result.name}"
+    for name, head in _INPUTS.items():
+        if value := result.summary.get(name):
+            pairs = value.items() if isinstance(value, Mapping) else ()
+            yield head, ", ".join(f"{key} {as_number(own)}" for key, own in pairs) or str(value)
+    others = ", ".join(f"{name} {metadata.version(name)}" for name in _VERSIONS)
+    yield "Versions", f"mgdd {__version__}, Python {platform.python_version()}, {others}"
 
 
 def _section(section: Section) -> dict[str, Any]:

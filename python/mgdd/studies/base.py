@@ -16,6 +16,7 @@ from mgdd.results.describe import Row, rows_of
 from mgdd.results.labels import to_jsonable
 from mgdd.results.result import Figures, Result
 from mgdd.studies.sections import Section, standard_sections
+from mgdd.studies.verdicts import verdict_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,12 +42,16 @@ class StudyResult(Result):
         Figures by caption.
     summary : mapping
         Plain numbers and text, ready for JSON: at least ``study``, ``seeds`` (0 where nothing is random) and ``rows``,
-        a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries.
+        a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries. The verdict
+        joins it.
     sections : tuple of Section
         What a report of the study says, in order; made of the summary, the figures and the dataset where the study
         writes none itself.
     title : str
         Heading of the report; the title in `available_studies` if left out.
+    verdict : tuple of str
+        The answer in a sentence or a few, with which a report begins; made of the summary where the study is one of
+        `available_studies`.
 
     Examples
     --------
@@ -62,8 +67,12 @@ class StudyResult(Result):
     summary: Figures = field(default_factory=Figures)
     sections: tuple[Section, ...] = ()
     title: str = ""
+    verdict: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.verdict:
+            object.__setattr__(self, "verdict", verdict_of(self.name, self.summary))
+        object.__setattr__(self, "summary", Figures({**self.summary, "verdict": list(self.verdict)}))
         if not self.sections:
             object.__setattr__(self, "sections", standard_sections(self.summary, self.figures, self.dataset))
 
@@ -73,6 +82,7 @@ class StudyResult(Result):
     def _rows(self) -> list[Row]:
         return rows_of(
             {
+                "verdict": self.verdict,
                 "seeds": self.summary.get("seeds"),
                 "rows": len(self.summary.get("rows", ())),
                 "sections": tuple(section.title for section in self.sections),

@@ -91,16 +91,8 @@ _LAWS_TEXT = (
 
 def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tuple[Section, ...]:
     """Make the sections of a report from the summary of the study."""
-    engine = ", ".join(f"{name} {value:g}" for name, value in s["engine"].items())
     profiles = s["common"]["wall_heat_scale"]
     return (
-        Section(
-            title="Traces",
-            text=(
-                f"{s['data']} Angles are °CA aTDC (firing TDC = 0, compression negative). mgdd {s['mgdd']}.",
-                f"Engine: {engine}.",
-            ),
-        ),
         Section(title="Best timing", text=_headline(s), table=_timing(s["best_timing"])),
         Section(title="Limitations found", items=tuple(_distrust(s))),
         Section(title="Every member of the family", text=(_MEMBERS_TEXT,), table=_members(s["best_timing"])),

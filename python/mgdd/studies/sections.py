@@ -17,7 +17,7 @@ __all__ = ["Section", "Table", "as_number", "cells", "column_names", "standard_s
 
 _ENDS = ("_low", "_high")
 _INTERVAL = "Brackets: 95 % interval over seeds, of the mean or, for cycles, of the median."
-_SAID = ("study", "seeds", "rows", "interrupted", "mgdd")
+_SAID = ("study", "seeds", "rows", "interrupted", "mgdd", "verdict")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +178,7 @@ def _head(name: str, dataset: xr.Dataset | None) -> str:
     if dataset is not None and name in dataset.variables:
         own = label_of(dataset[name])
         return _with_unit(own.long_name, own.units)
-    return _with_unit(name.replace("_", " "), unit_of(name))
+    return _with_unit(name.replace("_", " "), unit_of(name) if "_" in name else "-")  # a "bar" may be no pressure
 
 
 def _with_unit(text: str, unit: str) -> str:
