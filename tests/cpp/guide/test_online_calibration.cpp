@@ -104,8 +104,8 @@ TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
         run(bench, calibration, 150);
         const double bias = calibration.parameters()[wall] / 0.5 - 1.0;
         EXPECT_TRUE(std::abs(bias) < 0.05 || !calibration.determined())
-            << name_of(method) << " tdc " << s.pressure.tdc_error_cad << " gain " << s.pressure.gain_error << " noise " << noise
-            << " " << calibration.explain(wall);
+            << name_of(method) << " tdc " << s.pressure.tdc_error_cad << " gain " << s.pressure.gain_error << " noise "
+            << noise << " " << calibration.explain(wall);
         if (method != CalibrationMethod::extremum_seeking && noise < 0.2) {
           EXPECT_LT(std::abs(bias), 0.05) << calibration.explain(wall);
           EXPECT_TRUE(calibration.determined()) << calibration.explain(wall);
