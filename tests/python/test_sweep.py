@@ -260,7 +260,8 @@ def test_ctrl_c_carries_what_is_done() -> None:
 def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixture) -> None:
     grid = {"speed_rpm": [1500.0, 100.0, 120.0], "wall_heat_scale": [1.0, 100.0]}
     with caplog.at_level(logging.WARNING):
-        table = sweep(CYLINDER, POINT, grid, step_cad=5.0)
+        table = sweep(CYLINDER, POINT, grid, traces="pressure_bar", step_cad=5.0)
+    assert np.isnan(table["pressure_bar"].values).all(axis=-1).tolist() == np.isnan(table["p_max_bar"].values).tolist()
     assert np.isnan(table["p_max_bar"].values).tolist() == [[False, False], [False, True], [False, True]]
     assert all(np.isnan(table[name].values[1:, 1]).all() for name in table.data_vars)
     assert table.attrs["n_void"] == 2
