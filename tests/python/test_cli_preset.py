@@ -48,13 +48,15 @@ def test_a_copy_is_read_back_and_never_replaces_a_file(
 ) -> None:
     file = tmp_path / "mine.toml"
     assert out(capsys, "preset", "copy", name, str(file)) == {"name": name, "file": str(file)}
-    assert presets.load(file) == presets.load(name)
+    copied, shipped = presets.load(file), presets.load(name)
+    assert (copied.records, copied.sources, copied.title) == (shipped.records, shipped.sources, shipped.title)
+    assert (copied.name, shipped.name) == ("mine", name)
     changed = file.read_text(encoding="utf-8") + "# mine\n"
     file.write_text(changed, encoding="utf-8")
     assert main(["preset", "copy", name, str(file)]) == 2
     assert "exists already, and is not replaced: name another file" in capsys.readouterr().err
     assert file.read_text(encoding="utf-8") == changed
-    assert out(capsys, "preset", "show", str(file))["name"] == name
+    assert out(capsys, "preset", "show", str(file))["name"] == "mine"
 
 
 @pytest.mark.parametrize(
@@ -79,7 +81,9 @@ def test_a_copy_of_an_engine_simulates(capsys: pytest.CaptureFixture[str], tmp_p
     file = str(tmp_path / "mine.toml")
     assert main(["preset", "copy", "puma_single", file]) == 0
     capsys.readouterr()
-    assert out(capsys, "engine", "simulate", "--preset", file) == out(capsys, "engine", "simulate")
+    shipped, own = out(capsys, "engine", "simulate"), out(capsys, "engine", "simulate", "--preset", file)
+    assert (shipped.pop("preset"), own.pop("preset")) == ("puma_single", "mine")
+    assert own == shipped
 
 
 # --- completion ---------------------------------------------------------------------------------------------

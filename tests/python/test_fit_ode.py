@@ -1,4 +1,4 @@
-"""The user's own ODE through the house fit."""
+"""The user's own ODE through the fit of the package."""
 
 from __future__ import annotations
 

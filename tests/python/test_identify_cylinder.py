@@ -1,4 +1,4 @@
-"""Calibration: recovers what made the data, meets the reference fits, and says what to distrust."""
+"""Calibration: recovers what made the data, meets the reference fits, and names its limitations."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_every_bar_of_the_calibration(result: StudyResult) -> None:
     assert all(onset < 0.0 for onset in triangle["onset_against_soi_cad"])
 
 
-def test_the_report_says_what_to_distrust(result: StudyResult) -> None:
+def test_the_report_names_its_limitations(result: StudyResult) -> None:
     text = "\n".join(result.summary["warnings"])
     assert (
         "held at the injection or spark and would start before (SOC minus SOI in °CA: pressure_a100_bar +0.0)" in text

@@ -256,7 +256,7 @@ def test_ctrl_c_carries_what_is_done() -> None:
     assert (done.stdout, done.stderr) == ("kept\n", "")
 
 
-# --- what is no cycle ---------------------------------------------------------------------------------------
+# --- outside the model's range ---------------------------------------------------------------------------------------
 def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixture) -> None:
     grid = {"speed_rpm": [1500.0, 100.0, 120.0], "wall_heat_scale": [1.0, 100.0]}
     with caplog.at_level(logging.WARNING):

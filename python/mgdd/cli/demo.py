@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> None:
     step("write the report")
     page = write_report(result, **_REPORT.given(args))
     summary, text = {**result.summary, "report": page.as_posix()}, _text(result.summary)
-    for key, study, told in (("guided", "guided", _guided_text), ("throttle", "throttle-tracking", _throttle_text)):
+    for key, study, written in (("guided", "guided", _guided_text), ("throttle", "throttle-tracking", _throttle_text)):
         if stopped:
             break
         try:
@@ -56,8 +56,8 @@ def run(args: argparse.Namespace) -> None:
             stopped = True
         else:
             summary[key] = part.summary
-            text += told(part.summary)
-    emit(args, summary, text=[*text, f"\nEvery model's answer, and what to distrust: {page}"])
+            text += written(part.summary)
+    emit(args, summary, text=[*text, f"\nEvery model's answer, with the limitations found: {page}"])
     if stopped:
         raise Stopped(f"what was finished is printed, and in {page}")
 
@@ -132,8 +132,8 @@ def _throttle_text(summary: Any) -> list[str | Table]:
     ]
     return [
         (
-            f"\nThe throttle in front of the engine: {summary['seeds']} throttles within 20 % of the one that every\n"
-            "controller was told; settling times, median and slowest:\n"
+            f"\nThe throttle in front of the engine: {summary['seeds']} throttles within 20 % of the one for which\n"
+            "every controller is designed; settling times, median and slowest:\n"
         ),
         Table(columns=columns, rows=tuple(rows)),
         "\nMore throttles: mgdd study throttle-tracking. One run: mgdd throttle track --plant-scale coulomb_nm=1.2",

@@ -249,7 +249,7 @@ def _optimum_of_files(
             + lines({f"free_{name}": told(f"free_{name}") for name in _RANGED})
         )
     parts.append("In brackets: the range over the plausible models of the family; --json lists every one.")
-    parts += ["what to distrust:\n" + "\n".join(f"  - {text}" for text in warnings)] if warnings else []
+    parts += ["limitations found:\n" + "\n".join(f"  - {text}" for text in warnings)] if warnings else []
     payload = {"preset": preset, "law": main.name, "traces": [row.to_dict() for row in rows], "warnings": warnings}
     emit(args, payload, text="\n\n".join(parts))
     if not any(row.plausible for row in rows):

@@ -12,6 +12,7 @@ from mgdd.cli.options import add_command, add_group
 from mgdd.cli.output import check_file, check_output, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
+from mgdd.presets.preset import Preset
 from mgdd.studies.sections import Table
 
 __all__ = ["add"]
@@ -73,6 +74,9 @@ def _copy(args: argparse.Namespace) -> None:
     preset = presets.load(args.name)
     if Path(args.file).exists():
         raise ParameterError(f"{args.file}: exists already, and is not replaced: name another file")
-    write_whole_text(args.file, preset.to_toml())
+    own = Preset(
+        name=Path(args.file).stem, title=preset.title, sources=preset.sources, **dict(preset.records)
+    )
+    write_whole_text(args.file, own.to_toml())
     emit(args, {"name": preset.name, "file": args.file}, text=f"--preset {args.file} reads it")
     wrote(args.file)

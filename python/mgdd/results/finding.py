@@ -1,4 +1,4 @@
-"""One diagnostic: a code for programs, a sentence and its remedy for people; what a fit of the core leaves open."""
+"""One diagnostic: a code for programs, a human-readable sentence and its remedy; what a fit of the core leaves open."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tu
     profiles = s["common"]["wall_heat_scale"]
     return (
         Section(title="Best timing", text=_headline(s), table=_timing(s["best_timing"])),
-        Section(title="Limitations found", items=tuple(_distrust(s))),
+        Section(title="Limitations found", items=tuple(_limitations(s))),
         Section(title="Every member of the family", text=(_MEMBERS_TEXT,), table=_members(s["best_timing"])),
         Section(title="Every burn law, free to start before the injection", text=(_LAWS_TEXT,), table=_laws(s["laws"])),
         Section(
@@ -112,7 +112,7 @@ def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tu
     )
 
 
-def _distrust(s: Mapping[str, Any]) -> list[str]:
+def _limitations(s: Mapping[str, Any]) -> list[str]:
     out = []
     for law, profile in s["common"]["wall_heat_scale"].items():
         if not profile["identifiable"]:

@@ -38,7 +38,7 @@ class Calibration:
         return [name for name in self.fit.report.names if name in doubted]
 
     def doubts(self) -> list[str]:
-        """Say what to distrust: findings of the fit, TDC, a law that fits much better."""
+        """Return the limitations found: findings of the fit, TDC, a law that fits much better."""
         return [*map(str, self.fit.findings), *self.tdc.doubts(), *better_laws(self.fit, self.laws)]
 
     def to_dict(self) -> dict[str, Any]:
@@ -97,7 +97,7 @@ class Calibration:
             out += ["", f"not identifiable: {', '.join(self.unidentifiable())}"]
         out += ["", f"TDC offset {tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
         if self.doubts():
-            out += ["", "what to distrust:", *(f"  - {text}" for text in self.doubts())]
+            out += ["", "limitations found:", *(f"  - {text}" for text in self.doubts())]
         out += ["", "every burn law on the same traces:"]
         for law in self.laws:
             out += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
@@ -122,7 +122,7 @@ def _loads(fit: CylinderFit) -> list[str]:
 
 
 def judge_fit(fit: CylinderFit, *, fuel_heat_j: float | None, progress: Callable[[str], None]) -> Calibration:
-    """Judge a fit of `mgdd.identify.fit_cylinder`, which was told this heat of the fuel, on its own traces."""
+    """Judge a fit of `mgdd.identify.fit_cylinder`, given this heat of the fuel, on its own traces."""
     request = fit.request
     traces, cylinder, point = list(request.traces), request.cylinder, request.point
     profile = None

@@ -1,4 +1,4 @@
-"""The plant of an experiment in its mode, with its guard in front, and who is told of its cycles."""
+"""The plant of an experiment in its mode, with its guard in front, and the observers of its cycles."""
 
 from __future__ import annotations
 
