@@ -24,6 +24,8 @@ extensions = [
     "sphinx_copybutton",
     "numpydoc",
     "myst_nb",
+    "sphinx_codeautolink",
+    "matplotlib.sphinxext.plot_directive",
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_templates", "**.ipynb_checkpoints"]
@@ -36,6 +38,11 @@ myst_heading_anchors = 3
 nb_execution_mode = os.environ.get("MGDD_DOCS_EXECUTE", "off")
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
+
+codeautolink_concat_default = True  # the blocks of a page are one program
+plot_include_source = True
+plot_html_show_formats = plot_html_show_source_link = False
+plot_formats = [("png", 90)]
 
 
 def copy_notebooks() -> None:

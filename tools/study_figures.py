@@ -1,4 +1,4 @@
-"""Draw the figures of docs/studies.md and docs/throttle_tracking.md: one or two of each study.
+"""Draw the figures of docs/study_*.md and docs/throttle_tracking.md: one or two of each study.
 
 Run `python tools/study_figures.py [FOLDER [STUDY ...]]` with the package installed; FOLDER defaults to docs/_static,
 the studies to all of them.

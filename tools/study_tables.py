@@ -1,8 +1,8 @@
 """Print the tables of the docs that take a full run of a study, or put them there.
 
-Run `python tools/study_tables.py [--page docs/studies.md] online-calibration calibrated-guide` with the package
-installed; it takes a quarter of an hour. `--page docs/throttle_tracking.md throttle-tracking` takes a minute. With
-`--json FILE ...` it takes what `mgdd study NAME --json` has printed.
+Run `python tools/study_tables.py [--page docs/study_guide_learning.md] online-calibration calibrated-guide` with
+the package installed; it takes a quarter of an hour. `--page docs/throttle_tracking.md throttle-tracking` takes a
+minute. With `--json FILE ...` it takes what `mgdd study NAME --json` has printed.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import itertools
 import pkgutil
 import re
 import shlex
@@ -108,6 +109,33 @@ def test_variables_table_is_complete() -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.+?) \| (.+?) \|$", _page("formats").split("<!-- checked")[-1], re.MULTILINE)
     table = {name: (units, long_name) for name, units, long_name in rows}
     assert {name: (v.units, v.long_name) for name, v in VARIABLES.items()} == table
+
+
+# --- the way from the landing page --------------------------------------------------------------------------
+# A question, the links from page to page, the heading there, and what the answer must hold.
+CLICKS = {
+    "how do I read my pressure file": (("howto",), "Read my pressure file", "io.read_pressure("),
+    "tune a PID for my throttle": (("howto",), "Tune a PID for my throttle", 'tuned_controller("pid"'),
+    "my own model as a guide": (("howto",), "Use my own model as a guide", "CurveSeeking("),
+    "which seeker when": (("howto",), "Choose a seeker", "| several inputs |"),
+    "my DBC": (("howto",), "Run on my rig with my DBC", "which signal of the DBC"),
+    "does it run on Windows": (("getting_started",), "Install", "Windows"),
+    "a map as DCM": (("howto",), "Bring a map into the control unit", '.dcm"'),
+    "what does trust mean": (("glossary",), "Guidance", "\nTrust\n"),
+    "Ctrl-C in a study": (("howto",), "Troubleshooting", "Ctrl-C"),
+    "equation 2-6": (("explanation", "theory_engine"), "Which equation is where", "| 2-6 |"),
+}
+
+
+@pytest.mark.parametrize("question", CLICKS)
+def test_a_question_is_answered_two_clicks_from_the_landing_page(question: str) -> None:
+    pages, heading, answer = CLICKS[question]
+    for here, there in itertools.pairwise(("index", *pages)):
+        text = _page(here)
+        listed = "\n".join(re.findall(r"```\{toctree\}\n(.*?)```", text, re.DOTALL)).split()
+        assert f"]({there}.md" in text or there in listed, f"{here}.md has no link to {there}.md"
+    sections = re.split(r"^#+ (?=\S)", _page(pages[-1]), flags=re.MULTILINE)
+    assert any(section.startswith(heading) and answer in section for section in sections)
 
 
 # --- names --------------------------------------------------------------------------------------------------

@@ -225,11 +225,12 @@ def test_a_point_beside_a_trace_is_a_record_a_preset_or_numbers() -> None:
     warmer = {"intake_temperature_k": 360.0}
     found = [
         mgdd.engine.analyze(trace, preset, point=each)
-        for each in (preset, preset.point, warmer, mgdd.engine.OperatingPoint().replace(**warmer))
+        for each in (preset, preset.point, "puma_single", warmer, mgdd.engine.OperatingPoint().replace(**warmer))
     ]
     assert found[0].identical(found[1])
-    assert found[2].identical(found[3])
-    assert not found[0].identical(found[2])
+    assert found[0].identical(found[2])
+    assert found[3].identical(found[4])
+    assert not found[0].identical(found[3])
     with pytest.raises(ParameterError, match=r"point = 140\.0: must be an OperatingPoint"):
         mgdd.engine.analyze(trace, preset, point=140.0)
     with pytest.raises(ParameterError, match=r"point = 140\.0: must be an OperatingPoint"):

@@ -110,7 +110,19 @@ def learned():
     })  # fmt: skip
 
 
+def followed():
+    """A step that is followed badly: the reference, the angle and their difference are three different lines."""
+    return labelled_dataset({
+        "time_s": ("time_s", [0.0, 0.1, 0.3], "s", "time"),
+        "reference_deg": ("time_s", [20.0, 60.0, 60.0], "degree", "reference"),
+        "angle_deg": ("time_s", [19.0, 25.0, 63.0], "degree", "plate angle"),
+        "duty": ("time_s", [0.2, 0.9, 0.4], "-", "duty"),
+    })  # fmt: skip
+
+
 PLOTS = {
+    "throttle under control": (plot.throttle_run, followed),
+    "throttle": (plot.throttle_run, lambda: followed().drop_vars("reference_deg")),
     "seeking": (plot.seeking, sought),
     "convergence": (plot.convergence, tracks),
     "sensors over cycles": (plot.sensors, readings),
@@ -315,6 +327,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (plot.convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
         (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
+        (plot.throttle_run, followed, "angle_deg", "mgdd.throttle.simulate_throttle"),
     ],
 )
 def test_a_missing_variable_is_named_with_its_maker(function, dataset, variable, maker):
@@ -402,3 +415,20 @@ def test_sensors_over_cycles_timing_and_temperature():
     wrong = readings().rename(cycle="seed")
     with pytest.raises(DataError, match="must be one of cycle, soc_cad"):
         plot.sensors(wrong)
+
+
+# --- a throttle ---------------------------------------------------------------------------------------------
+def test_a_run_with_a_reference_shows_it_and_the_error() -> None:
+    ax = plot.throttle_run(followed())
+    assert entries(ax) == ["reference", "plate angle"]
+    assert line(ax, "reference").get_ydata().tolist() == [20.0, 60.0, 60.0]
+    panels = {other.get_ylabel(): other for other in ax.figure.axes}
+    assert list(panels) == ["plate angle [deg]", "error [deg]", "duty [-]"]
+    assert panels["error [deg]"].get_lines()[0].get_ydata().tolist() == [1.0, 35.0, -3.0]
+
+
+def test_a_run_without_a_reference_shows_what_is_there() -> None:
+    run = followed().drop_vars("reference_deg").assign(current_a=("time_s", [1.0, 2.0, 3.0], {"units": "A"}))
+    run["current_a"].attrs["long_name"] = "motor current"
+    ax = plot.throttle_run(run)
+    assert [other.get_ylabel() for other in ax.figure.axes] == ["plate angle [deg]", "duty [-]", "motor current [A]"]

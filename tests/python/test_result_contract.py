@@ -192,6 +192,7 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "pressure": (lambda: Drawn(simulate("puma_single")), ()),
     "holding_duty": (lambda: MADE["ExcitationCheck"](Path()), ()),
     "log_pv": (lambda: Drawn(simulate("puma_single")), ()),
+    "throttle_run": (lambda: MADE["ExcitationCheck"](Path()), ()),
     "sensors": (lambda: Drawn(EngineBench(seed=1).run([-6.0] * 20)), ()),
     "timing": (lambda: Drawn(mgdd.engine.timing_sweep("puma_single")), ()),
     "trade_off": (lambda: Drawn(mgdd.engine.timing_sweep("puma_single")), ("p_max_bar", "efficiency_gross")),

@@ -302,7 +302,7 @@ def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, cal
     assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
-    text = (root / "docs" / "studies.md").read_text(encoding="utf-8")
+    text = (root / "docs" / "study_guide_learning.md").read_text(encoding="utf-8")
     page = text.splitlines()
     for result in (online, calibrated):
         for lines in tool.tables(result.name, result.summary).values():

@@ -184,7 +184,7 @@ def test_the_page_has_the_rows_of_the_study(root: Path, study: StudyResult) -> N
     assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
-    page = (root / "docs" / "studies.md").read_text(encoding="utf-8").splitlines()
+    page = (root / "docs" / "study_map.md").read_text(encoding="utf-8").splitlines()
     for part, lines in tool.tables(study.name, study.summary).items():
         at = page.index(lines[0])
         end = next(k for k, line in enumerate(page[at:], at) if not line.startswith("|"))

@@ -74,9 +74,8 @@ def _copy(args: argparse.Namespace) -> None:
     preset = presets.load(args.name)
     if Path(args.file).exists():
         raise ParameterError(f"{args.file}: exists already, and is not replaced: name another file")
-    own = Preset(
-        name=Path(args.file).stem, title=preset.title, sources=preset.sources, **dict(preset.records)
-    )
+    records: dict[str, Any] = dict(preset.records)
+    own = Preset(name=Path(args.file).stem, title=preset.title, sources=preset.sources, **records)
     write_whole_text(args.file, own.to_toml())
     emit(args, {"name": preset.name, "file": args.file}, text=f"--preset {args.file} reads it")
     wrote(args.file)

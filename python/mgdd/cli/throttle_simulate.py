@@ -12,8 +12,8 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
+from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
-from mgdd.plot.throttle_run import throttle_run
 from mgdd.throttle import simulate_throttle
 from mgdd.throttle.duty_file import read_duty
 from mgdd.throttle.simulation import step_summary

@@ -16,8 +16,8 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.track import FIGURES, step_times_us
 from mgdd.loop.tune import with_stiction
 from mgdd.loop.tuned import tuned_with_doubts
+from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
-from mgdd.plot.throttle_track import throttle_track
 from mgdd.studies.sections import Table
 from mgdd.throttle import Throttle
 
@@ -118,7 +118,7 @@ def _track(args: argparse.Namespace) -> None:
         "warnings": list(doubts),
     }
     if args.figure is not None:
-        save_figure(drawn(throttle_track, run, size=(7.0, 5.4)), args.figure)
+        save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
     emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
 
 

@@ -49,7 +49,7 @@ def simulate(
     ----------
     cylinder : Cylinder, Preset, str or path-like
         The cylinder; or a preset, its name or its file; or a fit of a cylinder.
-    point : OperatingPoint, Preset or mapping of str to float, optional
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         Speed, fuel and intake state; ``fuel_mg=0`` is a motored cycle. Numbers by name replace those of the preset's
         nominal point, which it is if left out; a cylinder without a preset needs one.
     speed_rpm, fuel_mg : float, optional

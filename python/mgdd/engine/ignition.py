@@ -56,7 +56,7 @@ def ignition_delay(
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`. ``ignition_model`` chooses the correlation: ``watson`` and ``wolfer`` by the integral over
         the motored cycle, ``hardenberg_hase`` at the state of SOI, or ``polynomial`` in SOI.
-    point : OperatingPoint, Preset or mapping of str to float, optional
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         As in `simulate`; its fuel does not matter.
     soi_cad, soc_cad : float
         Start of injection or wanted start of combustion [°CA aTDC], in [-60, 20]; exactly one of them.

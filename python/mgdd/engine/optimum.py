@@ -45,7 +45,7 @@ def find_optimum(
     ----------
     cylinder : Cylinder, Preset, str or path-like
         The model, as in `simulate`.
-    point : OperatingPoint, Preset or mapping of str to float, optional
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         As in `simulate`; must carry fuel.
     objective : {"efficiency_gross", "imep_gross_bar", "imep_closed_bar"}
         What to maximise.

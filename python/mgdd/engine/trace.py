@@ -67,7 +67,7 @@ def analyze(
         bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
-    point : OperatingPoint, Preset or mapping of str to float, optional
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
         ``ivc_temperature_k`` or the intake temperature + 40 K.
     pegging : {"none", "inlet", "two_point", "least_squares"}

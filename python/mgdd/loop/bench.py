@@ -44,7 +44,7 @@ class EngineBench(_core.loop.EngineBench):
     ----------
     engine : Cylinder, Preset, str or path-like
         A preset, its name, or a cylinder of your own.
-    point : OperatingPoint, Preset or mapping of str to float, optional
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         Operating point; that of the preset if left out. It must carry fuel.
     schedule : sequence of (int, OperatingPoint), optional
         First cycle of each operating point, the first being 0, instead of ``point``.

@@ -14,6 +14,7 @@ from mgdd.plot.maps import map_cells, map_contour
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import holding_duty
+from mgdd.plot.throttle_run import throttle_run
 from mgdd.plot.timing import timing
 from mgdd.plot.trade_off import trade_off
 
@@ -26,6 +27,7 @@ __all__ = [
     "pressure",
     "seeking",
     "sensors",
+    "throttle_run",
     "timing",
     "trade_off",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, divide, legend, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, axis_label, divide, legend, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -15,18 +15,19 @@ if TYPE_CHECKING:
 
 __all__ = ["throttle_run"]
 
-_PANELS = (("duty", BLUE), ("current_a", ORANGE))
+_OPTIONAL = ("reference_deg", "current_a")
+_PANELS = (("error_deg", ORANGE), ("duty", BLUE), ("current_a", GREEN))
 
 
 def throttle_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw the plate angle over time, and duty and current in panels below.
+    """Draw the plate angle over time, with the reference if there is one; error, duty and current in panels below.
 
     Parameters
     ----------
     run : xarray.Dataset or Result
-        ``angle_deg`` [deg] and ``duty`` [-] over ``time_s`` [s], and ``current_a`` [A] if there, as
-        `mgdd.throttle.simulate_throttle` or `mgdd.io.read_throttle_log` gives them. Attribute ``limp_home_deg`` is
-        marked.
+        ``angle_deg`` [deg] and ``duty`` [-] over ``time_s`` [s], and ``reference_deg`` [deg] and ``current_a`` [A] if
+        there, as `mgdd.loop.track`, `mgdd.throttle.simulate_throttle` or `mgdd.io.read_throttle_log` gives them.
+        Attribute ``limp_home_deg`` is marked.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it gives its lower half to the panels. None makes a figure.
 
@@ -42,16 +43,23 @@ def throttle_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd.plot.throttle_run import throttle_run
-    >>> from mgdd.throttle import Throttle, simulate_throttle
-    >>> throttle_run(simulate_throttle(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
+    >>> from mgdd import plot
+    >>> from mgdd.loop import track, tuned_controller
+    >>> plot.throttle_run(track(tuned_controller("pid", "P1"), "step:20:60", throttle="P1")).get_ylabel()
     'plate angle [deg]'
     """
-    run = require("run", run, ("time_s", "angle_deg", "duty"), "mgdd.throttle.simulate_throttle", ("current_a",))
+    run = require("run", run, ("time_s", "angle_deg", "duty"), "mgdd.throttle.simulate_throttle", _OPTIONAL)
+    if "reference_deg" in run:
+        error = (run["reference_deg"] - run["angle_deg"]).assign_attrs(units="deg", long_name="error")
+        run = run.assign(error_deg=error)
     panels = [(name, color) for name, color in _PANELS if name in run]
-    ax = new_axes(ax, height=4.8)
-    time = run["time_s"].to_numpy()
-    lines = ax.plot(time, run["angle_deg"], "-", color=BLACK, linewidth=1.4, label=label_of(run["angle_deg"]).long_name)
+    ax = new_axes(ax, height=3.0 + 0.9 * len(panels))
+    time, lines = run["time_s"].to_numpy(), []
+    if "reference_deg" in run:
+        lines += ax.plot(time, run["reference_deg"], "--", color=GREY, linewidth=1.2, label="reference")
+    lines += ax.plot(
+        time, run["angle_deg"], "-", color=BLACK, linewidth=1.4, label=label_of(run["angle_deg"]).long_name
+    )
     if "limp_home_deg" in run.attrs:
         rest = float(run.attrs["limp_home_deg"])
         lines.append(

@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 CylinderLike = str | os.PathLike[str] | Preset | Cylinder | Fit
-PointLike = OperatingPoint | Preset | Mapping[str, float]
+PointLike = str | os.PathLike[str] | Preset | OperatingPoint | Mapping[str, float]
 ThrottleLike = str | os.PathLike[str] | Preset | Throttle
 
 
@@ -66,13 +66,14 @@ def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
 
 def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoint | None:
     """Return the operating point that is meant, None for None; numbers by name replace those of a nominal one."""
-    if given is None or isinstance(given, OperatingPoint):
-        return given
-    if isinstance(given, Preset):
-        return given.point
-    if isinstance(given, Mapping):
-        return (nominal or OperatingPoint()).replace(**given)
-    bound = "an OperatingPoint, a preset, or numbers by name, as {'speed_rpm': 1200.0}"
+    meant = _loaded(given, "engine")
+    if meant is None or isinstance(meant, OperatingPoint):
+        return meant
+    if isinstance(meant, Preset):
+        return meant.point
+    if isinstance(meant, Mapping):
+        return (nominal or OperatingPoint()).replace(**meant)
+    bound = "an OperatingPoint, a preset or its name, or numbers by name, as {'speed_rpm': 1200.0}"
     raise ParameterError(f"point = {shown(given)}: must be {bound}", field="point", value=given, bound=bound)
 
 
@@ -85,7 +86,7 @@ def engine_of(
     ----------
     cylinder : Cylinder, Preset, str, path-like or fit
         As of `cylinder_of`.
-    point : OperatingPoint, Preset or mapping of str to float, optional
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         The operating point; numbers by name replace those of the preset's nominal one, of ``OperatingPoint()`` where no
         preset is given. The nominal one if left out, which only a preset has.
     argument : str

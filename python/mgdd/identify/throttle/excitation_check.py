@@ -68,7 +68,7 @@ class ExcitationCheck(Result):
         return self.prediction
 
     def _draw(self, ax: Any) -> Any:
-        from mgdd.plot.throttle_run import throttle_run
+        from mgdd.plot import throttle_run
 
         return throttle_run(self.prediction, ax=ax)
 

@@ -46,13 +46,9 @@ class ExperimentResult(Result):
         return rows_of({**self.figures, "folder": str(self.folder)})
 
     def _draw(self, ax: Axes | None) -> Axes:
-        from mgdd.plot import seeking
-        from mgdd.plot.throttle_run import throttle_run
-        from mgdd.plot.throttle_track import throttle_track
+        from mgdd.plot import seeking, throttle_run
 
-        if "cycle" in self.dataset.dims:
-            return seeking(self, ax=ax)
-        return (throttle_track if "reference_deg" in self.dataset else throttle_run)(self, ax=ax)
+        return (seeking if "cycle" in self.dataset.dims else throttle_run)(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Give all but the signals, as JSON holds it."""

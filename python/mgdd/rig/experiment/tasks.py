@@ -234,10 +234,10 @@ def _dataset(
 
 
 def _draw_track(dataset: xr.Dataset) -> Figure:
-    from mgdd.plot.throttle_track import throttle_track
+    from mgdd.plot import throttle_run
 
     seen = dataset.assign(angle_deg=dataset["sensed_angle_deg"])
-    return drawn(throttle_track, seen, size=(7.0, 5.4))
+    return drawn(throttle_run, seen, size=(7.0, 5.4))
 
 
 def _draw_fit(validation: Any) -> Figure:
