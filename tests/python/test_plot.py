@@ -11,6 +11,9 @@ import pytest
 
 from mgdd import datasets, plot
 from mgdd.errors import DataError
+from mgdd.guide import FeedForward
+from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
 from mgdd.plot.learning import learning
 from mgdd.results.labels import ANGLE, labelled_dataset
@@ -432,3 +435,18 @@ def test_a_run_without_a_reference_shows_what_is_there() -> None:
     run["current_a"].attrs["long_name"] = "motor current"
     ax = plot.throttle_run(run)
     assert [other.get_ylabel() for other in ax.figure.axes] == ["plate angle [deg]", "duty [-]", "motor current [A]"]
+
+
+# --- what a run knows ---------------------------------------------------------------------------------------
+@pytest.mark.parametrize("guided", [False, True], ids=["loop of the core", "loop in Python"])
+def test_a_run_that_knows_its_optimum_and_limit_shows_them(guided: bool) -> None:
+    seeker = ExtremumSeeking(start=-8.0, lower=-30.0, upper=10.0, limits={"p_max_bar": 104.0})
+    loop = FeedForward(seeker, lambda _: -8.0) if guided else seeker
+    bench = EngineBench(seed=1, limits=["p_max_bar"], nox_sensor="none")
+    run = run_seeker(bench, loop, 60, criteria=LoopCriteria(optimum=-3.25))
+    ax = plot.seeking(run)
+    assert line(ax, "optimum −3.25").get_ydata()[0] == -3.25
+    limited = ax.figure.axes[-1]
+    assert line(limited, "limit p_max_bar 104").get_ydata()[0] == 104.0
+    assert sum(item.get_label().startswith("limit ") for item in limited.get_lines()) == 1
+    assert "optimum −4.00" in entries(plot.seeking(run, optimum_cad=-4.0))

@@ -166,6 +166,24 @@ class LoopCriteria:
             return _in_order("limits", self._uppers(), names)
         return _in_order("limits", {limit.name: limit.upper for limit in seeker.settings["limits"]}, names)
 
+    def attributes(self, names: tuple[str, ...], uppers: Sequence[float]) -> dict[str, float]:
+        """Give what a figure of the run marks: ``optimum``, and ``limit_NAME`` where there is one.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Limited quantities that are measured.
+        uppers : sequence of float
+            Their limits, infinite where there is none.
+
+        Returns
+        -------
+        dict of str to float
+            In the units of the input and of the limits.
+        """
+        found = {f"limit_{name}": upper for name, upper in zip(names, uppers, strict=True) if math.isfinite(upper)}
+        return found if self.optimum is None else {"optimum": float(self.optimum), **found}
+
     def to_core(self, names: tuple[str, ...]) -> dict[str, Any]:
         """Give what the loops of the core take.
 

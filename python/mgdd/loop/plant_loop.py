@@ -126,7 +126,7 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
         interrupted = True
         del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
     dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
-    dataset.attrs["interrupted"] = int(interrupted)
+    dataset.attrs |= {"interrupted": int(interrupted), **criteria.attributes(tuple(plant.limit_names), uppers)}
     summary = Figures(summarize_cycles(dataset, criteria))
     run = LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
     if interrupted:

@@ -88,6 +88,7 @@ def run_seeker(
     summary = Figures(with_a_limit(raw["summary"], names))
     summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
     uppers = criteria.limits_of(names, seeker)
+    dataset.attrs |= criteria.attributes(names, uppers)
     summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
     run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=seeker.findings)
     return hand_over(run, stop)

@@ -49,9 +49,9 @@ def seeking(
         optional are ``gradient_per_cad`` [unit of J per °CA], NOx of the sensor that ``attrs["nox_sensor"]`` names, and
         ``limits`` over ``limit``.
     optimum_cad : float, optional
-        Where the estimate should go [°CA aTDC].
+        Where the estimate should go [°CA aTDC]; ``attrs["optimum"]`` if left out, which the criteria of a run give.
     limit_values : mapping of str to float, optional
-        Limits by name, in their units.
+        Limits by name, in their units; ``attrs["limit_NAME"]`` if left out, which the seeker of a run gives.
     mean_cycles : int
         Window of the running mean of J [cycles].
     ax : matplotlib.axes.Axes, optional
@@ -82,7 +82,10 @@ def seeking(
     limited = [str(name) for name in run["limit"].to_numpy()] if "limits" in run else []
     inputs, needed = _inputs(run)
     require("run", run, (*needed, *([third] if third else []), *(["limits"] if limited else [])), _MADE_BY)
-    for name in limit_values or {}:
+    optimum_cad = run.attrs.get("optimum") if optimum_cad is None else optimum_cad
+    if limit_values is None:
+        limit_values = {name: run.attrs[f"limit_{name}"] for name in limited if f"limit_{name}" in run.attrs}
+    for name in limit_values:
         if name not in limited:
             raise DataError(f"limit_values: {name!r} was not measured as a limit in this run, which has {limited}")
     n, below = len(inputs), 1 + bool(third) + bool(limited)
@@ -112,7 +115,7 @@ def seeking(
     for index, name in enumerate(limited):
         dash, color = LINE_STYLES[index % len(LINE_STYLES)]
         panels[-1].plot(cycle, run["limits"].sel(limit=name), linestyle=dash, color=color, linewidth=0.7)
-        if limit_values and name in limit_values:
+        if name in limit_values:
             value = limit_values[name]
             label = minus(f"limit {name} {value:g}")
             line = panels[-1].axhline(value, color=ORANGE, linestyle=(0, (4, 1.5)), linewidth=1.6, label=label)

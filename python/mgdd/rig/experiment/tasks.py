@@ -328,4 +328,4 @@ class SeekPlan:
 def _draw(cycles: xr.Dataset, limits: dict[str, float]) -> Figure:
     from mgdd import plot
 
-    return drawn(plot.seeking, cycles, size=(8.0, 7.0), optimum_cad=None, limit_values=limits)
+    return drawn(plot.seeking, cycles, size=(8.0, 7.0), limit_values=limits)
