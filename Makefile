@@ -199,8 +199,8 @@ MODULE ?= throttle
 mutants: ready ## changed lines that the tests notice: make mutants MODULE=throttle (Python: mgdd.throttle)
 	$(ALOUD) $(PY) tools/mutate.py $(MODULE) --jobs $(JOBS) $(MUTANTS)
 
-docs: ready ## documentation with executed notebooks, docs/_build/html
-	$(DEV) MGDD_DOCS_EXECUTE=cache $(ALOUD) $(PY) -m sphinx -W -n --keep-going -q -b html docs docs/_build/html
+docs: ready ## documentation, docs/_build/html
+	$(DEV) $(ALOUD) $(PY) -m sphinx -W -n --keep-going -q -b html docs docs/_build/html
 
 .PHONY: clean help
 clean: ## remove what these commands made
