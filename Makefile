@@ -83,6 +83,7 @@ test: ready ## set up, then run the tests of both languages, except those marked
 
 test-all: MARKED :=
 test-all: ready ## lint, then the same with those marked slow
+	@tools/system_packages.sh browser
 	@$(MAKE) --no-print-directory lint
 	@$(RUN_TESTS)
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what is missing of Debian's packages. Each check looks for the thing itself, so that a compiler or a Python
 # from elsewhere is as good; without apt it names what to install. Usage: tools/system_packages.sh GROUP...
-# Groups: build (compile the module), test, bench, clang, mingw.
+# Groups: build (compile the module), test, browser (for tests of the live page), bench, clang, mingw.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -40,6 +40,7 @@ for group in "$@"; do
         [[ -x /sbin/ip ]] || has ip || useful+=(iproute2)
       fi
       ;;
+    browser) has chromium || has chromium-browser || useful+=(chromium) ;;
     bench) has_header benchmark/benchmark.h || missing+=(libbenchmark-dev) ;;
     clang) has clang++ || missing+=(clang) ;;
     mingw) has x86_64-w64-mingw32-g++-posix || missing+=(g++-mingw-w64-x86-64-posix) ;;

@@ -43,7 +43,7 @@ class Bench:
     """Hub, node and host, each in a process of its own, and the truth of the node."""
 
     def __init__(self, node: VirtualNode, truth: Path) -> None:
-        (hub, _), (served, _) = node._started
+        hub, served = (child.process for child in node._started)
         self.host = subprocess.Popen(
             [sys.executable, str(HOST), node.bus], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

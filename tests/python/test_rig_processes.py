@@ -90,7 +90,7 @@ def test_a_node_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
     code = (
         "import sys; from mgdd.rig import VirtualNode\n"
         "node = VirtualNode('etb', truth=sys.argv[1]); node.start()\n"
-        "print(*(process.pid for process, _ in node._started), flush=True)\n"
+        "print(*(child.process.pid for child in node._started), flush=True)\n"
         "sys.stdin.readline()\n"
     )
     truth = tmp_path / "truth.csv"

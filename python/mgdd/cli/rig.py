@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from mgdd.cli import rig_records, rig_run
+from mgdd.cli import rig_records, rig_run, rig_watch
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
@@ -44,6 +44,7 @@ def add(commands: Any) -> None:
     rig_run.add(verbs)
     rig_records.add(verbs)
     _add_selftest(verbs)
+    rig_watch.add(verbs)
     _add_hub(verbs)
     _add_node(verbs)
 

@@ -16,6 +16,7 @@ from mgdd.rig.exchange import RecordingRig, ReplayRig
 from mgdd.rig.experiment import Experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
+from mgdd.rig.live.notebook import watch
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import SafetyEnvelope, SafetyGate
@@ -37,6 +38,7 @@ __all__ = [
     "read_record",
     "repair_record",
     "run_experiment",
+    "watch",
 ]
 
 

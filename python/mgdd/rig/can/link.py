@@ -52,6 +52,14 @@ class Sender:
             out.append(Frame(id=where.frame_id, data=whole, extended=where.extended, fd=len(whole) > 8))
         return out
 
+    def go_on(self, message: MappedMessage, payload: bytes) -> None:
+        """Go on from the alive counter of a frame that another sender sent."""
+        if message.e2e is not None:
+            byte, place = payload[message.e2e.counter_byte], message.e2e.counter_place
+            counter = byte >> 4 if place == "high_nibble" else byte & 15 if place == "low_nibble" else byte
+            if counter < message.e2e.counter_modulus:
+                self._counters[message.name] = message.e2e.next_counter(counter)
+
 
 class Receiver:
     """Checks the frames of some messages; what does not belong to them is counted as foreign."""

@@ -9,14 +9,58 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from typing import IO, Self
+from typing import Self
 
 from mgdd.errors import RigError
 
-__all__ = ["VirtualNode"]
+__all__ = ["Child", "VirtualNode"]
 
 _START_S = 60.0
 _END_S = 5.0
+
+
+class Child:
+    """A module of Python in a process of its own, which says a line when it is ready; it ends with this process.
+
+    RigError, with what it said, where it ends before that.
+    """
+
+    def __init__(self, module: str, *words: str) -> None:
+        said = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 stop() closes it
+        process = subprocess.Popen(
+            [sys.executable, "-m", module, *words],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            start_new_session=True,  # a Ctrl-C in the terminal is for the run, which then ends them
+        )
+        self.process, self._said = process, said
+        assert process.stdout is not None  # noqa: S101 - PIPE
+        until = time.monotonic() + _START_S
+        with selectors.DefaultSelector() as selector:
+            selector.register(process.stdout, selectors.EVENT_READ)
+            line = process.stdout.readline() if selector.select(until - time.monotonic()) else ""
+        if not line:
+            process.kill()
+            process.wait()
+            said.seek(0)
+            text = said.read().strip()
+            self.stop()
+            raise RigError(f"{' '.join((module, *words[:2]))} did not start: {text or 'it said nothing'}")
+        self.line = line.strip()
+
+    def stop(self) -> None:
+        """End it; twice does nothing."""
+        self.process.terminate()
+        try:
+            self.process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+        self._said.close()
 
 
 class VirtualNode:
@@ -73,7 +117,7 @@ class VirtualNode:
         self._node_options += [word for fault in faults for word in ("--fault", fault)]
         self._node_options += ["--sample-ms", str(sample_ms)] if sample_ms is not None else []
         self._node_options += ["--experiment", str(experiment)] if experiment is not None else []
-        self._started: list[tuple[subprocess.Popen[str], IO[str]]] = []
+        self._started: list[Child] = []
         self._bus = ""
 
     @property
@@ -97,16 +141,7 @@ class VirtualNode:
         """End both; twice does nothing."""
         self._bus = ""
         while self._started:
-            process, said = self._started.pop()
-            process.terminate()
-            try:
-                process.wait(_END_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
-            said.close()
+            self._started.pop().stop()
 
     def __enter__(self) -> Self:
         self.start()
@@ -117,24 +152,5 @@ class VirtualNode:
 
     def _start(self, command: str, options: Sequence[str]) -> str:
         """Start a command and give the line that it says when it is ready."""
-        said = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 stop() closes it
-        process = subprocess.Popen(
-            [sys.executable, "-m", "mgdd", "rig", command, *options, "--quiet"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=said,
-            text=True,
-            start_new_session=True,  # a Ctrl-C in the terminal is for the run, which then ends them
-        )
-        self._started.append((process, said))
-        assert process.stdout is not None  # noqa: S101 - PIPE
-        until = time.monotonic() + _START_S
-        with selectors.DefaultSelector() as selector:
-            selector.register(process.stdout, selectors.EVENT_READ)
-            line = process.stdout.readline() if selector.select(until - time.monotonic()) else ""
-        if not line:
-            process.kill()
-            process.wait()
-            said.seek(0)
-            raise RigError(f"mgdd rig {command} did not start: {said.read().strip() or 'it said nothing'}")
-        return line.strip()
+        self._started.append(Child("mgdd", "rig", command, *options, "--quiet"))
+        return self._started[-1].line

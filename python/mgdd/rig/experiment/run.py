@@ -20,7 +20,7 @@ from mgdd.rig.experiment.core_track import track_on_core
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.run_folder import RunFolder, RunRecord, versions
 from mgdd.rig.experiment.stand import Cycle, Stand, Watched, guarded, opened_rig
-from mgdd.rig.experiment.tasks import Outcome, TrackPlan
+from mgdd.rig.experiment.tasks import Outcome, SeekPlan, TrackPlan
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -195,6 +195,8 @@ def _run(
 ) -> tuple[Outcome, dict[str, Any]]:
     def listen_here(cycle: Cycle) -> None:
         record.say(stand.events())
+        if isinstance(checked.plan, SeekPlan) and record.recorder is not None:
+            record.recorder.sample("seeker", checked.plan.estimate())
         listen(cycle)
 
     try:

@@ -303,12 +303,18 @@ class SeekPlan:
         )
         return plain if task.guide == "none" else GuidedEngine(plain, self.model, self.point, keep_start=True)
 
+    def estimate(self) -> dict[str, float]:
+        """Give what the running seeker takes for the best timing, and its standard deviation: NaN where it has none."""
+        sd = getattr(self._running, "estimate_sd", math.nan)
+        return {"estimate_cad": float(self._running.estimate[0]), "estimate_sd_cad": float(np.ravel(sd)[0])}
+
     def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many cycles."""
         cycles = _fewer(self.samples, most)
+        self._running = self.seeker()
         criteria = LoopCriteria(arrival=_ARRIVAL_CAD, limits=dict(self.task.limits) or None)
         try:
-            run = run_seeker(plant, self.seeker(), cycles, criteria=criteria)
+            run = run_seeker(plant, self._running, cycles, criteria=criteria)
         except Interrupted as stop:
             if not isinstance(stop.partial, LoopRun):
                 raise

@@ -1,0 +1,121 @@
+"""Debian's Chromium without a window, driven by its own protocol over the websocket client that Bokeh brings along."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any, Self
+from urllib.request import urlopen
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+_FLAGS = (
+    "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --disable-background-networking "
+    "--disable-component-update --disable-sync --no-first-run --hide-scrollbars --remote-debugging-port=0"
+).split()
+# Bokeh draws into shadow roots: a search of the document alone finds nothing.
+_DEEP = """(() => { const all = (root) => [...root.querySelectorAll("*")].flatMap(
+  (one) => [one, ...(one.shadowRoot ? all(one.shadowRoot) : [])]); return all(document); })()"""
+
+
+async def _connected(address: str) -> Any:
+    from tornado.websocket import websocket_connect
+
+    return await websocket_connect(address, max_message_size=1 << 26)
+
+
+class Browser:
+    """One page in one browser process."""
+
+    def __init__(self, url: str, folder: Path, *, width: int = 1280, height: int = 1400) -> None:
+        assert CHROMIUM is not None
+        self._loop = asyncio.new_event_loop()
+        self._process = subprocess.Popen(
+            [CHROMIUM, *_FLAGS, f"--user-data-dir={folder}", f"--window-size={width},{height}", url],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        port_file, until = folder / "DevToolsActivePort", time.monotonic() + 60.0
+        while not (port_file.exists() and port_file.read_text()) and time.monotonic() < until:
+            time.sleep(0.05)
+        port = int(port_file.read_text().split()[0])
+        pages: list[dict[str, Any]] = []
+        while not pages and time.monotonic() < until:
+            with urlopen(f"http://127.0.0.1:{port}/json/list") as answer:
+                pages = [page for page in json.load(answer) if page["type"] == "page"]
+        self._socket = self._loop.run_until_complete(_connected(pages[0]["webSocketDebuggerUrl"]))
+        self._number = 0
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        return self._loop.run_until_complete(asyncio.wait_for(self._call(method, parameters), 60.0))
+
+    async def _call(self, method: str, parameters: dict[str, Any]) -> dict[str, Any]:
+        self._number += 1
+        await self._socket.write_message(json.dumps({"id": self._number, "method": method, "params": parameters}))
+        while True:
+            answer = json.loads(await self._socket.read_message() or '{"id": null}')
+            if answer.get("id") == self._number:
+                assert "error" not in answer, answer
+                return answer["result"]
+
+    def evaluate(self, expression: str) -> Any:
+        return self.call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
+
+    def text(self) -> str:
+        """All that a person reads, apart from what is drawn on a canvas."""
+        return self.evaluate(
+            f"{_DEEP}.filter((one) => !['style', 'script', 'template'].includes(one.localName)).flatMap((one) => "
+            "[...one.childNodes].filter((own) => own.nodeType == 3).map((own) => own.data)).join('\\n')"
+        )
+
+    def shows(self, text: str, within_s: float = 60.0) -> bool:
+        until = time.monotonic() + within_s
+        while text not in self.text():
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.1)
+        return True
+
+    def click(self, label: str) -> None:
+        """Press and release the mouse in the middle of a button, as a hand does."""
+        box = self.evaluate(
+            f"(() => {{ const box = {_DEEP}.find((one) => one.localName == 'button' && "
+            f"one.innerText.includes({json.dumps(label)})).getBoundingClientRect(); "
+            "return [box.x + box.width / 2, box.y + box.height / 2]; })()"
+        )
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
+
+    def screenshot(self, file: Path) -> None:
+        file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
+
+    def freeze(self) -> None:
+        """Stop all of its processes, as a computer that has no time for them does."""
+        self._signal(signal.SIGSTOP)
+
+    def kill(self) -> None:
+        self._signal(signal.SIGKILL)
+        self._process.wait()
+
+    def _signal(self, number: int) -> None:
+        os.killpg(self._process.pid, number)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process.poll() is None:
+            self.kill()
+        self._loop.run_until_complete(self._leave())
+        self._loop.close()
+
+    async def _leave(self) -> None:
+        self._socket.close()  # outside of a running loop tornado would make another one, and leave it open
