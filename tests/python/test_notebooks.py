@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote
 
 import nbformat
 import pytest
@@ -90,6 +91,20 @@ def test_docs_build_without_a_warning(tmp_path: Path) -> None:
     assert run.returncode == 0, run.stdout + run.stderr
     assert (tmp_path / "html" / "index.html").is_file()
     check_without_a_network(tmp_path / "html")
+    check_links(tmp_path / "html")
+
+
+def check_links(site: Path) -> None:
+    """Every link to a page, a file or a heading of the documentation has its target."""
+    pages = {page: page.read_text(encoding="utf-8") for page in site.resolve().rglob("*.html")}
+    anchors = {page: set(re.findall(r"\s(?:id|name)=\"([^\"]+)\"", text)) for page, text in pages.items()}
+    links = [(page, link) for page, text in pages.items() for link in re.findall(r"<a [^>]*href=\"([^\"]+)\"", text)]
+    own = [(page, *unquote(link).partition("#")) for page, link in links if not re.match(r"[a-z]+:", link)]
+    assert len(own) > 10_000
+    for page, path, _, heading in own:
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{page.name}: {path}"
+        assert not heading or heading in anchors.get(target, {heading}), f"{page.name}: {path}#{heading}"
 
 
 def check_without_a_network(site: Path) -> None:
