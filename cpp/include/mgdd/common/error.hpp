@@ -89,7 +89,7 @@ struct RigError : Error {
 template <std::derived_from<Error> E>
 [[noreturn]] void fail(const E& error) {
 #ifdef __cpp_exceptions
-  throw error;
+  throw error;  // NOLINT(bugprone-exception-copy-constructor-throws): a copy that fails is std::bad_alloc, as anywhere
 #else
   std::fputs(error.what(), stderr);
   std::abort();
