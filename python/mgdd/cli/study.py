@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["add", "run_or_part"]
 
 _STUDY = Options(run_study, "seeds", "quick")
+_PAGE = Options(write_report, "interactive")
 _LOW = "_low"
 _OPTIONS = {"real": ("guided",)}  # of single studies
 
@@ -50,6 +51,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
+    _PAGE.add(parser)
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: %(default)s)")
 
 
@@ -82,7 +84,7 @@ def run(args: argparse.Namespace) -> None:
         executor=None if args.workers is None else processes(args.workers), **options,
     )  # fmt: skip
     paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
-    page = None if args.report is None else write_report(result, args.report)
+    page = None if args.report is None else write_report(result, args.report, **_PAGE.given(args))
     summary: dict[str, Any] = dict(result.summary)
     if folder is not None:
         summary["figures"] = [path.as_posix() for path in paths]

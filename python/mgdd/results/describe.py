@@ -19,11 +19,22 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Row", "as_figure", "as_html", "as_text", "core_rows", "described", "fields_of", "rows_of", "title_of"]
+__all__ = [
+    "Row",
+    "as_figure",
+    "as_html",
+    "as_text",
+    "core_rows",
+    "described",
+    "fields_of",
+    "rows_of",
+    "sparkline",
+    "title_of",
+]
 
 _WIDTH, _LINES = 100, 15
 _LONG = 60  # of a text in a table
-_MANY = 60  # rows in HTML
+_LEAD, _MANY = 8, 60  # rows in HTML: that are seen at once, and behind a fold
 _DIGITS = 6
 _PLAIN = ("parameters", "summary")  # mappings whose keys need no owner in front
 T = TypeVar("T")
@@ -65,7 +76,7 @@ def as_text(title: str, rows: Iterable[Row]) -> str:
     return "\n".join([head, *lines])
 
 
-def as_html(title: str, rows: Iterable[Row]) -> str:
+def as_html(title: str, rows: Iterable[Row], picture: str = "") -> str:
     """Lay out rows as an HTML table, for notebooks.
 
     Parameters
@@ -74,21 +85,55 @@ def as_html(title: str, rows: Iterable[Row]) -> str:
         Above the table.
     rows : iterable of Row
         One per line.
+    picture : str
+        Between title and table.
 
     Returns
     -------
     str
-        The HTML; what does not fit is counted below.
+        The HTML: a few rows, the others folded; what does not fit is counted below.
     """
     known = list(rows)
+    lead = len(known) if len(known) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
+    rest = known[lead:_MANY]
+    fold = f"<details><summary>{len(known) - lead} more</summary>{_table(rest)}</details>" if rest else ""
+    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
+    return f"<div><p><b>{html.escape(title)}</b></p>{picture}{_table(known[:lead])}{fold}{more}</div>"
+
+
+def _table(rows: Sequence[Row]) -> str:
     body = "".join(
         f"<tr><th style='text-align:left'>{html.escape(row.name)}</th>"
         f"<td style='text-align:right'>{html.escape(row.value)}</td>"
         f"<td style='text-align:left'>{'' if row.unit == '-' else html.escape(row.unit)}</td></tr>"
-        for row in known[:_MANY]
+        for row in rows
     )
-    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
-    return f"<div><p><b>{html.escape(title)}</b></p><table><tbody>{body}</tbody></table>{more}</div>"
+    return f"<table><tbody>{body}</tbody></table>"
+
+
+def sparkline(data: Any) -> str:
+    """Draw the first numbers of a Dataset along a dimension as a small SVG; empty where there are none.
+
+    Made by hand: importing matplotlib takes half a second.
+    """
+    for name, variable in data.data_vars.items():
+        if variable.ndim != 1 or variable.size < 10 or variable.dtype.kind != "f":
+            continue
+        values = variable.to_numpy()
+        known = np.isfinite(values)
+        if known.sum() < 2 or not np.ptp(values[known]) > 0.0:
+            continue
+        at = np.unique(np.linspace(0, values.size - 1, 200).astype(int))
+        at = at[known[at]]
+        low, span = values[known].min(), np.ptp(values[known])
+        places = zip(240 * at / (values.size - 1), 46 - 42 * (values[at] - low) / span, strict=True)
+        points = " ".join(f"{x:.0f},{y:.1f}" for x, y in places)
+        text = html.escape(f"{name} over {variable.dims[0]}")
+        return (
+            f"<svg width='240' height='50' role='img'><title>{text}</title>"
+            f"<polyline fill='none' stroke='#0072B2' points='{points}'></polyline></svg><br><small>{text}</small>"
+        )
+    return ""
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
