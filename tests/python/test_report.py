@@ -9,17 +9,11 @@ from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from mgdd import datasets
 from mgdd.cli import main
-from mgdd.errors import DataError, ParameterError
-from mgdd.loop import EngineBench, run_seeker
-from mgdd.optimize import ExtremumSeeking
 from mgdd.report import write_report
-from mgdd.results.interactive import as_plotly
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies import run_study
 from mgdd.studies.base import StudyResult
@@ -141,35 +135,6 @@ def test_the_figures_zoom_and_the_pictures_stay_for_paper(tmp_path: Path) -> Non
     assert text.count("Plotly.newPlot(document.currentScript") == text.count("<img class=") == len(result.figures)
     assert len(re.findall(r"<script>", text.split("<h1>")[0])) == 1
     assert "<noscript>" in text
-
-
-def test_a_result_draws_itself_by_plotly() -> None:
-    pytest.importorskip("plotly")
-    seeker = ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0)
-    run = run_seeker(EngineBench(seed=1), seeker, 100)
-    figure = run.plot(engine="plotly")
-    lines = [trace for trace in figure.data if trace.type == "scatter" and trace.x is not None and len(trace.x) >= 100]
-    assert any(np.array_equal(trace.y[-100:], run.dataset["estimate_cad"], equal_nan=True) for trace in lines)
-    with pytest.raises(ParameterError, match="must be 'matplotlib', or 'plotly' without ax"):
-        run.plot(engine="bokeh")
-    figure = Figure()
-    ax = figure.add_subplot()
-    ax.set_xscale("log")
-    ax.set_xlim(1.0, 1000.0)
-    ax.pcolormesh([1.0, 10.0, 1000.0], [0.0, 1.0, 2.0], [[1.0, 2.0], [3.0, 4.0]])
-    ax.axvline(100.0, label="limit")
-    cells, limit = as_plotly(figure).data
-    assert (cells.type, np.asarray(cells.z).tolist(), list(cells.x)) == ("heatmap", [[1, 2], [3, 4]], [1, 10, 1000])
-    assert (limit.name, limit.x) == ("limit", pytest.approx([100.0, 100.0]))
-    assert as_plotly(figure).layout.xaxis.range == pytest.approx((0.0, 3.0))
-    with pytest.raises(DataError, match="polar axes"):
-        as_plotly(_polar())
-
-
-def _polar() -> Figure:
-    figure = Figure()
-    figure.add_subplot(projection="polar")
-    return figure
 
 
 def test_the_verdict_is_made_of_the_numbers() -> None:

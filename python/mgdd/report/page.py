@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
 from mgdd.errors import DataError
-from mgdd.results.interactive import as_plotly, plotly_script
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import as_number
@@ -81,6 +80,11 @@ def write_report(
 def _page(result: StudyResult, *, interactive: bool) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
+    script = ""
+    if interactive:
+        from mgdd.results.interactive import plotly_script
+
+        script = plotly_script()
     loader = PackageLoader("mgdd.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
     style, _, _ = loader.get_source(environment, "style.css")
@@ -96,7 +100,7 @@ def _page(result: StudyResult, *, interactive: bool) -> str:
             (_section(section, interactive=interactive) for section in result.sections),
             key=lambda section: not section["figures"],
         ),
-        script=plotly_script() if interactive else "",
+        script=script,
         short=_SHORT,
     )
 
@@ -119,17 +123,19 @@ def _section(section: Section, *, interactive: bool) -> dict[str, Any]:
         "items": section.items,
         "table": section.table,
         "figures": [
-            {"caption": caption, "png": _png(figure), "live": _live(figure) if interactive else ""}
+            {"caption": caption, "png": _png(figure)} | (_live(figure) if interactive else {"live": ""})
             for caption, figure in section.figures.items()
         ],
     }
 
 
-def _live(figure: Figure) -> str:
+def _live(figure: Figure) -> dict[str, Any]:
+    from mgdd.results.interactive import as_plotly
+
     try:
-        return str(as_plotly(figure).to_json()).replace("<", "\\u003c")
-    except DataError:  # the picture stays
-        return ""
+        return {"live": as_plotly(figure).to_json().replace("<", "\\u003c")}
+    except DataError as error:  # the picture stays
+        return {"live": "", "still": str(error)}
 
 
 def _png(figure: Figure) -> str:
