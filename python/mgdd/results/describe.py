@@ -27,14 +27,15 @@ __all__ = [
     "core_rows",
     "described",
     "fields_of",
+    "picture_of",
     "rows_of",
-    "sparkline",
     "title_of",
 ]
 
 _WIDTH, _LINES = 100, 15
 _LONG = 60  # of a text in a table
 _LEAD, _MANY = 8, 60  # rows in HTML: that are seen at once, and behind a fold
+_CELLS = 25  # along an axis of a map in a small picture
 _DIGITS = 6
 _PLAIN = ("parameters", "summary")  # mappings whose keys need no owner in front
 T = TypeVar("T")
@@ -111,29 +112,47 @@ def _table(rows: Sequence[Row]) -> str:
     return f"<table><tbody>{body}</tbody></table>"
 
 
-def sparkline(data: Any) -> str:
-    """Draw the first numbers of a Dataset along a dimension as a small SVG; empty where there are none.
+def picture_of(data: Any) -> str:
+    """Draw the first numbers of a Dataset over one or two axes as a small SVG; empty where there are none.
 
     Made by hand: importing matplotlib takes half a second.
     """
     for name, variable in data.data_vars.items():
-        if variable.ndim != 1 or variable.size < 10 or variable.dtype.kind != "f":
+        values = variable.to_numpy() if variable.dtype.kind == "f" else np.empty(0)
+        known = values[np.isfinite(values)]
+        if known.size < 2 or not np.ptp(known) > 0.0:
             continue
-        values = variable.to_numpy()
-        known = np.isfinite(values)
-        if known.sum() < 2 or not np.ptp(values[known]) > 0.0:
+        places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - known.min()) / np.ptp(known)
+        if values.ndim == 1 and values.size >= (2 if places[0].dtype.kind == "f" else 10):
+            drawing = _line_of(places[0] if places[0].dtype.kind == "f" else np.arange(values.size), shades)
+        elif values.ndim == 2 and max(values.shape) <= _CELLS:
+            drawing = _cells_of(shades)
+        else:
             continue
-        at = np.unique(np.linspace(0, values.size - 1, 200).astype(int))
-        at = at[known[at]]
-        low, span = values[known].min(), np.ptp(values[known])
-        places = zip(240 * at / (values.size - 1), 46 - 42 * (values[at] - low) / span, strict=True)
-        points = " ".join(f"{x:.0f},{y:.1f}" for x, y in places)
-        text = html.escape(f"{name} over {variable.dims[0]}")
-        return (
-            f"<svg width='240' height='50' role='img'><title>{text}</title>"
-            f"<polyline fill='none' stroke='#0072B2' points='{points}'></polyline></svg><br><small>{text}</small>"
-        )
+        text = html.escape(f"{name} over {' and '.join(map(str, variable.dims))}")
+        picture = f"<svg width='240' height='50' role='img'><title>{text}</title>{drawing}</svg>"
+        return f"{picture}<br><small>{text}</small>"
     return ""
+
+
+def _line_of(x: Any, shades: Any) -> str:
+    at = np.unique(np.linspace(0, x.size - 1, 200).astype(int))
+    at = at[np.isfinite(shades[at])]
+    across = 240 * (x[at] - x[0]) / (x[-1] - x[0])
+    points = " ".join(f"{left:.0f},{46 - 42 * up:.1f}" for left, up in zip(across, shades[at], strict=True))
+    return f"<polyline fill='none' stroke='#0072B2' points='{points}'></polyline>"
+
+
+def _cells_of(shades: Any) -> str:
+    width, height = 240 // len(shades), 50 // len(shades[0])
+    dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
+    out = ""
+    for (i, j), shade in np.ndenumerate(shades):
+        if np.isfinite(shade):
+            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), own):.0f}" for own in dark_to_pale)
+            size = f"width='{width}' height='{height}'"
+            out += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
+    return out
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:

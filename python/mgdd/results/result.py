@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.results.describe import Row, as_figure, as_html, as_text, fields_of, rows_of, sparkline, title_of
+from mgdd.results.describe import Row, as_figure, as_html, as_text, fields_of, picture_of, rows_of, title_of
 from mgdd.results.labels import Label, labelled_dataset, named_label
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         try:
-            picture = sparkline(self.dataset)
+            picture = picture_of(self.dataset)
         except DataError:  # a fit that keeps no run
             picture = ""
         return as_html(self._title(), self._rows(), picture)
