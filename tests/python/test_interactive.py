@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import builtins
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -123,14 +123,7 @@ def test_what_has_no_such_form_is_refused_by_its_name(what: str, draw: Callable[
 
 
 def test_the_extra_is_named_where_plotly_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = builtins.__import__
-
-    def missing(name: str, *rest: Any) -> Any:
-        if name.partition(".")[0] == "plotly":
-            raise ModuleNotFoundError(name="plotly")
-        return real(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
+    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     for call in (plotly_script, lambda: as_plotly(Figure())):
         with pytest.raises(ImportError, match=r'pip install "mgdd\[interactive\]"'):
             call()
