@@ -132,9 +132,14 @@ def test_the_figures_zoom_and_the_pictures_stay_for_paper(tmp_path: Path) -> Non
     pytest.importorskip("plotly")
     result = run_study("sensor-delay", seeds=2, quick=True)
     text = write_report(result, tmp_path, interactive=True).read_text(encoding="utf-8")
-    assert text.count("Plotly.newPlot(document.currentScript") == text.count("<img class=") == len(result.figures)
+    assert text.count("Plotly.newPlot(d,") == text.count("<img class=") == len(result.figures)
     assert len(re.findall(r"<script>", text.split("<h1>")[0])) == 1
     assert "<noscript>" in text
+    figure = next(iter(result.figures.values()))
+    figure.axes[0].set_xlabel("$x$")  # which Plotly cannot write: the picture stays, and says why
+    text = write_report(result, tmp_path, interactive=True).read_text(encoding="utf-8")
+    assert text.count("Plotly.newPlot(d,") == len(result.figures) - 1
+    assert "has no interactive form" in text
 
 
 def test_the_verdict_is_made_of_the_numbers() -> None:

@@ -12,6 +12,7 @@ from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.errors import Interrupted, ParameterError, hinted
+from mgdd.io.extras import import_extra
 from mgdd.parallel.pool import processes
 from mgdd.report import write_report
 from mgdd.studies import run_study
@@ -74,6 +75,10 @@ def run(args: argparse.Namespace) -> None:
             refuse_idle(args, option, why=f"it is an option of the study {', '.join(studies)}, not of {args.name}")
         elif getattr(args, option) is not None:
             options[option] = getattr(args, option)
+    if args.report is None:
+        refuse_idle(args, "interactive", why="it is of the page that --report writes")
+    elif args.interactive:
+        import_extra("plotly", "interactive", "an interactive figure")  # before the study runs, not after it
     folder = None if args.figures is None else Path(args.figures)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
