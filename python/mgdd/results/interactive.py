@@ -242,8 +242,8 @@ def _note(text: Text, ax: Any = None, number: int = 0) -> dict[str, Any]:
         raise _refused("an arrow")
     box, said = text.get_window_extent(), _plain(text.get_text()) if text.get_visible() else ""
     middle, place = (0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)), {"xref": "paper", "yref": "paper"}
-    inches: Any = text.get_figure(root=True)
-    x, y = (ax.transData if ax else inches.transFigure).inverted().transform(middle)
+    whole: Any = text.figure
+    x, y = (ax.transData if ax else whole.transFigure).inverted().transform(middle)
     if ax:
         place = {"xref": f"x{number}", "yref": f"y{number}"}
         x, y = np.log10(x) if ax.get_xscale() == "log" else x, np.log10(y) if ax.get_yscale() == "log" else y
