@@ -53,7 +53,7 @@ def test_a_twin_lies_over_its_host_and_both_name_their_units() -> None:
     own = as_plotly(figure)
     assert (own.layout.yaxis3.overlaying, own.layout.yaxis3.side, own.layout.xaxis3.matches) == ("y2", "right", "x2")
     assert {"crank angle [°CA aTDC]", "cylinder pressure [bar]", "cylinder pressure"} <= texts(own)
-    assert "cylinder pressure [bar]: %{y}" in own.data[0].hovertemplate
+    assert "cylinder pressure [bar]: %{y:.5g}" in own.data[0].hovertemplate
     log = Figure()
     pressure(simulate("puma_single"), log_pv=True, ax=(ax := log.add_subplot()))
     layout = as_plotly(log).layout
@@ -70,7 +70,7 @@ def test_cells_keep_values_colours_breakpoints_and_colour_bar() -> None:
     table = next(own for own in drawn(figure) if own.type == "heatmap")
     assert np.array_equal(table.z, made.values.T, equal_nan=True)
     assert (table.zmin, table.zmax, len(table.colorscale)) == (-9.0, -1.0, 65)
-    assert "start of combustion [°CA aTDC]: %{z}" in table.hovertemplate
+    assert "start of combustion [°CA aTDC]: %{z:.5g}" in table.hovertemplate
     assert figure.layout.xaxis2.ticktext == ("900", "1500", "2100")
     assert {"−1", "−4 h", " ×", "held by p_max_bar", "start of combustion [°CA aTDC]"} <= texts(figure)
     assert next(own for own in figure.data if own.type == "scatter" and own.mode == "text").text == "h"  # of the legend
@@ -97,6 +97,18 @@ def test_bars_bands_dots_contours_and_marks_stand_where_they_are_drawn() -> None
     assert {"a &lt; b", "time [s]"} <= texts(turned)
 
 
+def test_a_text_beside_the_axes_stays_and_one_out_of_sight_does_not_come() -> None:
+    def draw(ax: Axes) -> None:
+        ax.set_xlim(0.0, 1.0)
+        ax.text(1.05, 0.5, "beside", transform=ax.transAxes)
+        ax.annotate("beyond", (2.0, 0.5))
+        ax.figure.add_subplot(label="unseen").set_visible(False)
+
+    figure = converted(draw)
+    assert [(note.text, note.xref) for note in figure.layout.annotations] == [("beside", "paper")]
+    assert "xaxis3" not in figure.layout
+
+
 def _polar() -> Figure:
     figure = Figure()
     figure.add_subplot(projection="polar")
@@ -108,6 +120,8 @@ def _polar() -> Figure:
     [
         ("polar axes", None),
         ("a symlog scale", lambda ax: (ax.set_ylim(-9.0, 9.0), ax.set_yscale("symlog"))),
+        ("axes inside axes", lambda ax: ax.inset_axes((0.5, 0.5, 0.4, 0.4))),
+        ("parts outside of axes", lambda ax: ax.figure.patches.append(ax.figure.patch)),
         ("an arrow", lambda ax: ax.annotate("a", (0, 0), (1, 1), arrowprops={"arrowstyle": "->"})),
         ("a Table", lambda ax: ax.table([["a"]])),
         ("a picture of pixels", lambda ax: ax.imshow(np.zeros((2, 2, 3)))),

@@ -6,7 +6,7 @@ Imported on use: it needs matplotlib.
 from __future__ import annotations
 
 import html
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -63,7 +63,9 @@ def as_plotly(figure: Figure) -> Any:
     texts = [*figure.texts, *(getattr(figure, f"_sup{which}") for which in ("title", "xlabel", "ylabel"))]
     notes = [_note(own) for own in dict.fromkeys(texts) if own is not None]
     legends, traces, grounds, known = list(figure.legends), list[Any](), list[Any](), dict[Any, int]()
-    for ax in figure.axes:
+    if [*figure.lines, *figure.patches, *figure.images, *figure.artists, *figure.subfigs]:
+        raise _refused("parts outside of axes")
+    for ax in filter(Artist.get_visible, figure.axes):
         known[ax] = number = len(known) + 2
         layout |= _axes(ax, known)
         ground: dict[str, Any] = dict(zip(("x0", "y0", "x1", "y1"), map(float, ax.get_position().extents), strict=True))
@@ -102,8 +104,8 @@ def _refused(what: str) -> DataError:
 
 def _axes(ax: Any, known: dict[Any, int]) -> dict[str, Any]:
     """Place both axes; a twin lies over its host."""
-    if ax.name != "rectilinear":
-        raise _refused(f"{ax.name} axes")
+    if ax.name != "rectilinear" or ax.child_axes:
+        raise _refused("axes inside axes" if ax.child_axes else f"{ax.name} axes")
     number, box, out = known[ax], ax.get_position(), dict[str, Any]()
     host = next(known[own] for own in known if np.allclose(own.get_position().bounds, box.bounds))
     for letter, axis, other, ends in (("x", ax.xaxis, "y", box.intervalx), ("y", ax.yaxis, "x", box.intervaly)):
@@ -232,7 +234,7 @@ def _hover(ax: Any, own: Any) -> dict[str, Any]:
     said = {"x": ax.get_xlabel(), "y": ax.get_ylabel()}
     if issubclass(type(own), QuadMesh | AxesImage):
         said["z"] = own.colorbar.ax.get_ylabel() if own.colorbar else "value"
-    lines = "<br>".join(f"{_plain(name) or letter}: %{{{letter}}}" for letter, name in said.items())
+    lines = "<br>".join(f"{_plain(name) or letter}: %{{{letter}:.5g}}" for letter, name in said.items())
     return {"name": label, "hovertemplate": f"{lines}<extra>{label}</extra>"}
 
 
@@ -240,15 +242,18 @@ def _note(text: Text, ax: Any = None, number: int = 0) -> dict[str, Any]:
     """Write a text where it stands: on the paper, or at its point of axes."""
     if isinstance(text, Annotation) and text.arrow_patch is not None:
         raise _refused("an arrow")
-    box, said = text.get_window_extent(), _plain(text.get_text()) if text.get_visible() else ""
-    middle, place = (0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)), {"xref": "paper", "yref": "paper"}
-    whole: Any = text.figure
-    x, y = (ax.transData if ax else whole.transFigure).inverted().transform(middle)
-    if ax:
+    box, whole, place = text.get_window_extent(), cast("Any", text.figure), {"xref": "paper", "yref": "paper"}
+    middle = (0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1))
+    inside = ax is not None and ax.bbox.contains(*middle)
+    # Of an annotation of a point that is out of sight matplotlib says the unit box.
+    seen = text.get_visible() and box.bounds != (0.0, 0.0, 1.0, 1.0) and (inside or not (ax and text.get_clip_on()))
+    x, y = (ax.transData if inside else whole.transFigure).inverted().transform(middle)
+    if inside:
         place = {"xref": f"x{number}", "yref": f"y{number}"}
         x, y = np.log10(x) if ax.get_xscale() == "log" else x, np.log10(y) if ax.get_yscale() == "log" else y
     font = {"size": _pixels(text.get_fontsize()), "color": _color(text.get_color())}
     place |= {"xanchor": "center", "yanchor": "middle", "align": text.get_horizontalalignment()}
+    said = _plain(text.get_text()) if seen else ""
     return {"text": said, "x": x, "y": y, "font": font, "textangle": -text.get_rotation(), "showarrow": False} | place
 
 
