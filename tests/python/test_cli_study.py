@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,17 @@ def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str]
         assert f"mgdd: error: {error['message']}\n" == err
     else:
         assert out == ""
+
+
+def test_a_page_that_zooms_is_refused_before_the_study_runs(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("mgdd.cli.study.run_study", lambda *_, **__: pytest.fail("it ran"))
+    _, err = run(capsys, "sensor-delay", "--interactive", code=2)
+    assert "--interactive does not act here; it is of the page that --report writes" in err
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    _, err = run(capsys, "sensor-delay", "--report", str(tmp_path), "--interactive", code=2)
+    assert 'an interactive figure needs plotly: pip install "mgdd[interactive]"' in err
 
 
 def test_refused_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
@@ -20,9 +21,10 @@ from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.loop import EngineBench, SensorDynamics, SurrogatePlant, run_seeker
+from mgdd.maps import CalibrationMap
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets.preset import Preset
-from mgdd.results.describe import Row, as_html, as_text, rows_of
+from mgdd.results.describe import Row, as_html, as_text, picture_of, rows_of
 from mgdd.results.units import unit_of
 from mgdd.signals import chirp
 from mgdd.studies.base import StudyResult
@@ -103,7 +105,8 @@ class Tags(HTMLParser):
         assert self.open == []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        assert all(name == "style" for name, _ in attrs)
+        drawn = tag in ("svg", "polyline", "rect")  # the small picture
+        assert drawn or all(name == "style" for name, _ in attrs)
         if tag != "br":
             self.open.append(tag)
 
@@ -169,6 +172,38 @@ def test_many_and_long_rows_are_counted_and_cut() -> None:
     long = as_text("t" * 300 + " end", [Row("x", "y " * 200)]).splitlines()
     assert max(map(len, long)) <= 100
     assert html.escape("<b> & 'c'") in as_html("<b> & 'c'", [])
+
+
+def test_the_html_shows_a_few_rows_a_fold_and_a_small_picture() -> None:
+    rows = [Row(f"name_{i}", str(i)) for i in range(47)]
+    seen, fold = as_html("title", rows).split("<details>")
+    assert (seen.count("<tr>"), fold.count("<tr>")) == (8, 39)
+    assert "<details>" not in as_html("title", rows[:10])
+    markup = objects()["run"]()._repr_html_()
+    Tags(markup)
+    picture = markup.split("<svg")[1].split("</svg>")[0]
+    assert len(picture) < 6000
+    assert 100 <= picture.count(",") <= 200
+    assert "<svg" not in objects()["optimum"]()._repr_html_()
+
+
+def test_a_map_shows_its_cells_and_no_name_is_markup() -> None:
+    axes = {"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20]}
+    known = CalibrationMap(
+        axes, [[-1, -4], [-2, -6], [-5, -9]], name="soc_cad", provenance={"from": "<b>bench</b> & 7"}
+    )
+    markup = known._repr_html_()
+    Tags(markup)
+    assert markup.count("<rect") == 6
+    assert "x='0' y='25' width='80' height='25' fill='rgb(254,232,56)'" in markup  # least speed and fuel: the latest
+    assert "soc_cad over speed_rpm and fuel_mg" in markup
+    assert "&lt;b&gt;bench&lt;/b&gt; &amp; 7" in markup
+    curve = CalibrationMap({"fuel_mg": [6, 8, 20]}, [-1, -2, -8], name="soc_cad")._repr_html_()
+    assert "points='0,4.0 34,10.0 240,46.0'" in curve
+    odd = xr.Dataset({"<i>x</i>": ("a<b", np.arange(20.0))})
+    assert "&lt;i&gt;x&lt;/i&gt; over a&lt;b" in picture_of(odd)
+    assert "<i>" not in picture_of(odd)
+    assert "<svg" not in objects()["timing map"]()._repr_html_()  # the same everywhere
 
 
 def test_rows_know_units_arrays_and_what_is_missing() -> None:

@@ -12,6 +12,7 @@ from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.errors import Interrupted, ParameterError, hinted
+from mgdd.io.extras import import_extra
 from mgdd.parallel.pool import processes
 from mgdd.report import write_report
 from mgdd.studies import run_study
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["add", "run_or_part"]
 
 _STUDY = Options(run_study, "seeds", "quick")
+_PAGE = Options(write_report, "interactive")
 _LOW = "_low"
 _OPTIONS = {"real": ("guided",)}  # of single studies
 
@@ -50,6 +52,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
+    _PAGE.add(parser)
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: %(default)s)")
 
 
@@ -72,6 +75,10 @@ def run(args: argparse.Namespace) -> None:
             refuse_idle(args, option, why=f"it is an option of the study {', '.join(studies)}, not of {args.name}")
         elif getattr(args, option) is not None:
             options[option] = getattr(args, option)
+    if args.report is None:
+        refuse_idle(args, "interactive", why="it is of the page that --report writes")
+    elif args.interactive:
+        import_extra("plotly", "interactive", "an interactive figure")  # before the study runs, not after it
     folder = None if args.figures is None else Path(args.figures)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -82,7 +89,7 @@ def run(args: argparse.Namespace) -> None:
         executor=None if args.workers is None else processes(args.workers), **options,
     )  # fmt: skip
     paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
-    page = None if args.report is None else write_report(result, args.report)
+    page = None if args.report is None else write_report(result, args.report, **_PAGE.given(args))
     summary: dict[str, Any] = dict(result.summary)
     if folder is not None:
         summary["figures"] = [path.as_posix() for path in paths]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
+from mgdd.errors import DataError
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import as_number
@@ -32,7 +33,9 @@ _INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine
 _SHORT = 8  # rows of a table that is not folded
 
 
-def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-report") -> Path:
+def write_report(
+    result: StudyResult, folder: str | os.PathLike[str] = "mgdd-report", *, interactive: bool = False
+) -> Path:
     """Write ``index.html`` and ``summary.json`` of a study.
 
     Parameters
@@ -41,11 +44,19 @@ def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-rep
         Of any study.
     folder : path-like
         Made if missing; the two files in it are replaced.
+    interactive : bool
+        Zoom and hover in the figures, by Plotly (``pip install "mgdd[interactive]"``): some 5 MB more. Paper, and a
+        browser without scripts, shows the pictures.
 
     Returns
     -------
     pathlib.Path
         The page. It holds its figures itself and needs no network.
+
+    Raises
+    ------
+    ImportError
+        Interactive figures without Plotly.
 
     Examples
     --------
@@ -58,7 +69,7 @@ def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-rep
     'index.html'
     """
     folder = Path(folder)
-    page = _page(result)
+    page = _page(result, interactive=interactive)
     text = json.dumps(to_jsonable(result.summary), indent=2, ensure_ascii=False, allow_nan=False)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -66,9 +77,14 @@ def write_report(result: StudyResult, folder: str | os.PathLike[str] = "mgdd-rep
     return folder / "index.html"
 
 
-def _page(result: StudyResult) -> str:
+def _page(result: StudyResult, *, interactive: bool) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
+    script = ""
+    if interactive:
+        from mgdd.results.interactive import plotly_script
+
+        script = plotly_script()
     loader = PackageLoader("mgdd.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
     style, _, _ = loader.get_source(environment, "style.css")
@@ -80,7 +96,11 @@ def _page(result: StudyResult) -> str:
         interrupted=bool(result.summary.get("interrupted")),
         facts=list(_facts(result)),
         # What is seen at a glance stands before what is looked up.
-        sections=sorted(map(_section, result.sections), key=lambda section: not section["figures"]),
+        sections=sorted(
+            (_section(section, interactive=interactive) for section in result.sections),
+            key=lambda section: not section["figures"],
+        ),
+        script=script,
         short=_SHORT,
     )
 
@@ -96,14 +116,26 @@ def _facts(result: StudyResult) -> Iterator[tuple[str, str]]:
     yield "Versions", f"mgdd {__version__}, Python {platform.python_version()}, {others}"
 
 
-def _section(section: Section) -> dict[str, Any]:
+def _section(section: Section, *, interactive: bool) -> dict[str, Any]:
     return {
         "title": section.title,
         "text": section.text,
         "items": section.items,
         "table": section.table,
-        "figures": [{"caption": caption, "png": _png(figure)} for caption, figure in section.figures.items()],
+        "figures": [
+            {"caption": caption, "png": _png(figure)} | (_live(figure) if interactive else {"live": ""})
+            for caption, figure in section.figures.items()
+        ],
     }
+
+
+def _live(figure: Figure) -> dict[str, Any]:
+    from mgdd.results.interactive import as_plotly
+
+    try:
+        return {"live": as_plotly(figure).to_json().replace("<", "\\u003c")}
+    except DataError as error:  # the picture stays
+        return {"live": "", "still": str(error)}
 
 
 def _png(figure: Figure) -> str:

@@ -19,11 +19,23 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Row", "as_figure", "as_html", "as_text", "core_rows", "described", "fields_of", "rows_of", "title_of"]
+__all__ = [
+    "Row",
+    "as_figure",
+    "as_html",
+    "as_text",
+    "core_rows",
+    "described",
+    "fields_of",
+    "picture_of",
+    "rows_of",
+    "title_of",
+]
 
 _WIDTH, _LINES = 100, 15
 _LONG = 60  # of a text in a table
-_MANY = 60  # rows in HTML
+_LEAD, _MANY = 8, 60  # rows in HTML: that are seen at once, and behind a fold
+_CELLS = 25  # along an axis of a map in a small picture
 _DIGITS = 6
 _PLAIN = ("parameters", "summary")  # mappings whose keys need no owner in front
 T = TypeVar("T")
@@ -65,7 +77,7 @@ def as_text(title: str, rows: Iterable[Row]) -> str:
     return "\n".join([head, *lines])
 
 
-def as_html(title: str, rows: Iterable[Row]) -> str:
+def as_html(title: str, rows: Iterable[Row], picture: str = "") -> str:
     """Lay out rows as an HTML table, for notebooks.
 
     Parameters
@@ -74,21 +86,73 @@ def as_html(title: str, rows: Iterable[Row]) -> str:
         Above the table.
     rows : iterable of Row
         One per line.
+    picture : str
+        Between title and table.
 
     Returns
     -------
     str
-        The HTML; what does not fit is counted below.
+        The HTML: a few rows, the others folded; what does not fit is counted below.
     """
     known = list(rows)
+    lead = len(known) if len(known) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
+    rest = known[lead:_MANY]
+    fold = f"<details><summary>{len(known) - lead} more</summary>{_table(rest)}</details>" if rest else ""
+    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
+    return f"<div><p><b>{html.escape(title)}</b></p>{picture}{_table(known[:lead])}{fold}{more}</div>"
+
+
+def _table(rows: Sequence[Row]) -> str:
     body = "".join(
         f"<tr><th style='text-align:left'>{html.escape(row.name)}</th>"
         f"<td style='text-align:right'>{html.escape(row.value)}</td>"
         f"<td style='text-align:left'>{'' if row.unit == '-' else html.escape(row.unit)}</td></tr>"
-        for row in known[:_MANY]
+        for row in rows
     )
-    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
-    return f"<div><p><b>{html.escape(title)}</b></p><table><tbody>{body}</tbody></table>{more}</div>"
+    return f"<table><tbody>{body}</tbody></table>"
+
+
+def picture_of(data: Any) -> str:
+    """Draw the first numbers of a Dataset over one or two axes as a small SVG; empty where there are none.
+
+    Made by hand: importing matplotlib takes half a second.
+    """
+    for name, variable in data.data_vars.items():
+        values = variable.to_numpy() if variable.dtype.kind == "f" else np.empty(0)
+        known = values[np.isfinite(values)]
+        if known.size < 2 or not np.ptp(known) > 0.0:
+            continue
+        places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - known.min()) / np.ptp(known)
+        if values.ndim == 1 and values.size >= (2 if places[0].dtype.kind == "f" else 10):
+            drawing = _line_of(places[0] if places[0].dtype.kind == "f" else np.arange(values.size), shades)
+        elif values.ndim == 2 and max(values.shape) <= _CELLS:
+            drawing = _cells_of(shades)
+        else:
+            continue
+        text = html.escape(f"{name} over {' and '.join(map(str, variable.dims))}")
+        picture = f"<svg width='240' height='50' role='img'><title>{text}</title>{drawing}</svg>"
+        return f"{picture}<br><small>{text}</small>"
+    return ""
+
+
+def _line_of(x: Any, shades: Any) -> str:
+    at = np.unique(np.linspace(0, x.size - 1, 200).astype(int))
+    at = at[np.isfinite(shades[at])]
+    across = 240 * (x[at] - x[0]) / (x[-1] - x[0])
+    points = " ".join(f"{left:.0f},{46 - 42 * up:.1f}" for left, up in zip(across, shades[at], strict=True))
+    return f"<polyline fill='none' stroke='#0072B2' points='{points}'></polyline>"
+
+
+def _cells_of(shades: Any) -> str:
+    width, height = 240 // len(shades), 50 // len(shades[0])
+    dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
+    out = ""
+    for (i, j), shade in np.ndenumerate(shades):
+        if np.isfinite(shade):
+            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), own):.0f}" for own in dark_to_pale)
+            size = f"width='{width}' height='{height}'"
+            out += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
+    return out
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
