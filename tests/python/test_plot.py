@@ -15,6 +15,7 @@ from mgdd.guide import FeedForward
 from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
+from mgdd.plot.convergence import convergence
 from mgdd.plot.learning import learning
 from mgdd.results.labels import ANGLE, labelled_dataset
 
@@ -127,7 +128,7 @@ PLOTS = {
     "throttle under control": (plot.throttle_run, followed),
     "throttle": (plot.throttle_run, lambda: followed().drop_vars("reference_deg")),
     "seeking": (plot.seeking, sought),
-    "convergence": (plot.convergence, tracks),
+    "convergence": (convergence, tracks),
     "sensors over cycles": (plot.sensors, readings),
     "sensors over timing": (plot.sensors, lambda: readings("soc_cad")),
     "learning": (learning, learned),
@@ -327,7 +328,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
         (plot.seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
-        (plot.convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
+        (convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
         (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
         (plot.throttle_run, followed, "angle_deg", "mgdd.throttle.simulate_throttle"),
@@ -391,18 +392,18 @@ def test_seeking_shows_the_slope_or_leaves_panels_out():
 
 
 def test_convergence_bands_and_refusals():
-    ax = plot.convergence(tracks())
+    ax = convergence(tracks())
     np.testing.assert_array_equal(line(ax, "fast").get_ydata(), tracks()["estimate_median_cad"][1])
     assert len(ax.collections) == 2
     band = ax.collections[0].get_paths()[0].vertices[:, 1]
     low, high = tracks()["estimate_low_cad"][0], tracks()["estimate_high_cad"][0]
     assert (band.min(), band.max()) == pytest.approx((float(low.min()), float(high.max())))
-    assert len(plot.convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
+    assert len(convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
     with pytest.raises(DataError, match="must be cycle and one more"):
-        plot.convergence(tracks().isel(case=0, drop=True))
+        convergence(tracks().isel(case=0, drop=True))
     many = tracks().isel(case=[0, 1] * 6).assign_coords(case=("case", list("abcdefghijkl"), tracks()["case"].attrs))
     with pytest.raises(DataError, match="case has 12 entries: at most 9"):
-        plot.convergence(many)
+        convergence(many)
 
 
 def test_sensors_over_cycles_timing_and_temperature():

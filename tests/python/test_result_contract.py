@@ -27,6 +27,7 @@ from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.loop import EngineBench, SurrogatePlant, run_seeker, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
+from mgdd.plot.convergence import convergence
 from mgdd.plot.response import response_diagnostics
 from mgdd.results.labels import check_labels
 from mgdd.results.result import Result
@@ -205,7 +206,11 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
 }
 
 
-DRAWN_BY = {"response_diagnostics": response_diagnostics, "log_pv": partial(plot.pressure, log_pv=True)}
+DRAWN_BY = {
+    "convergence": convergence,
+    "response_diagnostics": response_diagnostics,
+    "log_pv": partial(plot.pressure, log_pv=True),
+}
 
 
 class Drawn(Result):

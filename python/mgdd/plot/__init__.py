@@ -7,7 +7,6 @@ title use the figure's `suptitle`.
 
 from __future__ import annotations
 
-from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import pressure
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
@@ -19,7 +18,6 @@ from mgdd.plot.timing import timing
 from mgdd.plot.trade_off import trade_off
 
 __all__ = [
-    "convergence",
     "correlation_matrix",
     "holding_duty",
     "map_cells",

@@ -49,7 +49,7 @@ def convergence(tracks: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import numpy as np
     >>> import xarray as xr
-    >>> from mgdd import plot
+    >>> from mgdd.plot.convergence import convergence
     >>> cycle, angle = np.arange(200), {"units": "degree", "long_name": "estimate, °CA aTDC"}
     >>> estimates = [-14.0 * np.exp(-cycle / t) - 6.0 for t in (80.0, 20.0)]
     >>> tracks = xr.Dataset(
@@ -59,7 +59,7 @@ def convergence(tracks: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     ...         "case": ("case", ["slow", "fast"], {"units": "1", "long_name": "case"}),
     ...     },
     ... )
-    >>> plot.convergence(tracks).get_ylabel()
+    >>> convergence(tracks).get_ylabel()
     'estimate [°CA aTDC]'
     """
     optional = (*_BAND, "optimum_cad")

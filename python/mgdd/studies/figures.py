@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import plot
+from mgdd.plot.convergence import convergence
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +60,7 @@ def convergence_panels(panels: Sequence[tuple[str, xr.Dataset]], *, height: floa
     figure = new_figure(11.0, height)
     axes = figure.subplots(-(-len(panels) // columns), columns, sharex=True, sharey=True, squeeze=False)
     for place, (ax, (title, tracks)) in enumerate(zip(axes.flat, panels, strict=False)):
-        plot.convergence(tracks, ax=ax)
+        convergence(tracks, ax=ax)
         ax.get_legend().remove()
         ax.set_title(title, loc="left", fontsize="small")
         ax.set(xlabel="", ylabel="")

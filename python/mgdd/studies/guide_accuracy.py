@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import plot
 from mgdd.engine import OperatingPoint
 from mgdd.guide import Curve, FeedForward
 from mgdd.loop import EngineBench, SensorDynamics
+from mgdd.plot.convergence import convergence
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd.studies.figures import grey_band, names_of, new_figure
@@ -375,7 +375,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         own = dataset[[*names, "optimum_after_cad"]].sel(run=kept).rename(optimum_after_cad="optimum_cad")
         labels = [name.partition(", ")[2] for name in kept]
         own = own.assign_coords(run=("run", labels, dataset["run"].attrs))
-        plot.convergence(own, ax=ax)
+        convergence(own, ax=ax)
         ax.annotate(f"guide as {form}", (0.98, 0.96), xycoords="axes fraction", ha="right", va="top")
         ax.set_xlabel("engine cycle since the load step [-]")
     out = {"Load step from 12 to 30 mg: median of the estimate over the seeds, and the band of 80 % of them": figure}

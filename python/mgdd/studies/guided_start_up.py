@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import plot
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve
 from mgdd.loop import EngineBench
+from mgdd.plot.convergence import convergence
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Parts, Progress, StudyResult, check_seeds
@@ -264,7 +264,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     own = dataset[[*sorted(names), "optimum_cad"]].sel(guide=kept)
     out = {
         "Feed-forward: median of the estimate over the seeds, and the band that holds 80 % of them": drawn(
-            plot.convergence, own, size=(7.4, 4.2)
+            convergence, own, size=(7.4, 4.2)
         )
     }
     if "case" not in dataset:

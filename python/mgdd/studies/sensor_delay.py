@@ -14,6 +14,7 @@ from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking
 from mgdd.optimize.by_curvature import approach_gain
 from mgdd.optimize.optimum import Optimum
+from mgdd.plot.convergence import convergence
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.units import unit_attributes
@@ -228,7 +229,6 @@ def _dataset(
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from mgdd import plot
 
     groups = (
         ("Without delay, and with an analyser that turns the dither: the sign of the step decides", [0, 1, 2, 3], 1000),
@@ -238,7 +238,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     for caption, places, cycles in groups:
         kept = [place for place in places if place < dataset.sizes["case"]]
         if kept:
-            out[caption] = drawn(plot.convergence, dataset.isel(case=kept, cycle=slice(cycles)), size=(7.4, 4.2))
+            out[caption] = drawn(convergence, dataset.isel(case=kept, cycle=slice(cycles)), size=(7.4, 4.2))
     if "component_median_cad" in dataset:
         own = dataset[["component_median_cad", "component_low_cad", "component_high_cad", "optimum_cad"]]
         names = {f"component_{name}_cad": f"estimate_{name}_cad" for name in ("median", "low", "high")}
@@ -246,6 +246,6 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         labels = [f"period {int(period)}" for period in own["case"].to_numpy()]
         own = own.assign_coords(case=("case", labels, unit_attributes("-", "case")))
         out["Only NOx is late, each component demodulated with its own phase; default noise"] = drawn(
-            plot.convergence, own.isel(cycle=slice(2000)), size=(7.4, 4.2)
+            convergence, own.isel(cycle=slice(2000)), size=(7.4, 4.2)
         )
     return out
