@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from mgdd.errors import DataError
 
-if TYPE_CHECKING:
-    from mgdd.io.table import TextTable
-
-__all__ = ["Heading", "check_choice", "heading", "headings", "spelled_unit", "unit_text"]
+__all__ = ["Heading", "check_choice", "heading", "spelled_unit", "unit_text"]
 
 # Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
 _SPELLINGS = {
@@ -139,15 +136,6 @@ def _ratio(name: str) -> str | None:
         return None
     below = last.partition("/")[2]
     return below if _known(last) is None and _known(below) is not None else last
-
-
-def headings(table: TextTable) -> list[Heading]:
-    """Read header and units row of a table, column by column."""
-    names = table.header or ("",) * table.width
-    return [
-        heading(name, table.unit(index), where=f"{table.source}, {table.called(index)}")
-        for index, name in enumerate(names)
-    ]
 
 
 def spelled_unit(text: str) -> str | None:

@@ -108,7 +108,7 @@ def _of_csv(table: TextTable, names: Sequence[str] | None, always: Collection[st
     columns = {own[place]: table.numbers(place) for place in places}
     if not columns:
         raise DataError(f"{table.source}: no column of numbers")
-    rows = len(table.lines)
+    rows = table.height
     numbers = table.numbers(own.index(POINT)) if POINT in own else np.arange(float(rows))
     variables: dict[str, tuple[object, ...]] = {POINT: (POINT, numbers, "-", "number of the point")}
     for place in places:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, argument
+from mgdd.io.any_table import read_any_table
 from mgdd.io.column_names import Heading, heading
 from mgdd.io.pressure_checks import pair
 from mgdd.io.pressure_file import Reading, checked, cycles_of, odd_shape
-from mgdd.io.table import read_table
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
@@ -113,11 +113,13 @@ def read_pressure(
     delimiter: str | None = None,
     decimal: str = ".",
 ) -> xr.Dataset:
-    r"""Read the measured pressure of one cylinder, one cycle or many, from a text file.
+    r"""Read the measured pressure of one cylinder, one cycle or many, from a file.
 
-    The file holds columns separated by comma, semicolon, tab or blanks; a header line and a line of units
-    may come first; empty lines and lines that start with ``#`` are skipped. Several cycles stand in columns, one below
-    the other (the angle returns to its start), or with angles that run on. The page "Formats" has a table of forms.
+    Text holds columns separated by comma, semicolon, tab or blanks; lines of names and units may come first, and a
+    preamble above them; empty lines and lines that start with ``#`` are skipped. MATLAB, HDF5, TDMS, MDF, Parquet,
+    NumPy and XLSX files are known by their content; a matrix stands for one column per cycle. Several cycles stand in
+    columns, one below the other (the angle returns to its start), or with angles that run on. The page "Formats" has a
+    table of forms.
 
     Parameters
     ----------
@@ -201,7 +203,7 @@ def read_pressure(
         gain_bar_per_v=gain_bar_per_v,
         offset_bar=offset_bar,
     )
-    angle, pressure, speed, warnings = cycles_of(read_table(path, delimiter=delimiter, decimal=decimal), how)
+    angle, pressure, speed, warnings = cycles_of(read_any_table(path, delimiter=delimiter, decimal=decimal), how)
     attrs: dict[str, str | float] = {"file": Path(path).name, "warnings": "\n".join(warnings)}
     if speed is not None:
         attrs["speed_rpm"] = float(speed)

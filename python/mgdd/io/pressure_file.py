@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.column_names import Heading, check_choice, headings
+from mgdd.io.column_names import Heading, check_choice, heading
 from mgdd.io.cycle_phase import CYCLE_DEG, phase_warnings, repetition
 from mgdd.io.cycles import arranged
 from mgdd.io.pressure_checks import (
@@ -20,7 +20,7 @@ from mgdd.io.pressure_checks import (
     level_warning,
     steep_warning,
 )
-from mgdd.io.table import Place, TextTable
+from mgdd.io.table import Place, Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -77,11 +77,9 @@ class Reading:
                 )
 
 
-def cycles_of(
-    table: TextTable, how: Reading
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float | None, list[str]]:
+def cycles_of(table: Table, how: Reading) -> tuple[NDArray[np.float64], NDArray[np.float64], float | None, list[str]]:
     """Return angle [°CA aTDC], pressures [bar] as (cycle, angle), the speed [rpm] of a time, and warnings."""
-    heads = headings(table)
+    heads = _headings(table)
     index, degrees, unit, made = _angle(table, heads, how)
     columns = _choose_pressure(table, heads, how.pressure_column, index)
     gain = how.gain_bar_per_v
@@ -156,13 +154,20 @@ def checked(
     return angle, np.atleast_2d(bar), notes + doubts
 
 
-def _angle(
-    table: TextTable, heads: Sequence[Heading], how: Reading
-) -> tuple[int | None, NDArray[np.float64], str, bool]:
+def _headings(table: Table) -> list[Heading]:
+    """Read header and units row of a table, column by column."""
+    names = table.header or ("",) * table.width
+    return [
+        heading(name, table.unit(index), where=f"{table.source}, {table.called(index)}")
+        for index, name in enumerate(names)
+    ]
+
+
+def _angle(table: Table, heads: Sequence[Heading], how: Reading) -> tuple[int | None, NDArray[np.float64], str, bool]:
     """Return column, degrees, the unit that they came in, and whether they were made from a step or a time."""
     if how.angle_step_deg is not None:
         _check_start(table.source, "a count of samples", how)
-        count = np.arange(len(table.lines), dtype=np.float64)
+        count = np.arange(table.height, dtype=np.float64)
         return None, (how.angle_start_deg or 0.0) + how.angle_step_deg * count, "deg", True
     index, unit = _choose_angle(table, heads, how.angle_column, how.angle_unit)
     called = f"{table.source}: {table.called(index)}"
@@ -218,7 +223,7 @@ def _check_range(name: str, value: float | None, low: float, high: float) -> Non
 
 
 def _choose_angle(
-    table: TextTable, heads: Sequence[Heading], column: int | str | None, unit: str | None
+    table: Table, heads: Sequence[Heading], column: int | str | None, unit: str | None
 ) -> tuple[int, str]:
     """Return the column of the angle, or of the time, and its unit."""
     index = table.index(0 if column is None else column)
@@ -254,7 +259,7 @@ def _choose_angle(
 
 
 def _choose_pressure(
-    table: TextTable,
+    table: Table,
     heads: Sequence[Heading],
     column: int | str | Sequence[int | str] | None,
     angle: int | None,
@@ -287,9 +292,7 @@ def _choose_pressure(
     return possible
 
 
-def _check_alike(
-    table: TextTable, columns: Sequence[int], degrees: NDArray[np.float64], rows: NDArray[np.float64]
-) -> None:
+def _check_alike(table: Table, columns: Sequence[int], degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
     """Refuse columns of which one differs in shape from the first as no other cycle of the cylinder would."""
     odd = odd_shape(degrees, rows)
     if odd is not None:
@@ -311,7 +314,7 @@ def odd_shape(degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> int | 
 
 
 def _unit_of_pressure(
-    table: TextTable, heads: Sequence[Heading], columns: Sequence[int], unit: str | None, *, gain: bool
+    table: Table, heads: Sequence[Heading], columns: Sequence[int], unit: str | None, *, gain: bool
 ) -> tuple[str, bool]:
     """Return the unit of the pressure columns, and whether the file says it; volts need a gain."""
     said = {heads[i].unit for i in columns}
@@ -362,7 +365,7 @@ def _counts(values: NDArray[np.float64]) -> bool:
     return bool(steps.size and steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0.0))
 
 
-def _doubtful(table: TextTable, columns: Sequence[int], what: str) -> DataError:
+def _doubtful(table: Table, columns: Sequence[int], what: str) -> DataError:
     names = [repr(table.header[i]) if table.header else str(i) for i in columns]
     shown = ", ".join(names if len(names) <= 8 else [*names[:6], "...", names[-1]])
     return DataError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError, argument
+from mgdd.io.column_names import spelled_unit
 from mgdd.io.files import existing_file, read_plain_text, write_whole_text
 from mgdd.results.labels import check_labels
 from mgdd.results.units import unit_of
@@ -25,14 +27,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Place",
+    "Table",
     "TextTable",
     "parse_number",
     "read_table",
+    "text_table",
     "write_columns",
     "write_traces",
 ]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
+_ROWS = 4  # of one width, one below the other, are data
 _COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
 
 
@@ -69,26 +74,40 @@ class Place:
 
 
 @dataclass(frozen=True)
-class TextTable:
-    """Rows as text, with the line number (from 1) of each."""
+class Table(ABC):
+    """Columns of a file, called by position from 0 or by the name in the header."""
 
     source: str
-    decimal: str
     header: tuple[str, ...] | None
     units: tuple[str, ...] | None
-    mark: str | None
-    texts: tuple[str, ...]
-    lines: tuple[int, ...]
 
-    @cached_property
-    def rows(self) -> tuple[tuple[str, ...], ...]:
-        """Return the cells as text."""
-        return tuple(_cells(text, self.mark) for text in self.texts)
+    @property
+    def lines(self) -> tuple[int, ...] | None:
+        """Return the line (from 1) of each row; None where a file has no lines."""
+        return None
 
-    @cached_property
+    @property
+    @abstractmethod
     def width(self) -> int:
-        """Return the number of columns, which every row has."""
-        return len(_cells(self.texts[0], self.mark)) if self.texts else len(self.header or ())
+        """Return the number of columns."""
+
+    @property
+    @abstractmethod
+    def height(self) -> int:
+        """Return the number of rows."""
+
+    @abstractmethod
+    def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
+        """Return columns as the rows of an array, or name the first bad cell."""
+
+    def numeric(self, indices: Sequence[int]) -> list[int]:
+        """Return the columns in which any cell holds a number."""
+        return list(indices)
+
+    def numbers(self, index: int) -> NDArray[np.float64]:
+        """Return a column as float64, or name the first bad cell."""
+        values: NDArray[np.float64] = self.matrix([index])[0]
+        return values
 
     def index(self, column: int | str) -> int:
         """Return the position of a column given by position (from 0) or header name."""
@@ -128,16 +147,41 @@ class TextTable:
         """Return what a message calls a column: its name in the header, or its number."""
         return f"column {index}" if self.header is None else f"column {self.header[index]!r}"
 
+
+@dataclass(frozen=True)
+class TextTable(Table):
+    """Rows as text, with the line number (from 1) of each."""
+
+    decimal: str
+    mark: str | None
+    texts: tuple[str, ...]
+    numbered: tuple[int, ...]
+
+    @property
+    def lines(self) -> tuple[int, ...]:
+        """Return the line (from 1) of each row."""
+        return self.numbered
+
+    @property
+    def height(self) -> int:
+        """Return the number of rows."""
+        return len(self.texts)
+
+    @cached_property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """Return the cells as text."""
+        return tuple(_cells(text, self.mark) for text in self.texts)
+
+    @property
+    def width(self) -> int:
+        """Return the number of columns, which every row has."""
+        return len(_cells(self.texts[0], self.mark)) if self.texts else len(self.header or ())
+
     def numeric(self, indices: Sequence[int]) -> list[int]:
         """Return the columns in which any cell holds a number."""
         if not indices or self._fast(indices) is not None:
             return list(indices)
         return [i for i in indices if any(parse_number(row[i], self.decimal) is not None for row in self.rows)]
-
-    def numbers(self, index: int) -> NDArray[np.float64]:
-        """Return a column as float64, or name the first bad cell with line, column and value."""
-        values: NDArray[np.float64] = self.matrix([index])[0]
-        return values
 
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns as the rows of an array, or name the first bad cell."""
@@ -194,36 +238,79 @@ def read_table(
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
     file = existing_file(path)
+    return text_table(str(file), read_plain_text(path), delimiter=delimiter, decimal=decimal, units_row=units_row)
+
+
+def text_table(
+    source: str, text: str, *, delimiter: str | None = None, decimal: str = ".", units_row: bool = True
+) -> TextTable:
+    """Take a text for a table, as `read_table` does; messages call it by its source."""
     content = [
         (number, line.strip())
-        for number, line in enumerate(read_plain_text(path).splitlines(), start=1)
+        for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not content:
-        raise DataError(f"{file}: the file is empty: rows of numbers are needed")
-    mark = delimiter if delimiter is not None else _detect(content[0][1], decimal)
-    heads: list[tuple[str, ...]] = []
-    start = 0
-    if not units_row:
-        heads.append(_cells(content[0][1], mark))  # the caller's tables have a header, and a row of empty cells is data
-        start = 1
-    while units_row and start < min(2, len(content)) and _is_head(_cells(content[start][1], mark)):
-        heads.append(_cells(content[start][1], mark))
-        start += 1
+        raise DataError(f"{source}: the file is empty: rows of numbers are needed")
+    start = _first_row(content, delimiter, decimal) if units_row else 1  # tables of ours have one line of names
+    shown = content[min(start, len(content) - 1) if units_row else 0][1]
+    mark = delimiter if delimiter is not None else _detect(shown, decimal)
+    heads = [_cells(row, mark) for _, row in content[:start]]
     body = content[start:]
     if not body and units_row:
-        raise DataError(f"{file}: no numeric rows below the header: rows of numbers are needed")
+        raise DataError(f"{source}: no numeric rows below the header: rows of numbers are needed")
     width = _width(body[0][1], mark) if body else len(heads[0])
-    for number, text in body:
-        if _width(text, mark) != width:
+    for number, row in body:
+        if _width(row, mark) != width:
             raise DataError(
-                f"{file}, line {number}: {_width(text, mark)} cell(s) where line {body[0][0]} has {width}: "
+                f"{source}, line {number}: {_width(row, mark)} cell(s) where line {body[0][0]} has {width}: "
                 "every row needs the same columns"
             )
-    header = heads[0] if heads and len(heads[0]) == width else None
-    units = heads[1] if len(heads) == 2 else None
+    header, units = _names_and_units(heads, width)
     lines, texts = zip(*body, strict=True) if body else ((), ())
-    return TextTable(str(file), decimal, header, units, mark, texts, lines)
+    return TextTable(source, header, units, decimal, mark, texts, lines)
+
+
+def _first_row(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> int:
+    """Return where the rows of numbers begin: names, units, remarks and the lines of a preamble stand above them."""
+    for at, (_, text) in enumerate(content):
+        mark = delimiter if delimiter is not None else _detect(text, decimal)
+        cells, below = _cells(text, mark), content[at + 1 : at + _ROWS]
+        if _is_head(cells):
+            continue
+        if _like_number(cells[0]) or not _has_head(content[at + 1 :], delimiter, decimal):
+            return at  # one of another width is refused by its line
+        above = _cells(content[at - 1][1], mark) if at else ()
+        named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
+        if named and all(_width(row, mark) == len(cells) for _, row in below):
+            return at
+    return len(content)
+
+
+def _has_head(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> bool:
+    marks = ((text, delimiter if delimiter is not None else _detect(text, decimal)) for _, text in content)
+    return any(_is_head(_cells(text, mark)) for text, mark in marks)
+
+
+def _names_and_units(
+    heads: Sequence[tuple[str, ...]], width: int
+) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None]:
+    """Choose the lines above the rows that name the columns and their units; the others are remarks."""
+    whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
+    aligned = [cells[len(cells) - width :] for cells in whole if len(cells) == width or cells[0] == "X_Value"]
+    if len(heads) <= 2 and (len(aligned) == len(heads) or len(heads) == 1):
+        return next(iter(aligned), None), heads[1] if len(heads) == 2 else None
+    rows = [at for at, cells in enumerate(aligned) if at and _spells_units(cells)]
+    if rows:
+        return aligned[rows[-1] - 1], aligned[rows[-1]]
+    return (aligned[-1] if aligned else None), None
+
+
+def _spells_units(cells: Sequence[str]) -> bool:
+    texts = [cell.strip("[](){} ") for cell in cells]
+    known = [spelled_unit(text) is not None for text in texts if text]
+    bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
+    return (bool(known) and all(known)) or (bool(bracketed) and all(bracketed))
 
 
 def _cells(text: str, mark: str | None) -> tuple[str, ...]:

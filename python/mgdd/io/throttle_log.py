@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError, argument
-from mgdd.io.binary_files import read_mat
+from mgdd.io.any_table import read_any_table
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
-from mgdd.io.files import existing_file
-from mgdd.io.table import Place, TextTable, read_table
+from mgdd.io.table import Place, Table
 from mgdd.io.throttle_checks import check_even, check_samples, check_signals
 from mgdd.results.labels import labelled_dataset
 
@@ -209,14 +208,7 @@ def _read(
     called: dict[str, str] = {}
     units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
-    if existing_file(path).suffix.lower() == ".mat":
-        mat = read_mat(path)
-        for key, column in wanted.items():
-            chosen = key if column is None and mat.has(key) else column
-            if chosen is not None:
-                columns[key], called[key] = mat.numbers(chosen), repr(chosen)
-        return columns, Place(mat.source, columns=called), units
-    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    table = read_any_table(path, delimiter=delimiter, decimal=decimal)
     for key, column in wanted.items():
         chosen = key if column is None and key in (table.header or ()) else column
         if chosen is not None:
@@ -226,7 +218,7 @@ def _read(
     return columns, Place(table.source, table.lines, called), units
 
 
-def _unit_of_column(key: str, asked: str | None, table: TextTable, index: int) -> str:
+def _unit_of_column(key: str, asked: str | None, table: Table, index: int) -> str:
     """Return what the file says, else what is asked for, else the usual unit; the first two must agree."""
     said, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
     units = _UNITS[key]

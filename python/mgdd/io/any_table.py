@@ -1,0 +1,269 @@
+"""Columns of any file that a test bench or a program writes: text, MATLAB, HDF5, TDMS, MDF and others, by content.
+
+Every reader gives the columns under the names and with the units that the file gives them, never resampled.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.io.binary_files import read_netcdf
+from mgdd.io.extras import import_extra
+from mgdd.io.files import existing_file
+from mgdd.io.table import Table, parse_number, read_table, text_table
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+__all__ = ["ArrayTable", "read_any_table"]
+
+_HEAD = 128  # bytes that tell a format
+
+
+class _Column(NamedTuple):
+    name: str
+    values: NDArray[Any]
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ArrayTable(Table):
+    """Columns of a binary file; those of several rasters differ in length."""
+
+    columns: tuple[NDArray[Any], ...]
+
+    @property
+    def width(self) -> int:
+        """Return the number of columns."""
+        return len(self.columns)
+
+    @property
+    def height(self) -> int:
+        """Return the number of rows of the first column."""
+        return len(self.columns[0])
+
+    def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
+        """Return columns of one length as the rows of an array."""
+        lengths = {len(self.columns[index]) for index in indices}
+        if len(lengths) > 1:
+            sizes = ", ".join(f"{self.called(index)} has {len(self.columns[index])}" for index in indices)
+            raise DataError(f"{self.source}: columns of different rasters, {sizes}: name columns of one")
+        return np.array([self.columns[index] for index in indices], np.float64)
+
+
+def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> Table:
+    """Read the columns of a file by its content, whatever its name.
+
+    Text (also with a preamble, as of LabVIEW or INCA), MATLAB 4 to 7.3, HDF5 and netCDF, TDMS, MDF 3 and 4, Parquet,
+    NPY and NPZ, XLSX. ``delimiter`` and ``decimal`` are those of `read_table`, for text.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    mgdd.errors.DataError
+        Nothing with numbers in it, or a file that its own library cannot read.
+    ImportError
+        The extra that reads the format is not installed; the message names it.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from mgdd.io.any_table import read_any_table
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "log.npz"
+    ...     np.savez(file, time_s=np.arange(3.0), duty=np.zeros(3))
+    ...     table = read_any_table(file)
+    >>> table.header, table.numbers(0).tolist()
+    (('time_s', 'duty'), [0.0, 1.0, 2.0])
+    """
+    file = existing_file(path)
+    with file.open("rb") as stream:
+        head = stream.read(_HEAD)
+    reader = _reader_of(head, file)
+    if reader is None:
+        return read_table(path, delimiter=delimiter, decimal=decimal)
+    try:
+        found = reader(file)
+        if isinstance(found, Table):
+            return found
+        columns = [each for each in found if each.values.size]
+    except (ImportError, DataError):
+        raise
+    except Exception as error:  # of another library: any class
+        text = f"{type(error).__name__} {error}".strip()
+        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error
+    if not columns:
+        raise DataError(f"{file}: no column of numbers")
+    names = tuple(each.name for each in columns)
+    units = tuple(each.unit for each in columns)
+    header = None if not any(names) else names
+    return ArrayTable(str(file), header, units if any(units) else None, tuple(each.values for each in columns))
+
+
+def _reader_of(head: bytes, file: Path) -> Callable[[Path], Table | Iterable[_Column]] | None:
+    starts: dict[bytes, Callable[[Path], Table | Iterable[_Column]]] = {
+        b"MATLAB 7.3": _of_hdf5, b"MATLAB": _of_matlab, b"\x89HDF": _of_hdf5, b"CDF": _of_netcdf,
+        b"\x93NUMPY": _of_numpy, b"TDSm": _of_tdms, b"MDF ": _of_mdf, b"UnFinMF": _of_mdf, b"PAR1": _of_parquet,
+        b"PK\x03\x04": _of_zip,
+    }  # fmt: skip
+    found = next((reader for start, reader in starts.items() if head.startswith(start)), None)
+    if found is None and file.suffix.lower() == ".mat":
+        return _of_matlab  # of version 4, which has no mark
+    return found
+
+
+def _flat(arrays: Iterable[_Column]) -> Iterator[_Column]:
+    """Give vectors as they are, and a matrix column by column: along the samples of a vector, else its longer side."""
+    found = [each._replace(values=np.squeeze(each.values)) for each in arrays]
+    found = [each for each in found if each.values.dtype.kind in "fiub" and each.values.ndim in (1, 2)]
+    lengths = {len(each.values) for each in found if each.values.ndim == 1}
+    for each in found:
+        if each.values.ndim == 1:
+            yield each
+            continue
+        rows, columns = each.values.shape
+        turned = rows not in lengths and (columns in lengths or columns > rows)
+        for number, values in enumerate(each.values if turned else each.values.T, start=1):
+            yield each._replace(name=f"{each.name} {number}".strip(), values=values)
+
+
+def _of_matlab(file: Path) -> Iterator[_Column]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(file, squeeze_me=True, struct_as_record=False)
+    except Exception as error:
+        raise DataError(f"{file}: not a MATLAB file: {error}: save it with save(..., '-v7') or as CSV") from error
+    return _flat(
+        column for name, value in content.items() if not name.startswith("__") for column in _of_struct(name, value)
+    )
+
+
+def _of_struct(name: str, value: Any) -> Iterator[_Column]:
+    for field in getattr(value, "_fieldnames", ()):
+        yield from _of_struct(f"{name}.{field}", getattr(value, field))
+    if isinstance(value, np.ndarray):
+        yield _Column(name, value)
+
+
+def _of_hdf5(file: Path) -> Iterator[_Column]:
+    h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
+    found: list[_Column] = []
+    with h5py.File(file, "r") as content:
+        matlab = any("MATLAB_class" in item.attrs for item in content.values())
+
+        def visit(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" and not name.startswith("#"):
+                values = item[()]
+                unit = next((item.attrs[key] for key in ("units", "unit") if key in item.attrs), "")
+                unit = unit.decode() if isinstance(unit, bytes) else str(unit)
+                turned = np.transpose(values) if matlab else np.asarray(values)  # MATLAB writes columns first
+                found.append(_Column(name.replace("/", "."), turned, unit))
+
+        content.visititems(visit)
+    return _flat(found)
+
+
+def _of_netcdf(file: Path) -> Iterator[_Column]:
+    dataset = read_netcdf(file)
+    return _flat(
+        _Column(str(name), dataset[name].to_numpy(), str(dataset[name].attrs.get("units", "")))
+        for name in dataset.variables
+    )
+
+
+def _of_numpy(file: Path) -> Iterator[_Column]:
+    content = np.load(file, allow_pickle=False)
+    if isinstance(content, np.ndarray):
+        named = content.dtype.names
+        return _flat([_Column(name, content[name]) for name in named] if named else [_Column("", content)])
+    with content:
+        return _flat([_Column(name, content[name]) for name in content.files])
+
+
+def _of_tdms(file: Path) -> Iterator[_Column]:
+    nptdms = import_extra("nptdms", "formats", "a TDMS file")
+    content = nptdms.TdmsFile.read(file)
+    if content.file_status.incomplete_final_segment:
+        warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
+    channels = [channel for group in content.groups() for channel in group.channels()]
+    found: list[_Column] = []
+    for channel in channels:
+        alone = sum(other.name == channel.name for other in channels) == 1
+        name = channel.name if alone else f"{channel.group_name}.{channel.name}"
+        timed = "wf_increment" in channel.properties and len(channel)
+        if timed and not any(len(each.values) == len(channel) and each.unit == "s" for each in found):
+            found.append(_Column(f"time ({name})" if found else "time", channel.time_track(), "s"))
+        unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
+        found.append(_Column(name, np.asarray(channel[:]), str(unit)))
+    return _flat(found)
+
+
+def _of_mdf(file: Path) -> Iterator[_Column]:
+    asammdf = import_extra("asammdf", "mdf", "an MDF file")
+    found: list[_Column] = []
+    with asammdf.MDF(file) as content:
+        for number in range(len(content.groups)):
+            for signal in content.select([(None, number, k) for k in _channels(content, number)]):
+                if not any(np.array_equal(each.values, signal.timestamps) for each in found if each.unit == "s"):
+                    found.append(_Column(f"time {number}" if found else "time", signal.timestamps, "s"))
+                found.append(_Column(signal.name, signal.samples, signal.unit))
+    return _flat(found)
+
+
+def _channels(content: Any, number: int) -> list[int]:
+    master = content.masters_db.get(number)
+    return [k for k in range(len(content.groups[number].channels)) if k != master]
+
+
+def _of_parquet(file: Path) -> Iterator[_Column]:
+    parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
+    table = parquet.read_table(file)
+    notes = {field.name: field.metadata or {} for field in table.schema}
+    return _flat(
+        _Column(name, table[name].to_numpy(), (notes[name].get(b"units") or notes[name].get(b"unit") or b"").decode())
+        for name in table.column_names
+    )
+
+
+def _of_zip(file: Path) -> Table | Iterable[_Column]:
+    with zipfile.ZipFile(file) as archive:
+        sheets = "[Content_Types].xml" in archive.namelist()
+    return _of_xlsx(file) if sheets else _of_numpy(file)
+
+
+def _of_xlsx(file: Path) -> Table:
+    """Read the first sheet that holds a number as a text with tabs, with its lines of names."""
+    openpyxl = import_extra("openpyxl", "formats", "an XLSX file")
+    book = openpyxl.load_workbook(io.BytesIO(file.read_bytes()), read_only=True, data_only=True)
+    for sheet in book.worksheets:
+        rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
+        width = max((1 + k for row in rows for k, cell in enumerate(row) if cell), default=0)
+        if any(isinstance(cell, int | float) for row in sheet.iter_rows(values_only=True) for cell in row):
+            text = "\n".join("\t".join(_filled(row[:width])) for row in rows if any(row))
+            return text_table(f"{file}, sheet {sheet.title!r}", text, delimiter="\t")
+    raise DataError(f"{file}: no sheet has a number in it")
+
+
+def _filled(row: list[str]) -> list[str]:
+    """Mark empty cells: a tab at an end of the line would be lost."""
+    mark = "nan" if any(parse_number(cell) is not None for cell in row) else "-"
+    return [cell or mark for cell in row]
+
+
+def _as_text(cell: Any) -> str:
+    return repr(float(cell)) if isinstance(cell, int | float) else str(cell).replace("\t", " ").replace("\n", " ")

@@ -1,0 +1,275 @@
+"""Files of every format, written by its own library, read back equal; text with what stands above the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.errors import DataError
+from mgdd.io import read_pressure, read_throttle_log
+from mgdd.io.any_table import read_any_table
+
+# asammdf closes twice what it could not open.
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+ANGLE = np.arange(-180.0, 180.0, 0.5)
+CYCLES = np.array([40.0 + 0.1 * k + (20.0 + k) * np.exp(-(((ANGLE - 8.0) / 30.0) ** 2)) for k in range(3)])
+TIME = np.arange(0.0, 2.0, 0.001)
+LOG = {"time_s": TIME, "duty": 0.1 + 0.05 * np.sin(9.0 * TIME), "angle_deg": 20.0 + 3.0 * np.cos(9.0 * TIME)}
+
+
+def write_mat5(file: Path, names: dict[str, Any], _: dict[str, str]) -> None:
+    from scipy.io import savemat
+
+    savemat(file, names)
+
+
+def write_mat73(file: Path, names: dict[str, Any], _: dict[str, str]) -> None:
+    """Write what MATLAB writes: HDF5 behind 512 bytes of text, columns first."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(file, "w", userblock_size=512) as content:
+        for name, values in names.items():
+            item = content.create_dataset(
+                name, data=np.atleast_2d(values) if np.ndim(values) == 1 else np.transpose(values)
+            )
+            item.attrs["MATLAB_class"] = np.bytes_("double")
+    with file.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+def write_hdf5(file: Path, names: dict[str, Any], units: dict[str, str]) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(file, "w") as content:
+        for name, values in names.items():
+            content[name] = values
+            content[name].attrs["units"] = units.get(name, "")
+
+
+def write_netcdf3(file: Path, names: dict[str, Any], units: dict[str, str]) -> None:
+    import xarray as xr
+
+    dims = {1: ("row",), 2: ("row", "cycle")}
+    data = {name: (dims[np.ndim(values)], values, {"units": units.get(name, "")}) for name, values in names.items()}
+    xr.Dataset(data).to_netcdf(file, engine="scipy")
+
+
+def write_npz(file: Path, names: dict[str, Any], _: dict[str, str]) -> None:
+    with file.open("wb") as stream:
+        np.savez(stream, **names)
+
+
+def flat(names: dict[str, Any]) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name, values in names.items():
+        out |= (
+            {name: values} if np.ndim(values) == 1 else {f"{name} {k + 1}": column for k, column in enumerate(values.T)}
+        )
+    return out
+
+
+def write_tdms(file: Path, names: dict[str, Any], units: dict[str, str]) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    of = {name: units.get(name.split(" ")[0], "") for name in flat(names)}
+    channels = [nptdms.ChannelObject("g", n, v, properties={"unit_string": of[n]}) for n, v in flat(names).items()]
+    with nptdms.TdmsWriter(str(file)) as writer:
+        writer.write_segment(channels)
+
+
+def write_parquet(file: Path, names: dict[str, Any], units: dict[str, str]) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    columns = flat(names)
+    fields = [
+        arrow.field(name, arrow.float64(), metadata={"units": units.get(name.split(" ")[0], "")}) for name in columns
+    ]
+    parquet.write_table(
+        arrow.Table.from_arrays(list(map(arrow.array, columns.values())), schema=arrow.schema(fields)), file
+    )
+
+
+def write_xlsx(file: Path, names: dict[str, Any], units: dict[str, str]) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book, columns = openpyxl.Workbook(), flat(names)
+    book.active.append(["Bench 4, Tuesday"])
+    sheet = book.create_sheet("data")
+    sheet.append([*columns])
+    sheet.append([units.get(name.split(" ")[0], "") for name in columns])
+    for row in zip(*columns.values(), strict=True):
+        sheet.append(list(map(float, row)))
+    book.save(file)
+
+
+def write_mdf(file: Path, names: dict[str, Any], units: dict[str, str]) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    columns = flat(names)
+    time = columns.pop("time_s", np.arange(len(next(iter(columns.values())))) * 0.01)
+    with asammdf.MDF(version="4.10") as content:
+        content.append([
+            asammdf.Signal(samples=values, timestamps=time, name=name, unit=units.get(name.split(" ")[0], ""))
+            for name, values in columns.items()
+        ])  # fmt: skip
+        content.save(file.with_suffix(".mf4")).rename(file)
+
+
+WRITERS: dict[str, Callable[[Path, dict[str, Any], dict[str, str]], None]] = {
+    "mat5": write_mat5, "mat73": write_mat73, "hdf5": write_hdf5, "netcdf3": write_netcdf3, "npz": write_npz,
+    "tdms": write_tdms, "parquet": write_parquet, "xlsx": write_xlsx, "mdf": write_mdf,
+}  # fmt: skip
+WITHOUT_UNITS = {"mat5", "mat73", "npz"}
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_cycles_of_a_pressure_read_back_equal(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "last_night"  # without an ending: by content alone
+    WRITERS[form](file, {"angle": ANGLE, "pcyl": 1e5 * CYCLES.T}, {"angle": "deg", "pcyl": "Pa"})
+    unit = "Pa" if form in WITHOUT_UNITS else None
+    trace = read_pressure(
+        file, angle_column="angle", pressure_unit=unit, pressure_column=[f"pcyl {k}" for k in (1, 2, 3)]
+    )
+    np.testing.assert_allclose(trace["pressure_bar"], CYCLES, rtol=1e-12)
+    np.testing.assert_allclose(trace["crank_angle_cad"], ANGLE, rtol=1e-12)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_log_of_a_throttle_reads_back_equal(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "log"
+    WRITERS[form](file, LOG, {"time_s": "s", "duty": "-", "angle_deg": "deg"})
+    names = {"time": "time"} if form == "mdf" else {}
+    log = read_throttle_log(file, **names)
+    for name in ("duty", "angle_deg"):
+        np.testing.assert_allclose(log[name], LOG[name], rtol=1e-12)
+    np.testing.assert_allclose(log["time_s"], TIME, rtol=1e-12)
+
+
+def test_a_waveform_of_tdms_gets_its_time(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    properties = {"wf_increment": 0.001, "wf_start_offset": 0.0, "wf_samples": len(TIME)}
+    channels = [nptdms.ChannelObject("g", name, LOG[name], properties=properties) for name in ("duty", "angle_deg")]
+    with nptdms.TdmsWriter(str(tmp_path / "w.tdms")) as writer:
+        writer.write_segment(channels)
+    table = read_any_table(tmp_path / "w.tdms")
+    assert table.header == ("time", "duty", "angle_deg")
+    np.testing.assert_allclose(table.numbers(0), TIME, rtol=1e-12)
+
+
+def test_rasters_of_mdf_keep_their_own_times(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        content.append([asammdf.Signal(samples=np.arange(5.0), timestamps=np.arange(5.0), name="speed", unit="rpm")])
+        content.save(tmp_path / "two.mf4")
+    table = read_any_table(tmp_path / "two.mf4")
+    assert table.header == ("time", "duty", "time 1", "speed")
+    assert [len(table.numbers(k)) for k in range(4)] == [2000, 2000, 5, 5]
+    with pytest.raises(DataError, match=r"columns of different rasters, column 'duty' has 2000, column 'speed' has 5"):
+        table.matrix([1, 3])
+
+
+def test_an_array_of_numpy_has_columns_by_number(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.column_stack([ANGLE, *CYCLES]))
+    trace = read_pressure(tmp_path / "a.npy", pressure_column=[1, 2, 3])
+    np.testing.assert_array_equal(trace["pressure_bar"], CYCLES)
+
+
+def test_a_struct_of_matlab_has_fields(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "s.mat", {"bench": {"angle": ANGLE, "p": CYCLES[0], "note": "warm"}})
+    assert set(read_any_table(tmp_path / "s.mat").header or ()) == {"bench.angle", "bench.p"}
+
+
+# --- what is no table ---------------------------------------------------------------------------------------
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_cut_file_is_refused_by_name(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "whole"
+    WRITERS[form](file, LOG, {"time_s": "s"})
+    whole = file.read_bytes()
+    for share in (0.3, 0.9):
+        file.write_bytes(whole[: int(share * len(whole))])
+        if form == "tdms":  # it is written piece by piece, and keeps what is whole
+            with pytest.warns(UserWarning, match="the record was cut off: its last samples are missing"):
+                table = read_any_table(file)
+            for name in table.header or ():
+                values = table.numbers(table.index(name))
+                np.testing.assert_allclose(values, LOG[name][: len(values)])
+        else:
+            with pytest.raises(DataError, match=f"{file}.*: "):
+                read_any_table(file)
+
+
+def test_a_missing_reader_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    (tmp_path / "x.tdms").write_bytes(b"TDSm" + bytes(200))
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    with pytest.raises(ImportError, match=r'a TDMS file needs nptdms: pip install "mgdd\[formats\]"'):
+        read_any_table(tmp_path / "x.tdms")
+
+
+# --- text ---------------------------------------------------------------------------------------------------
+ROWS = "\n".join(f"{a:.1f};{p:.6f}" for a, p in zip(ANGLE, CYCLES[0], strict=True))
+LABVIEW = """\
+LabVIEW Measurement\t
+Writer_Version\t2
+Separator\tTab
+X_Columns\tOne
+***End_of_Header***\t
+\t
+Channels\t2\t
+Samples\t4\t4\t
+Date\t2018/01/01\t2018/01/01\t
+X_Dimension\tTime\tTime\t
+X0\t0.0000000000000000E+0\t0.0000000000000000E+0\t
+Delta_X\t0.001000\t0.001000\t
+***End_of_Header***\t\t
+X_Value\tduty\tangle_deg\tComment
+0.000000\t0.10\t20.0
+0.001000\t0.12\t20.5
+0.002000\t0.14\t21.0
+0.003000\t0.16\t21.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("above", "header", "units"),
+    [
+        ("", None, None),
+        ("angle;p\n", ("angle", "p"), None),
+        ("angle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
+        ("angle;p\ndeg;bar\nencoder;sensor 2\n", ("angle", "p"), ("deg", "bar")),
+        ("Test 4\nangle;p\n[deg];[bar]\n", ("angle", "p"), ("[deg]", "[bar]")),
+        ("Operator;Smith\nEngine;V8\nangle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
+        ("speed = 1500\nload = 40 %\nangle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
+        ("Date;2018-01-01;3\nRun;17\n\nangle;p\n", ("angle", "p"), None),
+    ],
+)
+def test_what_stands_above_the_rows(above: str, header: Any, units: Any, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(above + ROWS)
+    table = read_any_table(tmp_path / "t.csv")
+    assert (table.header, table.units) == (header, units)
+    np.testing.assert_allclose(table.numbers(1), CYCLES[0], atol=1e-6)
+    assert len(table.lines or ()) == len(ANGLE)
+
+
+def test_labview_text(tmp_path: Path) -> None:
+    (tmp_path / "t.lvm").write_text(LABVIEW)
+    table = read_any_table(tmp_path / "t.lvm")
+    assert table.header == ("X_Value", "duty", "angle_deg")
+    assert table.matrix([0, 2]).tolist() == [[0.0, 0.001, 0.002, 0.003], [20.0, 20.5, 21.0, 21.5]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("angle;p\n1;2;3\n2;3\n3;4\n4;5\n", "line 3: 2 cell(s) where line 2 has 3"),
+        ("angle;p\n1;2\n2;x\n3;4\n4;5\n", "line 3, column 'p': 'x' is not a number"),
+        ("angle;p\nP1;20;35\nP2;3.5\nP3;4.5\nP4;5.5\n", "line 3: 2 cell(s) where line 2 has 3"),
+    ],
+)
+def test_a_bad_row_is_never_taken_for_a_preamble(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(DataError) as error:
+        read_any_table(tmp_path / "t.csv").numbers(1)
+    assert message in str(error.value)
