@@ -200,8 +200,9 @@ MODULE ?= throttle
 mutants: ready ## changed lines that the tests notice: make mutants MODULE=throttle (Python: mgdd.throttle)
 	$(ALOUD) $(PY) tools/mutate.py $(MODULE) --jobs $(JOBS) $(MUTANTS)
 
-docs: ready ## documentation, docs/_build/html
-	$(DEV) $(ALOUD) $(PY) -m sphinx -W -n --keep-going -q -b html docs docs/_build/html
+docs: SITE ?= docs/_build/html
+docs: ready ## documentation, docs/_build/html; one version of a site: SITE=FOLDER/0.1.0
+	$(DEV) $(ALOUD) $(PY) -m sphinx -W -n --keep-going -q -b html docs $(SITE)
 
 .PHONY: clean help
 clean: ## remove what these commands made

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import filecmp
+import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import mgdd
 
@@ -74,9 +76,31 @@ html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
+    # Each version lies in a folder of one site; `list_versions` writes the list of them beside the folders.
+    "switcher": {"json_url": "../switcher.json", "version_match": release},
+    "check_switcher": False,
+    "navbar_end": ["version-switcher", "theme-switcher"],
     "footer_start": ["copyright"],
     "footer_end": [],
 }
 html_show_sourcelink = False
+
+
+def list_versions(app: Any, error: Exception | None) -> None:
+    """List what lies beside this build, for the menu of versions: a build in SITE/0.1.0 is served as /0.1.0/."""
+    if error is None and app.builder.format == "html":
+        found = sorted(Path(app.outdir).parent.glob("*/objects.inv"))
+        heads = {each.parent.name: each.read_bytes().splitlines()[2].decode() for each in found}
+        text = json.dumps([
+            {"version": head.removeprefix("# Version: "), "url": f"/{folder}/"} for folder, head in heads.items()
+        ])  # fmt: skip
+        (Path(app.outdir).parent / "switcher.json").write_text(text, encoding="utf-8")
+
+
+def setup(app: Any) -> None:
+    """Let Sphinx call `list_versions`."""
+    app.connect("build-finished", list_versions)
+
+
 html_static_path = ["_static"]
 html_css_files = ["mgdd.css"]

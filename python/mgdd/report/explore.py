@@ -55,8 +55,8 @@ def explore(what: CylinderLike | CalibrationMap, point: PointLike | None = None)
     Examples
     --------
     >>> from mgdd.report import explore
-    >>> sliders, picture, text = explore("puma_single").children  # doctest: +SKIP
-    >>> sliders.children[0].value = -10.0  # as a hand does it  # doctest: +SKIP
+    >>> sliders, picture, text = explore("puma_single").children
+    >>> sliders.children[0].value = -10.0  # as a hand does it
     """
     if isinstance(what, CalibrationMap):
         ends = {name: (own[0], own[-1], 0.5 * (own[0] + own[-1])) for name, own in what.axes.items()}

@@ -72,9 +72,9 @@ def watch(
     Examples
     --------
     >>> from mgdd.rig import watch
-    >>> with watch() as page:  # doctest: +SKIP
-    ...     print(page.url)
-    http://127.0.0.1:41235/fvJ0c1bS9b0sFzZ1m7dU4Q
+    >>> with watch() as page:
+    ...     page.url.startswith("http://127.0.0.1:")
+    True
     """
     import_extra("bokeh", "watch", "a live page")
     words = ["--map", os.fspath(signal_map)] if signal_map is not None else []
