@@ -19,6 +19,7 @@ from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.extras import import_extra
 from mgdd.io.files import existing_file
+from mgdd.io.matlab_tags import check_tags
 from mgdd.io.table import Table, parse_number, read_table, text_table
 
 if TYPE_CHECKING:
@@ -144,6 +145,7 @@ def _flat(arrays: Iterable[_Column]) -> Iterator[_Column]:
 def _of_matlab(file: Path) -> Iterator[_Column]:
     from scipy.io import loadmat
 
+    check_tags(file.read_bytes(), str(file))
     try:
         content = loadmat(file, squeeze_me=True, struct_as_record=False)
     except Exception as error:
