@@ -19,6 +19,7 @@ import nbformat
 from PIL import Image
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+_WIDGET = "application/vnd.jupyter.widget-view+json"  # dead without its kernel
 _COLOURS = 32  # a figure of lines needs no more, and is a quarter as large
 
 
@@ -27,7 +28,7 @@ def executed(path: Path, folder: Path) -> Any:
     notebook = nbformat.read(path, as_version=4)
     resources = {"metadata": {"path": str(folder)}}
     client = nbclient.NotebookClient(
-        notebook, timeout=300, kernel_name="python3", record_timing=False, resources=resources
+        notebook, timeout=300, iopub_timeout=120, kernel_name="python3", record_timing=False, resources=resources
     )
     client.execute(env={**os.environ, "MPLBACKEND": "module://matplotlib_inline.backend_inline"})
     return notebook
@@ -61,7 +62,11 @@ def main() -> None:
             notebook = executed(path, Path(folder))
         for cell in notebook.cells:
             if cell.cell_type == "code":
-                shown = (each for each in cell.outputs if each.output_type != "stream" or each.name == "stdout")
+                shown = (
+                    each
+                    for each in cell.outputs
+                    if each.get("name") != "stderr" and _WIDGET not in each.get("data", {})
+                )
                 cell.outputs = [_kept(each) for each in shown]
         nbformat.write(notebook, path)
         print(path.name, path.stat().st_size // 1024, "kB")
