@@ -68,6 +68,7 @@ def main() -> None:
                     if each.get("name") != "stderr" and _WIDGET not in each.get("data", {})
                 )
                 cell.outputs = [_kept(each) for each in shown]
+        notebook.metadata.pop("widgets", None)
         nbformat.write(notebook, path)
         print(path.name, path.stat().st_size // 1024, "kB")
 
