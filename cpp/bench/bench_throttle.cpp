@@ -36,7 +36,7 @@ Throttle preset(std::int64_t form) {
 }
 
 void report(benchmark::State& state, double seconds) {
-  state.SetLabel(std::string(name_of(static_cast<Friction>(state.range(0)))));
+  state.SetLabel(std::string(mgdd::name_of(static_cast<Friction>(state.range(0)))));
   state.counters["times_real_time"] =
       benchmark::Counter(seconds, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kDefaults);
 }
