@@ -41,10 +41,13 @@ S make(int inputs, bool with_limits) {
       s.dither.harmonics = {4, 5, 7};
     }
   }
-  if constexpr (requires { s.gain.size(); }) s.gain = Inputs::Constant(inputs, s.gain[0]);
+  const auto for_every_input = [&](Inputs& own) {
+    if (own.size() > 0) own = Inputs::Constant(inputs, own[0]);  // empty: the seeker makes its own
+  };
+  if constexpr (requires { s.gain.size(); }) for_every_input(s.gain);
   if constexpr (std::is_same_v<S, NewtonSeeking>) {
-    s.initial_hessian = Inputs::Constant(inputs, s.initial_hessian[0]);
-    s.initial_inverse = Inputs::Constant(inputs, s.initial_inverse[0]);
+    for_every_input(s.initial_hessian);
+    for_every_input(s.initial_inverse);
   }
   if constexpr (std::is_same_v<S, GoldenSection>) s.noise_sd = 0.25;  // goes on around the vertex of a parabola
   return S(s);
