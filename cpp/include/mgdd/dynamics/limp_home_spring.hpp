@@ -3,6 +3,8 @@
 // the model; positive when it closes. noexcept, heap-free.
 #pragma once
 
+#include <type_traits>
+
 #include "mgdd/math/select.hpp"
 
 namespace mgdd::dynamics {
@@ -38,6 +40,16 @@ MGDD_INLINE SpringLoad<T, C> spring_of_side(const T& x, const T& share, const C&
 template <class T, class C>
 MGDD_INLINE SpringLoad<T, C> limp_home_spring(const T& x, const SpringSide<C>& upper, const SpringSide<C>& lower,
                                               const C& over_ramp) noexcept {
+  if constexpr (!std::is_floating_point_v<T> && std::is_same_v<decltype(x < T(0.0)), bool>) {
+    // A number with derivatives: a branch spares those of minimum and maximum.
+    const bool up = !(x < T(0.0));
+    const SpringSide<C>& side = up ? upper : lower;
+    const T ratio = x * over_ramp;
+    if (T(1.0) < ratio || ratio < T(-1.0)) {
+      return spring_of_side(x, up ? T(1.0) : T(-1.0), side.stiffness, side.preload, C(0.0));
+    }
+    return spring_of_side(x, ratio, side.stiffness, side.preload, C(side.preload * over_ramp));
+  }
   const auto above = x >= T(0.0);
   const C stiffness = select(above, upper.stiffness, lower.stiffness);
   const C preload = select(above, upper.preload, lower.preload);
