@@ -15,7 +15,7 @@ from mgdd import datasets, io
 from mgdd.cli.main import main
 from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
 from mgdd.guide import TimingMap
-from mgdd.io.table import write_traces
+from mgdd.io.plain_csv import write_traces
 from mgdd.throttle import SensorPair, Throttle, simulate_throttle
 
 DATA = sorted((Path(mgdd.__file__).parent / "data").glob("*.csv"))

@@ -13,8 +13,8 @@ from mgdd.cli.from_library import Options
 from mgdd.cli.output import emit, save_figure, wrote
 from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf, write_netcdf
+from mgdd.io.plain_csv import write_columns
 from mgdd.io.point_table import POINT, read_points
-from mgdd.io.table import write_columns
 from mgdd.maps import write_map
 from mgdd.maps.files import map_content
 from mgdd.plot import map_cells

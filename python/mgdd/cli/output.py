@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole, write_whole_text
-from mgdd.io.table import write_traces
+from mgdd.io.plain_csv import write_traces
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.studies.sections import Table
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError, did_you_mean
-from mgdd.io.table import TextTable, read_table, write_columns
+from mgdd.io.plain_csv import write_columns
+from mgdd.io.table import TextTable, read_table
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.units import unit_of
 

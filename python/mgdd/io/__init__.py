@@ -5,7 +5,7 @@ Angles are degrees of crank angle with firing TDC = 0 and compression negative (
 
 from __future__ import annotations
 
-from mgdd.io.measured_csv import write_csv
+from mgdd.io.plain_csv import write_csv
 from mgdd.io.pressure import pressure_trace, read_pressure
 from mgdd.io.throttle_log import read_throttle_log, throttle_log
 

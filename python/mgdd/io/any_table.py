@@ -249,16 +249,18 @@ def _of_zip(file: Path) -> Table | Iterable[_Column]:
 
 
 def _of_xlsx(file: Path) -> Table:
-    """Read the first sheet that holds a number as a text with tabs, with its lines of names."""
+    """Read the sheet with the most numbers as a text with tabs, with its lines of names."""
     openpyxl = import_extra("openpyxl", "formats", "an XLSX file")
     book = openpyxl.load_workbook(io.BytesIO(file.read_bytes()), read_only=True, data_only=True)
-    for sheet in book.worksheets:
-        rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
-        width = max((1 + k for row in rows for k, cell in enumerate(row) if cell), default=0)
-        if any(isinstance(cell, int | float) for row in sheet.iter_rows(values_only=True) for cell in row):
-            text = "\n".join("\t".join(_filled(row[:width])) for row in rows if any(row))
-            return text_table(f"{file}, sheet {sheet.title!r}", text, delimiter="\t")
-    raise DataError(f"{file}: no sheet has a number in it")
+    sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
+    held = {title: sum(isinstance(cell, int | float) for row in rows for cell in row) for title, rows in sheets.items()}
+    title = max(held, key=lambda each: held[each], default="")
+    if not held.get(title):
+        raise DataError(f"{file}: no sheet has a number in it")
+    rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheets[title]]
+    width = max(1 + k for row in rows for k, cell in enumerate(row) if cell)
+    text = "\n".join("\t".join(_filled(row[:width])) for row in rows if any(row))
+    return text_table(f"{file}, sheet {title!r}", text, delimiter="\t")
 
 
 def _filled(row: list[str]) -> list[str]:

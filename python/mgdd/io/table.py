@@ -1,4 +1,4 @@
-"""Text tables: CSV or blank-separated columns with optional header and units row, and the one writer of plain CSV."""
+"""Text tables: CSV or blank-separated columns, with what stands above them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ShapeError, argument
+from mgdd.errors import DataError, argument
 from mgdd.io.column_names import spelled_unit
-from mgdd.io.files import existing_file, read_plain_text, write_whole_text
-from mgdd.results.labels import check_labels
+from mgdd.io.files import existing_file, read_plain_text
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 __all__ = [
     "Place",
@@ -32,8 +30,6 @@ __all__ = [
     "parse_number",
     "read_table",
     "text_table",
-    "write_columns",
-    "write_traces",
 ]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
@@ -353,50 +349,3 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
         return float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:
         return None
-
-
-def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]) -> None:
-    r"""Write columns of one length as CSV that any reader takes without options: a header, then rows.
-
-    Numbers come back bit for bit; texts, which hold no comma, quote or line break, stand as they are.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.table import write_columns
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "map.csv"
-    ...     write_columns({"fuel_mg": [6.0, 20.0], "source": ["idle", "model"]}, file)
-    ...     file.read_text()
-    'fuel_mg,source\n6.0,idle\n20.0,model\n'
-    """
-    cells = [
-        column.tolist() if column.dtype.kind == "U" else [repr(value) for value in column.astype(np.float64).tolist()]
-        for column in map(np.asarray, columns.values())
-    ]
-    rows = [",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]
-    write_whole_text(path, "\n".join(rows) + "\n")
-
-
-def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write every variable of a Dataset over its one dimension by `write_columns`; its scalars are left out.
-
-    A variable without units is a DataError, variables over different dimensions are a ShapeError.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
-    >>> from mgdd.io.table import write_traces
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "cycle.csv"
-    ...     write_traces(simulate(Cylinder(), OperatingPoint()), file)
-    ...     file.read_text().splitlines()[0][:28]
-    'crank_angle_cad,pressure_bar'
-    """
-    check_labels(dataset)
-    dims = [dim for dim in dataset.dims if any(v.dims == (dim,) for v in dataset.data_vars.values())]
-    if len(dims) != 1 or any(v.ndim > 1 for v in dataset.variables.values()):
-        raise ShapeError(f"a CSV holds columns over one dimension; this result has {dict(dataset.sizes)}")
-    names = [str(dims[0]), *(str(n) for n, v in dataset.data_vars.items() if v.dims == (dims[0],))]
-    write_columns({name: dataset[name].to_numpy() for name in names}, path)

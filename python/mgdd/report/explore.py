@@ -61,7 +61,7 @@ def explore(what: CylinderLike | CalibrationMap, point: PointLike | None = None)
     if isinstance(what, CalibrationMap):
         ends = {name: (own[0], own[-1], 0.5 * (own[0] + own[-1])) for name, own in what.axes.items()}
         return _panel(ends, what.labels, lambda at: _place(what, at))
-    cylinder, start = engine_of(what, point)
+    cylinder, start = engine_of(what, point, argument="what")
     ends = {"soc_cad": (-40.0, 20.0, -6.0), "fuel_mg": (0.0, 2.0 * start.fuel_mg or 50.0, start.fuel_mg)}
     ends["speed_rpm"] = (0.25 * start.speed_rpm, 2.0 * start.speed_rpm, start.speed_rpm)
 
