@@ -19,7 +19,7 @@ from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
-from mgdd.engine import Cylinder, OperatingPoint, analyze, sensitivities, simulate, timing_sweep
+from mgdd.engine import Cylinder, Indicating, OperatingPoint, analyze, sensitivities, simulate, timing_sweep
 from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
@@ -140,6 +140,10 @@ def loop_samples() -> xr.Dataset:
     return loop.samples()
 
 
+def indicating() -> Indicating:
+    return Indicating(np.arange(-180.0, 181.0), Cylinder(), speed_rpm=6000.0)
+
+
 def wall_heat() -> xr.Dataset:
     traces = datasets.read("hd_diesel_128x144")[:2]
     fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
@@ -161,6 +165,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
     **{f"datasets.read.{name}": lambda _, n=name: datasets.read(n) for name in NEEDS},
+    "engine.Indicating.oscillation": lambda _: indicating().oscillation(np.ones((2, 361))),
+    "engine.Indicating.record": lambda _: indicating().record(np.ones((2, 361))),
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
     "engine.convergence": lambda _: convergence(Cylinder(), POINT),
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),

@@ -1,12 +1,14 @@
 // Binds engine/pressure: the analysis of measured pressure, one cycle or many, and the check of a trace.
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/engine/pressure/indicating.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "mgdd/engine/pressure/trace_check.hpp"
 #include "record_binding.hpp"
@@ -25,6 +27,14 @@ std::vector<std::pair<const char*, std::vector<double>>> columns(const TraceAnal
           {"heat_loss_j_per_cad", a.heat_loss_j_per_cad()},
           {"heat_net_cumulative_j", a.heat_net_cumulative_j},
           {"heat_gross_cumulative_j", a.heat_gross_cumulative_j}};
+}
+
+// One figure of many records.
+template <class Record>
+py::array_t<double> column_of(const std::vector<Record>& all, const Figure<Record>& figure) {
+  std::vector<double> out(all.size());
+  std::transform(all.begin(), all.end(), out.begin(), [&](const Record& one) { return one.*(figure.member); });
+  return to_array(out);
 }
 
 // What does not differ from cycle to cycle of one record.
@@ -46,7 +56,7 @@ py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const
   for (const auto& [name, column] : columns(a))
     out[name] = to_array(column);
   py::dict scalars;
-  for (const TraceFigure& figure : trace_figures)
+  for (const Figure<TraceAnalysis>& figure : trace_figures)
     scalars[as_str(figure.name)] = a.*(figure.member);
   out["scalars"] = scalars;
   out["motored"] = a.motored;
@@ -79,10 +89,8 @@ py::dict bind_analyze_cycles(const InputArray& angle, const InputArray& pressure
     }
   }
   py::dict scalars;
-  for (const TraceFigure& figure : trace_figures) {
-    std::vector<double> row(n);
-    std::transform(all.begin(), all.end(), row.begin(), [&](const TraceAnalysis& a) { return a.*(figure.member); });
-    scalars[as_str(figure.name)] = to_array(row);
+  for (const Figure<TraceAnalysis>& figure : trace_figures) {
+    scalars[as_str(figure.name)] = column_of(all, figure);
   }
   out["scalars"] = scalars;
   py::list motored, found;
@@ -91,6 +99,60 @@ py::dict bind_analyze_cycles(const InputArray& angle, const InputArray& pressure
   out["motored"] = motored;
   out["window_found"] = found;
   out["warnings"] = count_warnings(all);
+  return out;
+}
+
+// Keeps the workspace of one stream of cycles beside the constant part.
+struct Stream {
+  Indicating indicating;
+  Indicating::Workspace work;
+};
+
+std::span<const double> samples_of(const Indicating& indicating, const InputArray& pressure) {
+  const auto width = static_cast<std::size_t>(pressure.ndim() > 0 ? pressure.shape(pressure.ndim() - 1) : 0);
+  if (width != indicating.samples()) {
+    throw about("pressure_bar", ShapeError("pressure_bar has " + std::to_string(width) + " samples per cycle, and " +
+                                           std::to_string(indicating.samples()) + " angles were given"));
+  }
+  return {pressure.data(), static_cast<std::size_t>(pressure.size())};
+}
+
+py::dict one_cycle(Stream& s, const InputArray& pressure) {
+  const std::span<const double> samples = samples_of(s.indicating, pressure);
+  if (pressure.ndim() != 1) throw about("pressure_bar", ShapeError("pressure_bar must be the samples of one cycle"));
+  const CycleFigures figures = s.indicating(samples.data(), s.work);
+  if (!(figures.p_max_bar <= highest_pressure_bar))
+    check_trace(s.indicating.angle_cad(), {samples.begin(), samples.end()});
+  py::dict out;
+  for (const Figure<CycleFigures>& figure : cycle_figures)
+    out[as_str(figure.name)] = figures.*(figure.member);
+  return out;
+}
+
+py::dict many_cycles(const Stream& s, const InputArray& pressure, std::size_t threads) {
+  const std::span<const double> samples = samples_of(s.indicating, pressure);
+  const std::vector<CycleFigures> all = without_gil([&] { return indicate_cycles(s.indicating, samples, threads); });
+  const std::vector<py::ssize_t> shape(pressure.shape(), pressure.shape() + pressure.ndim() - 1);
+  py::dict out;
+  for (const Figure<CycleFigures>& figure : cycle_figures)
+    out[as_str(figure.name)] = column_of(all, figure).reshape(shape);
+  return out;
+}
+
+py::dict oscillation(Stream& s, const InputArray& pressure) {
+  const std::span<const double> samples = samples_of(s.indicating, pressure);
+  const auto [first, last] = s.indicating.knock_samples();
+  const std::size_t cycles = samples.size() / s.indicating.samples();
+  py::array_t<double> sound({static_cast<py::ssize_t>(cycles), static_cast<py::ssize_t>(last - first)});
+  for (std::size_t c = 0; c < cycles; ++c) {
+    const auto one = s.indicating.oscillation(samples.data() + c * s.indicating.samples(), s.work);
+    std::copy(one.begin(), one.end(), sound.mutable_data() + c * (last - first));
+  }
+  const auto& angle = s.indicating.angle_cad();
+  py::dict out;
+  out["crank_angle_cad"] =
+      to_array({angle.begin() + static_cast<std::ptrdiff_t>(first), angle.begin() + static_cast<std::ptrdiff_t>(last)});
+  out["pressure_bar"] = sound;
   return out;
 }
 
@@ -105,6 +167,19 @@ void bind_pressure(py::module_& m) {
         arg("options"), "Pegging, heat release, burn angles, work.");
   m.def("analyze_cycles", &bind_analyze_cycles, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"),
         arg("point"), arg("options"), arg("threads") = 0, "The same of every row; warnings counted together.");
+  py::class_<Stream>(m, "Indicating")
+      .def(py::init([](const InputArray& angle, const Cylinder& cylinder, double speed_rpm, const O& how) {
+             const std::vector<double> angles = to_column(angle, "crank_angle_cad");
+             check_trace(angles, std::vector<double>(angles.size(), 1.0));
+             Indicating made(angles, cylinder, speed_rpm, how);
+             Indicating::Workspace work = made.make_workspace();
+             return Stream{std::move(made), std::move(work)};
+           }),
+           arg("crank_angle_cad"), arg("cylinder"), arg("speed_rpm"), arg("options"))
+      .def("one", &one_cycle, arg("pressure_bar"), "Figures of one cycle.")
+      .def("many", &many_cycles, arg("pressure_bar"), arg("threads") = 0,
+           "Figures of cycles, the last axis its angles.")
+      .def("oscillation", &oscillation, arg("pressure_bar"), "Pressure in the band of knock.");
   m.def(
       "check_trace",
       [](const InputArray& angle, const InputArray& pressure) {

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Cylinder', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
@@ -816,7 +816,7 @@ class Performance:
         The terms, in order.
         """
 class TraceOptions:
-    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, earliest_burn_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, total_at_end: bool = False, fractions_of_gross: bool = False, smoothing: str = 'automatic', smoothing_width_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing_cutoff_hz: typing.SupportsFloat | typing.SupportsIndex = 3000.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex | None = None, intake_factor: typing.SupportsFloat | typing.SupportsIndex = 1.5, bmep_bar: typing.SupportsFloat | typing.SupportsIndex | None = None, fuel_heat_j: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, earliest_burn_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, total_at_end: bool = False, fractions_of_gross: bool = False, smoothing: str = 'automatic', smoothing_width_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing_cutoff_hz: typing.SupportsFloat | typing.SupportsIndex = 3000.0, knock_low_hz: typing.SupportsFloat | typing.SupportsIndex = 4000.0, knock_high_hz: typing.SupportsFloat | typing.SupportsIndex = 20000.0, knock_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, knock_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex | None = None, intake_factor: typing.SupportsFloat | typing.SupportsIndex = 1.5, bmep_bar: typing.SupportsFloat | typing.SupportsIndex | None = None, fuel_heat_j: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         pegging : how the absolute pressure is found
         pegging_exponent : polytropic exponent of compression
@@ -834,10 +834,29 @@ class TraceOptions:
         smoothing : of the pressure before the heat release
         smoothing_width_cad : whole width [°CA]
         smoothing_cutoff_hz : where the gain is 1/2 [Hz]
+        knock_low_hz : lower end of the band of the oscillation [Hz]
+        knock_high_hz : its upper end [Hz]
+        knock_from_cad : start of the window of the oscillation [°CA aTDC]
+        knock_to_cad : its end [°CA aTDC]
         intake_pressure_kpa : what p(IVC) is judged against
         intake_factor : beyond this factor of it p(IVC) is doubted
         bmep_bar : a gross IMEP that cannot reach it is refused
         fuel_heat_j : heat of the stated fuel
+        """
+class Indicating:
+    def __init__(self, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, speed_rpm: typing.SupportsFloat | typing.SupportsIndex, options: TraceOptions) -> None:
+        ...
+    def many(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
+        """
+        Figures of cycles, the last axis its angles.
+        """
+    def one(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+        """
+        Figures of one cycle.
+        """
+    def oscillation(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+        """
+        Pressure in the band of knock.
         """
 def analyze(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions) -> dict:
     """

@@ -8,12 +8,14 @@ from __future__ import annotations
 from mgdd._core.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
 from mgdd.engine.cycle import sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import ignition_delay
+from mgdd.engine.indicating import Indicating
 from mgdd.engine.nox import fit_nox_proxy
 from mgdd.engine.optimum import find_optimum
 from mgdd.engine.trace import analyze
 
 __all__ = [
     "Cylinder",
+    "Indicating",
     "NoxModel",
     "NoxProxy",
     "OperatingPoint",

@@ -49,10 +49,13 @@ def analyze(
     smoothing: str | None = None,
     smoothing_width_cad: float = 4.0,
     smoothing_cutoff_hz: float = 3000.0,
+    knock_band_hz: tuple[float, float] = (4000.0, 20000.0),
+    knock_window_cad: tuple[float, float] = (-10.0, 90.0),
     bmep_bar: float | None = None,
     brake_torque_nm: float | None = None,
     n_cylinders: int = 1,
     fuel_mg: float | None = None,
+    traces: bool = True,
     quiet: bool = False,
 ) -> xr.Dataset:
     """Analyse pressure: pegging, heat release, burn angles, work, polytropic exponents, of one cycle or of many.
@@ -96,6 +99,10 @@ def analyze(
         Whole width [°CA] of ``savitzky_golay`` (a local parabola) and ``angle_window`` (a mean).
     smoothing_cutoff_hz : float
         Of ``low_pass`` [Hz]: a second-order Butterworth forward and backward, gain 1/2 there.
+    knock_band_hz : tuple of float
+        Band of the pressure oscillation [Hz], as in `Indicating`.
+    knock_window_cad : tuple of float
+        Where it is looked for [°CA aTDC].
     bmep_bar : float, optional
         Measured brake mean effective pressure [bar]. A cycle whose gross IMEP cannot reach it is refused; one that is
         too near to it, or too far, is doubted.
@@ -105,6 +112,10 @@ def analyze(
         Cylinders behind ``brake_torque_nm``.
     fuel_mg : float, optional
         Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.93 to 1.18 of its heat is doubted.
+    traces : bool
+        False for the figures of a long record only, by `Indicating` in the burn window of the mean cycle and without
+        smoothing: several times quicker, and without the memory of the traces. The mean cycle is analysed and doubted
+        whole, the others are not.
     quiet : bool
         Leave the warnings to the attribute instead of logging them too.
 
@@ -112,17 +123,16 @@ def analyze(
     -------
     xarray.Dataset
         Traces over ``crank_angle_cad`` (rates belong to the step that ends at the sample) and scalars
-        ``pegging_bar n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_from_cad heat_to_cad heat_net_j
-        heat_gross_j imep_closed_bar p_max_bar p_max_cad dp_max_bar_per_cad t_max_k trapped_mass_g tdc_offset_cad
-        compression_offset_bar``. Burn angles are NaN for a motored trace, ``tdc_offset_cad`` (what its angles are too
+        ``heat_from_cad heat_to_cad heat_gross_j work_closed_j t_max_k trapped_mass_g tdc_offset_cad
+        compression_offset_bar`` and those of `Indicating`, NaN where the trace does not reach.
+        Burn angles are NaN for a motored trace, ``tdc_offset_cad`` (what its angles are too
         large by, good to 0.7 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
         ``dp_max``, ``mass_source``, ``heat_window`` (``found``, ``given``, ``whole`` or ``no burn found``),
         ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per line).
 
-        Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand its
-        ``mean_NAME``, ``std_NAME`` and ``cov_NAME_percent`` (not of angles and offsets). ``lnv_imep_closed_percent``
-        is the lowest IMEP over the mean, ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored``
-        counts cycles.
+        Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand mean,
+        deviation, percentiles and COV, ``misfire`` and ``partial_burn`` as `Indicating.record` gives them,
+        ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored`` counts cycles.
 
     Raises
     ------
@@ -160,26 +170,30 @@ def analyze(
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
     stated = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
-    options = _core.engine.TraceOptions(
-        pegging=pegging,
-        pegging_exponent=pegging_exponent,
-        inlet_pressure_kpa=own.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
-        gamma_source=source,
-        gamma=number,
-        heat_from_cad=window[0] if window else None,
-        heat_to_cad=window[1] if window else None,
-        earliest_burn_cad=_number(trace, "soi_cad", _number(trace, "spark_cad")),
-        burn_from_cad=float(trace["soc_cad"]) if simulated else None,
-        total_at_end=simulated,
-        fractions_of_gross=fractions == "gross",
-        smoothing=_smoothing(smoothing, simulated),
-        smoothing_width_cad=smoothing_width_cad,
-        smoothing_cutoff_hz=smoothing_cutoff_hz,
-        intake_pressure_kpa=stated if stated is not None or point is None else point.intake_pressure_kpa,
-        intake_factor=_POINT_FACTOR if stated is None else _STATED_FACTOR,
-        bmep_bar=_bmep(trace, cylinder, bmep_bar, brake_torque_nm, n_cylinders),
-        fuel_heat_j=_fuel_heat(trace, cylinder, fuel_mg),
-    )
+    options = {
+        "pegging": pegging,
+        "pegging_exponent": pegging_exponent,
+        "inlet_pressure_kpa": own.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
+        "gamma_source": source,
+        "gamma": number,
+        "heat_from_cad": window[0] if window else None,
+        "heat_to_cad": window[1] if window else None,
+        "earliest_burn_cad": _number(trace, "soi_cad", _number(trace, "spark_cad")),
+        "burn_from_cad": float(trace["soc_cad"]) if simulated else None,
+        "total_at_end": simulated,
+        "fractions_of_gross": fractions == "gross",
+        "smoothing": _smoothing(smoothing, simulated),
+        "smoothing_width_cad": smoothing_width_cad,
+        "smoothing_cutoff_hz": smoothing_cutoff_hz,
+        "intake_pressure_kpa": stated if stated is not None or point is None else point.intake_pressure_kpa,
+        "intake_factor": _POINT_FACTOR if stated is None else _STATED_FACTOR,
+        "bmep_bar": _bmep(trace, cylinder, bmep_bar, brake_torque_nm, n_cylinders),
+        "fuel_heat_j": _fuel_heat(trace, cylinder, fuel_mg),
+        "knock_low_hz": knock_band_hz[0],
+        "knock_high_hz": knock_band_hz[1],
+        "knock_from_cad": knock_window_cad[0],
+        "knock_to_cad": knock_window_cad[1],
+    }
     attrs = {
         "file": trace.attrs.get("file", "trace"),
         "method": pegging,
@@ -188,9 +202,13 @@ def analyze(
         "dp_max": _DP_MAX,
     }
     given = "given" if heat_window_cad else "whole" if simulated else None
-    run = of_cycles if is_of_cycles(trace) else _one
     try:
-        result = run(trace, cylinder, own, options, attrs, given)
+        if is_of_cycles(trace):
+            result = of_cycles(trace, cylinder, own, options, attrs, given, traces=traces)
+        elif traces:
+            result = _one(trace, cylinder, own, options, attrs, given)
+        else:
+            raise ParameterError("traces = False is for a record of cycles, and this is one cycle: leave it out")
     except DataError as error:
         if error.field != "bmep_bar" or _number(trace, "brake_torque_nm", brake_torque_nm) is None:
             raise
@@ -205,11 +223,12 @@ def _one(
     trace: xr.Dataset,
     cylinder: Cylinder,
     point: OperatingPoint,
-    options: _core.engine.TraceOptions,
+    options: dict[str, Any],
     attrs: dict[str, Any],
     given: str | None,
 ) -> xr.Dataset:
-    raw = _core.engine.analyze(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, options)
+    made = _core.engine.TraceOptions(**options)
+    raw = _core.engine.analyze(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, made)
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),

@@ -14,10 +14,13 @@ from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["is_of_cycles", "of_cycles"]
+__all__ = ["CYCLE", "burn_marks", "burn_warnings", "is_of_cycles", "of_cycles", "scatter"]
 
-_CYCLE = "cycle"
-_OFFSETS = ("pegging_bar", "compression_offset_bar")
+CYCLE = "cycle"
+# Net heat over the median of the record; own choices, in the spirit of a fifth and four fifths of the IMEP.
+_MISFIRE, _PARTIAL, _NAMED = 0.2, 0.8, 8
+_OFFSETS = ("pegging_bar", "compression_offset_bar", "pmep_bar")
+_ANGLES = ("°CA aTDC", "°CA")
 _COLUMNS = (
     "pressure_bar",
     "temperature_k",
@@ -32,43 +35,64 @@ _COLUMNS = (
 def is_of_cycles(trace: Any) -> bool:
     """Whether this is a Dataset whose pressure has the dimensions cycle and crank angle."""
     variables = getattr(trace, "variables", {})
-    return "pressure_bar" in variables and set(variables["pressure_bar"].dims) == {_CYCLE, ANGLE}
+    return "pressure_bar" in variables and set(variables["pressure_bar"].dims) == {CYCLE, ANGLE}
 
 
 def of_cycles(
     trace: xr.Dataset,
     cylinder: Cylinder,
     point: OperatingPoint,
-    options: _core.engine.TraceOptions,
+    options: dict[str, Any],
     attrs: dict[str, Any],
     given: str | None,
+    *,
+    traces: bool = True,
 ) -> xr.Dataset:
-    """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV."""
-    pressure = trace["pressure_bar"].transpose(_CYCLE, ANGLE).to_numpy()
-    raw = _core.engine.analyze_cycles(trace[ANGLE].values, pressure, cylinder, point, options)
-    mean = _core.engine.analyze(trace[ANGLE].values, pressure.mean(axis=0), cylinder, point, options)
-    found = sum(raw["window_found"])
+    """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV.
+
+    Without `traces` the cycles have figures only, all in the burn window of the mean one.
+    """
+    angle, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
+    made = _core.engine.TraceOptions(**options)
+    columns: dict[str, tuple[Any, ...]] = {}
+    lines: list[str] = []
+    if traces:
+        raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, made)
+        mean = _core.engine.analyze(angle, pressure.mean(axis=0), cylinder, point, made)
+        scalars, lines, smoothing = raw["scalars"], list(raw["warnings"]), raw["smoothing"]
+        columns = {ANGLE: (ANGLE, raw[ANGLE]), "volume_l": (ANGLE, raw["volume_l"])}
+        columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in _COLUMNS}
+        window, motored = "found" if any(raw["window_found"]) else "no burn found", sum(raw["motored"])
+    else:
+        averaged = pressure.mean(axis=0)
+        if not np.isfinite(averaged).all():  # names the cycle
+            _core.engine.Indicating(angle, cylinder, point.speed_rpm, made).many(pressure)
+        mean = _core.engine.analyze(angle, averaged, cylinder, point, made)
+        found = {name: mean["scalars"][name] for name in ("heat_from_cad", "heat_to_cad")}
+        made = _core.engine.TraceOptions(**options | found)
+        scalars, smoothing = _core.engine.Indicating(angle, cylinder, point.speed_rpm, made).many(pressure), "none"
+        window = "found in the mean cycle" if mean["window_found"] else "no burn found"
+        motored = np.isnan(scalars["ca50_cad"]).sum()
     n = len(pressure)
-    lines = [*raw["warnings"], *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
+    marks = burn_marks(scalars)
+    lines += [*burn_warnings(marks), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
     return labelled_dataset(
         {
-            ANGLE: (ANGLE, raw[ANGLE]),
-            _CYCLE: (_CYCLE, trace[_CYCLE].values if _CYCLE in trace.coords else np.arange(1, n + 1)),
-            "volume_l": (ANGLE, raw["volume_l"]),
-            **{name: ((_CYCLE, ANGLE), raw[name]) for name in _COLUMNS},
-            **{name: (_CYCLE, values) for name, values in raw["scalars"].items()},
-            **_scatter(raw["scalars"]),
+            **columns,
+            CYCLE: (CYCLE, trace[CYCLE].values if CYCLE in trace.coords else np.arange(1, n + 1)),
+            **{name: (CYCLE, values) for name, values in {**scalars, **marks}.items()},
+            **scatter(scalars),
             **{
                 f"cycle_mean_{name}": ((), v, *_label(name, "of the mean cycle")) for name, v in mean["scalars"].items()
             },
         },
         attrs={
             **attrs,
-            "smoothing": raw["smoothing"],
-            "mass_source": raw["mass_source"],
-            "heat_window": given or ("found" if found else "no burn found"),
+            "smoothing": smoothing,
+            "mass_source": mean["mass_source"],
+            "heat_window": given or window,
             "cycles": n,
-            "motored": int(sum(raw["motored"])),
+            "motored": int(motored),
             "warnings": "\n".join(lines),
         },
     )
@@ -79,21 +103,62 @@ def _label(name: str, which: str) -> tuple[str, str]:
     return unit, f"{text}, {which}"
 
 
-def _scatter(scalars: dict[str, np.ndarray]) -> dict[str, tuple[Any, ...]]:
-    """Mean, standard deviation (n - 1) and, where zero is not a convention, the COV over the cycles with a figure."""
+def burn_marks(scalars: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Mark cycles without a burn and those that burn too little, where most cycles of the last axis burn."""
+    heat, burns = scalars["heat_net_j"], ~np.isnan(scalars["ca50_cad"])
+    share = heat / np.median(heat, axis=-1, keepdims=True)
+    fired = burns.mean(axis=-1, keepdims=True) > 0.5
+    misfire = fired & (~burns | (share < _MISFIRE))
+    return {"misfire": misfire, "partial_burn": fired & (share < _PARTIAL) & ~misfire}
+
+
+def burn_warnings(marks: dict[str, np.ndarray]) -> list[str]:
+    """Name the cycles that are marked; one line for each kind."""
+    lines = []
+    for name, text in (("misfire", "do not burn"), ("partial_burn", "burn less than four fifths of the median heat")):
+        cycles = (np.flatnonzero(marks[name]) + 1).tolist()
+        if cycles:
+            shown = ", ".join(map(str, cycles[:_NAMED])) + (", ..." if len(cycles) > _NAMED else "")
+            lines.append(f"{len(cycles)} of {marks[name].size} cycles {text}: cycle {shown}")
+    return lines
+
+
+def scatter(scalars: dict[str, np.ndarray], dims: tuple[str, ...] = ()) -> dict[str, tuple[Any, ...]]:
+    """Mean, deviation (n - 1), percentiles and, where zero is not a convention, the COV over the last axis."""
+    table = np.stack(list(scalars.values()))
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)  # all NaN, or one cycle: the answer is NaN
+        means, stds, least = np.nanmean(table, axis=-1), np.nanstd(table, axis=-1, ddof=1), np.nanmin(table, axis=-1)
+        low, high = _percentiles(table, (0.05, 0.95))
+        covs, lowest = 100.0 * stds / np.abs(means), 100.0 * least / means
     out: dict[str, tuple[Any, ...]] = {}
-    for name, values in scalars.items():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # all NaN, or one cycle: the answer is NaN
-            mean, std = np.nanmean(values), np.nanstd(values, ddof=1)
-        out[f"mean_{name}"] = ((), mean, *_label(name, "mean of the cycles"))
+    for k, name in enumerate(scalars):
         unit, text = _label(name, "standard deviation of the cycles")
-        out[f"std_{name}"] = ((), std, unit.removesuffix(" aTDC"), text)
-        if name.endswith("_cad") or name in _OFFSETS:
-            continue
-        cov = 100.0 * std / abs(mean) if mean else np.nan
-        out[f"cov_{name}_percent"] = ((), cov, "%", f"{VARIABLES[name].long_name}, coefficient of variation")
-    imep = scalars["imep_closed_bar"]
-    lowest = 100.0 * imep.min() / imep.mean() if imep.mean() else np.nan
-    out["lnv_imep_closed_percent"] = ((), lowest, "%", "lowest closed-cycle IMEP over the mean (LNV)")
+        out[f"mean_{name}"] = (dims, means[k], *_label(name, "mean of the cycles"))
+        out[f"std_{name}"] = (dims, stds[k], unit.removesuffix(" aTDC"), text)
+        out[f"p5_{name}"] = (dims, low[k], *_label(name, "5th percentile of the cycles"))
+        out[f"p95_{name}"] = (dims, high[k], *_label(name, "95th percentile of the cycles"))
+        named = VARIABLES[name].long_name
+        if name.startswith("imep"):
+            out[f"lnv_{name.removesuffix('_bar')}_percent"] = (
+                dims,
+                lowest[k],
+                "%",
+                f"lowest over the mean (LNV), {named}",
+            )
+        if name not in _OFFSETS and VARIABLES[name].units not in _ANGLES:
+            out[f"cov_{name}_percent"] = (dims, covs[k], "%", f"{named}, coefficient of variation")
+    return out
+
+
+def _percentiles(table: np.ndarray, shares: tuple[float, ...]) -> list[np.ndarray]:
+    """Give linear percentiles of the numbers of the last axis; NaN stand at its end once it is sorted."""
+    ordered = np.sort(table, axis=-1)
+    last = np.maximum(np.count_nonzero(~np.isnan(table), axis=-1) - 1, 0)
+    out = []
+    for share in shares:
+        below = np.floor(share * last).astype(int)
+        above = np.minimum(below + 1, last)
+        a, b = (np.take_along_axis(ordered, at[..., None], axis=-1)[..., 0] for at in (below, above))
+        out.append(a + (b - a) * (share * last - below))
     return out

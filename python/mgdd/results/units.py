@@ -50,6 +50,8 @@ _UNITS = {
     "_m_per_s": "m/s",
     "_g_per_s": "g/s",
     "_bar_per_cad": "bar/°CA",
+    "_bar2_cad": "bar² °CA",
+    "_bar_cad": "bar °CA",
     "_percent_per_cad2": "%/°CA²",
     "_percent_per_cad": "%/°CA",
     "_percent_per_ppm": "%/ppm",

@@ -8,6 +8,7 @@
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/ignition.hpp"
+#include "mgdd/engine/pressure/pegging.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "support/engine_case.hpp"
 

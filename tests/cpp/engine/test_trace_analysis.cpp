@@ -1,5 +1,6 @@
 // Analysis of traces: the way back from a simulated cycle, pegging, TDC errors, and the published figures of the
 // measured heavy-duty traces.
+#include "mgdd/engine/pressure/pegging.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 
 #include <algorithm>
@@ -93,15 +94,15 @@ TEST(EngineTrace, PeggingRecoversAnOffset) {
       x += offset;
     }
     o.pegging = Pegging::two_point;
-    EXPECT_NEAR(pegging_offset_bar(cycle.angles(), p, c.cylinder, o), -offset, 0.005);
+    EXPECT_NEAR(pegging_of(cycle.angles(), c.cylinder, o)(p.data()), -offset, 0.005);
     o.pegging = Pegging::least_squares;
-    EXPECT_NEAR(pegging_offset_bar(cycle.angles(), p, c.cylinder, o), -offset, 0.005);
+    EXPECT_NEAR(pegging_of(cycle.angles(), c.cylinder, o)(p.data()), -offset, 0.005);
     const TraceAnalysis a = analyze_trace(cycle.angles(), p, c.cylinder, c.point, o);
     EXPECT_NEAR(a.pressure_bar[100], cycle.pressures_bar()[100], 0.005);
     EXPECT_NEAR(a.n_compression, 1.37, 2e-3);
   }
   o.pegging = Pegging::none;
-  EXPECT_EQ(pegging_offset_bar(cycle.angles(), cycle.pressures_bar(), c.cylinder, o), 0.0);
+  EXPECT_EQ(pegging_of(cycle.angles(), c.cylinder, o)(cycle.pressures_bar().data()), 0.0);
 }
 
 TEST(EngineTrace, InletPeggingTakesTheMeanAroundBottomDeadCentre) {
@@ -114,12 +115,12 @@ TEST(EngineTrace, InletPeggingTakesTheMeanAroundBottomDeadCentre) {
   TraceOptions o;
   o.pegging = Pegging::inlet;
   o.inlet_pressure_kpa = 150.0;
-  EXPECT_NEAR(pegging_offset_bar(angle, p, Cylinder{}, o), 1.5 - 0.91, 1e-12);
+  EXPECT_NEAR(pegging_of(angle, Cylinder{}, o)(p.data()), 1.5 - 0.91, 1e-12);
   angle.erase(angle.begin(), angle.begin() + 30);
   p.erase(p.begin(), p.begin() + 30);
-  EXPECT_THROW(pegging_offset_bar(angle, p, Cylinder{}, o), DataError);
+  EXPECT_THROW(pegging_of(angle, Cylinder{}, o), DataError);
   o.inlet_pressure_kpa = 0.0;
-  EXPECT_THROW(pegging_offset_bar(angle, p, Cylinder{}, o), ParameterError);
+  EXPECT_THROW(pegging_of(angle, Cylinder{}, o), ParameterError);
 }
 
 TEST(EngineTrace, OneDegreeOfTdcErrorCostsNinePercentOfImep) {
@@ -168,7 +169,7 @@ TEST(EngineTrace, MeasuredHeavyDutyTracesGiveTheirPublishedFigures) {
     EXPECT_NEAR(a.work_closed_j, f.work_j, 0.1);
     EXPECT_NEAR(a.imep_closed_bar, f.imep, 0.01);
     EXPECT_NEAR(a.ca50_cad, f.ca50, 0.06);
-    EXPECT_NEAR(a.heat_net_j_total, f.heat_j, 1.0);
+    EXPECT_NEAR(a.heat_net_j, f.heat_j, 1.0);
     EXPECT_TRUE(a.warnings.empty());
     o.gamma_source = AnalysisGamma::split;
     EXPECT_NEAR(analyze_trace(t.angle_cad, t.pressure_bar, test_support::hd_cylinder(), t.point, o).ca50_cad,
@@ -261,8 +262,8 @@ TEST(EngineTrace, TheLargestRateOfAFallingTraceIsNegative) {
 TEST(EngineTrace, RatesAreTheHeatOfAStepByItsLength) {
   TraceAnalysis a;
   a.angle_cad = {-3.0, -2.0, 0.5};
-  a.heat_net_j = {0.0, 4.0, -10.0};
-  a.heat_loss_j = {0.0, 1.0, 5.0};
+  a.net_step_j = {0.0, 4.0, -10.0};
+  a.loss_step_j = {0.0, 1.0, 5.0};
   EXPECT_EQ(a.heat_release_net_j_per_cad(), (std::vector{0.0, 4.0, -4.0}));
   EXPECT_EQ(a.heat_loss_j_per_cad(), (std::vector{0.0, 1.0, 2.0}));
   EXPECT_EQ(a.heat_release_gross_j_per_cad(), (std::vector{0.0, 5.0, -2.0}));

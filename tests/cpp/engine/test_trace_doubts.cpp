@@ -12,6 +12,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/charge.hpp"
+#include "mgdd/engine/pressure/pegging.hpp"
 #include "support/engine_case.hpp"
 
 namespace mgdd::engine {

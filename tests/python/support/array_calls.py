@@ -11,7 +11,7 @@ import xarray as xr
 import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import Pid
-from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
+from mgdd.engine import Cylinder, Indicating, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
@@ -62,6 +62,10 @@ def ode(time: Any, u: Any, start: Any) -> Any:
     parameters = {"gain": 100.0, "lag_s": 0.1}
     model = identify.OdeModel(derivative=lag, output=lambda x, *_: x[0], parameters=parameters, initial_state=(0.0,))
     return model.simulate({"time_s": time, "u": u}, initial_state=start)["y"].to_numpy()
+
+
+def indicating(angle: Any) -> Indicating:
+    return Indicating(angle, Cylinder(), speed_rpm=6000.0)
 
 
 def run(model: Any) -> Call:
@@ -181,6 +185,10 @@ def queued(references: Any) -> Any:
 
 
 CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
+    "engine.Indicating.__init__": (lambda a, p: list(indicating(a).cycle(p).values()), (CRANK, BAR)),
+    "engine.Indicating.cycle": (lambda p: list(indicating(CRANK).cycle(p).values()), (BAR,)),
+    "engine.Indicating.oscillation": (lambda p: indicating(CRANK).oscillation(p)["oscillation_bar"].to_numpy(), (BAR,)),
+    "engine.Indicating.record": (lambda p: indicating(CRANK).record([p, p])["ca50_cad"].to_numpy(), (BAR,)),
     "engine.fit_nox_proxy": (lambda t, ppm: list(fit_nox_proxy(t, ppm).proxy.to_dict().values()), (KELVIN, PPM)),
     "engine.timing_sweep": (
         lambda soc: timing_sweep(Cylinder(), OperatingPoint(), soc_cad=soc)["imep_gross_bar"].to_numpy(), (SOC,),

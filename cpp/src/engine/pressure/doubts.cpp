@@ -199,7 +199,7 @@ void doubt_gain(TraceAnalysis& a, const Cylinder& cylinder, const TraceOptions& 
   if (a.motored) return;
   const std::string causes = ": suspect the gain of the amplifier, then the stated figure";
   if (o.fuel_heat_j) {
-    const double share = a.heat_gross_j_total / *o.fuel_heat_j;
+    const double share = a.heat_gross_j / *o.fuel_heat_j;
     if (share < fuel_share_low || share > fuel_share_high) {
       a.warnings.push_back({"gain", "the gross heat is " + shown(share) + " of the heat of the stated fuel, outside " +
                                         shown(fuel_share_low) + ".." + shown(fuel_share_high) + causes});

@@ -15,8 +15,8 @@ CumulativeHeat accumulate_heat(const TraceAnalysis& a, double from_cad, double t
   for (std::size_t k = 1; k < n; ++k) {
     if (a.angle_cad[k - 1] >= from_cad - 1e-9 && a.angle_cad[k] <= to_cad + 1e-9) {
       if (h.empty) h.first = k - 1, h.empty = false;
-      net += a.heat_net_j[k];
-      gross += a.heat_net_j[k] + a.heat_loss_j[k];
+      net += a.net_step_j[k];
+      gross += a.net_step_j[k] + a.loss_step_j[k];
       if (net > h.net_best_j) h.net_best_j = net, h.net_peak = k;
       if (gross > h.gross_best_j) h.gross_best_j = gross, h.gross_peak = k;
     }
@@ -26,17 +26,20 @@ CumulativeHeat accumulate_heat(const TraceAnalysis& a, double from_cad, double t
   return h;
 }
 
-double burn_angle_cad(const TraceAnalysis& a, const CumulativeHeat& h, bool gross, double share) {
-  const std::vector<double>& heat = gross ? h.gross_j : h.net_j;
-  const double level = share * (gross ? h.gross_best_j : h.net_best_j);
-  const std::size_t peak = gross ? h.gross_peak : h.net_peak;
-  for (std::size_t k = h.first; k < peak; ++k) {
+double level_angle_cad(std::span<const double> angle_cad, std::span<const double> heat, std::size_t first,
+                       std::size_t peak, double level) noexcept {
+  for (std::size_t k = first; k < peak; ++k) {
     if (heat[k + 1] >= level && heat[k + 1] > heat[k]) {
-      return a.angle_cad[k] +
-             (a.angle_cad[k + 1] - a.angle_cad[k]) * std::max(0.0, level - heat[k]) / (heat[k + 1] - heat[k]);
+      return angle_cad[k] +
+             (angle_cad[k + 1] - angle_cad[k]) * std::max(0.0, level - heat[k]) / (heat[k + 1] - heat[k]);
     }
   }
   return undefined<double>();
+}
+
+double burn_angle_cad(const TraceAnalysis& a, const CumulativeHeat& h, bool gross, double share) {
+  return gross ? level_angle_cad(a.angle_cad, h.gross_j, h.first, h.gross_peak, share * h.gross_best_j)
+               : level_angle_cad(a.angle_cad, h.net_j, h.first, h.net_peak, share * h.net_best_j);
 }
 
 }  // namespace mgdd::engine

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <string>
 
 #include <Eigen/Dense>
@@ -10,6 +11,7 @@
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/geometry.hpp"
+#include "mgdd/engine/pressure/angles.hpp"
 #include "mgdd/math/line_fit.hpp"
 
 namespace mgdd::engine {
@@ -17,18 +19,27 @@ namespace {
 
 using Column = std::vector<double>;
 
-// Mean pressure of the samples within `half` CAD of an angle.
-double mean_around(const Column& angle, const Column& pressure, double centre, double half) {
-  double sum = 0.0;
-  int count = 0;
-  for (std::size_t k = 0; k < angle.size(); ++k) {
-    if (std::abs(angle[k] - centre) <= half + 1e-9) sum += pressure[k], ++count;
-  }
-  if (count == 0) {
+// Adds `factor` times the mean pressure of the samples within `half` CAD of an angle to a sum over all samples.
+void add_mean(WeightedSum& sum, double factor, const Column& angle, double centre, double half) {
+  const auto [first, last] = samples_within(angle, centre - half, centre + half);
+  if (first == last) {
     throw DataError("pegging needs samples at " + text(centre) + " +- " + text(half) +
                     " °CA aTDC, but the trace spans " + text(angle.front()) + " to " + text(angle.back()));
   }
-  return sum / count;
+  for (std::size_t k = first; k < last; ++k)
+    sum.weights[k] += factor / static_cast<double>(last - first);
+}
+
+// Weights that turn values of y at the given x into the slope of their line.
+Column slope_weights(const Column& x) {
+  const double mean = std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
+  double squares = 0.0;
+  Column out;
+  for (const double at : x)
+    out.push_back(at - mean), squares += (at - mean) * (at - mean);
+  for (double& weight : out)
+    weight /= squares;
+  return out;
 }
 
 }  // namespace
@@ -52,37 +63,53 @@ double polytropic_exponent(const Column& angle, const Column& pressure, const Cy
   return polytropic_exponent(angle, pressure, volume, from_cad, to_cad);
 }
 
-double pegging_offset_bar(const Column& angle, const Column& pressure, const Cylinder& cylinder,
-                          const TraceOptions& options) {
+WeightedSum exponent_of_logarithms(const Column& angle, const Column& volume, double from_cad, double to_cad) {
+  const auto [first, last] = samples_within(angle, from_cad, to_cad);
+  if (last - first < 3) return {};
+  Column x;
+  for (std::size_t k = first; k < last; ++k)
+    x.push_back(-std::log(volume[k]));
+  return {first, slope_weights(x), 0.0};
+}
+
+WeightedSum pegging_of(const Column& angle, const Cylinder& cylinder, const TraceOptions& options) {
   validate(options);
   const Geometry<double> geometry(cylinder.geometry);
   const double n = options.pegging_exponent;
+  WeightedSum offset{0, Column(angle.size(), 0.0), 0.0};
   switch (options.pegging) {
     case Pegging::none:
-      return 0.0;
+      return {};
     case Pegging::inlet:  // mean around intake bottom dead centre equals the intake pressure (Randolph 1990)
-      return options.inlet_pressure_kpa * units::pa_per_kpa / units::pa_per_bar -
-             mean_around(angle, pressure, -180.0, 5.0);
+      offset.constant = options.inlet_pressure_kpa * units::pa_per_kpa / units::pa_per_bar;
+      add_mean(offset, -1.0, angle, -180.0, 5.0);
+      return offset;
     case Pegging::two_point: {  // p V^n = const through -100 and -65 CAD (Randolph 1990)
-      const double p1 = mean_around(angle, pressure, -100.0, 1.0);
-      const double p2 = mean_around(angle, pressure, -65.0, 1.0);
       const double ratio = std::pow(geometry.volume_m3(-100.0) / geometry.volume_m3(-65.0), n);
-      return (p2 - ratio * p1) / (ratio - 1.0);
+      add_mean(offset, -ratio / (ratio - 1.0), angle, -100.0, 1.0);
+      add_mean(offset, 1.0 / (ratio - 1.0), angle, -65.0, 1.0);
+      return offset;
     }
     case Pegging::least_squares:
       break;
   }
-  // Linear regression p = -offset + C V^-n over -100..-50 CAD (Brunt and Pond 1997).
-  LineFit line;
-  for (std::size_t k = 0; k < angle.size(); ++k) {
-    if (angle[k] < -100.0 - 1e-9 || angle[k] > -50.0 + 1e-9) continue;
-    line.add(std::pow(geometry.volume_m3(angle[k]) / geometry.volume_m3(-100.0), -n), pressure[k]);
-  }
-  if (line.n < 5.0) {
+  // Intercept of the linear regression p = -offset + C V^-n over -100..-50 CAD (Brunt and Pond 1997).
+  const auto [first, last] = samples_within(angle, -100.0, -50.0);
+  if (last - first < 5) {
     throw DataError("pegging 'least_squares' needs at least 5 samples in -100..-50 °CA aTDC, found " +
-                    std::to_string(static_cast<int>(line.n)));
+                    std::to_string(last - first));
   }
-  return -line.intercept();
+  Column x;
+  double mean = 0.0;
+  for (std::size_t k = first; k < last; ++k) {
+    x.push_back(std::pow(geometry.volume_m3(angle[k]) / geometry.volume_m3(-100.0), -n));
+    mean += x.back() / static_cast<double>(last - first);
+  }
+  offset.first = first;
+  offset.weights = slope_weights(x);
+  for (double& weight : offset.weights)
+    weight = weight * mean - 1.0 / static_cast<double>(last - first);
+  return offset;
 }
 
 FreePolytrope free_polytrope(const Column& angle, const Column& pressure, const Column& volume, double from_cad,

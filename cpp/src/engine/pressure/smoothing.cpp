@@ -8,18 +8,10 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
+#include "mgdd/engine/pressure/angles.hpp"
 
 namespace mgdd::engine {
 namespace {
-
-double median_step(const std::vector<double>& angle) {
-  std::vector<double> steps(angle.size() - 1);
-  for (std::size_t k = 0; k + 1 < angle.size(); ++k)
-    steps[k] = angle[k + 1] - angle[k];
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
 
 // Value at the centre of the least-squares parabola through the samples within `reach` of it, by Cramer's rule.
 double parabola_at(const std::vector<double>& x, const std::vector<double>& y, std::size_t centre, std::size_t reach) {
@@ -31,13 +23,6 @@ double parabola_at(const std::vector<double>& x, const std::vector<double>& y, s
   }
   const double c0 = s2 * s4 - s3 * s3, c1 = s2 * s3 - s1 * s4, c2 = s1 * s3 - s2 * s2;
   return (c0 * t0 + c1 * t1 + c2 * t2) / (s0 * c0 + s1 * c1 + s2 * c2);
-}
-
-bool is_even(const std::vector<double>& angle, double step, double tolerance) {
-  for (std::size_t k = 0; k + 1 < angle.size(); ++k) {
-    if (std::abs(angle[k + 1] - angle[k] - step) > tolerance * step) return false;
-  }
-  return true;
 }
 
 }  // namespace
@@ -52,7 +37,7 @@ Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const Tra
   }
   if (kind == Smoothing::none) return;
   if (kind == Smoothing::low_pass) {
-    if (!is_even(angle, step, 0.01)) {
+    if (!is_even(angle, 0.01)) {
       throw DataError("smoothing 'low_pass' needs even angles, but the steps of crank_angle_cad differ from " +
                       text(step) + " °CA by more than 1 %: take savitzky_golay or angle_window");
     }
@@ -77,7 +62,7 @@ Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const Tra
   }
   reach_ = reach;
   mean_ = kind == Smoothing::angle_window;
-  if (!mean_ && is_even(angle, step, 1e-6)) {  // the weights are those of one unit sample after the other
+  if (!mean_ && is_even(angle, 1e-6)) {  // the weights are those of one unit sample after the other
     const std::vector<double> x(angle.begin(), angle.begin() + static_cast<std::ptrdiff_t>(samples));
     std::vector<double> unit(samples, 0.0);
     for (std::size_t i = 0; i < samples; ++i) {

@@ -14,29 +14,11 @@
 #include "mgdd/engine/pressure/burn_window.hpp"
 #include "mgdd/engine/pressure/doubts.hpp"
 #include "mgdd/engine/pressure/heat.hpp"
-#include "mgdd/engine/pressure/pegging.hpp"
-#include "mgdd/engine/pressure/rise_rate.hpp"
 #include "mgdd/engine/pressure/smoothing.hpp"
 #include "mgdd/engine/pressure/trace_check.hpp"
 
 namespace mgdd::engine {
 namespace {
-
-// Window of a trace without a burn, where none is given.
-constexpr double idle_from_cad = -10.0, idle_to_cad = 90.0;
-
-// Indices [first, last) of the samples from IVC to EVO; DataError with fewer than 20.
-std::pair<std::size_t, std::size_t> closed_part(const std::vector<double>& angle_cad,
-                                                const GeometryParameters<double>& g) {
-  const auto index = [&](auto place) { return static_cast<std::size_t>(place - angle_cad.begin()); };
-  const std::size_t first = index(std::lower_bound(angle_cad.begin(), angle_cad.end(), g.ivc_cad - 1e-9));
-  const std::size_t last = index(std::upper_bound(angle_cad.begin(), angle_cad.end(), g.evo_cad + 1e-9));
-  if (last < first + 20) {
-    throw DataError("only " + std::to_string(last - std::min(first, last)) + " samples lie between ivc_cad = " +
-                    text(g.ivc_cad) + " and evo_cad = " + text(g.evo_cad) + ": an analysis needs at least 20");
-  }
-  return {first, last};
-}
 
 std::vector<double> part(const std::vector<double>& column, std::pair<std::size_t, std::size_t> range) {
   return {column.begin() + static_cast<std::ptrdiff_t>(range.first),
@@ -52,27 +34,15 @@ void require_absolute(const TraceAnalysis& a) {
   }
 }
 
-// Gas temperature, work and peaks, from the pressure as measured.
+// Volume and temperature of the gas, from the pressure as measured.
 void describe_gas(TraceAnalysis& a, const CycleModel<double>& model, double gas_j_per_k) {
   const auto volume = model.volume_m3();
-  const std::size_t n = a.angle_cad.size();
-  a.work_closed_j = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < a.angle_cad.size(); ++k) {
     a.volume_l.push_back(volume[k] / units::m3_per_l);
     a.temperature_k.push_back(a.pressure_bar[k] * units::pa_per_bar * volume[k] / gas_j_per_k);
-    if (k == 0) continue;
-    a.work_closed_j +=
-        0.5 * (a.pressure_bar[k - 1] + a.pressure_bar[k]) * units::pa_per_bar * (volume[k] - volume[k - 1]);
   }
-  a.imep_closed_bar = a.work_closed_j / model.geometry().swept_m3 / units::pa_per_bar;
-  const auto at =
-      static_cast<std::size_t>(std::max_element(a.pressure_bar.begin(), a.pressure_bar.end()) - a.pressure_bar.begin());
-  const Peak<double> top =
-      parabola_peak(samples_around<double>(a.angle_cad, at, [&a](std::size_t k) { return a.pressure_bar[k]; }));
-  a.p_max_bar = top.value;
-  a.p_max_cad = top.angle_cad;
+  a.work_closed_j = a.imep_closed_bar * units::pa_per_bar * model.geometry().swept_m3;
   a.t_max_k = *std::max_element(a.temperature_k.begin(), a.temperature_k.end());
-  a.dp_max_bar_per_cad = steepest_rise_bar_per_cad(a.angle_cad, a.pressure_bar);
 }
 
 // Net heat and wall loss of every step, from the smoothed pressure.
@@ -84,8 +54,8 @@ void release_heat(TraceAnalysis& a, const CycleModel<double>& model, const Charg
   for (std::size_t k = 0; k < n; ++k)
     pressure_pa[k] = smooth_bar[k] * units::pa_per_bar;
   model.wall_heat(charge, pressure_pa, burn_from_cad, loss);
-  a.heat_net_j.assign(n, 0.0);
-  a.heat_loss_j.assign(n, 0.0);
+  a.net_step_j.assign(n, 0.0);
+  a.loss_step_j.assign(n, 0.0);
   for (std::size_t k = 0; k + 1 < n; ++k) {
     double gamma = o.gamma;
     if (o.gamma_source == AnalysisGamma::cylinder) {
@@ -96,8 +66,8 @@ void release_heat(TraceAnalysis& a, const CycleModel<double>& model, const Charg
     if (o.gamma_source == AnalysisGamma::split) {
       gamma = a.angle_cad[k] < burn_from_cad ? o.gamma_compression : o.gamma_combustion;
     }
-    a.heat_net_j[k + 1] = net_heat(gamma, pressure_pa[k], volume[k], pressure_pa[k + 1], volume[k + 1]);
-    a.heat_loss_j[k + 1] = loss[k];
+    a.net_step_j[k + 1] = net_heat(gamma, pressure_pa[k], volume[k], pressure_pa[k + 1], volume[k + 1]);
+    a.loss_step_j[k + 1] = loss[k];
   }
 }
 
@@ -107,8 +77,9 @@ void sum_heat(TraceAnalysis& a, const TraceOptions& o) {
     throw DataError("no sample lies in the heat release window " + text(a.heat_from_cad) + " to " +
                     text(a.heat_to_cad) + " °CA aTDC");
   }
-  a.heat_net_j_total = o.total_at_end ? heat.net_j.back() : heat.net_best_j;
-  a.heat_gross_j_total = o.total_at_end ? heat.gross_j.back() : heat.gross_best_j;
+  a.heat_net_j = o.total_at_end ? heat.net_j.back() : heat.net_best_j;
+  a.heat_gross_j = o.total_at_end ? heat.gross_j.back() : heat.gross_best_j;
+  a.ca10_cad = a.ca50_cad = a.ca90_cad = undefined<double>();
   if (!a.motored) {
     a.ca10_cad = burn_angle_cad(a, heat, o.fractions_of_gross, 0.1);
     a.ca50_cad = burn_angle_cad(a, heat, o.fractions_of_gross, 0.5);
@@ -125,7 +96,7 @@ struct TraceAnalyzer::Shared {
   Cylinder cylinder;
   OperatingPoint point;
   TraceOptions options;
-  std::pair<std::size_t, std::size_t> closed;
+  Indicating indicating;
   CycleModel<double> model;
   Smoother smoother;
 };
@@ -135,9 +106,11 @@ TraceAnalyzer::TraceAnalyzer(const std::vector<double>& angle_cad, const Cylinde
   validate(cylinder);
   validate(point);
   validate(options);
-  const auto closed = closed_part(angle_cad, cylinder.geometry);
-  const std::vector<double> inside = part(angle_cad, closed);
-  shared_ = std::make_shared<const Shared>(Shared{angle_cad, cylinder, point, options, closed,
+  TraceOptions figures = options;
+  figures.gamma_source = AnalysisGamma::constant;
+  Indicating indicating(angle_cad, cylinder, point.speed_rpm, figures);
+  const std::vector<double> inside = part(angle_cad, indicating.closed());
+  shared_ = std::make_shared<const Shared>(Shared{angle_cad, cylinder, point, options, std::move(indicating),
                                                   CycleModel<double>(cylinder, inside),
                                                   Smoother(inside, point.speed_rpm, options)});
 }
@@ -149,12 +122,13 @@ TraceAnalysis analyze_trace(const std::vector<double>& angle_cad, const std::vec
 }
 
 TraceAnalysis TraceAnalyzer::operator()(const std::vector<double>& pressure_bar) const {
-  const auto& [angle_cad, cylinder, point, options, closed, model, smoother] = *shared_;
+  const auto& [angle_cad, cylinder, point, options, indicating, model, smoother] = *shared_;
   check_trace(angle_cad, pressure_bar);
   TraceAnalysis a;
-  a.pegging_bar = pegging_offset_bar(angle_cad, pressure_bar, cylinder, options);
-  a.angle_cad = part(angle_cad, closed);
-  a.pressure_bar = part(pressure_bar, closed);
+  Indicating::Workspace work = indicating.make_workspace();
+  static_cast<CycleFigures&>(a) = indicating(pressure_bar.data(), work);
+  a.angle_cad = part(angle_cad, indicating.closed());
+  a.pressure_bar = part(pressure_bar, indicating.closed());
   for (double& p : a.pressure_bar)
     p += a.pegging_bar;
   require_absolute(a);
@@ -179,16 +153,14 @@ TraceAnalysis TraceAnalyzer::operator()(const std::vector<double>& pressure_bar)
   if (a.motored) a.tdc_offset_cad = strokes.tdc_offset_cad;
   a.window_found = !options.heat_from_cad && burn.found && !a.motored;
   a.heat_from_cad = options.heat_from_cad.value_or(
-      a.window_found ? std::max(burn.start_cad - heat_margin_before_cad, a.angle_cad.front()) : idle_from_cad);
+      a.window_found ? std::max(burn.start_cad - heat_margin_before_cad, a.angle_cad.front()) : idle_heat_from_cad);
   a.heat_to_cad = options.heat_to_cad.value_or(
-      a.window_found ? std::min(burn.end_cad + heat_margin_after_cad, a.angle_cad.back()) : idle_to_cad);
-  const double burn_from =
-      options.burn_from_cad.value_or(options.heat_from_cad.value_or(a.window_found ? burn.start_cad : idle_from_cad));
+      a.window_found ? std::min(burn.end_cad + heat_margin_after_cad, a.angle_cad.back()) : idle_heat_to_cad);
+  const double burn_from = options.burn_from_cad.value_or(
+      options.heat_from_cad.value_or(a.window_found ? burn.start_cad : idle_heat_from_cad));
   release_heat(a, model, charge, smooth_bar, burn_from, options);
   sum_heat(a, options);
 
-  a.n_compression = polytropic_exponent(a.angle_cad, a.pressure_bar, a.volume_l, -100.0, -40.0);
-  a.n_expansion = polytropic_exponent(a.angle_cad, a.pressure_bar, a.volume_l, 60.0, 120.0);
   add_warnings(a, cylinder, options, burn);
   return a;
 }

@@ -7,11 +7,10 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
+#include "mgdd/engine/pressure/angles.hpp"
 
 namespace mgdd::engine {
 namespace {
-
-constexpr double highest_bar = 500.0;  // no piston engine runs above it; kPa or Pa said to be bar does
 
 std::string sample(const char* name, std::size_t k, double value) {
   return std::string(name) + "[" + std::to_string(k) + "] = " + text(value);
@@ -49,21 +48,19 @@ void check_trace(const std::vector<double>& angle, const std::vector<double>& pr
                             ": angles must increase; sort the trace or cut it to one cycle"));
     }
   }
-  std::vector<double> sorted = steps;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double usual = median_step(angle);
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    if (steps[k] > 1.5 * *middle) {
+    if (steps[k] > 1.5 * usual) {
       throw DataError("gap of " + text(steps[k]) + " °CA between crank_angle_cad[" + std::to_string(k) +
                       "] = " + text(angle[k]) + " and " + text(angle[k + 1]) + ", where the usual step is " +
-                      text(*middle) + ": fill it or cut the trace");
+                      text(usual) + ": fill it or cut the trace");
     }
   }
   const double highest = *std::max_element(pressure.begin(), pressure.end());
-  if (highest > highest_bar) {
+  if (highest > highest_pressure_bar) {
     const char* unit = highest > 1e5 ? "Pa" : "kPa";
     throw about("pressure_bar",
-                DataError("pressure_bar reaches " + text(highest) + " bar, above " + text(highest_bar) +
+                DataError("pressure_bar reaches " + text(highest) + " bar, above " + text(highest_pressure_bar) +
                           ": this looks like " + unit + "; convert it or say pressure_unit='" + unit + "'"));
   }
 }

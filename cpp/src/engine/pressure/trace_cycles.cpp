@@ -44,6 +44,25 @@ std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad,
   return out;
 }
 
+std::vector<CycleFigures> indicate_cycles(const Indicating& indicating, std::span<const double> record,
+                                          std::size_t threads) {
+  const std::size_t samples = indicating.samples(), cycles = record.size() / samples;
+  if (cycles == 0 || cycles * samples != record.size()) {
+    throw about("pressure_bar", ShapeError("pressure_bar holds " + std::to_string(record.size()) +
+                                           " samples: whole cycles of " + std::to_string(samples) + " are needed"));
+  }
+  std::vector<CycleFigures> out(cycles);
+  const std::size_t workers = thread_count(cycles, threads);
+  std::vector<Indicating::Workspace> work(workers, indicating.make_workspace());
+  parallel_for(cycles, workers, [&](std::size_t cycle, std::size_t worker, StopRequest&) {
+    const double* const pressure = record.data() + cycle * samples;
+    out[cycle] = indicating(pressure, work[worker]);
+    if (out[cycle].p_max_bar <= highest_pressure_bar) return;
+    naming_cycle(cycle, [&] { check_trace(indicating.angle_cad(), {pressure, pressure + samples}); });
+  });
+  return out;
+}
+
 std::vector<std::string> count_warnings(const std::vector<TraceAnalysis>& cycles) {
   struct Kind {
     std::string_view kind;

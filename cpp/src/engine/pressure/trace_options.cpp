@@ -38,6 +38,9 @@ void validate(const TraceOptions& o) {
           "in (0, 30] °CA");
   require(o.smoothing_cutoff_hz > 0.0 && o.smoothing_cutoff_hz <= 1e6, "smoothing_cutoff_hz", o.smoothing_cutoff_hz,
           "in (0, 1e6] Hz");
+  require(o.knock_low_hz >= 100.0 && o.knock_low_hz <= 1e6, "knock_low_hz", o.knock_low_hz, "in [100, 1e6] Hz");
+  require(o.knock_high_hz > 1.5 * o.knock_low_hz, "knock_high_hz", o.knock_high_hz, "above 1.5 knock_low_hz");
+  require(o.knock_from_cad < o.knock_to_cad, "knock_from_cad", o.knock_from_cad, "before knock_to_cad");
   if (o.intake_pressure_kpa) {
     require(*o.intake_pressure_kpa > 0.0 && *o.intake_pressure_kpa <= 2000.0, "intake_pressure_kpa",
             *o.intake_pressure_kpa, "in (0, 2000] kPa");

@@ -17,17 +17,17 @@ std::vector<double> per_cad(const std::vector<double>& angle_cad, const std::vec
 }  // namespace
 
 std::vector<double> TraceAnalysis::heat_release_net_j_per_cad() const {
-  return per_cad(angle_cad, heat_net_j);
+  return per_cad(angle_cad, net_step_j);
 }
 
 std::vector<double> TraceAnalysis::heat_loss_j_per_cad() const {
-  return per_cad(angle_cad, heat_loss_j);
+  return per_cad(angle_cad, loss_step_j);
 }
 
 std::vector<double> TraceAnalysis::heat_release_gross_j_per_cad() const {
-  std::vector<double> gross(heat_net_j.size());
+  std::vector<double> gross(net_step_j.size());
   for (std::size_t k = 0; k < gross.size(); ++k)
-    gross[k] = heat_net_j[k] + heat_loss_j[k];
+    gross[k] = net_step_j[k] + loss_step_j[k];
   return per_cad(angle_cad, gross);
 }
 

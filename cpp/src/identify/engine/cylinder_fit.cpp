@@ -206,7 +206,7 @@ std::vector<std::string> common_parameters() {
 LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylinder) {
   const engine::TraceAnalysis a =
       engine::analyze_trace(trace.angle_cad, trace.pressure_bar, cylinder, trace.point, engine::TraceOptions{});
-  if (a.motored || !(a.heat_net_j_total > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) ||
+  if (a.motored || !(a.heat_net_j > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) ||
       a.ca90_cad <= a.ca10_cad) {
     throw DataError("trace '" + trace.label +
                     "' shows no heat release: it looks motored, and a burn "
@@ -226,7 +226,7 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
   const double s10 = law.angle_of(0.1);
   burn.burn_duration_cad = (a.ca90_cad - a.ca10_cad) / (law.angle_of(0.9) - s10);
   burn.soc_cad = a.ca10_cad - s10 * burn.burn_duration_cad;
-  burn.fuel_heat_j = 1.1 * a.heat_net_j_total;
+  burn.fuel_heat_j = 1.1 * a.heat_net_j;
   if (cylinder.burn.burn_shape == engine::BurnShape::double_wiebe) {
     // Split the single burn into a short first and a long second part; the fit settles their shares.
     burn.second_fraction = 0.6;

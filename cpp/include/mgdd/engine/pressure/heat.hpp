@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "mgdd/engine/pressure/trace_analysis.hpp"
@@ -13,6 +14,10 @@ namespace mgdd::engine {
 inline double net_heat(double gamma, double p0, double v0, double p1, double v1) noexcept {
   return (p1 * v1 - p0 * v0) / (gamma - 1.0) + 0.5 * (p0 + p1) * (v1 - v0);
 }
+
+/// Angle at which rising heat first reaches a level, linear between samples `first` and `peak`; NaN where it does not.
+double level_angle_cad(std::span<const double> angle_cad, std::span<const double> heat, std::size_t first,
+                       std::size_t peak, double level) noexcept;
 
 /// Cumulative heat of the steps that lie in [from, to], one value per sample.
 struct CumulativeHeat {

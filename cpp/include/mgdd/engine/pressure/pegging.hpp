@@ -7,13 +7,17 @@
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/pressure/trace_options.hpp"
 #include "mgdd/math/dual.hpp"
+#include "mgdd/math/weighted_sum.hpp"
 
 namespace mgdd::engine {
 
-/// Offset to add to a relative trace [bar] (engine analysis calls it; here for use on its own). DataError where the
-/// trace does not cover the angles that the method reads.
-double pegging_offset_bar(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
-                          const Cylinder& cylinder, const TraceOptions& options);
+/// Offset to add to a relative trace [bar], from all of its samples. DataError where the angles that the method reads
+/// are not there.
+WeightedSum pegging_of(const std::vector<double>& angle_cad, const Cylinder& cylinder, const TraceOptions& options);
+
+/// Exponent of p V^n = const over [from, to] from the logarithms of all samples; empty with fewer than three there.
+WeightedSum exponent_of_logarithms(const std::vector<double>& angle_cad, const std::vector<double>& volume,
+                                   double from_cad, double to_cad);
 
 /// Exponent of p V^n = const by regression of ln p on ln V over [from, to]; NaN with fewer than three samples there.
 double polytropic_exponent(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,

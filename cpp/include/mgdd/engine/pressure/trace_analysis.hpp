@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "mgdd/engine/cylinder.hpp"
-#include "mgdd/engine/pressure/pegging.hpp"
+#include "mgdd/engine/pressure/indicating.hpp"
 #include "mgdd/engine/pressure/trace_options.hpp"
 #include "mgdd/math/dual.hpp"
 
@@ -26,25 +26,15 @@ struct TraceWarning {
   bool operator==(const TraceWarning&) const = default;
 };
 
-struct TraceAnalysis {
+/// The burn angles and the heat are those of the smoothed pressure in the window that was found.
+struct TraceAnalysis : CycleFigures {
   std::vector<double> angle_cad, pressure_bar, volume_l, temperature_k;
-  std::vector<double> heat_net_j, heat_loss_j;                         ///< of the step that ends at the sample
+  std::vector<double> net_step_j, loss_step_j;                         ///< of the step that ends at the sample
   std::vector<double> heat_net_cumulative_j, heat_gross_cumulative_j;  ///< zero at the window's start
-  double pegging_bar = 0.0;                                            ///< added to the trace
-  double n_compression = undefined<double>();
-  double n_expansion = undefined<double>();
-  double ca10_cad = undefined<double>();
-  double ca50_cad = undefined<double>();
-  double ca90_cad = undefined<double>();
-  double heat_from_cad = undefined<double>();     ///< window of the cumulative heat
-  double heat_to_cad = undefined<double>();       ///< its end
-  double heat_net_j_total = undefined<double>();  ///< peak of the cumulative heat, or its end where options say so
-  double heat_gross_j_total = undefined<double>();
-  double imep_closed_bar = undefined<double>();
+  double heat_from_cad = undefined<double>();                          ///< window of the cumulative heat
+  double heat_to_cad = undefined<double>();                            ///< its end
+  double heat_gross_j = undefined<double>();  ///< peak of the cumulative heat, or its end where options say so
   double work_closed_j = undefined<double>();
-  double p_max_bar = undefined<double>();
-  double p_max_cad = undefined<double>();
-  double dp_max_bar_per_cad = undefined<double>();  ///< slope of the steepest line over 2 CAD
   double t_max_k = undefined<double>();
   double trapped_mass_g = undefined<double>();
   double tdc_offset_cad = undefined<double>();          ///< motored: what the angles are too large by, good to 0.7 CAD
@@ -62,31 +52,23 @@ struct TraceAnalysis {
 };
 
 /// The single figures of an analysis by name.
-struct TraceFigure {
-  std::string_view name;
-  double TraceAnalysis::* member;
-};
-inline constexpr std::array<TraceFigure, 19> trace_figures{{
-    {"pegging_bar", &TraceAnalysis::pegging_bar},
-    {"n_compression", &TraceAnalysis::n_compression},
-    {"n_expansion", &TraceAnalysis::n_expansion},
-    {"ca10_cad", &TraceAnalysis::ca10_cad},
-    {"ca50_cad", &TraceAnalysis::ca50_cad},
-    {"ca90_cad", &TraceAnalysis::ca90_cad},
-    {"heat_from_cad", &TraceAnalysis::heat_from_cad},
-    {"heat_to_cad", &TraceAnalysis::heat_to_cad},
-    {"heat_net_j", &TraceAnalysis::heat_net_j_total},
-    {"heat_gross_j", &TraceAnalysis::heat_gross_j_total},
-    {"imep_closed_bar", &TraceAnalysis::imep_closed_bar},
-    {"work_closed_j", &TraceAnalysis::work_closed_j},
-    {"p_max_bar", &TraceAnalysis::p_max_bar},
-    {"p_max_cad", &TraceAnalysis::p_max_cad},
-    {"dp_max_bar_per_cad", &TraceAnalysis::dp_max_bar_per_cad},
-    {"t_max_k", &TraceAnalysis::t_max_k},
-    {"trapped_mass_g", &TraceAnalysis::trapped_mass_g},
-    {"tdc_offset_cad", &TraceAnalysis::tdc_offset_cad},
-    {"compression_offset_bar", &TraceAnalysis::compression_offset_bar},
-}};
+inline constexpr auto trace_figures = [] {
+  using A = TraceAnalysis;
+  std::array<Figure<A>, cycle_figures.size() + 8> all{};
+  std::size_t n = 0;
+  for (const Figure<CycleFigures>& figure : cycle_figures)
+    all[n++] = {figure.name, figure.member};
+  for (const Figure<A>& figure : {Figure<A>{"heat_from_cad", &A::heat_from_cad},
+                                  {"heat_to_cad", &A::heat_to_cad},
+                                  {"heat_gross_j", &A::heat_gross_j},
+                                  {"work_closed_j", &A::work_closed_j},
+                                  {"t_max_k", &A::t_max_k},
+                                  {"trapped_mass_g", &A::trapped_mass_g},
+                                  {"tdc_offset_cad", &A::tdc_offset_cad},
+                                  {"compression_offset_bar", &A::compression_offset_bar}})
+    all[n++] = figure;
+  return all;
+}();
 
 /// Analyses the samples between IVC and EVO. The trapped amount is that of `measured_gas_j_per_k`. ParameterError for
 /// an option, a mass or a speed that cannot be; DataError for a trace that cannot be analysed, or whose work is below

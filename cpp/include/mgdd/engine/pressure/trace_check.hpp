@@ -5,6 +5,9 @@
 
 namespace mgdd::engine {
 
+/// No piston engine runs above it; kPa or Pa taken for bar do.
+inline constexpr double highest_pressure_bar = 500.0;
+
 /// Throws ShapeError or DataError, naming index, value and remedy, unless angles [°CA aTDC] and pressures [bar] have
 /// the same length (>= 20), are finite, and angles increase strictly without a gap (a step over 1.5 times the median).
 /// A highest pressure above 500 bar is refused as a wrong unit (Pa or kPa).

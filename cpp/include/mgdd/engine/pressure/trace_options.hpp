@@ -33,6 +33,11 @@ struct TraceOptions {
   double smoothing_width_cad = 4.0;            ///< `savitzky_golay` and `angle_window`: whole width
   double smoothing_cutoff_hz = 3000.0;         ///< `low_pass`: the gain there is 1/2
 
+  double knock_low_hz = 4000.0;    ///< band of the oscillation; half the gain at both ends
+  double knock_high_hz = 20000.0;  ///< one that the sampling does not reach is left out
+  double knock_from_cad = -10.0;   ///< where it is looked for, as far as the trace reaches
+  double knock_to_cad = 90.0;
+
   std::optional<double> intake_pressure_kpa;  ///< what p(IVC) is judged against
   double intake_factor = 1.5;                 ///< p(IVC) beyond this factor of it is doubted
   std::optional<double> bmep_bar;             ///< a gross IMEP that cannot reach it is refused
@@ -59,6 +64,10 @@ constexpr auto fields_of(const TraceOptions&) {
       field<&O::smoothing>("smoothing", "of the pressure before the heat release"),
       field<&O::smoothing_width_cad>({"smoothing_width_cad", "°CA", {}, "whole width"}),
       field<&O::smoothing_cutoff_hz>({"smoothing_cutoff_hz", "Hz", {}, "where the gain is 1/2"}),
+      field<&O::knock_low_hz>({"knock_low_hz", "Hz", {}, "lower end of the band of the oscillation"}),
+      field<&O::knock_high_hz>({"knock_high_hz", "Hz", {}, "its upper end"}),
+      field<&O::knock_from_cad>(cad("knock_from_cad", "start of the window of the oscillation")),
+      field<&O::knock_to_cad>(cad("knock_to_cad", "its end")),
       field<&O::intake_pressure_kpa>({"intake_pressure_kpa", "kPa", {}, "what p(IVC) is judged against"}),
       field<&O::intake_factor>({"intake_factor", "-", {}, "beyond this factor of it p(IVC) is doubted"}),
       field<&O::bmep_bar>({"bmep_bar", "bar", {}, "a gross IMEP that cannot reach it is refused"}),
