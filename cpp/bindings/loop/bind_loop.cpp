@@ -50,14 +50,20 @@ py::dict run(BoundBench& bound_bench, BoundSeeker<S>& bound_seeker, std::int64_t
              double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
              const std::vector<double>& exceed_above, const std::vector<double>& limits) {
   const LoopCriteria criteria{optimum_cad, arrival_cad, tail_cycles, exceed_from, exceed_above, limits};
+  py::dict seen;  // before another call can take the seeker
   auto outcome = [&] {
     const auto bench = bound_bench.use();
     const auto seeker = bound_seeker.use();
-    return interruptible(
-        [&](const std::stop_token& stop) { return run_loop(*bench, *seeker, cycles, criteria, stop); });
+    auto run =
+        interruptible([&](const std::stop_token& stop) { return run_loop(*bench, *seeker, cycles, criteria, stop); });
+    seen = watched(*seeker);
+    return run;
   }();
-  return hand_over(std::move(outcome),
-                   [&](const LoopRun& done) { return to_dict(done, bound_bench.constant().settings()); });
+  return hand_over(std::move(outcome), [&](const LoopRun& done) {
+    py::dict out = to_dict(done, bound_bench.constant().settings());
+    out["watched"] = seen;
+    return out;
+  });
 }
 
 template <class S>

@@ -48,6 +48,27 @@ inline StateColumns columns_from(const std::map<std::string, InputArray>& given)
   return columns;
 }
 
+/// The delay at which every limit is read, by name [cycles].
+template <class T>
+py::dict limit_delays(const T& seeker) {
+  py::dict delays;
+  for (std::size_t i = 0; i < seeker.limit_count(); ++i)
+    delays[as_str(seeker.settings().limits[i].name)] = optimize::limit_delay_of(seeker, i);
+  return delays;
+}
+
+/// What `SeekerFindings` looks at, of a seeker that is in use.
+template <class S>
+py::dict watched(const S& seeker) {
+  const auto& failures = seeker.protocol().failures;
+  py::dict out;
+  out["failing_above"] = input_array(failures.failing_above());
+  out["failing_below"] = input_array(failures.failing_below());
+  out["failing_everywhere"] = failures.failing_everywhere();
+  out["limit_delays"] = limit_delays(seeker);
+  return out;
+}
+
 /// ask, tell, restart and what a loop asks of a recorded seeker, or of what stands around one.
 template <class T>
 void bind_asking(py::class_<Guarded<T>>& cls) {
@@ -106,14 +127,7 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
           },
           "Names of the limits, in the order of tell.")
       .def_property_readonly(
-          "limit_delays",
-          [](const B& b) {
-            const auto r = b.use();
-            py::dict delays;
-            for (std::size_t i = 0; i < r->limit_count(); ++i)
-              delays[as_str(r->settings().limits[i].name)] = optimize::limit_delay_of(*r, i);
-            return delays;
-          },
+          "limit_delays", [](const B& b) { return limit_delays(*b.use()); },
           "The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit "
           "another.")
       .def_property_readonly(

@@ -13,6 +13,7 @@ from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, steer
+from mgdd.optimize.seeker_findings import findings_of
 from mgdd.results.result import Figures
 
 if TYPE_CHECKING:
@@ -90,5 +91,6 @@ def run_seeker(
     uppers = criteria.limits_of(names, seeker)
     dataset.attrs |= criteria.attributes(names, uppers)
     summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
-    run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=seeker.findings)
+    findings = findings_of(seeker.settings, **raw["watched"])
+    run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=findings)
     return hand_over(run, stop)

@@ -9,9 +9,11 @@ import numpy as np
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
-__all__ = ["SeekerFindings"]
+__all__ = ["SeekerFindings", "findings_of"]
 
 
 if TYPE_CHECKING:
@@ -50,21 +52,39 @@ class SeekerFindings(_Watching):
         >>> [finding.code for finding in seeker.findings], float(history["applied"][-1, 0]) <= 3.0
         (['failing_inputs'], True)
         """
-        out = list[Finding]()
-        if self.failing_everywhere:
-            text = "the last twelve cycles and more have failed, of every input that was tried"
-            out.append(Finding("failing_everywhere", (), text, "look at the plant, or start where it is known to run"))
-        for side, edges in (("above", self.failing_above), ("below", self.failing_below)):
-            for index in np.flatnonzero(np.isfinite(edges)):
-                name, edge = f"input[{index}]", float(edges[index])
-                text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
-                remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
-                out.append(Finding("failing_inputs", (name,), text, remedy))
-        for limit in self.settings["limits"]:
-            taken = self.limit_delays[limit.name]
-            if taken != limit.delay_cycles:
-                text = f"readings of {limit.name} fit a delay of {taken:g} cycles, not {limit.delay_cycles:g} as stated"
-                at_end = abs(taken - limit.delay_cycles) >= limit.delay_uncertainty
-                more = ", and raise delay_uncertainty: it is the end of the search" if at_end else ""
-                out.append(Finding("limit_delay", (limit.name,), text, f"mend delay_cycles of the limit{more}"))
-        return tuple(out)
+        return findings_of(
+            self.settings,
+            failing_above=self.failing_above,
+            failing_below=self.failing_below,
+            failing_everywhere=self.failing_everywhere,
+            limit_delays=self.limit_delays,
+        )
+
+
+def findings_of(
+    settings: Mapping[str, Any],
+    *,
+    failing_above: NDArray[np.float64],
+    failing_below: NDArray[np.float64],
+    failing_everywhere: bool,
+    limit_delays: Mapping[str, float],
+) -> tuple[Finding, ...]:
+    """Put into words what a seeker has seen."""
+    out = list[Finding]()
+    if failing_everywhere:
+        text = "the last twelve cycles and more have failed, of every input that was tried"
+        out.append(Finding("failing_everywhere", (), text, "look at the plant, or start where it is known to run"))
+    for side, edges in (("above", failing_above), ("below", failing_below)):
+        for index in np.flatnonzero(np.isfinite(edges)):
+            name, edge = f"input[{index}]", float(edges[index])
+            text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
+            remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
+            out.append(Finding("failing_inputs", (name,), text, remedy))
+    for limit in settings["limits"]:
+        taken = limit_delays[limit.name]
+        if taken != limit.delay_cycles:
+            text = f"readings of {limit.name} fit a delay of {taken:g} cycles, not {limit.delay_cycles:g} as stated"
+            at_end = abs(taken - limit.delay_cycles) >= limit.delay_uncertainty
+            more = ", and raise delay_uncertainty: it is the end of the search" if at_end else ""
+            out.append(Finding("limit_delay", (limit.name,), text, f"mend delay_cycles of the limit{more}"))
+    return tuple(out)
