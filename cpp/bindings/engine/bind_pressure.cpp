@@ -37,6 +37,15 @@ py::array_t<double> column_of(const std::vector<Record>& all, const Figure<Recor
   return to_array(out);
 }
 
+// The texts, and the kind of each.
+void add_warnings(py::dict& out, const std::vector<TraceWarning>& warnings) {
+  std::vector<std::string> texts, kinds;
+  for (const TraceWarning& warning : warnings)
+    texts.push_back(warning.text), kinds.emplace_back(warning.kind);
+  out["warnings"] = texts;
+  out["doubts"] = kinds;
+}
+
 // What does not differ from cycle to cycle of one record.
 py::dict common_part(const TraceAnalysis& a) {
   py::dict out;
@@ -61,10 +70,7 @@ py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const
   out["scalars"] = scalars;
   out["motored"] = a.motored;
   out["window_found"] = a.window_found;
-  std::vector<std::string> warnings;
-  for (const TraceWarning& warning : a.warnings)
-    warnings.push_back(warning.text);
-  out["warnings"] = warnings;
+  add_warnings(out, a.warnings);
   return out;
 }
 
@@ -98,7 +104,7 @@ py::dict bind_analyze_cycles(const InputArray& angle, const InputArray& pressure
     motored.append(a.motored), found.append(a.window_found);
   out["motored"] = motored;
   out["window_found"] = found;
-  out["warnings"] = count_warnings(all);
+  add_warnings(out, count_warnings(all));
   return out;
 }
 

@@ -128,7 +128,8 @@ def analyze(
         Burn angles are NaN for a motored trace, ``tdc_offset_cad`` (what its angles are too
         large by, good to 0.7 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
         ``dp_max``, ``mass_source``, ``heat_window`` (``found``, ``given``, ``whole`` or ``no burn found``),
-        ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per line).
+        ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per
+        line) and ``doubts`` (the kind of each).
 
         Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand mean,
         deviation, percentiles and COV, ``misfire`` and ``partial_burn`` as `Indicating.record` gives them,
@@ -215,8 +216,11 @@ def analyze(
         raise error.reworded(f"{error}; the torque was taken as that of its cylinders: see n_cylinders") from None
     for warning in () if quiet else result.attrs["warnings"].splitlines():
         _LOG.warning("%s: %s", attrs["file"], warning)
-    read = str(trace.attrs.get("warnings", ""))  # what reading doubted was logged by the reader
-    return result.assign_attrs(warnings="\n".join(filter(None, (read, result.attrs["warnings"]))))
+    read = str(trace.attrs.get("warnings", "")).splitlines()  # what reading doubted was logged by the reader
+    return result.assign_attrs(
+        warnings="\n".join([*read, *result.attrs["warnings"].splitlines()]),
+        doubts="\n".join([*("reading" for _ in read), *result.attrs["doubts"].splitlines()]),
+    )
 
 
 def _one(
@@ -243,6 +247,7 @@ def _one(
             "heat_window": given or ("found" if raw["window_found"] else "no burn found"),
             "motored": int(raw["motored"]),
             "warnings": "\n".join(raw["warnings"]),
+            "doubts": "\n".join(raw["doubts"]),
         },
     )
 

@@ -56,10 +56,11 @@ def of_cycles(
     made = _core.engine.TraceOptions(**options)
     columns: dict[str, tuple[Any, ...]] = {}
     lines: list[str] = []
+    kinds: list[str] = []
     if traces:
         raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, made)
         mean = _core.engine.analyze(angle, pressure.mean(axis=0), cylinder, point, made)
-        scalars, lines, smoothing = raw["scalars"], list(raw["warnings"]), raw["smoothing"]
+        scalars, lines, kinds, smoothing = raw["scalars"], raw["warnings"], raw["doubts"], raw["smoothing"]
         columns = {ANGLE: (ANGLE, raw[ANGLE]), "volume_l": (ANGLE, raw["volume_l"])}
         columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in _COLUMNS}
         window, motored = "found" if any(raw["window_found"]) else "no burn found", sum(raw["motored"])
@@ -75,7 +76,9 @@ def of_cycles(
         motored = np.isnan(scalars["ca50_cad"]).sum()
     n = len(pressure)
     marks = burn_marks(scalars)
-    lines += [*burn_warnings(marks), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
+    unburnt = burn_warnings(marks)
+    lines = [*lines, *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
+    kinds = [*kinds, *unburnt, *mean["doubts"]]
     return labelled_dataset(
         {
             **columns,
@@ -94,6 +97,7 @@ def of_cycles(
             "cycles": n,
             "motored": int(motored),
             "warnings": "\n".join(lines),
+            "doubts": "\n".join(kinds),
         },
     )
 
@@ -112,14 +116,14 @@ def burn_marks(scalars: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"misfire": misfire, "partial_burn": fired & (share < _PARTIAL) & ~misfire}
 
 
-def burn_warnings(marks: dict[str, np.ndarray]) -> list[str]:
-    """Name the cycles that are marked; one line for each kind."""
-    lines = []
+def burn_warnings(marks: dict[str, np.ndarray]) -> dict[str, str]:
+    """Name the cycles that are marked; a line for each mark that one has."""
+    lines = {}
     for name, text in (("misfire", "do not burn"), ("partial_burn", "burn less than four fifths of the median heat")):
         cycles = (np.flatnonzero(marks[name]) + 1).tolist()
         if cycles:
             shown = ", ".join(map(str, cycles[:_NAMED])) + (", ..." if len(cycles) > _NAMED else "")
-            lines.append(f"{len(cycles)} of {marks[name].size} cycles {text}: cycle {shown}")
+            lines[name] = f"{len(cycles)} of {marks[name].size} cycles {text}: cycle {shown}"
     return lines
 
 

@@ -48,8 +48,9 @@ TEST(EngineTraceCycles, WarningsOfOneKindAreCounted) {
   for (const std::size_t c : {1u, 3u, 4u})
     r.pressure[c][60] += 40.0;
   const auto lines = count_warnings(analyze_cycles(r.angle, r.pressure, r.engine.cylinder, r.engine.point, {}));
-  const auto spikes = std::count_if(lines.begin(), lines.end(), [](const std::string& line) {
-    return line.starts_with("3 of 5 cycles: the sample at -110") && line.ends_with("(cycle 2)");
+  const auto spikes = std::count_if(lines.begin(), lines.end(), [](const TraceWarning& w) {
+    return w.kind == "spike" && w.text.starts_with("3 of 5 cycles: the sample at -110") &&
+           w.text.ends_with("(cycle 2)");
   });
   EXPECT_EQ(spikes, 1);
 }

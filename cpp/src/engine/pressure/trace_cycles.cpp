@@ -63,7 +63,7 @@ std::vector<CycleFigures> indicate_cycles(const Indicating& indicating, std::spa
   return out;
 }
 
-std::vector<std::string> count_warnings(const std::vector<TraceAnalysis>& cycles) {
+std::vector<TraceWarning> count_warnings(const std::vector<TraceAnalysis>& cycles) {
   struct Kind {
     std::string_view kind;
     std::size_t first, count;
@@ -81,10 +81,10 @@ std::vector<std::string> count_warnings(const std::vector<TraceAnalysis>& cycles
       }
     }
   }
-  std::vector<std::string> lines;
+  std::vector<TraceWarning> lines;
   for (const Kind& k : kinds) {
-    lines.push_back(std::to_string(k.count) + " of " + std::to_string(cycles.size()) + " cycles: " + k.text +
-                    " (cycle " + std::to_string(k.first + 1) + ")");
+    lines.push_back({k.kind, std::to_string(k.count) + " of " + std::to_string(cycles.size()) + " cycles: " + k.text +
+                                 " (cycle " + std::to_string(k.first + 1) + ")"});
   }
   return lines;
 }

@@ -98,6 +98,6 @@ std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad,
                                           const TraceOptions& options, std::size_t threads = 0);
 
 /// One line per kind of warning, in the order of their first cycle: "12 of 60 cycles: ... (cycle 3)".
-std::vector<std::string> count_warnings(const std::vector<TraceAnalysis>& cycles);
+std::vector<TraceWarning> count_warnings(const std::vector<TraceAnalysis>& cycles);
 
 }  // namespace mgdd::engine
