@@ -92,6 +92,15 @@ class Table(ABC):
     def height(self) -> int:
         """Return the number of rows."""
 
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Return the number of rows of each column."""
+        return (self.height,) * self.width
+
+    def first_row(self) -> tuple[str, ...] | None:
+        """Return the cells of the first row below the header as text; None where a file has no lines."""
+        return None
+
     @abstractmethod
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns as the rows of an array, or name the first bad cell."""
@@ -168,6 +177,10 @@ class TextTable(Table):
         """Return the cells as text."""
         return tuple(_cells(text, self.mark) for text in self.texts)
 
+    def first_row(self) -> tuple[str, ...] | None:
+        """Return the cells of the first row below the header as text."""
+        return _cells(self.texts[0], self.mark) if self.texts else None
+
     @property
     def width(self) -> int:
         """Return the number of columns, which every row has."""
@@ -216,6 +229,8 @@ class TextTable(Table):
             number = parse_number(row[index], self.decimal)
             if number is None:
                 remedy = "correct it or start the line with #"
+                if position == 0 and self.header is not None:
+                    remedy = "if the line is a further one of the header, start it with #, else correct it"
                 if "," in row[index] and self.decimal == ".":
                     remedy = f"pass {argument('decimal', repr(','))} if the comma is a decimal mark"
                 raise DataError(f"{where}: {row[index]!r} is not a number: {remedy}")
@@ -258,9 +273,10 @@ def text_table(
     width = _width(body[0][1], mark) if body else len(heads[0])
     for number, row in body:
         if _width(row, mark) != width:
+            cut = number == body[-1][0] and _width(row, mark) < width
             raise DataError(
                 f"{source}, line {number}: {_width(row, mark)} cell(s) where line {body[0][0]} has {width}: "
-                "every row needs the same columns"
+                f"every row needs the same columns{'; the file is cut off there: remove its last line' if cut else ''}"
             )
     header, units = _names_and_units(heads, width)
     lines, texts = zip(*body, strict=True) if body else ((), ())
