@@ -278,9 +278,28 @@ def text_table(
                 f"{source}, line {number}: {_width(row, mark)} cell(s) where line {body[0][0]} has {width}: "
                 f"every row needs the same columns{'; the file is cut off there: remove its last line' if cut else ''}"
             )
+    _check_commas(source, content[:start], heads, body, mark)
     header, units = _names_and_units(heads, width)
     lines, texts = zip(*body, strict=True) if body else ((), ())
     return TextTable(source, header, units, decimal, mark, texts, lines)
+
+
+def _check_commas(
+    source: str,
+    lines: Sequence[tuple[int, str]],
+    heads: Sequence[tuple[str, ...]],
+    body: Sequence[tuple[int, str]],
+    mark: str | None,
+) -> None:
+    """Refuse commas that separate cells and are decimal marks as well: twice as many cells as names."""
+    if mark != "," or not heads or not body or len(heads[-1]) < 2:
+        return
+    names, cells = len(heads[-1]), _cells(body[0][1], mark)
+    if len(cells) == 2 * names and all(cell.isdecimal() for cell in cells[1::2]):
+        raise DataError(
+            f"{source}, line {lines[-1][0]}: {names} columns, and the rows have {len(cells)} cells: commas are "
+            "separators and decimal marks as well: write the file with another separator"
+        )
 
 
 def _first_row(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> int:
