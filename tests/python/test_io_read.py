@@ -239,7 +239,7 @@ def test_channels_are_chosen_by_either_name(write: Write) -> None:
     bench = read(file, firing_tdc_deg=360.0, channels=["torque [Nm]", "pressure_2_bar"])
     assert list(bench.data_vars) == ["pressure_2_bar", "torque"]
     np.testing.assert_array_equal(bench["torque"], TORQUE.reshape(5, 1440))
-    with pytest.raises(DataError, match=r"channels = 'torqe': did you mean 'torque'\?; there are 'pressure_1_bar'"):
+    with pytest.raises(DataError, match=r"channels='torqe': did you mean 'torque'\?; there are 'pressure_1_bar'"):
         read(file, firing_tdc_deg=360.0, channels=["torqe"])
     text = file.read_text().replace("\n", ",ok\n").replace("[Nm],ok", "[Nm],note [V]")
     broken = text.replace(f",{float(TORQUE[7])!r},", ",off,")

@@ -201,7 +201,7 @@ def _of_netcdf(file: Path) -> Iterator[_Column]:
     dataset = read_netcdf(file).transpose(ANGLE, ..., missing_dims="ignore")
     columns = (
         _Column(str(name), dataset[name].to_numpy(), str(dataset[name].attrs.get("units", "")))
-        for name in dataset.variables
+        for name in sorted(dataset.variables, key=lambda each: each != ANGLE)  # the angle first, as in a text
     )
     return _flat(columns, along=dataset.sizes.get(ANGLE))
 

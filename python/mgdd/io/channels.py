@@ -12,6 +12,7 @@ import numpy as np
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.angle_column import Angle, angle_of, headings
 from mgdd.io.column_names import Heading, last_number, spelled_unit, stated_unit, stem, without_brackets
+from mgdd.io.pressure import CYCLE
 from mgdd.io.pressure_file import choose_pressure, odd_shape
 from mgdd.io.reading import TIME_UNITS, Reading
 from mgdd.io.table import Table
@@ -81,7 +82,7 @@ def layout_of(table: Table, how: Reading) -> Layout:
     for group in _series(table, heads, [i for i in fast if i not in taken], count):
         channels.append(_channel(table, heads, group, "fast", channels))
     for i in numeric:
-        if i in fast or i == angle.column or i in times:
+        if i in fast or i == angle.column or i in times or _numbers_cycles(table, heads[i], i):
             continue
         clock = _clock(table, heads, times, i)
         channels.append(_channel(table, heads, (i,), "other" if clock is None else "slow", channels, clock))
@@ -104,7 +105,9 @@ def kept_channels(table: Table, layout: Layout, names: Sequence[str] | None) -> 
     if strange is not None:
         have = columns_shown([channel.name for channel in layout.channels])
         near = did_you_mean(str(strange), known)
-        raise DataError(f"{table.source}: channels = {strange!r}: {near or 'no such channel'}; there are {have}")
+        raise DataError(
+            f"{table.source}: {argument('channels', repr(strange))}: {near or 'no such channel'}; there are {have}"
+        )
     chosen = {known[name].name for name in names}
     return [channel for channel in layout.channels if channel.name in chosen]
 
@@ -175,6 +178,10 @@ def _alike(degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> bool:
     return odd_shape(degrees, rows) is None
 
 
+def _numbers_cycles(table: Table, head: Heading, index: int) -> bool:
+    return head.name == CYCLE and np.array_equal(table.numbers(index), np.arange(1, table.lengths[index] + 1))
+
+
 def _grouped(table: Table, heads: Sequence[Heading], columns: Sequence[int]) -> list[tuple[int, ...]]:
     """Put columns of one name together that differ in their last number, and in no cylinder."""
     groups: dict[object, list[int]] = {}
@@ -219,7 +226,7 @@ def _channel(
     words = stem(header) if len(columns) > 1 else without_brackets(header)
     name = re.sub(r"\W+", "_", words).strip("_") or f"column_{index}"
     name = f"c_{name}" if name[0].isdigit() else name
-    used = {ANGLE, "cycle", *(other.name for other in others)}
+    used = {ANGLE, CYCLE, *(other.name for other in others)}
     known = VARIABLES[name].units if name in VARIABLES else units
     reserved = name in used or re.fullmatch(r"time_\d+_s", name)
     if reserved or attribute_units(known or "-") != attribute_units(units or "-"):

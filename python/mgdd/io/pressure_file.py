@@ -180,6 +180,8 @@ def choose_pressure(
         return named
     first = 0 if angle is None else angle + 1
     possible = [i for i in range(first, table.width) if heads[i].quantity in (None, "pressure")]
+    if angle is not None:
+        possible = [i for i in possible if table.lengths[i] == table.lengths[angle]]
     possible = [i for i in table.numeric(possible) if angle is not None or not _counts(table.numbers(i))]
     if not possible and table.width == 1:
         raise DataError(
