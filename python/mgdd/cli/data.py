@@ -124,7 +124,8 @@ def _column(
     lowest, highest = None, None
     try:
         values = table.matrix(group)
-        lowest, highest = float(np.nanmin(values)), float(np.nanmax(values))
+        if not np.isnan(values).all():
+            lowest, highest = float(np.nanmin(values)), float(np.nanmax(values))
     except DataError as error:
         if table.numeric([index]) and not any(str(error) in doubt for doubt in doubts):
             doubts.append(str(error))
