@@ -311,6 +311,57 @@ def test_angles_and_pressures_are_let_through() -> None:
     assert no_pressure(np.clip(FIRST, 2.0, 60.0), 5.0) is None  # a charge amplifier at its end
 
 
+@pytest.mark.parametrize("reader", [read, read_pressure])
+def test_an_angle_that_counts_turns_is_no_angle_of_cycles(reader: Any, write: Write) -> None:
+    file = write([RUN % 360.0, FIRST], "CAD,p [bar]")
+    with pytest.raises(
+        DataError, match=r"every second turn has another pressure.*pass angle_step_deg=0.5 instead of its"
+    ):
+        reader(file)
+    made = reader(file, angle_step_deg=0.5, firing_tdc_deg=360.0, pressure_column="p [bar]")
+    np.testing.assert_array_equal(made["pressure_bar"], FIRST.reshape(5, 1440))
+    two_stroke = np.tile(ONE[360:1080], 6) * (1.0 + 0.01 * np.repeat(np.arange(6.0), 720))
+    made = reader(write([np.tile(FULL[360:1080], 6), two_stroke], "CAD,p [bar]"))
+    np.testing.assert_array_equal(made["pressure_bar"], two_stroke.reshape(6, 720))
+
+
+def test_what_is_said_of_samples_that_are_not_finite(tmp_path: Path) -> None:
+    hole = np.where(np.arange(RUN.size) == 154, np.nan, 1.0)
+    cases = {
+        r"sample 154: crank angle = nan: must be finite": {"angle": hole * RUN, "p": FIRST},
+        r"sample 154: pressure = nan: must be finite": {"angle": RUN, "p": hole * FIRST},
+        r"column 'p2', row 154: nan: must be finite": {"angle": RUN, "p1": FIRST, "p2": hole * SECOND},
+    }
+    for message, columns in cases.items():
+        WRITERS["npz"](tmp_path / "a.npz", columns, {})
+        with pytest.raises(DataError, match=message):
+            read(tmp_path / "a.npz", firing_tdc_deg=360.0)
+    WRITERS["npz"](tmp_path / "a.npz", {"angle": RUN, "p": FIRST, "lift": hole * RUN}, {})
+    assert int(read(tmp_path / "a.npz", firing_tdc_deg=360.0)["lift"].isnull().sum()) == 1
+
+
+def test_a_step_is_that_of_the_raster_of_the_pressure(tmp_path: Path) -> None:
+    columns = {"T_exh": 600.0 + np.arange(9.0) ** 2, "time_s": np.arange(9.0), "p": FIRST, "torque": TORQUE}
+    WRITERS["npz"](tmp_path / "a.npz", columns, {})
+    options = {"angle_step_deg": 0.5, "firing_tdc_deg": 360.0}
+    bench = read(tmp_path / "a.npz", **options)
+    assert bench["T_exh"].dims == ("time_1_s",)
+    np.testing.assert_array_equal(bench["torque"], TORQUE.reshape(5, 1440))
+    assert bench[ANGLE].attrs["source"] == "angle_step_deg=0.5"
+    assert (
+        bench[["pressure_bar"]]
+        .drop_vars("time_1_s", errors="ignore")
+        .equals(read_pressure(tmp_path / "a.npz", **options))
+    )
+
+
+def test_a_cylinder_that_is_none_is_named(write: Write) -> None:
+    file = write([RUN, FIRST, 0.01 * SECOND], "CAD,p1 [bar],p2 [bar]")
+    with pytest.raises(DataError, match=r"column 'p2 \[bar\]': the highest pressure 1.7.*or name the cylinders' press"):
+        read(file, firing_tdc_deg=360.0)
+    assert read(file, firing_tdc_deg=360.0, pressure_column="p1 [bar]")["p2"].attrs["units"] == "bar"
+
+
 # --- bad files ---------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("change", "message"),

@@ -44,6 +44,8 @@ class Angle(NamedTuple):
     def cycles(self) -> float:
         """Return how many cycles there are, a part of one counting as one."""
         step, span = np.diff(self.degrees), float(np.ptp(self.degrees))
+        if not step.size or not np.isfinite(span):
+            return np.inf  # the check of the trace says what is wrong with it
         back = step * (1.0 if np.mean(step > 0.0) >= 0.5 else -1.0) < -0.5 * span
         return max(1.0 + float(np.sum(back)), span / CYCLE_DEG)
 

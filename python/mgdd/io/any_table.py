@@ -10,6 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -59,7 +60,7 @@ class ArrayTable(Table):
         """Return the number of rows of the first column."""
         return len(self.columns[0])
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Return the number of rows of each column."""
         return tuple(map(len, self.columns))

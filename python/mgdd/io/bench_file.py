@@ -180,7 +180,11 @@ def _cut(
         cut = [part[:1] if len(each) < columns else part for each, part in zip(others, record.along, strict=True)]
         for j, pressure in enumerate(each for each in pressures if each is not master):
             called = f"{table.source}, {[each for each in cylinders if each is not channel][j].source}"
-            check_magnitude(record.angle, cut[j], pressure.unit, called, pressure.unit_of_file)
+            try:
+                check_magnitude(record.angle, cut[j], pressure.unit, called, pressure.unit_of_file)
+            except DataError as error:
+                named = argument("pressure_column", "")
+                raise error.reworded(f"{error}; or name the cylinders' pressures, {named}") from error
             cut[j] = to_bar(cut[j], pressure.unit)
         cut.insert(k, record.bar)
         return record, cut

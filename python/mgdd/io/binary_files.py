@@ -29,18 +29,17 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
 
     Examples
     --------
-        >>> import pathlib, tempfile
-        >>> from mgdd.errors import DataError
-    from mgdd.io.extras import import_extra
-        >>> from mgdd.io.binary_files import read_netcdf
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     file = pathlib.Path(folder) / "table.nc"
-        ...     _ = file.write_text("speed_rpm,fuel_mg")
-        ...     try:
-        ...         read_netcdf(file)
-        ...     except DataError as error:
-        ...         print(str(error).rpartition("/")[2])
-        table.nc: not a netCDF file: it begins with b'speed_rp'; a text table ends in .csv
+    >>> import pathlib, tempfile
+    >>> from mgdd.errors import DataError
+    >>> from mgdd.io.binary_files import read_netcdf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "table.nc"
+    ...     _ = file.write_text("speed_rpm,fuel_mg")
+    ...     try:
+    ...         read_netcdf(file)
+    ...     except DataError as error:
+    ...         print(str(error).rpartition("/")[2])
+    table.nc: not a netCDF file: it begins with b'speed_rp'; a text table ends in .csv
     """
     import xarray as xr
 

@@ -59,7 +59,7 @@ def layout_of(table: Table, how: Reading) -> Layout:
     """Find angle, cylinder pressures, other channels of their raster, and the columns of other rasters."""
     heads = headings(table)
     times = _times(table, heads)
-    numeric = [i for i in range(table.width) if table.numeric([i])]
+    numeric = table.numeric(range(table.width))
     if how.angle_column is None and how.angle_step_deg is None and heads[0].quantity != "angle":
         named = next((heads[i].name for i in numeric if heads[i].quantity == "angle"), None)
         how = replace(how, angle_column=named)

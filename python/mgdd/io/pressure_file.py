@@ -64,8 +64,10 @@ class Record(NamedTuple):
 
 def cycles_of(table: Table, how: Reading) -> Record:
     """Read the cycles of one cylinder."""
-    heads = headings(table)
-    angle = angle_of(table, heads, how)
+    heads, samples = headings(table), None
+    if how.angle_step_deg is not None and len(set(table.lengths)) > 1:
+        samples = table.lengths[choose_pressure(table, heads, how.pressure_column, None)[0]]
+    angle = angle_of(table, heads, how, samples=samples)
     columns = choose_pressure(table, heads, how.pressure_column, angle.column)
     return record_of(table, angle, pressure_of(table, heads, columns, how, angle), how)
 
@@ -156,6 +158,7 @@ def checked(
         place = Place(source, rows)
         together = cut.values if along is None else np.concatenate([cut.values, along])
         cut = arranged(degrees, together, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place)
+        _check_turns(cut.degrees, cut.values[0], source)
         degrees, values = cut.degrees - tdc_offset_cad, cut.values[0]
         rows = place.only(cut.rows).rows
     one = values[0] if len(values) == 1 else values  # check_trace names what is not finite or too short
@@ -163,6 +166,19 @@ def checked(
     doubts = [*level_warning(angle, values, unit), *steep_warning(angle, bar)] if level else []
     doubts += phase_warnings(angle, np.atleast_2d(bar), over_time=over_time, source=source)
     return Record(angle, np.atleast_2d(bar), cut.values[1:], [*cut.notes, *doubts], cut.taken, cut.total)
+
+
+def _check_turns(degrees: NDArray[np.float64], rows: NDArray[np.float64], source: str) -> None:
+    """Refuse an angle that returns in every turn where every second turn has another pressure: a cycle has two."""
+    step = float(np.median(np.diff(degrees)))
+    if len(rows) < 2 or abs(degrees[-1] - degrees[0] + step - 360.0) > 1.5 * step:
+        return
+    if odd_shape(degrees, np.stack([rows[::2].mean(axis=0), rows[1::2].mean(axis=0)])) is not None:
+        raise DataError(
+            f"{source}: the angle returns every 360 degrees, and every second turn has another pressure: it counts "
+            f"turns and not cycles: pass {argument('angle_step_deg', format(step, 'g'))} instead of its column, and "
+            f"{argument('firing_tdc_deg', '')} with the angle of firing TDC counted from the first sample, 0 to 720"
+        )
 
 
 def choose_pressure(

@@ -18,8 +18,9 @@ _HELD, _NEAR, _BETWEEN = 0.05, 0.08, 0.01
 _STANDS, _EVEN = 0.2, 0.9
 # A turn and a cycle in radians, and how far a coarse step may miss them.
 _RADIANS, _MISSED = (2.0 * np.pi, 4.0 * np.pi), 0.05
-# A pressure rises once in a cycle from the lower to the upper level; a wave does so smoothly, at even distances.
-_RISES, _LEVELS, _SMOOTH, _REGULAR = 1.5, (0.25, 0.75), 0.45, 0.2
+# A pressure rises once in a cycle from the lower to the upper level; a wave does so smoothly, at even distances, and is
+# as long above its middle as below, where a whole cycle of a pressure is above for less than a fifth, at any speed.
+_RISES, _LEVELS, _SMOOTH, _REGULAR, _ABOVE = 1.5, (0.25, 0.75), 0.45, 0.2, (0.3, 0.7)
 
 
 def no_angle(values: NDArray[np.float64], unit: str) -> str | None:
@@ -64,7 +65,8 @@ def no_pressure(values: NDArray[np.float64], cycles: float) -> str | None:
     marks = np.where(values >= last, 1, np.where(values <= first, -1, 0))
     at = np.flatnonzero(marks)
     rises = at[1:][(marks[at[1:]] > 0) & (marks[at[:-1]] < 0)]
-    smooth = np.abs(step).max() < _SMOOTH * (high - low)
+    above = float(np.mean(values > 0.5 * (low + high)))
+    smooth = np.abs(step).max() < _SMOOTH * (high - low) and _ABOVE[0] < above < _ABOVE[1]
     if rises.size >= max(3.0, _RISES * cycles) and smooth:
         apart = np.diff(rises)
         if apart.std() <= _REGULAR * apart.mean():
