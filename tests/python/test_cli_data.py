@@ -151,6 +151,16 @@ def test_info_shows_a_column_per_cycle_as_one(capsys: pytest.CaptureFixture[str]
     ]  # fmt: skip
 
 
+def test_a_long_series_is_one_line_in_a_file_that_cannot_be_cut(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    np.savez(folder / "many.npz", angle=FULL + 540.0, p=np.tile(CYCLES[:1], (30, 1)).T)
+    columns = out(capsys, "data", "info", "many.npz")["columns"]
+    assert [(column["name"], column["highest"]) for column in columns] == [
+        ("angle", 719.5), ("p 1 ... p 30", pytest.approx(52.0)),
+    ]  # fmt: skip
+
+
 # --- errors ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("argv", "message"),

@@ -21,7 +21,7 @@ from mgdd.io.any_table import format_of, read_any_table
 from mgdd.io.bench_file import bench_record
 from mgdd.io.binary_files import write_netcdf, write_parquet
 from mgdd.io.channels import layout_of
-from mgdd.io.column_names import stated_unit
+from mgdd.io.column_names import stated_unit, stem
 from mgdd.io.plain_csv import long_columns, write_long
 from mgdd.io.reading import Reading
 from mgdd.io.table import Table as FileTable
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add"]
 
+_SERIES = 12  # columns of one name that are shown one by one
 _LOG = logging.getLogger(__name__)
 _OWN = Options(read, "channels", "pressure_column", "angle_column")
 _SPEED, _FETCH = Options(read_pressure, "speed_rpm"), Options(datasets.read, "fetch")
@@ -100,8 +101,7 @@ def _info(args: argparse.Namespace) -> None:
             taken[(layout.angle.column,)] = ANGLE
     except DataError as error:
         doubts.append(f"not read as cycles: {error}")
-    alone = set(range(table.width)) - {i for columns in taken for i in columns}
-    groups = sorted([*taken, *((i,) for i in alone)])
+    groups = sorted([*taken, *_alone(table, {i for columns in taken for i in columns})])
     columns = [_column(table, group, taken.get(group, ""), bench, doubts) for group in groups]
     shape = {} if bench is None else {str(dim): size for dim, size in bench.sizes.items()}
     payload = {
@@ -113,6 +113,16 @@ def _info(args: argparse.Namespace) -> None:
     )
     head = f"{args.file}: {payload['format']}{''.join(f', {size} {dim}' for dim, size in shape.items())}\n"
     emit(args, payload, text=[head, shown, *(f"doubtful: {doubt}" for doubt in doubts)])
+
+
+def _alone(table: FileTable, taken: set[int]) -> list[tuple[int, ...]]:
+    """Return the columns that no channel has; those of a long series, as of a column per cycle, together."""
+    series: dict[tuple[str, int], list[int]] = {}
+    for index in set(range(table.width)) - taken:
+        name = stem(table.header[index]) if table.header else ""
+        series.setdefault((name, table.lengths[index]), []).append(index)
+    long = [tuple(sorted(group)) for group in series.values() if len(group) > _SERIES]
+    return [*long, *((index,) for group in series.values() if len(group) <= _SERIES for index in group)]
 
 
 def _column(
