@@ -80,6 +80,7 @@ def test_the_later_cylinder_may_stand_first(write: Write) -> None:
     bench = read(file, firing_tdc_deg=360.0)
     np.testing.assert_array_equal(bench["pressure_3_bar"], SECOND.reshape(5, 1440))
     np.testing.assert_array_equal(bench["pressure_1_bar"], FIRST.reshape(5, 1440))
+    assert bench[ANGLE].attrs["source"] == "column 'CAD', 0 at firing TDC of pressure_1_bar"
     alone = read_pressure(file, pressure_column="cyl_1 [bar]", firing_tdc_deg=360.0)
     np.testing.assert_array_equal(bench["pressure_1_bar"], alone["pressure_bar"])
 
@@ -209,6 +210,22 @@ def test_slow_rasters_and_one_value_per_cycle(form: str, tmp_path: Path) -> None
         )
         with pytest.raises(DataError, match=r"column 'x' has 3 values: neither .*leave it out of channels"):
             read(file, firing_tdc_deg=360.0, channels=["x"])
+
+
+def test_a_time_in_minutes_is_not_taken_for_seconds(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "f", "w") as content:
+        content["angle"], content["p"] = FULL, ONE
+        content["time"], content["T"] = np.arange(7.0), 600.0 + np.arange(7.0)
+        content["time"].attrs["units"] = "min"
+    bench = read(tmp_path / "f")
+    assert list(bench.data_vars) == ["pressure_bar"]
+    assert "'T', 'time' left out: neither over the crank angle, nor with a time" in bench.attrs["warnings"]
+    with h5py.File(tmp_path / "f", "a") as content:
+        content["time"].attrs["units"] = ""
+    bench = read(tmp_path / "f")
+    np.testing.assert_array_equal(bench["time_1_s"], np.arange(7.0))
+    assert "the file gives no unit of column 'time': taken as seconds" in bench.attrs["warnings"]
 
 
 def test_values_per_cycle_follow_the_cycles_that_are_whole(tmp_path: Path) -> None:

@@ -135,9 +135,10 @@ def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *
         if len(cylinders) > 1:
             _check_finite(table, channel, pressure)
     values = [_values(table, channel) for channel in fast]
-    record, cut = _cut(table, layout, cylinders, pressures, values)
+    record, cut, reference = _cut(table, layout, cylinders, pressures, values)
     variables: dict[str, tuple[Any, ...]] = {ANGLE: (ANGLE, record.angle)}
-    sources = {ANGLE: layout.angle_source, CYCLE: "counted from 1"}
+    of = f", 0 at firing TDC of {reference}" if len(cylinders) > 1 else ""
+    sources = {ANGLE: f"{layout.angle_source}{of}", CYCLE: "counted from 1"}
     count = len(record.bar)
     if count > 1:
         variables[CYCLE] = cycle_count(count)
@@ -163,8 +164,8 @@ def _cut(
     cylinders: Sequence[Channel],
     pressures: Sequence[Pressure],
     fast: Sequence[NDArray[np.float64]],
-) -> tuple[Record, list[NDArray[np.float64]]]:
-    """Cut all channels at the cycles of the cylinder whose firing TDC the angle counts from."""
+) -> tuple[Record, list[NDArray[np.float64]], str]:
+    """Cut all channels at the cycles of the cylinder whose firing TDC the angle counts from, and name that one."""
     first: DataError | None = None
     columns = len(pressures[0].values)
     for k, (channel, master) in enumerate(zip(cylinders, pressures, strict=True)):
@@ -187,7 +188,7 @@ def _cut(
                 raise error.reworded(f"{error}; or name the cylinders' pressures, {named}") from error
             cut[j] = to_bar(cut[j], pressure.unit)
         cut.insert(k, record.bar)
-        return record, cut
+        return record, cut, channel.name
     raise first or DataError(f"{table.source}: no cylinder pressure: name it, {argument('pressure_column', '')}")
 
 

@@ -28,6 +28,7 @@ Kind = Literal["pressure", "fast", "slow", "other"]
 # Of units that no expression of a units library spells so.
 _WRITTEN = {"°c": "degC", "degc": "degC", "nm": "N m", "n m": "N m", "n·m": "N m", "1/min": "rpm", "min-1": "rpm"}
 _LONGEST_NUMBER = 4
+_TEMPERATURE = re.compile(r"(?<![^\W_])T(?![^\W_])")  # without a unit; a time is a small t
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,7 @@ def layout_of(table: Table, how: Reading) -> Layout:
     times = _times(table, heads)
     numeric = table.numeric(range(table.width))
     if how.angle_column is None and how.angle_step_deg is None and heads[0].quantity != "angle":
-        named = next((heads[i].name for i in numeric if heads[i].quantity == "angle"), None)
-        how = replace(how, angle_column=named)
+        how = replace(how, angle_column=next((i for i in numeric if heads[i].quantity == "angle"), None))
     samples, clock = None, None
     if how.angle_step_deg is not None:
         at = _first_pressure(table, heads, how, numeric)
@@ -130,6 +130,8 @@ def _times(table: Table, heads: Sequence[Heading]) -> list[int]:
     if table.lines is not None:
         return []  # a text has one raster
     called = [i for i, head in enumerate(heads) if head.quantity == "time" and head.unit in (None, *TIME_UNITS)]
+    called = [i for i in called if heads[i].strange is None and heads[i].unclear is None]  # a unit such as min
+    called = [i for i in called if heads[i].unit or not _TEMPERATURE.search(heads[i].name)]
     return [i for i in called if np.all(np.diff(table.numbers(i)) > 0.0)]
 
 
