@@ -340,6 +340,10 @@ def test_an_angle_that_counts_turns_is_no_angle_of_cycles(reader: Any, write: Wr
     two_stroke = np.tile(ONE[360:1080], 6) * (1.0 + 0.01 * np.repeat(np.arange(6.0), 720))
     made = reader(write([np.tile(FULL[360:1080], 6), two_stroke], "CAD,p [bar]"))
     np.testing.assert_array_equal(made["pressure_bar"], two_stroke.reshape(6, 720))
+    motored = 2.0 + 40.0 * np.exp(-((FULL[360:1080] / 35.0) ** 2))
+    late = motored + 43.0 * np.exp(-(((FULL[360:1080] - 45.0) / 20.0) ** 2))  # every second cycle misfires
+    made = reader(write([np.tile(FULL[360:1080], 4), np.tile([late, motored], (2, 1)).ravel()], "CAD,p [bar]"))
+    assert made.sizes["cycle"] == 4
 
 
 def test_what_is_said_of_samples_that_are_not_finite(tmp_path: Path) -> None:

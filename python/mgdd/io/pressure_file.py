@@ -34,6 +34,8 @@ __all__ = ["Pressure", "Record", "checked", "choose_pressure", "cycles_of", "odd
 _MIN_CORRELATION = 0.5
 _PEAK_WITHIN_CAD = 40.0
 _LARGEST_OFFSET_CAD = 20.0
+# A misfire still looks like a late burn by half; the turn of the gas exchange does not look like the other one at all.
+_OTHER_TURN = 0.3
 
 
 class Pressure(NamedTuple):
@@ -173,7 +175,9 @@ def _check_turns(degrees: NDArray[np.float64], rows: NDArray[np.float64], source
     step = float(np.median(np.diff(degrees)))
     if len(rows) < 2 or abs(degrees[-1] - degrees[0] + step - 360.0) > 1.5 * step:
         return
-    if odd_shape(degrees, np.stack([rows[::2].mean(axis=0), rows[1::2].mean(axis=0)])) is not None:
+    one, other = (rows[k::2].mean(axis=0) for k in (0, 1))
+    one, other = one - one.mean(), other - other.mean()
+    if one @ other < _OTHER_TURN * np.sqrt((one @ one) * (other @ other)):
         raise DataError(
             f"{source}: the angle returns every 360 degrees, and every second turn has another pressure: it counts "
             f"turns and not cycles: pass {argument('angle_step_deg', format(step, 'g'))} instead of its column, and "
