@@ -25,7 +25,7 @@ from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibratio
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
-from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_csv
+from mgdd.io import pressure_trace, read, read_pressure, read_throttle_log, throttle_log, write_csv
 from mgdd.loop import EngineBench, ThrottleFault, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results.fit_report import FitReport
@@ -52,6 +52,15 @@ def log() -> xr.Dataset:
 def written_log(folder: Path) -> xr.Dataset:
     write_csv(log(), folder / "log.csv")
     return read_throttle_log(folder / "log.csv")
+
+
+def whole_file(folder: Path) -> Any:
+    angle = np.arange(-180.0, 180.0)
+    hump = np.exp(-(((angle - 8.0) / 30.0) ** 2))
+    columns = {"CAD": angle, "p 1": 2.0 + 50.0 * hump, "p 2": 2.0 + 60.0 * hump, "lift 1": hump, "lift 2": 2.0 * hump}
+    slow = {"time_s": np.arange(7.0), "T_exh": 600.0 + np.arange(7.0), "imep": np.array([5.0, 6.0])}
+    np.savez(folder / "whole.npz", **columns, **slow)
+    return read(folder / "whole.npz")
 
 
 def pressures(folder: Path) -> xr.Dataset:
@@ -204,6 +213,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "surrogate.random_step_records": lambda _: random_step_records(50),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
+    "io.read": whole_file,
     "io.read_pressure": pressures,
     "io.read_throttle_log": written_log,
     "io.throttle_log": lambda _: log(),

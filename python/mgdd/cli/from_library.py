@@ -45,6 +45,7 @@ def named_options(**options: str) -> AbstractContextManager[None]:
 _KINDS: Mapping[str, dict[str, Any]] = {
     "int | str | Sequence": {"type": column_of, "action": "append", "metavar": "COLUMN"},
     "int | str": {"type": column_of, "metavar": "COLUMN"},
+    "Sequence[str]": {"action": "append", "metavar": "NAME"},
     "tuple": {"type": float, "nargs": 2, "metavar": ("LOW", "HIGH")},
     "float": {"type": float, "metavar": "X"},
     "ArrayLike": {"type": float, "metavar": "X"},

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import completion, demo, doctor, engine, maps, preset, rig, study, throttle
+from mgdd.cli import completion, data, demo, doctor, engine, maps, preset, rig, study, throttle
 from mgdd.cli.from_library import as_option
 from mgdd.cli.options import Parser, UsageError
 from mgdd.cli.output import Stopped, fail
@@ -115,6 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     throttle.add(commands)
     rig.add(commands)
     study.add(commands)
+    data.add(commands)
     preset.add(commands)
     doctor.add(commands)
     completion.add(commands, parser)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CYLINDER_CHOICES",
     "PEGGING",
+    "READING",
     "SCHEME",
     "Parser",
     "UsageError",
@@ -45,9 +46,10 @@ _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
 SCHEME = Options(simulate, "integrator", "step_cad")
 PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
-_READING = Options(
-    read_pressure, "pressure_column", "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_column",
-    "angle_unit", "firing_tdc_deg", "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
+_COLUMNS = Options(read_pressure, "pressure_column", "angle_column")
+READING = Options(
+    read_pressure, "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_unit", "firing_tdc_deg",
+    "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
 )  # fmt: skip
 CYLINDER_CHOICES = {
     "burn": "burn_shape",
@@ -145,7 +147,9 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
         help="measured pressure as text: one column of crank angle [°CA aTDC: firing TDC = 0, compression negative] "
         "and one of pressure, or one per cycle; several cycles may also stand below each other",
     )  # fmt: skip
-    group = _READING.add(parser, "what the files hold, where they do not say it or say it otherwise")
+    group = parser.add_argument_group("what the files hold, where they do not say it or say it otherwise")
+    for options in (_COLUMNS, READING):
+        options.add(group)
     group.add_argument(
         "--conditions", metavar="FILE.csv",
         help=f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}",
@@ -189,7 +193,9 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
     traces = []
     for file in args.files:
-        trace = read_pressure(file, speed_rpm=rows[file].get("speed_rpm", speed), **_READING.given(args))
+        trace = read_pressure(
+            file, speed_rpm=rows[file].get("speed_rpm", speed), **_COLUMNS.given(args), **READING.given(args)
+        )
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
         traces.append(trace.assign_attrs(**rows[file]))

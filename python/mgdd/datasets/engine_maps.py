@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.datasets.files import ENGINE_MAPS, LICENCES
 from mgdd.errors import DataError
 from mgdd.io.table import read_table
 from mgdd.results.labels import labelled_dataset
@@ -32,7 +33,7 @@ _TITLES = {"vw_1.9tdi_ornl_hot.csv": "Volkswagen 1.9 L TDI", "mercedes_1.7_ornl_
 _ATTRS = {
     "source": "data/fuel_converter of https://github.com/geraldo-reboucas/adv-vehicle-sim, commit b3777b3",
     "citation": "measured at Oak Ridge National Laboratory (S. Sluder), published with ADVISOR",
-    "licence": "permission of the Alliance for Sustainable Energy, LLC, without the ADVISOR trademark (license.txt)",
+    "licence": LICENCES[ENGINE_MAPS],
     "changes": "matrices as a table, temperature in K; the rows above full load, which the source pads, are left out",
     "note": "warm engine, steady state, stock calibration: neither timing nor rail pressure nor EGR vary",
 }

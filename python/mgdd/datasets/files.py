@@ -10,7 +10,7 @@ from pathlib import Path
 from mgdd.datasets.origins import ORIGINS, fetched, find_fetched
 from mgdd.errors import DataError
 
-__all__ = ["ENGINE_MAPS", "FILES", "HD", "names", "path"]
+__all__ = ["ENGINE_MAPS", "FILES", "HD", "LICENCES", "names", "path", "place"]
 
 _VARIABLE = "MGDD_DATA_DIR"
 _PACKAGE = Path(__file__).parents[1] / "data"
@@ -35,6 +35,17 @@ FILES: dict[str, tuple[str, ...]] = {
     "h2df_502": ("h2df_test502_cycles.csv",),
     HD: (f"{HD}_conditions.csv", f"{HD}_traces.csv"),
     "wh2009": ("WienerHammerBenchmark.csv",),
+}
+
+_NOT_SEEN = "the terms of the authors were not seen"
+_NEURAL = f"Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; {_NOT_SEEN}"
+LICENCES: dict[str, str] = {
+    ENGINE_MAPS: "permission of the Alliance for Sustainable Energy, LLC, without the ADVISOR trademark (license.txt)",
+    "cascaded_tanks": _NEURAL,
+    "emps": _NEURAL,
+    "h2df_502": "Apache-2.0",
+    HD: "MIT",
+    "wh2009": f"MIT of the redistributing repository forgi86/RNN-adaptation; {_NOT_SEEN}",
 }
 
 
@@ -112,6 +123,14 @@ def path(name: str, file: str) -> Path:
             f"put your own version under {_VARIABLE}/{name}"
         )
     return packaged
+
+
+def place(name: str) -> str:
+    """Say where a data set is, or how it gets here."""
+    if name in names():
+        return str(path(name, FILES[name][0]).parent)
+    fetched_by = f"mgdd data get {name} --fetch -o FILE"
+    return f"not here: {fetched_by if name in ORIGINS else f'put it into ${_VARIABLE}/{name}'}"
 
 
 def _data_dir() -> Path | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd.datasets import origins
 from mgdd.datasets.engine_maps import engine_map
-from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, names, path
+from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, LICENCES, names, path
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
 from mgdd.io.point_table import read_conditions
@@ -59,7 +59,7 @@ _H2DF_ATTRS = {
     "title": "hydrogen-diesel engine under random steps, test 502",
     "source": "https://github.com/alexwin9478/H2dfDnnTrainExpData, commit f10b298, data/Test_502_NoPress.mat",
     "citation": "A. Winkler, V. Sharma, D. Gordon, A. Norouzi, Zenodo, doi 10.5281/zenodo.16902579",
-    "licence": "Apache-2.0",
+    "licence": LICENCES["h2df_502"],
     "changes": "21 of 153 fields, units converted, angles turned to °CA aTDC",
     "angle_convention": "°CA aTDC: firing TDC = 0, compression negative; soi_cad = -(degrees before TDC)",
 }
@@ -231,8 +231,7 @@ def _emps_record(file: Path) -> xr.Dataset:
             "file": file.name,
             "citation": "A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, Workshop on "
             "Nonlinear System Identification Benchmarks (workshop of 2019)",
-            "licence": "Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; the terms of "
-            "the authors were not seen",
+            "licence": LICENCES["emps"],
         },
     )
 
@@ -251,8 +250,7 @@ def _cascaded_tanks() -> tuple[xr.Dataset, xr.Dataset]:
             attrs={
                 "title": f"cascaded tanks with overflow, {title}",
                 "citation": "M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noël, Cascaded tanks benchmark",
-                "licence": "Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; the terms of "
-                "the authors were not seen",
+                "licence": LICENCES["cascaded_tanks"],
             },
         )
 
@@ -279,8 +277,7 @@ def _wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
             attrs={
                 "title": f"Wiener-Hammerstein circuit, {title}",
                 "citation": "J. Schoukens, J. Suykens, L. Ljung, Wiener-Hammerstein benchmark (2009)",
-                "licence": "MIT of the redistributing repository forgi86/RNN-adaptation; the terms of the authors "
-                "were not seen",
+                "licence": LICENCES["wh2009"],
             },
         )
 

@@ -1,16 +1,18 @@
-"""Files in, files out: measured pressure, throttle logs (also from MATLAB), operating conditions, parameters.
+"""Files in, files out: whole test-cell files, measured pressure, throttle logs, operating conditions, parameters.
 
 Angles are degrees of crank angle with firing TDC = 0 and compression negative (°CA aTDC); pressure is in bar.
 """
 
 from __future__ import annotations
 
+from mgdd.io.bench_file import read
 from mgdd.io.plain_csv import write_csv
 from mgdd.io.pressure import pressure_trace, read_pressure
 from mgdd.io.throttle_log import read_throttle_log, throttle_log
 
 __all__ = [
     "pressure_trace",
+    "read",
     "read_pressure",
     "read_throttle_log",
     "throttle_log",

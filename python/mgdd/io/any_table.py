@@ -10,6 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +22,7 @@ from mgdd.io.extras import import_extra
 from mgdd.io.files import existing_file
 from mgdd.io.matlab_tags import check_tags
 from mgdd.io.table import Table, parse_number, read_table, text_table
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import os
@@ -28,9 +30,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["ArrayTable", "read_any_table"]
+__all__ = ["ArrayTable", "format_of", "read_any_table"]
 
 _HEAD = 128  # bytes that tell a format
+
+
+_Reader = Callable[[Path], "Table | Iterable[_Column]"]
 
 
 class _Column(NamedTuple):
@@ -54,6 +59,11 @@ class ArrayTable(Table):
     def height(self) -> int:
         """Return the number of rows of the first column."""
         return len(self.columns[0])
+
+    @cached_property
+    def lengths(self) -> tuple[int, ...]:
+        """Return the number of rows of each column."""
+        return tuple(map(len, self.columns))
 
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns of one length as the rows of an array."""
@@ -115,8 +125,16 @@ def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None
     return ArrayTable(str(file), header, units if any(units) else None, tuple(each.values for each in columns))
 
 
-def _reader_of(head: bytes, file: Path) -> Callable[[Path], Table | Iterable[_Column]] | None:
-    starts: dict[bytes, Callable[[Path], Table | Iterable[_Column]]] = {
+def format_of(path: str | os.PathLike[str]) -> str:
+    """Name the format by which `read_any_table` reads a file."""
+    file = existing_file(path)
+    with file.open("rb") as stream:
+        reader = _reader_of(stream.read(_HEAD), file)
+    return "text" if reader is None else _FORMATS[reader]
+
+
+def _reader_of(head: bytes, file: Path) -> _Reader | None:
+    starts: dict[bytes, _Reader] = {
         b"MATLAB 7.3": _of_hdf5, b"MATLAB": _of_matlab, b"\x89HDF": _of_hdf5, b"CDF": _of_netcdf,
         b"\x93NUMPY": _of_numpy, b"TDSm": _of_tdms, b"MDF ": _of_mdf, b"UnFinMF": _of_mdf, b"PAR1": _of_parquet,
         b"PK\x03\x04": _of_zip,
@@ -127,11 +145,11 @@ def _reader_of(head: bytes, file: Path) -> Callable[[Path], Table | Iterable[_Co
     return found
 
 
-def _flat(arrays: Iterable[_Column]) -> Iterator[_Column]:
+def _flat(arrays: Iterable[_Column], along: int | None = None) -> Iterator[_Column]:
     """Give vectors as they are, and a matrix column by column: along the samples of a vector, else its longer side."""
     found = [each._replace(values=np.squeeze(each.values)) for each in arrays]
     found = [each for each in found if each.values.dtype.kind in "fiub" and each.values.ndim in (1, 2)]
-    lengths = {len(each.values) for each in found if each.values.ndim == 1}
+    lengths = {len(each.values) for each in found if each.values.ndim == 1} if along is None else {along}
     for each in found:
         if each.values.ndim == 1:
             yield each
@@ -181,11 +199,12 @@ def _of_hdf5(file: Path) -> Iterator[_Column]:
 
 
 def _of_netcdf(file: Path) -> Iterator[_Column]:
-    dataset = read_netcdf(file)
-    return _flat(
+    dataset = read_netcdf(file).transpose(ANGLE, ..., missing_dims="ignore")
+    columns = (
         _Column(str(name), dataset[name].to_numpy(), str(dataset[name].attrs.get("units", "")))
-        for name in dataset.variables
+        for name in sorted(dataset.variables, key=lambda each: each != ANGLE)  # the angle first, as in a text
     )
+    return _flat(columns, along=dataset.sizes.get(ANGLE))
 
 
 def _of_numpy(file: Path) -> Iterator[_Column]:
@@ -271,3 +290,9 @@ def _filled(row: list[str]) -> list[str]:
 
 def _as_text(cell: Any) -> str:
     return repr(float(cell)) if isinstance(cell, int | float) else str(cell).replace("\t", " ").replace("\n", " ")
+
+
+_FORMATS: dict[_Reader, str] = {
+    _of_hdf5: "HDF5 (or MATLAB 7.3, netCDF 4)", _of_matlab: "MATLAB", _of_netcdf: "netCDF 3", _of_numpy: "NumPy",
+    _of_tdms: "TDMS", _of_mdf: "MDF", _of_parquet: "Parquet", _of_zip: "XLSX or NPZ",
+}  # fmt: skip

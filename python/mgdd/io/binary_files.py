@@ -1,21 +1,24 @@
-"""Classic netCDF files, read whole and written whole."""
+"""Classic netCDF files, read whole and written whole, and Parquet files, written whole."""
 
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import DataError
+from mgdd.io.extras import import_extra
 from mgdd.io.files import existing_file, write_whole
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
 
     import xarray as xr
 
 __all__ = [
     "read_netcdf",
     "write_netcdf",
+    "write_parquet",
 ]
 
 _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
@@ -58,3 +61,15 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
 def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a Dataset of numbers and texts as classic netCDF, as `write_whole` does."""
     write_whole(path, lambda half: dataset.to_netcdf(half, engine="scipy"))
+
+
+def write_parquet(columns: Mapping[str, tuple[Any, str, str]], path: str | os.PathLike[str]) -> None:
+    """Write name: (values, unit, long name) as the columns of a Parquet file, as `write_whole` does."""
+    arrow = import_extra("pyarrow", "parquet", "a Parquet file")
+    parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
+    arrays = [arrow.array(values) for values, _, _ in columns.values()]
+    fields = [
+        arrow.field(name, array.type, metadata={"units": units, "long_name": long_name})
+        for array, (name, (_, units, long_name)) in zip(arrays, columns.items(), strict=True)
+    ]
+    write_whole(path, lambda half: parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), half))

@@ -8,7 +8,10 @@ from typing import NamedTuple
 
 from mgdd.errors import DataError
 
-__all__ = ["Heading", "check_choice", "heading", "spelled_unit", "unit_text"]
+__all__ = [
+    "Heading", "check_choice", "heading", "last_number", "spelled_unit", "stated_unit", "stem", "unit_text",
+    "without_brackets",
+]  # fmt: skip
 
 # Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
 _SPELLINGS = {
@@ -59,7 +62,7 @@ _REMARKS = set(
     "cyl cylinder zyl zylinder cycle firing fired motored measured model sim plate wanted actual soll ist".split()
 )
 _GAUGE = re.compile(r"(?<![a-z])(barg|psig|gauge)(?![a-z])", re.IGNORECASE)
-_CYLINDER = re.compile(r"(?:cyl\w*?|zyl\w*?)[\s_.\-#]*(\d+)")
+_CYLINDER = re.compile(r"(?:(?:cyl\w*?|zyl\w*?)[\s_.\-#]*|^pressure_(?=\d+_bar))(\d+)")  # the last is our own
 
 
 class Heading(NamedTuple):
@@ -154,18 +157,49 @@ def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
         raise DataError.of(name, value, f"one of {', '.join(map(repr, allowed))}")
 
 
+def stated_unit(name: str, units_row: str | None = None) -> str | None:
+    """Return the unit of a column as the file writes it, known or not; None where it gives none."""
+    said = next((text.strip() for text in (units_row or "", *_SQUARE.findall(name)) if text.strip()), None)
+    return said or _unit_word(name)
+
+
 def _unit_of(name: str) -> str | None:
+    return _known(_unit_word(name) or "")
+
+
+def _unit_word(name: str) -> str | None:
     """Return the unit in brackets, or the last word where it is one; a running number may follow it."""
     for text in reversed(_BRACKETS.findall(name)):
-        unit = _known(text)
-        if unit is not None:
-            return unit
+        if _known(text) is not None:
+            return str(text)
     if (ratio := _ratio(name)) and _known(ratio):
-        return _known(ratio)
+        return ratio
     words = [word for word in re.split(r"[\s_/,;.\-]+", name.strip()) if word and not word.isdecimal()]
     if not words or (len(words[-1]) == 1 and (len(words) == 1 or (words[-1] != "V" and words[0].lower() == "p"))):
         return None  # a lone letter is a name, and p_a is a cylinder rather than an ampere
-    return _known(words[-1])
+    return words[-1] if _known(words[-1]) is not None else None
+
+
+def stem(name: str) -> str:
+    """Return a name without its unit in brackets and without its last number, which counts cycles or cylinders."""
+    bare = without_brackets(name)
+    number = last_number(name)
+    return bare if number is None else "".join(bare.rsplit(number, 1)).rstrip(" _.-#")
+
+
+def last_number(name: str) -> str | None:
+    """Return the last number in a name, its unit in brackets left out."""
+    found = re.findall(r"\d+", without_brackets(name))
+    return found[-1] if found else None
+
+
+def without_brackets(name: str) -> str:
+    """Return a name without the brackets that hold a unit; remarks stay."""
+
+    def kept(found: re.Match[str]) -> str:
+        return " " if found[0].startswith("[") or _known(found[1]) is not None else f" {found[1]} "
+
+    return _BRACKETS.sub(kept, name).strip()
 
 
 def _words(name: str) -> set[str]:

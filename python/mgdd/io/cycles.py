@@ -15,7 +15,7 @@ from mgdd.signals.even_grid import wide_steps
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Cycles", "arranged"]
+__all__ = ["Cycles", "arranged", "several_cycles"]
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
 _SAME = 0.01
@@ -24,23 +24,30 @@ _ROUNDING = 1e-6
 
 
 class Cycles(NamedTuple):
-    """Angle [deg], pressures (cycle, angle), the row of each sample of the first cycle, and notes for the user."""
+    """Angle [deg], channels (channel, cycle, angle), the row of each sample of the first cycle, notes for the user.
+
+    `taken` are the numbers, from 0, of the cycles that are whole among all of the record, where it has `total`.
+    """
 
     degrees: NDArray[np.float64]
-    pressure: NDArray[np.float64]
+    values: NDArray[np.float64]
     rows: NDArray[np.intp]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    taken: tuple[int, ...] | None = None
+    total: int = 0
 
 
 def arranged(
     degrees: NDArray[np.float64],
-    pressure: NDArray[np.float64],
+    values: NDArray[np.float64],
     *,
     firing_tdc_deg: float | None,
     before_tdc: bool,
     place: Place,
 ) -> Cycles:
-    """Turn angles as in the file [deg] to °CA aTDC and cut pressures, one row per column, into complete cycles.
+    """Turn angles as in the file [deg] to °CA aTDC and cut channels (channel, column, sample) into complete cycles.
+
+    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle.
 
     Raises
     ------
@@ -54,46 +61,52 @@ def arranged(
     if before_tdc:
         degrees = 0.0 - degrees
         if np.all(np.diff(degrees) < 0.0):
-            degrees, pressure, rows = degrees[::-1], pressure[:, ::-1], rows[::-1]
-    span = float(np.ptp(degrees))
-    falls = np.flatnonzero(np.diff(degrees) < -0.5 * span) + 1
-    rises = bool(np.all(np.diff(degrees) > 0.0))
-    runs_on = rises and span > 720.0 + _SAME
-    if (falls.size or runs_on) and len(pressure) > 1:
+            degrees, values, rows = degrees[::-1], values[..., ::-1], rows[::-1]
+    falls, runs_on = several_cycles(degrees)
+    columns = values.shape[1]
+    if (falls.size or runs_on) and columns > 1:
         raise DataError(
             f"{place.source}: several pressure columns, and several cycles below each other: name one column, "
             f"{argument('pressure_column', '')}"
         )
     notes: tuple[str, ...] = ()
     if falls.size:
-        stack = _stacked(degrees, pressure[0], rows, falls, place)
-        degrees, pressure, rows, notes = stack
-        if firing_tdc_deg is None or not _splits_a_burn(degrees, firing_tdc_deg) or len(pressure) == 1:
-            return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, place), notes)
-    if firing_tdc_deg is not None and len(pressure) > 1 and _splits_a_burn(degrees, firing_tdc_deg):
+        stack = _stacked(degrees, values[:, 0], rows, falls, place)
+        degrees, values, rows, notes, *_ = stack
+        columns = values.shape[1]
+        if firing_tdc_deg is None or not _splits_a_burn(degrees, firing_tdc_deg) or columns == 1:
+            turned = _turned(degrees, values, rows, firing_tdc_deg, place)
+            return turned._replace(notes=notes, taken=stack.taken, total=stack.total)
+    if firing_tdc_deg is not None and columns > 1 and _splits_a_burn(degrees, firing_tdc_deg):
         # The columns follow each other: end of compression in one, its combustion at the head of the next.
         whole = degrees[-1] - degrees[0] >= 720.0 - 1e-3
         keep = slice(0, degrees.size - 1 if whole else degrees.size)
-        degrees = np.concatenate([degrees[keep] + 720.0 * k for k in range(len(pressure))])
-        rows = np.tile(rows[keep], len(pressure))
-        pressure, runs_on = pressure[:, keep].reshape(1, -1), True
+        degrees = np.concatenate([degrees[keep] + 720.0 * k for k in range(columns)])
+        rows = np.tile(rows[keep], columns)
+        values, runs_on = values[..., keep].reshape(len(values), 1, -1), True
     if runs_on:
         _check_tdc(degrees, firing_tdc_deg, place)
-        cut = _running(degrees, pressure[0], rows, float(firing_tdc_deg or 0.0), place)
+        cut = _running(degrees, values[:, 0], rows, float(firing_tdc_deg or 0.0), place)
         return cut._replace(notes=notes + cut.notes)
-    return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, place), notes)
+    return _turned(degrees, values, rows, firing_tdc_deg, place)._replace(notes=notes)
+
+
+def several_cycles(degrees: NDArray[np.float64]) -> tuple[NDArray[np.intp], bool]:
+    """Return where an angle falls back to its start, and whether it runs on over more than one cycle."""
+    step, span = np.diff(degrees), float(np.ptp(degrees))
+    return np.flatnonzero(step < -0.5 * span) + 1, bool(np.all(step > 0.0)) and span > 720.0 + _SAME
 
 
 def _turned(
     degrees: NDArray[np.float64],
-    pressure: NDArray[np.float64],
+    values: NDArray[np.float64],
     rows: NDArray[np.intp],
     firing_tdc_deg: float | None,
     place: Place,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+) -> Cycles:
     """Sort one cycle of a 0..720 record by its angles in °CA aTDC."""
     if firing_tdc_deg is None:
-        return degrees, np.ascontiguousarray(pressure), rows
+        return Cycles(degrees, np.ascontiguousarray(values), rows)
     _check_tdc(degrees, firing_tdc_deg, place)
     step = np.diff(degrees)
     if not np.all(step > 0.0):
@@ -105,7 +118,7 @@ def _turned(
     shifted = degrees - firing_tdc_deg
     cad = np.where(shifted > 360.0, shifted - 720.0, np.where(shifted < -360.0, shifted + 720.0, shifted))
     order = np.argsort(cad, kind="stable")
-    return cad[order], np.ascontiguousarray(pressure[:, order]), rows[order]
+    return Cycles(cad[order], np.ascontiguousarray(values[..., order]), rows[order])
 
 
 def _seam(start: float, firing_tdc_deg: float) -> float:
@@ -133,7 +146,7 @@ def _check_tdc(degrees: NDArray[np.float64], firing_tdc_deg: float | None, place
 
 def _stacked(
     degrees: NDArray[np.float64],
-    pressure: NDArray[np.float64],
+    values: NDArray[np.float64],
     rows: NDArray[np.intp],
     falls: NDArray[np.intp],
     place: Place,
@@ -167,12 +180,14 @@ def _stacked(
             )
     which = f"cycle{'s' if len(dropped) > 1 else ''} {' and '.join(map(str, dropped))}"
     notes = [f"{which} of {len(blocks)} left out: incomplete"] if dropped else []
-    return Cycles(grid, np.stack([pressure[b] for b in kept]), rows[kept[0]], tuple(notes))
+    taken = tuple(k for k, complete in enumerate(whole) if complete)
+    cut = np.stack([values[:, b] for b in kept], axis=1)
+    return Cycles(grid, cut, rows[kept[0]], tuple(notes), taken, len(blocks))
 
 
 def _running(
     degrees: NDArray[np.float64],
-    pressure: NDArray[np.float64],
+    values: NDArray[np.float64],
     rows: NDArray[np.intp],
     firing_tdc_deg: float,
     place: Place,
@@ -185,7 +200,7 @@ def _running(
             f"{place.row(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual "
             f"step is {step:g}; fill it or cut the record there"
         )
-    found = repetition(degrees, pressure, firing_tdc_deg)
+    found = repetition(degrees, values[0], firing_tdc_deg)
     if found is not None and found.differs:
         factor = CYCLE_DEG / found.degrees
         raise DataError(
@@ -213,12 +228,14 @@ def _running(
     same = np.all(np.diff(starts) == grid.size)
     cut = degrees[starts[0] : starts[0] + at.size].reshape(at.shape) if same else at
     if same and np.abs(cut - at).max() <= _SAME * step:
-        values = pressure[starts[0] : starts[0] + at.size].reshape(at.shape)
+        values = values[:, starts[0] : starts[0] + at.size].reshape(-1, *at.shape)
     else:
         at = at[at[:, -1] <= degrees[-1] + _SAME * step]
-        values = np.interp(at, degrees, pressure)
+        values = np.stack([np.interp(at, degrees, row) for row in values])
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
     past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
     cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
     order = np.argsort(cad, kind="stable")
-    return Cycles(cad[order], np.ascontiguousarray(values[:, order]), rows[starts[0] : starts[1]][order], tuple(notes))
+    return Cycles(
+        cad[order], np.ascontiguousarray(values[..., order]), rows[starts[0] : starts[1]][order], tuple(notes)
+    )

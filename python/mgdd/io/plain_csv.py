@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,16 +11,17 @@ from mgdd.io.files import write_whole_text
 from mgdd.io.pressure import CYCLE
 from mgdd.io.pressure_checks import check_trace
 from mgdd.io.throttle_checks import check_throttle_log
-from mgdd.results.labels import ANGLE, check_labels
+from mgdd.results.labels import ANGLE, check_labels, label_of
+from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["write_columns", "write_csv", "write_traces"]
+__all__ = ["long_columns", "write_columns", "write_csv", "write_long", "write_traces"]
 
 _LOG = ("time_s", "duty", "angle_deg", "current_a", "supply_v")
 
@@ -115,3 +116,43 @@ def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
         raise ShapeError(f"a CSV holds columns over one dimension; this result has {dict(dataset.sizes)}")
     names = [str(dims[0]), *(str(n) for n, v in dataset.data_vars.items() if v.dims == (dims[0],))]
     write_columns({name: dataset[name].to_numpy() for name in names}, path)
+
+
+def long_columns(dataset: xr.Dataset) -> dict[str, tuple[NDArray[Any], str, str]]:
+    """Return name: (values, unit, long name) of a Dataset as columns of one length, cycle below cycle; no scalars.
+
+    Coordinates come first; the number of a cycle is left out where the angle says where one begins. Variables that are
+    not all over the same dimensions are a ShapeError.
+    """
+    check_labels(dataset)
+    names = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim]
+    dims = max((dataset[name].dims for name in names), key=len, default=())
+    if not dims:
+        raise ShapeError("a table holds columns: nothing here is over a dimension")
+    other = next((name for name in names if set(dataset[name].dims) != set(dims)), None)
+    if other is not None:
+        over = ", ".join(map(str, dataset[other].dims))
+        raise ShapeError(
+            f"a table holds columns of one length: {other} is over {over}, others over {', '.join(map(str, dims))}: "
+            "write netCDF (.nc), or less of it"
+        )
+    whole = dataset[names].transpose(*dims)
+    kept = [str(dim) for dim in dims if not (dim == CYCLE and ANGLE in dims)]
+    out = {}
+    for name in (*kept, *names):
+        values = whole[name].broadcast_like(whole[names[0]]).transpose(*dims).to_numpy().ravel()
+        out[name] = (values, *label_of(dataset[name]))
+    return out
+
+
+def write_long(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write the columns of `long_columns` by `write_columns`; a unit that no name says stands in brackets behind it."""
+    columns = long_columns(dataset)
+    heads = [
+        name if unit_of(name) == units != "-" else _bracketed(name, units) for name, (_, units, _) in columns.items()
+    ]
+    write_columns(dict(zip(heads, (values for values, _, _ in columns.values()), strict=True)), path)
+
+
+def _bracketed(name: str, units: str) -> str:
+    return f"{name} [{units.removeprefix('unit of ')}]".replace(",", " ").replace('"', " ")

@@ -13,22 +13,27 @@ from mgdd.errors import DataError, argument
 from mgdd.io.any_table import read_any_table
 from mgdd.io.column_names import Heading, heading
 from mgdd.io.pressure_checks import pair
-from mgdd.io.pressure_file import Reading, checked, cycles_of, odd_shape
+from mgdd.io.pressure_file import checked, cycles_of, odd_shape
+from mgdd.io.reading import Reading
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from mgdd.io.pressure_file import Record
 
 __all__ = [
     "CYCLE",
     "as_trace",
+    "cycle_count",
     "mean_cycle",
     "one_cycle",
     "pressure_trace",
     "read_pressure",
+    "record_attrs",
 ]
 
 CYCLE = "cycle"
@@ -84,7 +89,7 @@ def pressure_trace(
     if hasattr(pressure_bar, "columns") and hasattr(pressure_bar, "to_numpy"):  # a DataFrame: a column per cycle
         pressure_bar = pressure_bar.to_numpy().T
     given, values = pair(crank_angle_cad, pressure_bar)
-    angle, pressure, warnings = checked(
+    record = checked(
         given,
         np.atleast_2d(values),
         firing_tdc_deg=firing_tdc_deg,
@@ -92,7 +97,7 @@ def pressure_trace(
         tdc_offset_cad=tdc_offset_cad,
         source=name,
     )
-    return _dataset(angle, pressure, {"file": name, "warnings": "\n".join(warnings)})
+    return _dataset(record, name)
 
 
 def read_pressure(
@@ -203,22 +208,25 @@ def read_pressure(
         gain_bar_per_v=gain_bar_per_v,
         offset_bar=offset_bar,
     )
-    angle, pressure, speed, warnings = cycles_of(read_any_table(path, delimiter=delimiter, decimal=decimal), how)
-    attrs: dict[str, str | float] = {"file": Path(path).name, "warnings": "\n".join(warnings)}
-    if speed is not None:
-        attrs["speed_rpm"] = float(speed)
-    return _dataset(angle, pressure, attrs)
+    return _dataset(cycles_of(read_any_table(path, delimiter=delimiter, decimal=decimal), how), Path(path).name)
 
 
-def _dataset(angle: NDArray[np.float64], pressure: NDArray[np.float64], attrs: dict[str, str | float]) -> xr.Dataset:
-    if len(pressure) == 1:
-        return labelled_dataset({ANGLE: (ANGLE, angle), "pressure_bar": (ANGLE, pressure[0])}, attrs=attrs)
-    variables = {
-        CYCLE: (CYCLE, np.arange(1, len(pressure) + 1), "-", "cycle"),
-        ANGLE: (ANGLE, angle),
-        "pressure_bar": ((CYCLE, ANGLE), pressure),
-    }
-    return labelled_dataset(variables, attrs=attrs)
+def _dataset(record: Record, name: str) -> xr.Dataset:
+    variables: dict[str, tuple[Any, ...]] = {ANGLE: (ANGLE, record.angle), _PRESSURE: (ANGLE, record.bar[0])}
+    if len(record.bar) > 1:
+        variables |= {CYCLE: cycle_count(len(record.bar)), _PRESSURE: ((CYCLE, ANGLE), record.bar)}
+    return labelled_dataset(variables, attrs=record_attrs(record, name))
+
+
+def cycle_count(count: int) -> tuple[Any, ...]:
+    """Return the coordinate of so many cycles."""
+    return CYCLE, np.arange(1, count + 1), "-", "cycle"
+
+
+def record_attrs(record: Record, name: str) -> dict[str, str | float]:
+    """Return the attributes of a record: file, warnings, and the speed where a time was turned into an angle."""
+    speed = {} if record.speed_rpm is None else {"speed_rpm": float(record.speed_rpm)}
+    return {"file": name, "warnings": "\n".join(dict.fromkeys(record.notes)), **speed}
 
 
 _PRESSURE = "pressure_bar"

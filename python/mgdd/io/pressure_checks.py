@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "CONVENTION", "MIN_SAMPLES", "PRESSURE_UNITS", "check_span", "check_trace", "level_warning", "pair", "steep_warning"
+    "CONVENTION", "MIN_SAMPLES", "PRESSURE_UNITS", "check_magnitude", "check_span", "check_trace", "level_warning",
+    "pair", "steep_warning", "to_bar",
 ]  # fmt: skip
 
 CONVENTION = "crank angle is in °CA aTDC: firing TDC = 0, compression negative"
@@ -88,7 +89,7 @@ def _level_bar(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> tuple[
     return float(degrees[0]), float(bar[..., 0].mean())
 
 
-def _check_unit(
+def check_magnitude(
     degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str, source: str, unit_of_file: bool
 ) -> None:
     """Refuse a unit that the highest pressure excludes, and name those that peak and intake level allow."""
@@ -211,10 +212,10 @@ def check_trace(
     _check_convention(degrees, source)
     _check_gap(degrees, place)
     bar = to_bar(values, unit)
-    _check_unit(degrees, values, unit, source, unit_of_file)
+    check_magnitude(degrees, values, unit, source, unit_of_file)
     if bar.ndim == 2:
         for cycle, row in enumerate(values, start=1):
-            _check_unit(degrees, row, unit, f"{source}, cycle {cycle}", unit_of_file)
+            check_magnitude(degrees, row, unit, f"{source}, cycle {cycle}", unit_of_file)
     mean = bar if bar.ndim == 1 else bar.mean(axis=0)
     _check_peak(degrees, mean, source)
     _check_tdc(degrees, mean, source)

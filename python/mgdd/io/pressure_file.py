@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.column_names import Heading, check_choice, heading
-from mgdd.io.cycle_phase import CYCLE_DEG, phase_warnings, repetition
-from mgdd.io.cycles import arranged
+from mgdd.io.angle_column import Angle, angle_of, at_the_speed_of_the_record, headings
+from mgdd.io.column_names import Heading
+from mgdd.io.cycle_phase import phase_warnings
+from mgdd.io.cycles import Cycles, arranged
 from mgdd.io.pressure_checks import (
     MIN_SAMPLES,
     PRESSURE_UNITS,
@@ -20,111 +20,126 @@ from mgdd.io.pressure_checks import (
     level_warning,
     steep_warning,
 )
+from mgdd.io.reading import Reading
 from mgdd.io.table import Place, Table
+from mgdd.io.wrong_channel import no_pressure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-__all__ = ["ANGLE_UNITS", "Reading", "checked", "cycles_of", "odd_shape"]
+__all__ = ["Pressure", "Record", "checked", "choose_pressure", "cycles_of", "odd_shape", "pressure_of", "record_of"]
 
-_TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
-ANGLE_UNITS = ("deg", "rad", *_TIME_UNITS)
 # Cycles of one cylinder, fired or not, share their compression; another cylinder has its peak elsewhere.
 _MIN_CORRELATION = 0.5
 _PEAK_WITHIN_CAD = 40.0
 _LARGEST_OFFSET_CAD = 20.0
-# A speed is stated to a digit or read off a display; one that is further off is of another point.
-_CORRECTED = 0.01
+# A misfire still looks like a late burn by half; the turn of the gas exchange does not look like the other one at all.
+_OTHER_TURN = 0.3
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How a table is to be read; the fields are the arguments of `mgdd.io.read_pressure`."""
+class Pressure(NamedTuple):
+    """Columns of a pressure: values as rows, the unit, whether the file says it, whether it is absolute, notes."""
 
-    angle_column: int | str | None
-    pressure_column: int | str | Sequence[int | str] | None
-    angle_unit: str | None
-    pressure_unit: str | None
-    firing_tdc_deg: float | None
-    before_tdc: bool
-    tdc_offset_cad: float
-    angle_step_deg: float | None
-    angle_start_deg: float | None
-    speed_rpm: float | None
-    gain_bar_per_v: float | None
-    offset_bar: float | None
-
-    def __post_init__(self) -> None:
-        if self.pressure_unit is not None:
-            check_choice("pressure_unit", self.pressure_unit, PRESSURE_UNITS)
-        if self.angle_unit is not None:
-            check_choice("angle_unit", self.angle_unit, ANGLE_UNITS)
-        _check_range("angle_step_deg", self.angle_step_deg, 0.0, 10.0)
-        _check_range("speed_rpm", self.speed_rpm, 0.0, 30000.0)
-        if self.gain_bar_per_v is not None and not (np.isfinite(self.gain_bar_per_v) and self.gain_bar_per_v):
-            raise DataError.of("gain_bar_per_v", self.gain_bar_per_v, "a finite number, not 0")
-        if self.offset_bar is not None and self.gain_bar_per_v is None:
-            raise DataError(
-                f"{argument('offset_bar')} acts on volts only: give {argument('gain_bar_per_v', '')} too; an offset in "
-                "bar is what the pegging of the analysis finds"
-            )
-        for other, value in (("angle_column", self.angle_column), ("angle_unit", self.angle_unit)):
-            if self.angle_step_deg is not None and value is not None:
-                raise DataError(
-                    f"{argument('angle_step_deg')} is for samples without an angle column, {argument(other)} for a "
-                    "column: give one of them"
-                )
+    columns: list[int]
+    values: NDArray[np.float64]
+    unit: str
+    unit_of_file: bool
+    level: bool
+    notes: list[str]
 
 
-def cycles_of(table: Table, how: Reading) -> tuple[NDArray[np.float64], NDArray[np.float64], float | None, list[str]]:
-    """Return angle [°CA aTDC], pressures [bar] as (cycle, angle), the speed [rpm] of a time, and warnings."""
-    heads = _headings(table)
-    index, degrees, unit, made = _angle(table, heads, how)
-    columns = _choose_pressure(table, heads, how.pressure_column, index)
-    gain = how.gain_bar_per_v
-    pressure_unit, unit_of_file = _unit_of_pressure(table, heads, columns, how.pressure_unit, gain=gain is not None)
+class Record(NamedTuple):
+    """Angle [°CA aTDC], pressure [bar] (cycle, angle), what was cut with it (channel, cycle, angle), and notes.
+
+    `taken` and `total` are those of `Cycles`; `speed_rpm` is that of a time.
+    """
+
+    angle: NDArray[np.float64]
+    bar: NDArray[np.float64]
+    along: NDArray[np.float64]
+    notes: list[str]
+    taken: tuple[int, ...] | None
+    total: int
+    speed_rpm: float | None = None
+
+
+def cycles_of(table: Table, how: Reading) -> Record:
+    """Read the cycles of one cylinder."""
+    heads, samples = headings(table), None
+    if how.angle_step_deg is not None and len(set(table.lengths)) > 1:
+        samples = table.lengths[choose_pressure(table, heads, how.pressure_column, None)[0]]
+    angle = angle_of(table, heads, how, samples=samples)
+    columns = choose_pressure(table, heads, how.pressure_column, angle.column)
+    return record_of(table, angle, pressure_of(table, heads, columns, how, angle), how)
+
+
+def pressure_of(table: Table, heads: Sequence[Heading], columns: list[int], how: Reading, angle: Angle) -> Pressure:
+    """Read columns as the cycles of one cylinder, and refuse what is not a pressure, by its shape or its unit."""
+    gain, notes = how.gain_bar_per_v, []
+    unit, unit_of_file = _unit_of_pressure(table, heads, columns, how.pressure_unit, gain=gain is not None)
     values = table.matrix(columns)
     if how.pressure_column is None and len(columns) > 1:
-        _check_alike(table, columns, degrees, values)
-    warnings = []
+        _check_alike(table, columns, angle.degrees, values)
+    for index, row in zip(columns, values, strict=True):
+        looks = no_pressure(row, angle.cycles)
+        if looks is not None:
+            raise DataError(
+                f"{table.source}: {table.called(index)} is not a cylinder pressure: its values are {looks}: name the "
+                f"pressure, {argument('pressure_column', '')}"
+            )
     level = not any(heads[i].gauge for i in columns)
     if not level:
-        warnings.append("the file says gauge pressure, 1 atmosphere below the absolute one: peg it")
+        notes.append("the file says gauge pressure, 1 atmosphere below the absolute one: peg it")
     if gain is not None:
-        values = values * (gain * (1e-3 if pressure_unit == "mV" else 1.0)) + (how.offset_bar or 0.0)
-        pressure_unit, unit_of_file, level = "bar", False, how.offset_bar is not None
+        values = values * (gain * (1e-3 if unit == "mV" else 1.0)) + (how.offset_bar or 0.0)
+        unit, unit_of_file, level = "bar", False, how.offset_bar is not None
         if not level:
-            warnings.append(f"no {argument('offset_bar')}: the pressure is relative, peg it")
-    tdc = how.firing_tdc_deg
-    if made and tdc is None and degrees[-1] > 360.5:
+            notes.append(f"no {argument('offset_bar')}: the pressure is relative, peg it")
+    return Pressure(columns, values, unit, unit_of_file, level, notes)
+
+
+def record_of(
+    table: Table,
+    angle: Angle,
+    pressure: Pressure,
+    how: Reading,
+    along: NDArray[np.float64] | None = None,
+    *,
+    source: str | None = None,
+) -> Record:
+    """Cut a pressure into cycles, check it, and cut further channels (channel, column, sample) with it."""
+    degrees, values, tdc, speed = angle.degrees, pressure.values, how.firing_tdc_deg, how.speed_rpm
+    notes = list(pressure.notes)
+    if angle.made and tdc is None and degrees[-1] > 360.5:
         tdc = 0.0  # angle_start_deg is in °CA aTDC
-    speed = how.speed_rpm
-    over_time = made and how.angle_step_deg is None
+    over_time = angle.made and how.angle_step_deg is None
     if over_time and tdc is not None and len(values) == 1 and np.isfinite(values).all():
-        degrees, speed, notes = _at_the_speed_of_the_record(degrees, values[0], float(speed or 0.0), tdc, table.source)
-        warnings += notes
-    angle, bar, more = checked(
+        degrees, speed, more = at_the_speed_of_the_record(degrees, values[0], float(speed or 0.0), tdc, table.source)
+        notes += more
+    record = checked(
         degrees,
         values,
-        unit=pressure_unit,
-        angle_unit=unit,
+        along=along,
+        unit=pressure.unit,
+        angle_unit=angle.unit,
         firing_tdc_deg=tdc,
         before_tdc=how.before_tdc,
         tdc_offset_cad=how.tdc_offset_cad,
-        source=table.source,
+        source=source or table.source,
         rows=table.lines,
-        level=level,
-        unit_of_file=unit_of_file,
+        level=pressure.level,
+        unit_of_file=pressure.unit_of_file,
         over_time=over_time,
     )
-    return angle, bar, speed, warnings + more
+    return record._replace(speed_rpm=speed, notes=notes + record.notes)
 
 
 def checked(
     degrees: NDArray[np.float64],
     values: NDArray[np.float64],
     *,
+    along: NDArray[np.float64] | None = None,
     unit: str = "bar",
     angle_unit: str = "deg",
     firing_tdc_deg: float | None,
@@ -135,130 +150,42 @@ def checked(
     level: bool = True,
     unit_of_file: bool = False,
     over_time: bool = False,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+) -> Record:
     """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in."""
     if not abs(tdc_offset_cad) <= _LARGEST_OFFSET_CAD:
         raise DataError.of("tdc_offset_cad", tdc_offset_cad, f"within ±{_LARGEST_OFFSET_CAD:g} °CA")
+    cut = Cycles(degrees, values[None], np.arange(degrees.size))
     if np.isfinite(degrees).all() and np.isfinite(values).all() and degrees.size >= MIN_SAMPLES:
         check_span(degrees, angle_unit, source, several=firing_tdc_deg is not None)
         place = Place(source, rows)
-        cut = arranged(degrees, values, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place)
-        degrees, values, notes = cut.degrees - tdc_offset_cad, cut.pressure, list(cut.notes)
+        together = cut.values if along is None else np.concatenate([cut.values, along])
+        cut = arranged(degrees, together, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place)
+        _check_turns(cut.degrees, cut.values[0], source)
+        degrees, values = cut.degrees - tdc_offset_cad, cut.values[0]
         rows = place.only(cut.rows).rows
-    else:
-        notes = []  # check_trace names what is not finite or too short
-    one = values[0] if len(values) == 1 else values
+    one = values[0] if len(values) == 1 else values  # check_trace names what is not finite or too short
     angle, bar = check_trace(degrees, one, unit=unit, source=source, rows=rows, unit_of_file=unit_of_file)
     doubts = [*level_warning(angle, values, unit), *steep_warning(angle, bar)] if level else []
     doubts += phase_warnings(angle, np.atleast_2d(bar), over_time=over_time, source=source)
-    return angle, np.atleast_2d(bar), notes + doubts
+    return Record(angle, np.atleast_2d(bar), cut.values[1:], [*cut.notes, *doubts], cut.taken, cut.total)
 
 
-def _headings(table: Table) -> list[Heading]:
-    """Read header and units row of a table, column by column."""
-    names = table.header or ("",) * table.width
-    return [
-        heading(name, table.unit(index), where=f"{table.source}, {table.called(index)}")
-        for index, name in enumerate(names)
-    ]
-
-
-def _angle(table: Table, heads: Sequence[Heading], how: Reading) -> tuple[int | None, NDArray[np.float64], str, bool]:
-    """Return column, degrees, the unit that they came in, and whether they were made from a step or a time."""
-    if how.angle_step_deg is not None:
-        _check_start(table.source, "a count of samples", how)
-        count = np.arange(table.height, dtype=np.float64)
-        return None, (how.angle_start_deg or 0.0) + how.angle_step_deg * count, "deg", True
-    index, unit = _choose_angle(table, heads, how.angle_column, how.angle_unit)
-    called = f"{table.source}: {table.called(index)}"
-    if unit not in _TIME_UNITS:
-        if how.angle_start_deg is not None:
-            raise DataError(
-                f"{called} holds angles: {argument('angle_start_deg')} is for a time or a file without an angle column"
-                ": leave it out"
-            )
-        values = table.numbers(index)
-        return index, np.rad2deg(values) if unit == "rad" else values, unit, False
-    if how.speed_rpm is None:
-        raise DataError(f"{called} is a time: pass {argument('speed_rpm', '')} to turn it into a crank angle")
-    _check_start(called, "a time", how)
-    seconds = table.numbers(index) / _TIME_UNITS[unit]
-    return index, (how.angle_start_deg or 0.0) + 6.0 * how.speed_rpm * (seconds - seconds[0]), "deg", True
-
-
-def _at_the_speed_of_the_record(
-    degrees: NDArray[np.float64], pressure: NDArray[np.float64], speed_rpm: float, firing_tdc_deg: float, source: str
-) -> tuple[NDArray[np.float64], float, list[str]]:
-    """Compare the stated speed with the period of the record: correct angles and speed, or refuse."""
-    if not (np.isfinite(degrees).all() and np.all(np.diff(degrees) > 0.0)):
-        return degrees, speed_rpm, []  # check_trace names the sample
-    found = repetition(degrees, pressure, firing_tdc_deg)
-    if found is None or not found.differs:
-        return degrees, speed_rpm, []
-    share = CYCLE_DEG / found.degrees
-    stated = argument("speed_rpm", format(speed_rpm, "g"))
-    said = (
-        f"the pressure repeats every {found.degrees:.6g} degrees of {stated}, not 720: over {found.cycles} cycles the "
-        f"engine ran at {speed_rpm * share:.6g} rpm"
-    )
-    if abs(share - 1.0) > _CORRECTED:
-        raise DataError(f"{source}: {said}: correct it")
-    scaled = degrees[0] + (degrees - degrees[0]) * share
-    return scaled, speed_rpm * share, [f"{said}, and its angles were made with that"]
-
-
-def _check_start(where: str, what: str, how: Reading) -> None:
-    if how.before_tdc:
-        raise DataError(f"{where}: {argument('before_tdc')} is for an angle column: leave it out")
-    if how.angle_start_deg is None and how.firing_tdc_deg is None:
+def _check_turns(degrees: NDArray[np.float64], rows: NDArray[np.float64], source: str) -> None:
+    """Refuse an angle that returns in every turn where every second turn has another pressure: a cycle has two."""
+    step = float(np.median(np.diff(degrees)))
+    if len(rows) < 2 or abs(degrees[-1] - degrees[0] + step - 360.0) > 1.5 * step:
+        return
+    one, other = (rows[k::2].mean(axis=0) for k in (0, 1))
+    one, other = one - one.mean(), other - other.mean()
+    if one @ other < _OTHER_TURN * np.sqrt((one @ one) * (other @ other)):
         raise DataError(
-            f"{where}: {what} says nothing of firing TDC: pass {argument('angle_start_deg', '')} with the angle of the "
-            f"first sample, or {argument('firing_tdc_deg', '')} with the angle of firing TDC counted from it"
+            f"{source}: the angle returns every 360 degrees, and every second turn has another pressure: it counts "
+            f"turns and not cycles: pass {argument('angle_step_deg', format(step, 'g'))} instead of its column, and "
+            f"{argument('firing_tdc_deg', '')} with the angle of firing TDC counted from the first sample, 0 to 720"
         )
 
 
-def _check_range(name: str, value: float | None, low: float, high: float) -> None:
-    if value is not None and not low < value <= high:
-        raise DataError.of(name, value, f"> {low:g} and <= {high:g}")
-
-
-def _choose_angle(
-    table: Table, heads: Sequence[Heading], column: int | str | None, unit: str | None
-) -> tuple[int, str]:
-    """Return the column of the angle, or of the time, and its unit."""
-    index = table.index(0 if column is None else column)
-    head, called = heads[index], f"{table.source}: {table.called(index)}"
-    others = [heads[i].name for i in range(table.width) if i != index and heads[i].quantity == "angle"]
-    hint = f"pass {argument('angle_column', repr(others[0]))}" if others else "name the column of the crank angle"
-    if head.unit in ANGLE_UNITS:
-        if unit is not None and unit != head.unit:
-            raise DataError(
-                f"{called} is in {head.unit} as the file says: leave {argument('angle_unit')} out or correct the file"
-            )
-        if head.quantity == "time" and others and column is None:
-            raise DataError(f"{called} is a time, and {others[0]!r} an angle: {hint}")
-        return index, head.unit
-    if unit is not None:
-        return index, unit
-    step = argument("angle_step_deg", "")
-    if head.strange is not None or head.unclear is not None:
-        raise DataError(
-            f"{called} is in {head.strange or head.unclear!r}, which is not known: convert it, or pass "
-            f"{argument('angle_unit', '')} with one of {', '.join(ANGLE_UNITS)}"
-        )
-    if head.quantity == "time":
-        raise DataError(
-            f"{called} looks like a time: {hint}, or pass {argument('angle_unit', repr('s'))} or "
-            f"{argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')} to turn it into an angle"
-        )
-    if head.quantity == "counter":
-        raise DataError(f"{called} counts samples: {hint}, or pass {step} with the degrees between samples")
-    if head.quantity is not None and head.quantity != "angle":
-        raise DataError(f"{called} is not a crank angle: {hint}; for a file without one pass {step}")
-    return index, "deg"
-
-
-def _choose_pressure(
+def choose_pressure(
     table: Table,
     heads: Sequence[Heading],
     column: int | str | Sequence[int | str] | None,
@@ -273,6 +200,8 @@ def _choose_pressure(
         return named
     first = 0 if angle is None else angle + 1
     possible = [i for i in range(first, table.width) if heads[i].quantity in (None, "pressure")]
+    if angle is not None:
+        possible = [i for i in possible if table.lengths[i] == table.lengths[angle]]
     possible = [i for i in table.numeric(possible) if angle is not None or not _counts(table.numbers(i))]
     if not possible and table.width == 1:
         raise DataError(

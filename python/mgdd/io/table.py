@@ -92,6 +92,15 @@ class Table(ABC):
     def height(self) -> int:
         """Return the number of rows."""
 
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Return the number of rows of each column."""
+        return (self.height,) * self.width
+
+    def first_row(self) -> tuple[str, ...] | None:
+        """Return the cells of the first row below the header as text; None where a file has no lines."""
+        return None
+
     @abstractmethod
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns as the rows of an array, or name the first bad cell."""
@@ -168,6 +177,10 @@ class TextTable(Table):
         """Return the cells as text."""
         return tuple(_cells(text, self.mark) for text in self.texts)
 
+    def first_row(self) -> tuple[str, ...] | None:
+        """Return the cells of the first row below the header as text."""
+        return _cells(self.texts[0], self.mark) if self.texts else None
+
     @property
     def width(self) -> int:
         """Return the number of columns, which every row has."""
@@ -216,6 +229,8 @@ class TextTable(Table):
             number = parse_number(row[index], self.decimal)
             if number is None:
                 remedy = "correct it or start the line with #"
+                if position == 0 and self.header is not None:
+                    remedy = "if the line is a further one of the header, start it with #, else correct it"
                 if "," in row[index] and self.decimal == ".":
                     remedy = f"pass {argument('decimal', repr(','))} if the comma is a decimal mark"
                 raise DataError(f"{where}: {row[index]!r} is not a number: {remedy}")
@@ -258,13 +273,33 @@ def text_table(
     width = _width(body[0][1], mark) if body else len(heads[0])
     for number, row in body:
         if _width(row, mark) != width:
+            cut = number == body[-1][0] and _width(row, mark) < width
             raise DataError(
                 f"{source}, line {number}: {_width(row, mark)} cell(s) where line {body[0][0]} has {width}: "
-                "every row needs the same columns"
+                f"every row needs the same columns{'; the file is cut off there: remove its last line' if cut else ''}"
             )
+    _check_commas(source, content[:start], heads, body, mark)
     header, units = _names_and_units(heads, width)
     lines, texts = zip(*body, strict=True) if body else ((), ())
     return TextTable(source, header, units, decimal, mark, texts, lines)
+
+
+def _check_commas(
+    source: str,
+    lines: Sequence[tuple[int, str]],
+    heads: Sequence[tuple[str, ...]],
+    body: Sequence[tuple[int, str]],
+    mark: str | None,
+) -> None:
+    """Refuse commas that separate cells and are decimal marks as well: twice as many cells as names."""
+    if mark != "," or not heads or not body or len(heads[-1]) < 2:
+        return
+    names, cells = len(heads[-1]), _cells(body[0][1], mark)
+    if len(cells) == 2 * names and all(cell.isdecimal() for cell in cells[1::2]):
+        raise DataError(
+            f"{source}, line {lines[-1][0]}: {names} columns, and the rows have {len(cells)} cells: commas are "
+            "separators and decimal marks as well: write the file with another separator"
+        )
 
 
 def _first_row(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> int:

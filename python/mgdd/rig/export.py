@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import Error, ParameterError, RigError
-from mgdd.io.binary_files import write_netcdf
+from mgdd.io.binary_files import write_netcdf, write_parquet
 from mgdd.io.extras import import_extra
 from mgdd.io.files import existing_file
 from mgdd.results.labels import label_of
@@ -157,15 +157,7 @@ def _write_netcdf(path: Path, data: xr.Dataset) -> None:
 
 
 def _write_parquet(path: Path, data: xr.Dataset) -> None:
-    arrow = import_extra("pyarrow", "parquet", "a Parquet file")
-    parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
-    columns = _columns(data)
-    arrays = [arrow.array(values) for values, _, _ in columns.values()]
-    fields = [
-        arrow.field(name, array.type, metadata={"units": units, "long_name": long_name})
-        for array, (name, (_, units, long_name)) in zip(arrays, columns.items(), strict=True)
-    ]
-    parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), path)
+    write_parquet(_columns(data), path)
 
 
 _TABLE_WRITERS: Mapping[str, tuple[str, Callable[[Path, Any], None]]] = MappingProxyType(

@@ -1,0 +1,170 @@
+"""The crank angle of a table: of a column, of a time with a speed, or of a step; refused where the values are none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError, argument
+from mgdd.io.column_names import Heading, heading
+from mgdd.io.cycle_phase import CYCLE_DEG, repetition
+from mgdd.io.reading import ANGLE_UNITS, TIME_UNITS, Reading
+from mgdd.io.table import Table
+from mgdd.io.wrong_channel import no_angle
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Angle", "angle_of", "at_the_speed_of_the_record", "headings"]
+
+# A speed is stated to a digit or read off a display; one that is further off is of another point.
+_CORRECTED = 0.01
+
+
+def headings(table: Table) -> list[Heading]:
+    """Read header and units row of a table, column by column."""
+    names = table.header or ("",) * table.width
+    return [
+        heading(name, table.unit(index), where=f"{table.source}, {table.called(index)}")
+        for index, name in enumerate(names)
+    ]
+
+
+class Angle(NamedTuple):
+    """Column, degrees, the unit that they came in, and whether they were made from a step or a time."""
+
+    column: int | None
+    degrees: NDArray[np.float64]
+    unit: str
+    made: bool
+
+    @property
+    def cycles(self) -> float:
+        """Return how many cycles there are, a part of one counting as one."""
+        step, span = np.diff(self.degrees), float(np.ptp(self.degrees))
+        if not step.size or not np.isfinite(span):
+            return np.inf  # the check of the trace says what is wrong with it
+        back = step * (1.0 if np.mean(step > 0.0) >= 0.5 else -1.0) < -0.5 * span
+        return max(1.0 + float(np.sum(back)), span / CYCLE_DEG)
+
+
+def angle_of(table: Table, heads: Sequence[Heading], how: Reading, *, samples: int | None = None) -> Angle:
+    """Read the angle, or make it; `samples` is the length of the raster of a file without one."""
+    if how.angle_step_deg is not None:
+        _check_start(table.source, "a count of samples", how)
+        count = np.arange(table.height if samples is None else samples, dtype=np.float64)
+        return Angle(None, (how.angle_start_deg or 0.0) + how.angle_step_deg * count, "deg", True)
+    index, unit = _choose_angle(table, heads, how.angle_column, how.angle_unit)
+    called = f"{table.source}: {table.called(index)}"
+    if unit not in TIME_UNITS:
+        if how.angle_start_deg is not None:
+            raise DataError(
+                f"{called} holds angles: {argument('angle_start_deg')} is for a time or a file without an angle column"
+                ": leave it out"
+            )
+        values = table.numbers(index)
+        _check_first_row(table, values)
+        looks = no_angle(values, unit) if table.width > 1 else None
+        if looks is not None:
+            raise DataError(
+                f"{called} is not a crank angle: its values are {looks}: {_hint(table, heads, index)}, or pass "
+                f"{argument('angle_step_deg', '')} with the degrees between samples"
+            )
+        return Angle(index, np.rad2deg(values) if unit == "rad" else values, unit, False)
+    if how.speed_rpm is None:
+        raise DataError(f"{called} is a time: pass {argument('speed_rpm', '')} to turn it into a crank angle")
+    _check_start(called, "a time", how)
+    seconds = table.numbers(index) / TIME_UNITS[unit]
+    return Angle(index, (how.angle_start_deg or 0.0) + 6.0 * how.speed_rpm * (seconds - seconds[0]), "deg", True)
+
+
+def _check_first_row(table: Table, values: NDArray[np.float64]) -> None:
+    """Refuse a line of numbers below the names that counts the channels instead of starting the angle."""
+    cells, step = table.first_row(), np.diff(values)
+    if cells is None or table.lines is None or table.header is None or step.size < 2:
+        return
+    usual = float(np.median(step[1:]))
+    counts = all(cell.isdecimal() and len(cell) < 6 for cell in cells)
+    if counts and len({int(cell) - at for at, cell in enumerate(cells)}) == 1 and abs(step[0] - usual) > abs(usual) / 2:
+        raise DataError(
+            f"{table.source}, line {table.lines[0]}: the line counts its cells, {cells[0]} to {cells[-1]}, and the "
+            "angle begins below it: if it is a further line of the header, start it with #"
+        )
+
+
+def at_the_speed_of_the_record(
+    degrees: NDArray[np.float64], pressure: NDArray[np.float64], speed_rpm: float, firing_tdc_deg: float, source: str
+) -> tuple[NDArray[np.float64], float, list[str]]:
+    """Compare the stated speed with the period of the record: correct angles and speed, or refuse."""
+    if not (np.isfinite(degrees).all() and np.all(np.diff(degrees) > 0.0)):
+        return degrees, speed_rpm, []  # check_trace names the sample
+    found = repetition(degrees, pressure, firing_tdc_deg)
+    if found is None or not found.differs:
+        return degrees, speed_rpm, []
+    share = CYCLE_DEG / found.degrees
+    stated = argument("speed_rpm", format(speed_rpm, "g"))
+    said = (
+        f"the pressure repeats every {found.degrees:.6g} degrees of {stated}, not 720: over {found.cycles} cycles the "
+        f"engine ran at {speed_rpm * share:.6g} rpm"
+    )
+    if abs(share - 1.0) > _CORRECTED:
+        raise DataError(f"{source}: {said}: correct it")
+    scaled = degrees[0] + (degrees - degrees[0]) * share
+    return scaled, speed_rpm * share, [f"{said}, and its angles were made with that"]
+
+
+def _check_start(where: str, what: str, how: Reading) -> None:
+    if how.before_tdc:
+        raise DataError(f"{where}: {argument('before_tdc')} is for an angle column: leave it out")
+    if how.angle_start_deg is None and how.firing_tdc_deg is None:
+        raise DataError(
+            f"{where}: {what} says nothing of firing TDC: pass {argument('angle_start_deg', '')} with the angle of the "
+            f"first sample, or {argument('firing_tdc_deg', '')} with the angle of firing TDC counted from it"
+        )
+
+
+def _choose_angle(
+    table: Table, heads: Sequence[Heading], column: int | str | None, unit: str | None
+) -> tuple[int, str]:
+    """Return the column of the angle, or of the time, and its unit."""
+    index = table.index(0 if column is None else column)
+    head, called = heads[index], f"{table.source}: {table.called(index)}"
+    others = _other_angles(table, heads, index)
+    hint = _hint(table, heads, index)
+    if head.unit in ANGLE_UNITS:
+        if unit is not None and unit != head.unit:
+            raise DataError(
+                f"{called} is in {head.unit} as the file says: leave {argument('angle_unit')} out or correct the file"
+            )
+        if head.quantity == "time" and others and column is None:
+            raise DataError(f"{called} is a time, and {others[0]!r} an angle: {hint}")
+        return index, head.unit
+    if unit is not None:
+        return index, unit
+    step = argument("angle_step_deg", "")
+    if head.strange is not None or head.unclear is not None:
+        raise DataError(
+            f"{called} is in {head.strange or head.unclear!r}, which is not known: convert it, or pass "
+            f"{argument('angle_unit', '')} with one of {', '.join(ANGLE_UNITS)}"
+        )
+    if head.quantity == "time":
+        raise DataError(
+            f"{called} looks like a time: {hint}, or pass {argument('angle_unit', repr('s'))} or "
+            f"{argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')} to turn it into an angle"
+        )
+    if head.quantity == "counter":
+        raise DataError(f"{called} counts samples: {hint}, or pass {step} with the degrees between samples")
+    if head.quantity is not None and head.quantity != "angle":
+        raise DataError(f"{called} is not a crank angle: {hint}; for a file without one pass {step}")
+    return index, "deg"
+
+
+def _other_angles(table: Table, heads: Sequence[Heading], index: int) -> list[str]:
+    return [heads[i].name for i in range(table.width) if i != index and heads[i].quantity == "angle"]
+
+
+def _hint(table: Table, heads: Sequence[Heading], index: int) -> str:
+    others = _other_angles(table, heads, index)
+    return f"pass {argument('angle_column', repr(others[0]))}" if others else "name the column of the crank angle"

@@ -1,0 +1,85 @@
+"""Whether the values of a column can be an angle or a pressure, and what they look like where they cannot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.io.pressure_checks import MIN_SAMPLES, RADIAN_SPAN
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["no_angle", "no_pressure"]
+
+# Two levels hold at least this share of the samples each, so near to an end of the range, and next to none is between.
+_HELD, _NEAR, _BETWEEN = 0.05, 0.08, 0.01
+_STANDS, _EVEN = 0.2, 0.9
+# A turn and a cycle in radians, and how far a coarse step may miss them.
+_RADIANS, _MISSED = (2.0 * np.pi, 4.0 * np.pi), 0.05
+# A pressure rises once in a cycle from the lower to the upper level; a wave does so smoothly, at even distances, and is
+# as long above its middle as below, where a whole cycle of a pressure is above for less than a fifth, at any speed.
+_RISES, _LEVELS, _SMOOTH, _REGULAR, _ABOVE = 1.5, (0.25, 0.75), 0.45, 0.2, (0.3, 0.7)
+
+
+def no_angle(values: NDArray[np.float64], unit: str) -> str | None:
+    """Say what a column looks like that cannot be an angle; None where it may be one."""
+    if values.size < MIN_SAMPLES or not np.isfinite(values).all():
+        return None
+    low, high = float(values.min()), float(values.max())
+    step, span = np.diff(values), high - low
+    if (held := _held(values)) is not None:
+        return held
+    inner = step[np.abs(step) <= 0.5 * span]
+    if not inner.size or np.all(inner > 0.0) or np.all(inner < 0.0):
+        if inner.size == step.size or not inner.size:
+            return None
+        period = span + float(np.median(np.abs(inner)))
+        if unit == "deg" and span < RADIAN_SPAN and min(abs(period / turn - 1.0) for turn in _RADIANS) > _MISSED:
+            return f"a sawtooth from {low:g} to {high:g}, as a voltage of an encoder"
+        if unit == "deg" and period > 720.0 * (1.0 + _MISSED):
+            return f"a count from {low:g} to {high:g} that starts again, as the pulses of an encoder"
+        return None
+    if np.mean(inner == 0.0) > _STANDS and (np.all(inner >= 0.0) or np.all(inner <= 0.0)):
+        whole = "a count of pulses" if np.all(values == np.round(values)) else "a staircase"
+        return f"{whole} from {low:g} to {high:g}, which stands still in {np.mean(inner == 0.0):.0%} of the samples"
+    moving = inner[inner != 0.0]
+    if moving.size and min(np.mean(moving > 0.0), np.mean(moving < 0.0)) > _STANDS:
+        return f"a wave that rises and falls between {low:g} and {high:g}, as a voltage of an encoder"
+    return None
+
+
+def no_pressure(values: NDArray[np.float64], cycles: float) -> str | None:
+    """Say what a column looks like that cannot be the pressure of so many cycles; None where it may be one."""
+    if values.size < MIN_SAMPLES or not np.isfinite(values).all():
+        return None
+    if (held := _held(values)) is not None:
+        return held
+    low, high = float(values.min()), float(values.max())
+    step = np.diff(values)
+    usual = float(np.median(step))
+    if usual and np.mean(np.abs(step - usual) <= 1e-3 * abs(usual)) >= _EVEN:
+        return f"even steps from {low:g} to {high:g}, as an angle, a time or a count"
+    first, last = low + _LEVELS[0] * (high - low), low + _LEVELS[1] * (high - low)
+    marks = np.where(values >= last, 1, np.where(values <= first, -1, 0))
+    at = np.flatnonzero(marks)
+    rises = at[1:][(marks[at[1:]] > 0) & (marks[at[:-1]] < 0)]
+    above = float(np.mean(values > 0.5 * (low + high)))
+    smooth = np.abs(step).max() < _SMOOTH * (high - low) and _ABOVE[0] < above < _ABOVE[1]
+    if rises.size >= max(3.0, _RISES * cycles) and smooth:
+        apart = np.diff(rises)
+        if apart.std() <= _REGULAR * apart.mean():
+            return f"a wave that rises {rises.size} times in {cycles:.3g} cycle(s) between {low:g} and {high:g}"
+    return None
+
+
+def _held(values: NDArray[np.float64]) -> str | None:
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        return f"the constant {low:g}"
+    share = (values - low) / (high - low)
+    lower, upper = float(np.mean(share <= _NEAR)), float(np.mean(share >= 1.0 - _NEAR))
+    if 1.0 - lower - upper < _BETWEEN and min(lower, upper) >= _HELD:
+        return f"a square wave between {low:g} and {high:g}, as the marks or pulses of an encoder"
+    return None
