@@ -36,6 +36,7 @@ def test_public_names_are_few_and_none_stands_twice() -> None:
     names = [each for name in PACKAGES for each in package(name).__all__]
     # 160 since whole files of a test cell are read and their cycles indicated; a file and a data set are both read.
     assert len(names) <= 160, "unexport or merge a name before one is added"
+    assert {name for name in names if names.count(name) > 1} == {"read"}
 
 
 def test_a_class_of_the_core_shows_names_and_defaults_and_describes_them() -> None:
