@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 import mgdd
 from map_cases import sweep as map_sweep
 from mgdd import datasets, identify, plot, presets
-from mgdd.engine import find_optimum, ignition_delay, simulate
+from mgdd.engine import find_optimum, ignition_delay, simulate, trust
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
@@ -103,6 +103,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "WallHeatProfile": lambda _: identify.wall_heat_profile(cylinder_fit(), scales=[0.5, 1.0]),
     "ThrottleValidation": lambda _: identify.validate_throttle(throttle_fit(), log()),
     "ResidualTests": lambda _: identify.validate_throttle(throttle_fit(), log()).tests,
+    "Trust": lambda _: trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144"),
     "ExcitationCheck": lambda _: identify.check_excitation(chirp(offset=0.15, amplitude=0.1), Throttle()),
     "RecordContent": lambda _: identify.check_excitation(chirp(offset=0.15, amplitude=0.1), Throttle()).content,
     "CalibrationMap": lambda _: optimize_map(map_sweep(), "efficiency_gross"),

@@ -1,4 +1,4 @@
-"""`mgdd engine simulate | analyze | calibrate | optimum`; `analyze`, `seek` and `sweep` have modules of their own."""
+"""`mgdd engine simulate | calibrate | optimum`; `analyze`, `check`, `seek` and `sweep` have modules of their own."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.analyze import add_analyze
+from mgdd.cli.check import add_check
 from mgdd.cli.from_library import Options, default_of, named_options, shown
 from mgdd.cli.options import (
     CYLINDER_CHOICES,
@@ -50,11 +51,12 @@ def add(commands: Any) -> None:
     """Add the group and its commands."""
     verbs = add_group(
         commands, "engine",
-        help_text="one cycle: simulate, analyze, calibrate, optimum; many: seek, sweep",
+        help_text="one cycle: simulate, analyze, check, calibrate, optimum; many: seek, sweep",
         example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
     )  # fmt: skip
     _add_simulate(verbs)
     add_analyze(verbs)
+    add_check(verbs)
     _add_calibrate(verbs)
     _add_optimum(verbs)
     add_seek(verbs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import logging
 import math
 import re
@@ -36,6 +37,7 @@ __all__ = [
     "check_pegging",
     "engine_of",
     "number_pairs",
+    "readers_of",
     "refuse_idle",
     "require_positive",
     "traces_of",
@@ -187,19 +189,25 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Prese
 
 def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     """Read the pressure files, with their conditions as attributes."""
+    return [read() for read in readers_of(args).values()]
+
+
+def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
+    """Give for each pressure file what reads it, so that one which is refused does not stop the others."""
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
     rows = conditions_of(args.files, args.conditions)
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
-    traces = []
-    for file in args.files:
+
+    def read(file: str) -> xr.Dataset:
         trace = read_pressure(
             file, speed_rpm=rows[file].get("speed_rpm", speed), **_COLUMNS.given(args), **READING.given(args)
         )
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
-        traces.append(trace.assign_attrs(**rows[file]))
-    return traces
+        return trace.assign_attrs(**rows[file])
+
+    return {file: functools.partial(read, file) for file in args.files}
 
 
 def check_pegging(args: argparse.Namespace) -> None:

@@ -12,6 +12,7 @@ from mgdd.engine.indicating import Indicating
 from mgdd.engine.nox import fit_nox_proxy
 from mgdd.engine.optimum import find_optimum
 from mgdd.engine.trace import analyze
+from mgdd.engine.trust import Trust, trust
 
 __all__ = [
     "Cylinder",
@@ -22,6 +23,7 @@ __all__ = [
     "Performance",
     "PerformanceTerm",
     "SoftSensor",
+    "Trust",
     "analyze",
     "find_optimum",
     "fit_nox_proxy",
@@ -29,6 +31,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "timing_sweep",
+    "trust",
 ]
 
 

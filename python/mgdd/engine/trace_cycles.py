@@ -54,11 +54,13 @@ def of_cycles(
     """
     angle, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
     made = _core.engine.TraceOptions(**options)
+    # Brake work and fuel are stated as means: they judge the mean cycle, not one that misfired.
+    single = _core.engine.TraceOptions(**options | dict.fromkeys(("bmep_bar", "fuel_heat_j")))
     columns: dict[str, tuple[Any, ...]] = {}
     lines: list[str] = []
     kinds: list[str] = []
     if traces:
-        raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, made)
+        raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, single)
         mean = _core.engine.analyze(angle, pressure.mean(axis=0), cylinder, point, made)
         scalars, lines, kinds, smoothing = raw["scalars"], raw["warnings"], raw["doubts"], raw["smoothing"]
         columns = {ANGLE: (ANGLE, raw[ANGLE]), "volume_l": (ANGLE, raw["volume_l"])}
@@ -110,7 +112,8 @@ def _label(name: str, which: str) -> tuple[str, str]:
 def burn_marks(scalars: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Mark cycles without a burn and those that burn too little, where most cycles of the last axis burn."""
     heat, burns = scalars["heat_net_j"], ~np.isnan(scalars["ca50_cad"])
-    share = heat / np.median(heat, axis=-1, keepdims=True)
+    usual = np.median(heat, axis=-1, keepdims=True)
+    share = np.divide(heat, usual, out=np.ones_like(heat), where=usual > 0.0)
     fired = burns.mean(axis=-1, keepdims=True) > 0.5
     misfire = fired & (~burns | (share < _MISFIRE))
     return {"misfire": misfire, "partial_burn": fired & (share < _PARTIAL) & ~misfire}

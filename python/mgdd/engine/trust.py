@@ -1,0 +1,331 @@
+"""Whether a pressure file can be trusted: every check by name, with its verdict, the cause and the remedy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from mgdd.engine.trace import analyze
+from mgdd.engine.trace_cycles import CYCLE
+from mgdd.errors import DataError, ParameterError
+from mgdd.io.cycle_phase import phase_warnings
+from mgdd.io.pressure import as_trace
+from mgdd.results.describe import Row
+from mgdd.results.labels import ANGLE, labelled_dataset
+from mgdd.results.result import Result
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from mgdd.presets.meant import CylinderLike, PointLike
+
+__all__ = ["Check", "Trust", "trust"]
+
+Verdict = Literal["pass", "open", "doubt", "fail"]
+_WORST: tuple[Verdict, ...] = ("pass", "open", "doubt", "fail")
+# Kinds of doubts of `analyze` by the check that they belong to, in the order of a look at a file.
+_CHECKS: dict[str, tuple[str, ...]] = {
+    "file": ("reading", "coverage"),
+    "samples": ("spike", "clipped", "stuck"),
+    "crank angle": ("slip",),
+    "top dead centre": ("tdc",),
+    "level": ("level", "pegging"),
+    "compression": ("compression",),
+    "expansion": ("expansion",),
+    "charge": ("mass",),
+    "burn": ("no_burn", "early_burn", "window", "window_sensitivity"),
+    "work and heat": ("gain",),
+    "gas exchange": ("exchange",),
+    "cycles": ("misfire", "partial_burn", "odd_level", "drift"),
+}
+_FATAL = ("clipped", "stuck")  # the figures are not those of the gas
+_REMEDIES = {
+    "coverage": "record at least from IVC to EVO",
+    "spike": "look for ignition noise and loose contacts; repair or drop the sample",
+    "clipped": "lower the gain of the amplifier or widen its range, and measure again",
+    "stuck": "look for lost samples, and measure again",
+    "slip": "take the angle of an encoder; look for lost pulses",
+    "tdc": "shift the angles by tdc_offset_cad, or measure TDC by a motored run or a sensor",
+    "level": "peg it: pegging='inlet' with the measured pressure, or 'two_point'; correct the unit",
+    "pegging": "peg it: pegging='inlet' with the measured pressure, or 'two_point'; then look at TDC",
+    "compression": "look at pegging, then TDC, unit and compression ratio",
+    "expansion": "shield or cool the sensor, or take another; peg every cycle",
+    "mass": "state trapped_mass_g in g per cycle, and the conditions of this record",
+    "no_burn": "give heat_window_cad to analyze",
+    "early_burn": "state soi_cad of the first injection in °CA aTDC",
+    "window": "give heat_window_cad to analyze",
+    "window_sensitivity": "smooth more, or give heat_window_cad to analyze",
+    "gain": "look at the gain of the amplifier, then at the stated figure",
+    "exchange": "peg it by the intake pressure; look at the cylinder that the channel belongs to",
+    "misfire": "leave these cycles out of means; look at injection or ignition",
+    "partial_burn": "leave these cycles out of means; look at injection or ignition",
+    "odd_level": "peg every cycle; look at the charge amplifier and the connectors",
+    "drift": "peg every cycle; warm the sensor up, and let the amplifier settle",
+}
+_ONE = "one cycle: nothing to compare it with"
+# Level of a cycle [bar]: off the median by more than this and six robust deviations, or drifting from first to last.
+_OFF_BAR, _OFF_SCATTERS, _DRIFT_BAR, _DRIFT_STDERRS = 0.1, 6.0, 0.1, 5.0
+# Over gas exchange: absolute pressures and pumping work that engines have, and the step at intake bottom dead centre.
+_EXCHANGE_BAR, _PMEP_BAR, _STEP = (0.15, 8.0), (-3.0, 1.5), (0.6, 1.7)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check: what was looked at, the verdict, what was seen, and what to do."""
+
+    name: str
+    verdict: Verdict
+    text: str = ""
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.verdict}{': ' if self.text else ''}{self.text}{'; ' if self.remedy else ''}{self.remedy}"
+
+
+@dataclass(frozen=True, repr=False)
+class Trust(Result):
+    """The checks of one pressure file.
+
+    Parameters
+    ----------
+    file : str
+        Its name.
+    checks : tuple of Check
+        ``pass``, ``open`` (not decided by what the file holds), ``doubt``, or ``fail``: the figures cannot be right.
+    analysis : xarray.Dataset, optional
+        What `analyze` found; None where it refused the file.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> from mgdd.engine import trust
+    >>> report = trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144", bmep_bar=12.5)
+    >>> report["work and heat"].verdict, report["gas exchange"].text
+    ('pass', 'the record has no 720 degrees')
+    """
+
+    file: str
+    checks: tuple[Check, ...]
+    analysis: xr.Dataset | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict, ``open`` ones left out where anything passes."""
+        worst = max((check.verdict for check in self.checks), key=_WORST.index)
+        return "pass" if worst == "open" else worst
+
+    def __getitem__(self, name: str) -> Check:
+        """Return a check by name."""
+        found = next((check for check in self.checks if check.name == name), None)
+        if found is None:
+            raise ParameterError(f"no check {name!r}: there are {', '.join(check.name for check in self.checks)}")
+        return found
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The checks: ``verdict``, ``text`` and ``remedy`` over ``check``."""
+        columns = {name: [getattr(check, name) for check in self.checks] for name in ("verdict", "text", "remedy")}
+        names = {"verdict": "verdict", "text": "what was seen", "remedy": "what to do"}
+        variables = {name: ("check", np.array(values), "-", names[name]) for name, values in columns.items()}
+        check = ("check", np.array([each.name for each in self.checks]), "-", "check")
+        return labelled_dataset({"check": check, **variables}, attrs={"file": self.file, "verdict": self.verdict})
+
+    def _title(self) -> str:
+        return f"{self.file}: {self.verdict}"
+
+    def _rows(self) -> list[Row]:
+        return [Row(check.name, str(check)) for check in self.checks]
+
+    def summary(self) -> str:
+        """Return the verdict and all checks, one per line.
+
+        Returns
+        -------
+        str
+            What fails comes first.
+        """
+        ordered = sorted(self.checks, key=lambda check: -_WORST.index(check.verdict))
+        return "\n".join([self._title(), *(f"  {check.name:16}{check}" for check in ordered)])
+
+
+def trust(
+    trace: Any,
+    cylinder: CylinderLike,
+    *,
+    point: PointLike | None = None,
+    pegging: str = "none",
+    pegging_exponent: float = 1.35,
+    inlet_pressure_kpa: float | None = None,
+    bmep_bar: float | None = None,
+    brake_torque_nm: float | None = None,
+    n_cylinders: int = 1,
+    fuel_mg: float | None = None,
+) -> Trust:
+    """Check a pressure file before its figures are believed.
+
+    Parameters
+    ----------
+    trace : Dataset, DataFrame, mapping, DataArray, Series, pair of array_like, or path-like
+        As of `analyze`: one cycle or many; more can be checked of 720 degrees and of many cycles.
+    cylinder : Cylinder, Preset, str or path-like
+        As of `analyze`.
+    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
+        As of `analyze`.
+    pegging, pegging_exponent, inlet_pressure_kpa
+        As of `analyze`.
+    bmep_bar, brake_torque_nm, n_cylinders, fuel_mg
+        As of `analyze`: without them nothing judges the gain of the amplifier.
+
+    Returns
+    -------
+    Trust
+        Every check with its verdict. A file that `analyze` refuses fails the check ``file``; it raises nothing.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    mgdd.errors.ParameterError
+        An option outside its domain.
+
+    Notes
+    -----
+    Sound traces are those of simulated engines over wall heat, gamma and boost, and of measured heavy-duty engines:
+    ``docs/validation.md`` says how many faults of which size are met, and which are out of reach. An error of TDC of a
+    fired trace is: ``open``, see `mgdd.identify.estimate_tdc`.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> from mgdd.engine import trust
+    >>> sound = datasets.read("hd_diesel_128x144")[1]
+    >>> trust(sound, "hd_diesel_128x144").verdict
+    'pass'
+    >>> clipped = sound.assign(pressure_bar=sound["pressure_bar"].clip(max=100.0))
+    >>> trust(clipped, "hd_diesel_128x144")["samples"].verdict
+    'fail'
+    """
+    name = str(getattr(trace, "attrs", {}).get("file", trace if isinstance(trace, str) else "trace"))
+    try:
+        made = as_trace(trace)
+        name = str(made.attrs.get("file", name))
+        found = analyze(
+            made,
+            cylinder,
+            point=point,
+            pegging=pegging,
+            pegging_exponent=pegging_exponent,
+            inlet_pressure_kpa=inlet_pressure_kpa,
+            bmep_bar=bmep_bar,
+            brake_torque_nm=brake_torque_nm,
+            n_cylinders=n_cylinders,
+            fuel_mg=fuel_mg,
+            quiet=True,
+        )
+    except DataError as error:
+        return Trust(name, (Check("file", "fail", str(error)),))
+    said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
+    said = [(kind, text) for kind, text in said if not (kind == "reading" and "crank angle slips" in text)]
+    said += _slips(made) + _of_levels(made, found) + _of_exchange(made, found)
+    judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
+    stated = [key for key, value in judged.items() if value is not None or _stated(made, key)]
+    skipped = _skipped(made, found, stated)
+    return Trust(name, tuple(_check(check, kinds, said, skipped) for check, kinds in _CHECKS.items()), found)
+
+
+def _stated(trace: xr.Dataset, name: str) -> bool:
+    return name in trace.attrs and not math.isnan(float(trace.attrs[name]))
+
+
+def _check(
+    name: str, kinds: tuple[str, ...], said: list[tuple[str, str]], skipped: dict[str, tuple[str, str]]
+) -> Check:
+    """Put all that was said of one check together; the mean of the cycles repeats what single ones say."""
+    own = [(kind, text) for kind, text in said if kind in kinds]
+    if not own:
+        return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "pass")
+    verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in own) else "doubt"
+    remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in own if kind in _REMEDIES)
+    first = dict(reversed(own))
+    return Check(name, verdict, "; ".join(first.values()), "; ".join(remedies))
+
+
+def _skipped(trace: xr.Dataset, found: xr.Dataset, stated: list[str]) -> dict[str, tuple[str, str]]:
+    """Name the checks that these data cannot decide, and what would."""
+    out = {}
+    cycles = trace.sizes.get(CYCLE, 1)
+    if int(found.attrs["motored"]) < max(cycles, 1):
+        out["top dead centre"] = (
+            "a fired trace hardly shows an error",
+            "mgdd.identify.estimate_tdc scans it; a motored record shows it",
+        )
+    if not stated:
+        out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
+    if not np.isfinite(found["imep_net_bar"]).all():
+        out["gas exchange"] = ("the record has no 720 degrees", "")
+    if cycles == 1:
+        out["cycles"] = out["crank angle"] = (_ONE, "")
+    return out
+
+
+def _columns(trace: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    bar = trace["pressure_bar"]
+    return trace[ANGLE].to_numpy(), np.atleast_2d(bar.transpose(..., ANGLE).to_numpy())
+
+
+def _slips(trace: xr.Dataset) -> list[tuple[str, str]]:
+    angle, bar = _columns(trace)
+    return [("slip", text) for text in phase_warnings(angle, bar, over_time=False, source="trace")]
+
+
+def _of_levels(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
+    """Compare the cycles' levels early in compression with each other, pegged as they were analysed."""
+    angle, bar = _columns(trace)
+    if len(bar) < 4:
+        return []
+    start = max(float(angle[0]), -150.0)
+    early = (angle >= start - 1e-9) & (angle <= start + 20.0)
+    level = bar[:, early].mean(axis=1) + np.atleast_1d(found["pegging_bar"].to_numpy())
+    off = level - np.median(level)
+    usual = 1.4826 * float(np.median(np.abs(off)))
+    out = []
+    odd = np.flatnonzero(np.abs(off) > max(_OFF_BAR, _OFF_SCATTERS * usual))
+    if odd.size and odd.size < 0.2 * len(bar):
+        worst = int(odd[np.argmax(np.abs(off[odd]))])
+        text = f"{odd.size} of {len(bar)} cycles start at another level: cycle {worst + 1} by {off[worst]:+.2g} bar"
+        out.append(("odd_level", text))
+    count = np.arange(len(bar)) - 0.5 * (len(bar) - 1)
+    slope = float(count @ off / (count @ count))
+    rest = off - off.mean() - slope * count
+    stderr = math.sqrt(float(rest @ rest) / max(len(bar) - 2, 1) / float(count @ count))
+    drift = slope * (len(bar) - 1)
+    if abs(drift) > max(_DRIFT_BAR, _DRIFT_STDERRS * stderr * (len(bar) - 1)):
+        out.append(("drift", f"the level moves by {drift:+.2g} bar from cycle 1 to cycle {len(bar)}"))
+    return out
+
+
+def _of_exchange(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
+    """Judge levels and work between the valves' events, of records of 720 degrees."""
+    if not np.isfinite(found["imep_net_bar"]).all():
+        return []
+    angle, bar = _columns(trace)
+    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
+
+    def level(low: float, high: float) -> float:
+        return float(mean[(angle >= low) & (angle <= high)].mean())
+
+    intake, exhaust, end = level(-300.0, -200.0), level(220.0, 300.0), level(-190.0, -170.0)
+    out = []
+    for text, value in (("intake", intake), ("exhaust", exhaust)):
+        if not _EXCHANGE_BAR[0] < value < _EXCHANGE_BAR[1]:
+            out.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
+    pmep = float(np.mean(found["pmep_bar"]))
+    if not _PMEP_BAR[0] < pmep < _PMEP_BAR[1]:
+        out.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
+    if not out and not _STEP[0] < end / intake < _STEP[1]:
+        out.append(("exchange", f"the intake stroke runs at {intake:.3g} bar and ends at {end:.3g} bar"))
+    return out

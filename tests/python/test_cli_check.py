@@ -1,0 +1,60 @@
+"""`mgdd engine check`: one verdict per file, refused files among them, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mgdd import datasets, io
+from mgdd.cli import main
+
+HD = ("--preset", "hd_diesel_128x144")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("bench")
+    sound = datasets.read("hd_diesel_128x144")[1]
+    io.write_csv(sound, folder / "sound.csv")
+    io.write_csv(sound.assign(pressure_bar=sound["pressure_bar"].clip(max=100.0)), folder / "clipped.csv")
+    (folder / "torn.csv").write_text("crank_angle_cad,pressure_bar\n-30,4\n-29,?\n", encoding="utf-8")
+    return [str(folder / name) for name in ("sound.csv", "clipped.csv", "torn.csv")]
+
+
+def test_every_file_has_a_verdict(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["engine", "check", *files, *HD, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["files"]
+    assert [(each["file"], each["verdict"]) for each in found] == [
+        ("sound.csv", "pass"), ("clipped.csv", "fail"), ("torn.csv", "fail"),
+    ]  # fmt: skip
+    (samples,) = [check for check in found[1]["checks"] if check["name"] == "samples"]
+    assert samples["verdict"] == "fail"
+    assert "equal samples" in samples["text"]
+    assert "amplifier" in samples["remedy"]
+    assert "line 3" in found[2]["checks"][0]["text"]
+
+
+def test_text_says_the_worst_first(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["engine", "check", *files[1:], *HD]) == 0
+    clipped, torn = capsys.readouterr().out.split("\n\n")
+    assert clipped.splitlines()[0] == "clipped.csv: fail"
+    assert clipped.splitlines()[1].split()[0] == "samples"
+    assert torn.splitlines()[0] == "torn.csv: fail"
+
+
+def test_what_is_stated_is_judged(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def verdict(*options: str) -> str:
+        assert main(["engine", "check", files[0], *HD, "--json", *options]) == 0
+        (file,) = json.loads(capsys.readouterr().out)["files"]
+        verdicts = {check["name"]: check["verdict"] for check in file["checks"]}
+        return str(verdicts.get("work and heat", file["verdict"]))
+
+    assert verdict("--bmep-bar", "12.5") == "pass"  # closed IMEP is 13.7 bar
+    assert verdict("--bmep-bar", "8") == "doubt"
+    assert verdict("--bmep-bar", "15") == "fail"
+    assert verdict() == "open"
+    assert main(["engine", "check", files[0], *HD, "--inlet-pressure-kpa", "100"]) == 2
+    assert "--pegging inlet" in capsys.readouterr().err
+    assert main(["engine", "check", str(tmp_path / "none.csv"), *HD]) == 2

@@ -1,0 +1,108 @@
+"""The trust report: verdicts, what stays open, and that nothing raises where a file is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from independent_cycle import draw, record
+from mgdd import datasets
+from mgdd.engine import trust
+from mgdd.errors import DataError, ParameterError
+from mgdd.io import pressure_trace
+from mgdd.results.labels import check_labels
+
+ENGINE = draw(np.random.default_rng(5))
+ANGLE, BAR, FUEL = record(np.random.default_rng(6), ENGINE, 12)
+
+
+def seen(bar: np.ndarray = BAR, angle: np.ndarray = ANGLE, **options: object):
+    return trust(pressure_trace(angle, bar, name="bench 4"), ENGINE.cylinder(), **options)
+
+
+def test_a_sound_record_passes_and_says_what_stays_open() -> None:
+    report = seen()
+    assert report.verdict == "pass"
+    assert {check.name: check.verdict for check in report.checks if check.verdict != "pass"} == {
+        "top dead centre": "open", "work and heat": "open",
+    }  # fmt: skip
+    assert report.summary().splitlines()[0] == "bench 4: pass"
+    assert float(report.analysis["mean_imep_net_bar"]) < float(report.analysis["mean_imep_gross_bar"])
+    check_labels(report.dataset)
+    assert report.to_dataframe().loc["samples", "verdict"] == "pass"
+
+
+def test_one_closed_cycle_leaves_more_open() -> None:
+    report = trust(datasets.read("hd_diesel_128x144")[2], "hd_diesel_128x144")
+    opened = {check.name for check in report.checks if check.verdict == "open"}
+    assert opened == {"crank angle", "top dead centre", "work and heat", "gas exchange", "cycles"}
+
+
+def test_stated_fuel_judges_the_gain() -> None:
+    fuel = float(FUEL.mean())
+    assert seen(fuel_mg=fuel)["work and heat"].verdict == "pass"
+    doubted = seen(1.3 * BAR, fuel_mg=fuel)["work and heat"]
+    assert doubted.verdict == "doubt"
+    assert "gain" in doubted.remedy
+    assert trust(
+        pressure_trace(ANGLE, BAR).assign_attrs(fuel_mg=fuel), ENGINE.cylinder()
+    )["work and heat"].verdict == "pass"  # fmt: skip
+
+
+def test_the_worst_comes_first_and_the_reader_is_told_what_to_do() -> None:
+    report = seen(np.minimum(BAR, 0.9 * BAR.max()))
+    first = report.summary().splitlines()[1]
+    assert report.verdict == report["samples"].verdict == "fail"
+    assert first.split()[:2] == ["samples", "fail:"]
+    assert "amplifier" in first
+    with pytest.raises(ParameterError, match="no check 'sample'"):
+        report["sample"]
+
+
+def test_levels_of_cycles_are_compared() -> None:
+    bar = BAR.copy()
+    bar[7] += 0.4
+    assert "cycle 8 by +0.4 bar" in seen(bar)["cycles"].text
+    drifting = seen(BAR + np.linspace(0.0, 0.4, len(BAR))[:, None])["cycles"]
+    assert "moves by +0.4" in drifting.text
+    assert "from cycle 1 to cycle 12" in drifting.text
+    assert seen(BAR + np.linspace(0.0, 0.04, len(BAR))[:, None])["cycles"].verdict == "pass"
+
+
+def test_the_gas_exchange_is_judged() -> None:
+    low = np.where((ANGLE < -190.0) | (ANGLE > 190.0), BAR - ENGINE.intake_bar, BAR)
+    assert seen(low)["gas exchange"].verdict == "doubt"
+    turned = BAR[:, ::-1][:, np.argsort(-ANGLE, kind="stable")]
+    np.testing.assert_array_equal(turned, BAR)  # a fixture that hides nothing
+    lifted = np.where(ANGLE < -200.0, 1.9 * BAR, BAR)
+    assert "intake stroke" in seen(lifted)["gas exchange"].text
+
+
+def test_a_refused_file_fails_and_raises_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "torn.csv"
+    file.write_text("crank_angle_cad,p\n-30,5\n-29,x\n", encoding="utf-8")
+    report = trust(str(file), ENGINE.cylinder())
+    assert report.verdict == "fail"
+    assert report.analysis is None
+    assert "torn.csv" in report["file"].text
+    assert report.dataset.sizes["check"] == 1
+    with pytest.raises(FileNotFoundError):
+        trust(str(tmp_path / "none.csv"), ENGINE.cylinder())
+    with pytest.raises(DataError):  # an analysis says why
+        pressure_trace(ANGLE, np.roll(BAR, 480, axis=1))
+
+
+def test_every_kind_of_doubt_belongs_to_a_check() -> None:
+    source = Path(__file__).parents[2] / "cpp" / "src" / "engine" / "pressure"
+    text = "".join(file.read_text(encoding="utf-8") for file in source.glob("*.cpp"))
+    import re
+
+    from mgdd.engine.trust import _CHECKS, _REMEDIES
+
+    kinds = set(re.findall(r'warnings\.push_back\(\s*\{\s*"(\w+)"', text)) | {"clipped", "stuck"}
+    known = {kind for own in _CHECKS.values() for kind in own}
+    assert len(kinds) > 12
+    assert kinds <= known
+    assert known - {"reading"} == set(_REMEDIES)
