@@ -208,6 +208,8 @@ def _form_of(file: Path) -> str:
     with file.open("rb") as stream:
         head = stream.read(_HEAD)
     ending = file.suffix.lower()
+    if ending == ".toml":
+        _ending(file)  # a parameter file
     if head.startswith(b"CDF") or (ending == ".nc" and not head.startswith(b"\x89HDF")):
         return "nc" if ending == ".nc" else ""
     if is_xml(head):
