@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from mgdd.io.column_names import spelled_unit
 from mgdd.maps.cells import can_be_name, spoken_name
+from mgdd.results.labels import VARIABLES
 from mgdd.results.units import attribute_units, unit_of
 
 __all__ = ["NOT_GIVEN", "Heading", "heading_of", "unit_from", "unit_to", "without_brackets"]
@@ -66,7 +67,8 @@ def heading_of(text: str, *, unit: str = "", fallback: str, taken: tuple[str, ..
     plain = _UMLAUTS.get(plain[:1], plain[:1]) + plain[1:]
     candidates = (plain, re.sub(r"[^\w.\[\]%]+", "_", plain).strip("_"), _name_of_unit(written) if not words else "")
     name = next((each for each in candidates if each not in taken and _can_name(each, written)), fallback)
-    return Heading(name, unit_from(written, name), words if words not in ("", name) else spoken_name(name))
+    known = VARIABLES[name].long_name if name in VARIABLES else spoken_name(name)
+    return Heading(name, unit_from(written, name), words if words not in ("", name) else known)
 
 
 def _can_name(name: str, written: str) -> bool:
