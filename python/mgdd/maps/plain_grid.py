@@ -153,9 +153,17 @@ def _found(text: str, mark: str | None, origin: str) -> _Grid | None:
         units = below if not any(map(_like_number, below[1])) else None
         start = place + 1 + (units is not None)
         body = lines[start:]
-        if body and len(trimmed(body[0][1])) > 1 and (_like_number(body[0][1][0]) or not body[0][1][0]):
+        if head[0].casefold() in _EMPTY and place and _names_columns(lines[place - 1][1], len(head)):
+            return None
+        if body and any(map(_like_number, body[0][1])):
             return _Grid(lines[:place], (line, head), units, body)
     return None
+
+
+def _names_columns(cells: list[str], width: int) -> bool:
+    """Whether a line has a name for every column of a table of points."""
+    said = trimmed(cells)
+    return len(said) == width and not any(_like_number(cell) or cell.casefold() in _EMPTY for cell in said)
 
 
 def _cells(text: str, mark: str | None, origin: str) -> Rows:
