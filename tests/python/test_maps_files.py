@@ -363,7 +363,8 @@ def test_the_writer_of_whole_files(tmp_path: Path) -> None:
 
 def test_a_smoothed_map_travels_too(tmp_path: Path) -> None:
     pytest.importorskip("clarabel", reason="clarabel is not installed: pip install 'mgdd[maps]'")
-    found = smooth_map(optimised(), slope_limits={"fuel_mg": 0.9}, fill=True)
+    with pytest.warns(UserWarning, match="extrapolated 3 cells"):
+        found = smooth_map(optimised(), slope_limits={"fuel_mg": 0.9}, fill=True)
     write_map(found, tmp_path / "map.json")
     assert read_map(tmp_path / "map.json") == found
     write_map(found, tmp_path / "map.dcm")

@@ -333,6 +333,18 @@ def test_a_grid_on_a_sheet(tmp_path: Path) -> None:
         read(whole[:1500], tmp_path, "cut.xlsx")
 
 
+@pytest.mark.parametrize("ending", ["csv", "json", "nc", "dcm", "cdfx"])
+def test_the_content_says_the_form_and_not_the_name(ending: str, tmp_path: Path) -> None:
+    table = CalibrationMap(AXES, VALUES, name="soc_cad")
+    write_map(table, tmp_path / f"map.{ending}")
+    raw = (tmp_path / f"map.{ending}").read_bytes()
+    for name in ("map", "map.txt", "map.csv", "map.CSV"):
+        assert read(raw, tmp_path, name) == table
+    if ending in ("csv", "dcm"):  # as a spreadsheet or an editor saves it
+        for encoding in ("utf-16", "utf-8-sig", "cp1252"):
+            assert read(raw.decode().encode(encoding), tmp_path, "map.txt") == table
+
+
 # --- DCM and CDFX -------------------------------------------------------------------------------------------
 def test_odd_labels_of_a_dcm_file() -> None:
     found = read_dcm(DATA / "odd_labels.dcm")

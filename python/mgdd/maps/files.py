@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -34,7 +35,7 @@ __all__ = ["map_content", "read_map", "write_map"]
 
 _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".cdfx", ".nc")
-_HEAD = 4096  # bytes that tell a form
+_HEAD = 1 << 16  # bytes that tell a form
 
 
 def write_map(
@@ -180,8 +181,8 @@ def read_map(
     form = _form_of(file)
     try:
         data = read_netcdf(file) if form == "nc" else None
-        if data is not None and len(data.dims) == 1 and POINT in data.dims:
-            form = ""
+        if data is not None and len(data.dims) == 1 and (POINT in data.dims or not data.coords):
+            form = ""  # a list of points
         if form != "" and (rows is not None or columns is not None):
             which = argument("rows") if rows is not None else argument("columns")
             raise ParameterError(f"{file}: names its axes itself: leave {which} out")
@@ -211,12 +212,13 @@ def _form_of(file: Path) -> str:
     if ending == ".toml":
         _ending(file)  # a parameter file
     if head.startswith(b"CDF") or (ending == ".nc" and not head.startswith(b"\x89HDF")):
-        return "nc" if ending == ".nc" else ""
+        return "nc"
     if is_xml(head):
         return "labels"
-    if b"\0" in head:
+    wide = head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    if b"\0" in head and not wide:
         return ""
-    text = head.decode("utf-8", "replace").lstrip("\ufeff").lstrip()
+    text = head.decode("utf-16" if wide else "utf-8", "replace").lstrip("\ufeff").lstrip()
     first = next((line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "*!."), "")
     if first.lstrip().startswith("KONSERVIERUNG_FORMAT") or ending in (".dcm", ".cdfx"):
         return "labels"
