@@ -26,7 +26,7 @@ LONG = 500_000
 LETTERS, DIGITS = "n" * LONG, "7" * LONG
 MESSAGE, MEMORY = 4200, 100e6
 NAMES = [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in SAMPLES]
-TEXTS = [name for name in SAMPLES if SAMPLES[name].ending in ("csv", "json", "toml", "dcm", "dbc")]
+TEXTS = [name for name in SAMPLES if SAMPLES[name].ending in ("csv", "json", "toml", "dcm", "cdfx", "dbc")]
 FEW_TEXTS = [name for name in TEXTS if name not in SLOW]
 # What reaches `ParameterFile.read` before anything of its own.
 ALIKE = [name for name in SAMPLES if re.search(r"^identify|^throttle|^surrogate|throttle$", name)]

@@ -106,3 +106,49 @@ def test_a_measured_engine_becomes_a_map(here: Path, capsys: pytest.CaptureFixtu
     assert told["maps"][0]["axes"] == dict(data["nox_g_per_kwh"].sizes)
     assert main(["map", "show", "nox.json", "--contour", "--figure", "nox.png"]) == 0
     assert (here / "nox.png").stat().st_size > 10_000
+
+
+def test_a_measured_grid_becomes_a_label_file(
+    here: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """The way of a measured map: its axes chosen, its gaps filled within a tolerance, as CDFX and as DCM."""
+    pytest.importorskip("clarabel", reason="clarabel is not installed: pip install 'mgdd[maps]'")
+    torque = 50.0 + 1e-2 * SPEED[:, None] - 0.4 * FUEL
+    rows = [["speed [1/min] / fuel [mg]", *FUEL], *([n, *row] for n, row in zip(SPEED, torque, strict=True))]
+    rows[1][3] = rows[3][5] = ""
+    (here / "bench.csv").write_text("Größtes Moment [Nm]\n" + "\n".join(";".join(map(str, row)) for row in rows))
+    assert main(["map", "show", "bench.csv"]) == 2
+    assert "pass --rows 'speed [1/min]' if speed [1/min] runs down" in capsys.readouterr().err
+    asked = ["bench.csv", "--rows", "speed_rpm", "--columns", "fuel_mg", "--name", "torque_nm"]
+    told = ran(capsys, "map", "smooth", *asked, "--fill", "--tolerance", "0.5", "-o", "smooth.json")
+    assert told["tolerance"] == 0.5
+    assert 0.0 <= told["largest_shift"] <= 0.5
+    (doubt,) = told["warnings"]
+    assert doubt.startswith("torque_nm: extrapolated 1 cell: speed_rpm = 3000, fuel_mg = 40")
+    back = read_map(here / "smooth.json")
+    np.testing.assert_allclose(back.values, torque, atol=0.5)
+    assert (back.cells["source"][0, 2], back.cells["source"][2, 4]) == ("interpolated", "extrapolated")
+    assert main(["map", "smooth", *asked, "--fill", "--tolerance", "0.5"]) == 0
+    shown = capsys.readouterr().out
+    assert caplog.messages[-1] == doubt
+    assert "tolerance 0.5" in shown
+    assert "extrapolated, 1 cell" in shown
+    for ending in ("cdfx", "dcm"):
+        ran(
+            capsys, "map", "export", "smooth.json", "--label", "KF.Torque", "--encoding", "latin-1", "-o", f"e.{ending}"
+        )
+    first, second = read_dcm(here / "e.cdfx"), read_dcm(here / "e.dcm")
+    assert first == second
+    assert first.maps["KF.Torque"].labels["KF.Torque"].long_name == "Größtes Moment"
+    assert "Größtes".encode("latin-1") in (here / "e.dcm").read_bytes()
+
+
+def test_axes_without_names_are_doubted_on_the_command_line(
+    here: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    (here / "bare.csv").write_text(",10,20\n900,1,2\n1500,3,5\n")
+    assert main(["map", "show", "bare.csv"]) == 0
+    assert "name it with --rows 'speed_rpm'" in caplog.messages[0]
+    capsys.readouterr()
+    assert main(["map", "export", "bare.csv", "--encoding", "latin-1", "-o", "a.json"]) == 2
+    assert "--encoding does not act here; only a .dcm or .cdfx file" in capsys.readouterr().err

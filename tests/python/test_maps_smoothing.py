@@ -133,10 +133,15 @@ def test_the_smoothed_map_loses_less_than_it_may_everywhere() -> None:
 def test_cells_without_a_value_stay_empty_or_are_filled() -> None:
     best = optimize_map(sweep(), "efficiency_gross", limits={"p_max_bar": 110.0}, max_loss=0.002, infeasible="keep")
     limits = {"speed_rpm": 2e-3, "fuel_mg": 0.65}
-    kept, filled = (smooth_map(best, slope_limits=limits, fill=fill) for fill in (False, True))
+    kept = smooth_map(best, slope_limits=limits)
+    with pytest.warns(
+        UserWarning, match=r"soc_cad: extrapolated 3 cells: speed_rpm = 900, fuel_mg = 40; .*: check them"
+    ):
+        filled = smooth_map(best, slope_limits=limits, fill=True)
     assert kept.cells["source"][:, 4].tolist() == ["infeasible"] * 3
     np.testing.assert_array_equal(kept.values[:, :4], filled.values[:, :4])
-    assert filled.cells["source"][:, 4].tolist() == ["interpolated"] * 3
+    assert filled.cells["source"][:, 4].tolist() == ["extrapolated"] * 3  # beyond the last fuel that has a value
+    assert "3 cells" in filled.provenance["filled"]
     assert np.isfinite(filled.values).all()
     assert np.abs(slopes(filled)[1]).max() <= 0.65 * (1.0 + 1e-9)
     assert np.abs(slopes(filled)[0]).max() <= 2e-3 * (1.0 + 1e-9)
@@ -185,6 +190,7 @@ def test_a_missing_solver_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatc
         smooth_map(rough())
 
 
+@pytest.mark.filterwarnings("ignore:.*extrapolated")
 @settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_any_map_is_smoothed_within_its_rules_or_they_contradict_each_other(data: st.DataObject) -> None:
@@ -258,3 +264,97 @@ def test_cells_with_and_without_a_range_are_smoothed_and_kept():
     assert list(filled.cells["source"]) == ["smoothed", "given", "interpolated", "smoothed"]
     assert np.abs(np.diff(filled.values)).max() <= 4.0 * (1.0 + 1e-6)
     assert np.all(filled.values[[0, 3]] >= [-6.0, -7.0])
+
+
+# --- measured maps ------------------------------------------------------------------------------------------
+def measured(values: np.ndarray, axes: dict[str, np.ndarray] = AXES) -> CalibrationMap:
+    """A map without ranges, as a bench gives it; NaN where nothing was measured."""
+    source = np.where(np.isnan(values), "unattainable", "measured")
+    return CalibrationMap(axes, values, name="torque_nm", cells={"source": source})
+
+
+@st.composite
+def planes(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    """A plane over the uneven axes, and which of its cells are missing: three on no line are left."""
+    slope = draw(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=2))
+    plane = 50.0 + slope[0] * 1e-2 * N + slope[1] * M
+    missing = np.array(draw(st.lists(st.booleans(), min_size=15, max_size=15))).reshape(3, 5)
+    missing[[0, 0, 2], [0, 4, 1]] = False
+    return plane, missing
+
+
+@pytest.mark.filterwarnings("ignore:.*extrapolated")
+@settings(max_examples=60, deadline=None)
+@given(planes(), st.sampled_from([None, 0.0, 0.5]), st.sampled_from([0.0, 1.0, 50.0]))
+def test_filling_a_plane_gives_the_plane(case: Any, tolerance: float | None, weight: float) -> None:
+    plane, missing = case
+    holed = np.where(missing, np.nan, plane)
+    filled = smooth_map(measured(holed), fill=True, tolerance=tolerance, weight=weight)
+    np.testing.assert_allclose(filled.values, plane, atol=2e-3 * max(1.0, np.ptp(plane)))
+    assert (set(filled.cells["source"][missing].tolist()) | {"interpolated"}) <= {"interpolated", "extrapolated"}
+
+
+@pytest.mark.filterwarnings("ignore:.*extrapolated")
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.0, 20.0), st.sampled_from([(7,), (3, 5), (2, 4)]))
+def test_no_measured_cell_moves_by_more_than_the_tolerance(seed: int, tolerance: float, shape: Any) -> None:
+    rng = np.random.default_rng(seed)
+    axes = {name: np.cumsum(rng.uniform(0.1, 100.0, size)) for name, size in zip(("x", "y"), shape, strict=False)}
+    values = rng.normal(1e3, 10.0, shape)
+    values[rng.random(shape) < 0.2] = np.nan
+    values.ravel()[0] = 1e3
+    table = measured(values, axes)
+    found = smooth_map(table, fill=True, tolerance=tolerance, weight=float(rng.uniform(0.0, 100.0)))
+    known = np.isfinite(values)
+    moves = np.abs(found.values - values)[known]
+    assert moves.max() <= tolerance  # to the last bit
+    assert np.isfinite(found.values).all()
+    assert f"tolerance {tolerance:g} N m, largest move {moves.max():.4g} N m at x = " in found.provenance["smoothed"]
+
+
+def test_a_tolerance_takes_noise_away_and_stays_inside_of_a_range() -> None:
+    plane = 50.0 + 1e-2 * N - 0.4 * M
+    rng = np.random.default_rng(3)
+    noisy = plane + rng.uniform(-1.0, 1.0, (3, 5))
+    found = smooth_map(measured(noisy), tolerance=1.0, weight=1e4)
+    assert np.abs(found.values - plane).max() < np.abs(noisy - plane).max()
+    assert np.sqrt(np.mean((found.values - plane) ** 2)) < 0.7 * np.sqrt(np.mean((noisy - plane) ** 2))
+    table = rough()
+    tight = smooth_map(table, tolerance=0.5)
+    assert np.abs(tight.values - table.values).max() <= 0.5
+    assert (tight.values >= table.cells["low"]).all()
+    assert (tight.values <= table.cells["high"]).all()
+    same = smooth_map(table, tolerance=1e6)
+    np.testing.assert_allclose(same.values, smooth_map(table).values, atol=1e-6)
+
+
+def test_cells_outside_of_the_hull_are_doubted_aloud() -> None:
+    plane = 50.0 + 1e-2 * N - 0.4 * M
+    missing = np.zeros((3, 5), dtype=bool)
+    missing[1, 2] = missing[0, 4] = missing[0, 3] = True
+    with pytest.warns(UserWarning, match=r"torque_nm: extrapolated 2 cells: speed_rpm = 900, fuel_mg = 25; speed_rpm"):
+        found = smooth_map(measured(np.where(missing, np.nan, plane)), fill=True, tolerance=0)
+    assert found.cells["source"][1, 2] == "interpolated"
+    assert found.cells["source"][0, 3:].tolist() == ["extrapolated", "extrapolated"]
+    assert (found.cells["source"][~missing] == "measured").all()
+    np.testing.assert_array_equal(found.values[~missing], plane[~missing])
+    assert found.provenance["filled"].startswith("3 cells: speed_rpm = 900, fuel_mg = 25; ")
+    assert found.provenance["extrapolated"].startswith("2 cells: ")
+
+
+def test_a_single_row_has_its_hull_along_itself() -> None:
+    values = np.full((3, 5), np.nan)
+    values[1, [0, 3]] = 10.0, 13.0
+    with pytest.warns(UserWarning, match="extrapolated 11 cells"):
+        found = smooth_map(measured(values), fill=True, tolerance=0)
+    assert found.cells["source"][1].tolist() == ["measured", "interpolated", "interpolated", "measured", "extrapolated"]
+    slanted = np.full((3, 5), np.nan)
+    slanted[0, 0], slanted[2, 4] = 1.0, 2.0
+    with pytest.warns(UserWarning, match="extrapolated 13 cells"):
+        smooth_map(measured(slanted), fill=True, tolerance=0)
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, np.nan, np.inf, True])
+def test_a_tolerance_out_of_its_domain(tolerance: Any) -> None:
+    with pytest.raises(ParameterError, match="tolerance = "):
+        smooth_map(measured(50.0 + 0.0 * N * M), tolerance=tolerance)

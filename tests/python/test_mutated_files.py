@@ -233,6 +233,7 @@ def survey_any(name: str, folder: Path, count: int, first_seed: int) -> Counter[
 
 
 @pytest.mark.filterwarnings("ignore:.*not readable and left out")
+@pytest.mark.filterwarnings("ignore:.*does not name the axis")
 @pytest.mark.parametrize("name", [name for name in SAMPLES if name not in SLOW])
 def test_a_mutant_of_any_file_is_refused_with_an_error_of_mgdd(name: str, tmp_path: Path) -> None:
     assert survey_any(name, tmp_path, 40, 0)["refused"] > 0
@@ -240,6 +241,7 @@ def test_a_mutant_of_any_file_is_refused_with_an_error_of_mgdd(name: str, tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*not readable and left out")
+@pytest.mark.filterwarnings("ignore:.*does not name the axis")
 @pytest.mark.parametrize("name", SAMPLES)
 def test_many_mutants_of_any_file_are_refused_with_an_error_of_mgdd(name: str, tmp_path: Path) -> None:
     assert survey_any(name, tmp_path, 100 if name in SLOW else 1500, 10_000)["refused"] > 0

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import logging
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import OperatingPoint
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import CSV, write_table
+from mgdd.cli.map_files import CSV, doubts_said, write_table
 from mgdd.cli.options import SCHEME, add_command, add_engine, engine_of, number_pairs, refuse_idle
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.ranges import factors_of
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["add_design"]
 
-_LOG = logging.getLogger(__name__)
 _DESIGN = Options(design_points, "method", "seed", "model", "n_starts", n="points")
 _MARGIN, _TIMING = Options(FeasibleRegion.of_points, "margin"), Options(sweep, "soc_cad")
 _ENGINE = ("preset", "set", *OperatingPoint.fields(), "burn", "gamma", "wall_heat", "ignition", "soc_cad")
@@ -80,12 +77,8 @@ def _design(args: argparse.Namespace) -> None:
     factors, limits = factors_of(args.over), number_pairs(args.limit, "--limit")
     region, driven = _region(args, limits), _driven(args, tuple(factors))
     before = _before(args, tuple(factors))
-    with warnings.catch_warnings(record=True) as doubts, named_options(n="points", existing="extend", outputs="limit"):
-        warnings.simplefilter("always", UserWarning)
+    with doubts_said() as said, named_options(n="points", existing="extend", outputs="limit"):
         plan = design_points(factors, feasible=_both(region, driven), existing=before, **_DESIGN.given(args))
-    said = [str(doubt.message) for doubt in doubts]
-    for text in said:
-        _LOG.warning("%s", text)
     payload = _payload(plan, limits, region, said)
     payload["within"] = args.within
     payload["existing"] = 0 if before is None else before.sizes["point"]

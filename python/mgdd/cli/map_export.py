@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd import datasets
-from mgdd.cli.map_files import MAP_ENDINGS
-from mgdd.cli.map_show import READING
+from mgdd.cli.from_library import Options
+from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, map_in
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
-from mgdd.maps import CalibrationMap, read_map, write_map
+from mgdd.maps import CalibrationMap, write_map
 
 if TYPE_CHECKING:
     from mgdd.guide import TimingMap
@@ -22,22 +22,25 @@ __all__ = ["add_export"]
 
 _ENGINES = ("volkswagen", "mercedes")  # in the order of the set
 _GUIDE = (".csv", ".toml")
+_WRITING = Options(write_map, "encoding")
 
 
 def add_export(verbs: Any) -> None:
     """Add the command."""
     parser = add_command(
         verbs, "export", _export,
-        help_text="write maps in another form: CSV, JSON, netCDF, DCM, or the table of a guide",
+        help_text="write maps in another form: CSV, JSON, netCDF, DCM, CDFX, or the table of a guide",
         example="mgdd map export smooth.json --label SocBase -o engine.dcm",
-        endings=".csv, .json or .nc, which hold everything; .dcm, which may hold several maps; with --guide-map .toml",
+        endings=".csv, .json or .nc, which hold everything; .dcm or .cdfx, which may hold several maps; with "
+        "--guide-map .toml",
     )  # fmt: skip
-    parser.add_argument("files", nargs="*", metavar="MAP", help=".csv, .json, .nc or .dcm; several only into a .dcm")
+    parser.add_argument("files", nargs="*", metavar="MAP", help=f"{FORMS}; several only into a .dcm or .cdfx")
     READING.add(parser)
     parser.add_argument(
         "--label", action="append", default=[], metavar="NAME",
-        help="label in a DCM file, one per map in their order (default: the names of the maps)",
+        help="label in a DCM or CDFX file, one per map in their order (default: the names of the maps)",
     )  # fmt: skip
+    _WRITING.add(parser)
     parser.add_argument(
         "--advisor", choices=_ENGINES,
         help="instead of a file: the measured map of this engine of the data set advisor_engine_maps, whose variable "
@@ -54,11 +57,13 @@ def _export(args: argparse.Namespace) -> None:
         raise ParameterError("-o is needed: name the file to write, for example -o engine.dcm")
     check_file("-o", args.output, _GUIDE if args.guide_map else MAP_ENDINGS)
     maps = _maps(args)
-    into_dcm = Path(args.output).suffix == ".dcm"
-    if not into_dcm:
-        refuse_idle(args, "label", why="only a .dcm file has labels")
-    if len(maps) > 1 and not into_dcm:
-        raise ParameterError(f"-o {args.output}: {len(maps)} maps fit into a .dcm only: give one map, or that ending")
+    has_labels = Path(args.output).suffix in (".dcm", ".cdfx")
+    if not has_labels:
+        refuse_idle(args, "label", "encoding", why="only a .dcm or .cdfx file has labels and encodings")
+    if len(maps) > 1 and not has_labels:
+        raise ParameterError(
+            f"-o {args.output}: {len(maps)} maps fit into a .dcm or .cdfx only: give one map, or that ending"
+        )
     if args.label and len(args.label) != len(maps):
         raise ParameterError(f"--label: {len(args.label)} for {len(maps)} maps: give one per map, in their order")
     names = args.label or [table.name for table in maps]
@@ -67,14 +72,14 @@ def _export(args: argparse.Namespace) -> None:
         raise ParameterError(f"two maps would be called {twice!r} in {args.output}: give each a --label")
     if args.guide_map:
         _write_guide(maps[0].to_timing_map(), args)
-    elif into_dcm:
-        write_map(dict(zip(names, maps, strict=True)), args.output)
+    elif has_labels:
+        write_map(dict(zip(names, maps, strict=True)), args.output, **_WRITING.given(args))
     else:
         write_map(maps[0], args.output)
     wrote(args.output)
     file, args.output = args.output, None
     kept = {"sd"} if args.guide_map else set()
-    lost = sorted({*_lost(maps)} - kept) if into_dcm or args.guide_map else []
+    lost = sorted({*_lost(maps)} - kept) if has_labels or args.guide_map else []
     payload = {
         "file": file,
         "maps": [
@@ -93,7 +98,7 @@ def _maps(args: argparse.Namespace) -> list[CalibrationMap]:
     if args.advisor is None:
         if not args.files:
             raise ParameterError("no map: name a file, or a measured engine with --advisor")
-        return [read_map(file, **READING.given(args)) for file in args.files]
+        return [map_in(args, file) for file in args.files]
     if args.files:
         raise ParameterError(f"--advisor and {args.files[0]} contradict each other: give one")
     data = datasets.read("advisor_engine_maps")[_ENGINES.index(args.advisor)]

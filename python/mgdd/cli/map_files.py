@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import contextlib
+import logging
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +18,7 @@ from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf, write_netcdf
 from mgdd.io.plain_csv import write_columns
 from mgdd.io.point_table import POINT, read_points
-from mgdd.maps import write_map
+from mgdd.maps import read_map, write_map
 from mgdd.maps.files import map_content
 from mgdd.plot import map_cells
 from mgdd.plot.style import drawn
@@ -25,11 +28,34 @@ if TYPE_CHECKING:
 
     from mgdd.maps import CalibrationMap
 
-__all__ = ["CSV", "MAP_ENDINGS", "emit_map", "grid_table", "write_table"]
+__all__ = [
+    "CSV", "FORMS", "MAP_ENDINGS", "READING", "doubts_said", "emit_map", "grid_table", "map_in", "write_table",
+]  # fmt: skip
+_LOG = logging.getLogger(__name__)
 
 CSV = Options(read_points, "delimiter", "decimal")
-MAP_ENDINGS = (".csv", ".json", ".nc", ".dcm")
+MAP_ENDINGS = (".csv", ".json", ".nc", ".dcm", ".cdfx")
+READING = Options(read_map, "name", "decimal", "rows", "columns")
+FORMS = "a map of any form: .csv, .json, .nc, .dcm, .cdfx, a grid or points of a spreadsheet or program"
 _SIZE = (6.6, 4.6)
+
+
+@contextlib.contextmanager
+def doubts_said() -> Iterator[list[str]]:
+    """Say the doubts of the library as messages of the command; the list is filled at the end."""
+    said: list[str] = []
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", UserWarning)
+        yield said
+    said += [str(doubt.message) for doubt in doubts]
+    for text in said:
+        _LOG.warning("%s", text)
+
+
+def map_in(args: argparse.Namespace, file: str) -> CalibrationMap:
+    """Read a map as the options of `READING` say."""
+    with doubts_said():
+        return read_map(file, **READING.given(args))
 
 
 def grid_table(file: str) -> xr.Dataset:

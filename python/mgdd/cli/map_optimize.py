@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table
+from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, doubts_said, emit_map, grid_table, map_in
 from mgdd.cli.map_text import map_blocks
 from mgdd.cli.options import add_command, assignments, number_pairs
 from mgdd.cli.output import check_figure, check_output
-from mgdd.maps import CalibrationMap, optimize_map, read_map, smooth_map
+from mgdd.maps import CalibrationMap, optimize_map, smooth_map
 from mgdd.maps.compare import steepest
 
 __all__ = ["add_optimize", "add_smooth"]
 
 _OPTIMUM = Options(optimize_map, "max_loss", "infeasible", over="along")
-_SMOOTH = Options(smooth_map, "weight", "fill")
-_FORMS = ".csv, .json or .nc, which hold everything; .dcm for calibration tools"
+_SMOOTH = Options(smooth_map, "weight", "fill", "tolerance")
+_ENDINGS = ".csv, .json or .nc, which hold everything; .dcm or .cdfx for calibration tools"
 
 
 def add_optimize(verbs: Any) -> None:
@@ -31,7 +31,7 @@ def add_optimize(verbs: Any) -> None:
         help_text="find the best value of an input at every operating point of a table, under limits",
         example="mgdd map optimize table.nc --maximize efficiency_gross --along soc_cad --limit p_max_bar=130 "
         "--max-loss 0.002 -o best.json",
-        endings=_FORMS,
+        endings=_ENDINGS,
     )  # fmt: skip
     parser.add_argument(
         "file", metavar="TABLE.nc",
@@ -77,9 +77,12 @@ def add_smooth(verbs: Any) -> None:
         verbs, "smooth", _smooth,
         help_text="smooth a map inside of the allowed ranges of its cells, under limits on its slopes",
         example="mgdd map smooth best.json --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.json",
-        endings=_FORMS,
+        endings=_ENDINGS,
     )  # fmt: skip
-    parser.add_argument("file", metavar="MAP", help="of mgdd map optimize --max-loss, .csv, .json or .nc")
+    parser.add_argument(
+        "file", metavar="MAP", help=f"of mgdd map optimize --max-loss; with --tolerance or --fill {FORMS}"
+    )
+    READING.add(parser)
     _SMOOTH.add(parser)
     parser.add_argument(
         "--slope-limit", action="append", default=[], metavar="AXIS=X",
@@ -91,14 +94,16 @@ def add_smooth(verbs: Any) -> None:
 def _smooth(args: argparse.Namespace) -> None:
     check_output(args, *MAP_ENDINGS)
     check_figure(args.figure)
-    optimum = read_map(args.file)
+    optimum = map_in(args, args.file)
     slopes = number_pairs(args.slope_limit, "--slope-limit")
-    smooth = smooth_map(optimum, slope_limits=slopes, **_SMOOTH.given(args))
+    with doubts_said() as doubts:
+        smooth = smooth_map(optimum, slope_limits=slopes, **_SMOOTH.given(args))
     moved = np.abs(smooth.values - optimum.values)
     shift = float(np.nanmax(moved))  # smooth_map refuses a map without a value
     slopes_now = {name: steepest(smooth, name) for name in smooth.axes}
     unit = smooth.unit.removesuffix(" aTDC")
-    said = [f"moved by at most {shift:.3g} {unit} in a cell"]
+    within = "" if args.tolerance is None else f", tolerance {args.tolerance:g}"
+    said = [f"moved by at most {shift:.3g} {unit} in a cell{within}"]
     for name, slope in slopes_now.items():
         if slope is None:
             continue
@@ -107,7 +112,8 @@ def _smooth(args: argparse.Namespace) -> None:
         was = "" if before is None else f"; before {before:.3g}"
         said.append(f"steepest over {name}: {slope:.3g} {unit}/{smooth.labels[name].units}{limit}{was}")
     text = [*_shown(args, smooth), "", *said]
-    emit_map(args, smooth, text, largest_shift=shift, largest_slope=slopes_now, n_held=_held(smooth))
+    more = {"tolerance": args.tolerance, "warnings": doubts}
+    emit_map(args, smooth, text, largest_shift=shift, largest_slope=slopes_now, n_held=_held(smooth), **more)
 
 
 def _add_figure(parser: argparse.ArgumentParser) -> None:

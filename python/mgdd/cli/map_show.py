@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table, write_table
+from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, emit_map, grid_table, map_in, write_table
 from mgdd.cli.map_text import COLUMNS, grid_blocks, map_blocks
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.errors import ParameterError
-from mgdd.maps import CalibrationMap, apply_map, compare_maps, read_map
+from mgdd.maps import CalibrationMap, apply_map, compare_maps
 from mgdd.maps.cells import TEXTS, cell_at
 from mgdd.maps.compare import achieved_figures
 from mgdd.plot import map_cells, map_contour
@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["READING", "add_diff", "add_show"]
+__all__ = ["add_diff", "add_show"]
 
-READING = Options(read_map, "name", "decimal")
 _COMPARED = Options(compare_maps, "grid", "tolerance")
 
 
@@ -37,9 +36,9 @@ def add_show(verbs: Any) -> None:
         verbs, "show", _show,
         help_text="show a map with breakpoints, units, and the limits and sources of its cells",
         example="mgdd map show smooth.json --sweep table.nc --figure smooth.png",
-        endings=".csv, .json, .nc or .dcm, the map",
+        endings=".csv, .json, .nc, .dcm or .cdfx, the map",
     )  # fmt: skip
-    parser.add_argument("file", metavar="MAP", help=".csv, .json, .nc or .dcm")
+    parser.add_argument("file", metavar="MAP", help=FORMS)
     READING.add(parser)
     parser.add_argument(
         "--column", choices=COLUMNS, default="value",
@@ -59,7 +58,7 @@ def _show(args: argparse.Namespace) -> None:
         raise ParameterError("--contour does not act here; it is a form of the picture: name one with --figure FILE")
     if args.contour and args.column in TEXTS:
         raise ParameterError(f"--contour and --column {args.column} contradict each other: it holds texts")
-    table = read_map(args.file, **READING.given(args))
+    table = map_in(args, args.file)
     text, more = map_blocks(table, args.column), {}
     if args.sweep is not None:
         more["achieved"], said = _achieved(table, grid_table(args.sweep))
@@ -95,7 +94,7 @@ def add_diff(verbs: Any) -> None:
         example="mgdd map diff best.json smooth.json --tolerance 1 --figure diff.png",
         endings=".nc, the differences, or .json",
     )  # fmt: skip
-    parser.add_argument("first", metavar="FIRST", help=".csv, .json, .nc or .dcm")
+    parser.add_argument("first", metavar="FIRST", help=FORMS)
     parser.add_argument("second", metavar="SECOND", help="the map that the first is subtracted from")
     READING.add(parser)
     _COMPARED.add(parser)
@@ -105,7 +104,7 @@ def add_diff(verbs: Any) -> None:
 def _diff(args: argparse.Namespace) -> None:
     check_output(args, ".nc", ".json")
     check_figure(args.figure)
-    first, second = (read_map(file, **READING.given(args)) for file in (args.first, args.second))
+    first, second = (map_in(args, file) for file in (args.first, args.second))
     found = compare_maps(first, second, **_COMPARED.given(args))
     file = args.output
     if file is not None and Path(file).suffix == ".nc":

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.map_files import grid_table
-from mgdd.cli.map_show import READING
+from mgdd.cli.map_files import READING, grid_table, map_in
 from mgdd.cli.options import add_command, number_pairs, refuse_idle
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.errors import DataError, ParameterError, did_you_mean
-from mgdd.maps import apply_map, read_map
+from mgdd.maps import apply_map
 from mgdd.plot import trade_off
 from mgdd.plot.style import drawn
 from mgdd.results.labels import label_of
@@ -62,7 +61,7 @@ def _trade_off(args: argparse.Namespace) -> None:
     check_figure(args.figure)
     args.along = _ALONG.of(args)["over"]
     if args.map is None:
-        refuse_idle(args, "name", why="without --map no map is read")
+        refuse_idle(args, "name", "rows", "columns", why="without --map no map is read")
     if args.figure is None:
         refuse_idle(args, "every", why="it labels the picture: name one with --figure FILE")
     table = grid_table(args.file)
@@ -73,7 +72,7 @@ def _trade_off(args: argparse.Namespace) -> None:
         raise ParameterError(f"{args.file}: one line each for {' x '.join(free)} is too much: fix one with --at AXIS=X")
     shown, marked = table[[args.right, args.up]].sel(fixed), None
     if args.map is not None:
-        marked = apply_map(read_map(args.map, **READING.given(args)), table)
+        marked = apply_map(map_in(args, args.map), table)
         if args.along not in marked.data_vars:
             raise DataError(f"{args.map}: not a map of {args.along}: choose another --along or another map")
         marked = marked[[args.along, args.right, args.up]].sel(fixed)

@@ -5,6 +5,7 @@ Every reader gives the columns under the names and with the units that the file 
 
 from __future__ import annotations
 
+import contextlib
 import io
 import warnings
 import zipfile
@@ -19,7 +20,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.extras import import_extra
-from mgdd.io.files import existing_file
+from mgdd.io.files import existing_file, read_plain_text
 from mgdd.io.matlab_tags import check_tags
 from mgdd.io.table import Table, parse_number, read_table, text_table
 from mgdd.results.labels import ANGLE
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["ArrayTable", "format_of", "read_any_table"]
+__all__ = ["ArrayTable", "cells_as_text", "format_of", "read_any_table"]
 
 _HEAD = 128  # bytes that tell a format
 
@@ -107,16 +108,11 @@ def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None
     reader = _reader_of(head, file)
     if reader is None:
         return read_table(path, delimiter=delimiter, decimal=decimal)
-    try:
+    with _named_damage(file):
         found = reader(file)
         if isinstance(found, Table):
             return found
         columns = [each for each in found if each.values.size]
-    except (ImportError, DataError):
-        raise
-    except Exception as error:  # of another library: any class
-        text = f"{type(error).__name__} {error}".strip()
-        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error
     if not columns:
         raise DataError(f"{file}: no column of numbers")
     names = tuple(each.name for each in columns)
@@ -131,6 +127,33 @@ def format_of(path: str | os.PathLike[str]) -> str:
     with file.open("rb") as stream:
         reader = _reader_of(stream.read(_HEAD), file)
     return "text" if reader is None else _FORMATS[reader]
+
+
+def cells_as_text(path: str | os.PathLike[str]) -> tuple[str, str, bool] | None:
+    """Give a text file, or the sheet of an XLSX file as a text with tabs, what to call it, and whether it is a sheet.
+
+    None for a file of columns, which `read_any_table` reads.
+    """
+    file = existing_file(path)
+    with file.open("rb") as stream:
+        reader = _reader_of(stream.read(_HEAD), file)
+    if reader is None:
+        return str(file), read_plain_text(file), False
+    with _named_damage(file):
+        if reader is _of_zip and _is_xlsx(file):
+            return *_sheet_text(file), True
+    return None
+
+
+@contextlib.contextmanager
+def _named_damage(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except (ImportError, DataError):
+        raise
+    except Exception as error:  # of another library: any class
+        text = f"{type(error).__name__} {error}".strip()
+        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error
 
 
 def _reader_of(head: bytes, file: Path) -> _Reader | None:
@@ -262,13 +285,21 @@ def _of_parquet(file: Path) -> Iterator[_Column]:
 
 
 def _of_zip(file: Path) -> Table | Iterable[_Column]:
+    return _of_xlsx(file) if _is_xlsx(file) else _of_numpy(file)
+
+
+def _is_xlsx(file: Path) -> bool:
     with zipfile.ZipFile(file) as archive:
-        sheets = "[Content_Types].xml" in archive.namelist()
-    return _of_xlsx(file) if sheets else _of_numpy(file)
+        return "[Content_Types].xml" in archive.namelist()
 
 
 def _of_xlsx(file: Path) -> Table:
-    """Read the sheet with the most numbers as a text with tabs, with its lines of names."""
+    source, text = _sheet_text(file)
+    return text_table(source, text, delimiter="\t")
+
+
+def _sheet_text(file: Path) -> tuple[str, str]:
+    """Give the sheet with the most numbers as a text with tabs, with its lines of names, and what to call it."""
     openpyxl = import_extra("openpyxl", "formats", "an XLSX file")
     book = openpyxl.load_workbook(io.BytesIO(file.read_bytes()), read_only=True, data_only=True)
     sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
@@ -279,7 +310,7 @@ def _of_xlsx(file: Path) -> Table:
     rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheets[title]]
     width = max(1 + k for row in rows for k, cell in enumerate(row) if cell)
     text = "\n".join("\t".join(_filled(row[:width])) for row in rows if any(row))
-    return text_table(f"{file}, sheet {title!r}", text, delimiter="\t")
+    return f"{file}, sheet {title!r}", text
 
 
 def _filled(row: list[str]) -> list[str]:

@@ -245,6 +245,6 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[Path], object]) -
         half.unlink(missing_ok=True)
 
 
-def write_whole_text(path: str | os.PathLike[str], text: str) -> None:
-    r"""Write a text as UTF-8 with ``\n`` at the end of its lines, as `write_whole` does."""
-    write_whole(path, lambda half: half.write_text(text, encoding="utf-8", newline="\n"))
+def write_whole_text(path: str | os.PathLike[str], text: str, *, encoding: str = "utf-8") -> None:
+    r"""Write a text with ``\n`` at the end of its lines, as `write_whole` does."""
+    write_whole(path, lambda half: half.write_text(text, encoding=encoding, newline="\n"))

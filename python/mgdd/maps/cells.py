@@ -49,7 +49,7 @@ TEXTS: Mapping[str, tuple[str, str]] = {
     "source": ("where the value comes from", "given"),
     "active_limit": ("limit that holds the value", ""),
 }
-_NAME = re.compile(r"[A-Za-z_][\w.\[\]]*")  # labels of a control unit have dots and brackets
+_NAME = re.compile(r"[A-Za-z_%][\w.\[\]%]*")  # labels of a control unit have dots, brackets and percent signs
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,8 @@
-"""Calibration maps in DCM files: what of a map such a file holds, and the unit of its texts."""
+"""Calibration maps in DCM and CDFX files: what of a map such a file holds, and the unit of its texts."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,27 +11,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, Error, argument
-from mgdd.io.files import read_plain_text, write_whole_text
+from mgdd.io.column_names import check_choice
+from mgdd.io.files import decoded, existing_file, write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap, map_of
+from mgdd.maps.cdfx import cdfx_blocks, cdfx_text, is_xml
 from mgdd.maps.cells import can_be_name, spoken_name
 from mgdd.maps.dcm import DcmBlock, dcm_blocks, dcm_text
-from mgdd.results.units import attribute_units, unit_of
+from mgdd.maps.written import unit_from, unit_to
 
 if TYPE_CHECKING:
     import os
 
-__all__ = ["DcmFile", "read_dcm", "write_dcm"]
+__all__ = ["DcmFile", "read_dcm", "write_labels"]
 
-# Units as calibration tools write them; everything else stands as it is. Where an angle counts from they do not say.
-_DCM_UNITS = {
-    "°KW": "°CA", "°CRK": "°CA", "deg CA": "°CA", "degCA": "°CA", "1/min": "rpm", "U/min": "rpm", "Nm": "N m",
-    "°C": "degC", "°": "deg",
-}  # fmt: skip
+ENCODINGS = ("utf-8", "latin-1", "cp1252")
 
 
 @dataclass(frozen=True, kw_only=True)
 class DcmFile:
-    """Content of a DCM file.
+    """Content of a DCM or CDFX file.
 
     Parameters
     ----------
@@ -39,7 +38,10 @@ class DcmFile:
     values : mapping of str to (float, str)
         Single values with their units.
     skipped : tuple of str
-        What was not read: blocks of other kinds, as texts and lists of functions, and labels that no map can be called.
+        What was not read: blocks of other kinds, as texts and lists of functions, labels that no map can be called,
+        and keywords that are not known.
+    breakpoints : mapping of str to (tuple of float, str)
+        Axes that several maps share, with their units.
 
     Examples
     --------
@@ -51,41 +53,75 @@ class DcmFile:
     maps: Mapping[str, CalibrationMap]
     values: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     skipped: tuple[str, ...] = ()
+    breakpoints: Mapping[str, tuple[tuple[float, ...], str]] = field(default_factory=dict)
 
 
-def write_dcm(
+def write_labels(
     maps: Sequence[CalibrationMap] | Mapping[str, CalibrationMap],
     path: str | os.PathLike[str],
     *,
     values: Mapping[str, tuple[float, str]] | None = None,
+    encoding: str = "utf-8",
 ) -> None:
-    """Write maps and single values to one DCM file; see `mgdd.maps.write_map`."""
+    """Write maps and single values to one file, DCM or CDFX by its ending; see `mgdd.maps.write_map`."""
+    check_choice("encoding", encoding, ENCODINGS)
     given = [map_of(table) for table in (maps.values() if isinstance(maps, Mapping) else maps)]
     named = [*zip(maps if isinstance(maps, Mapping) else [table.name for table in given], given, strict=True)]
     blocks = []
     for name, (number, unit) in (values or {}).items():
         if not np.isfinite(number):
             raise DataError.of(f"value {name}", number, "finite")
-        blocks.append(DcmBlock(name=name, long_name=spoken_name(name), unit=unit, values=[[float(number)]]))
+        long_name = spoken_name(name)
+        blocks.append(DcmBlock(name=name, long_name=long_name, unit=unit_to(unit), values=[[float(number)]]))
     blocks += [_block_of(name, table) for name, table in named]
+    names = [block.name for block in blocks]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DataError(f"{twice}: stands in the file twice: give the maps other names")
+    comments = [f"{name}, {key}: {text}" for name, table in named for key, text in table.provenance.items()]
+    if Path(path).suffix.lower() == ".cdfx":
+        write_whole_text(path, _encoded(cdfx_text(blocks, comments, encoding), path, encoding), encoding=encoding)
+        return
     for block in blocks:
-        if [other.name for other in blocks].count(block.name) > 1:
-            raise DataError(f"{block.name}: stands in the file twice: give the maps other names")
         for text in (block.long_name, block.unit, block.unit_x, block.unit_y, block.name):
             if '"' in text or "\n" in text:
                 raise DataError(f"{block.name}: {text!r}: a DCM text has no quotes and no line breaks")
-    comments = [f"{name}, {key}: {text}" for name, table in named for key, text in table.provenance.items()]
-    write_whole_text(path, dcm_text(blocks, comments))
+        if block.name.split() != [block.name]:
+            raise DataError(f"{block.name!r}: a label of a DCM file is one word: give the map another name")
+    write_whole_text(path, _encoded(dcm_text(blocks, comments), path, encoding), encoding=encoding)
+
+
+def _encoded(text: str, path: str | os.PathLike[str], encoding: str) -> str:
+    """Give the text back where the encoding has all of its letters, and a reader finds the same ones again."""
+    try:
+        raw = text.encode(encoding)
+    except UnicodeEncodeError as error:
+        letter, line = text[error.start], text.count("\n", 0, error.start) + 1
+        said = text.splitlines()[line - 1].strip()
+        raise DataError(
+            f"{path}, line {line}: {letter!r} in {said!r} is no letter of {encoding}: change the text, or write it "
+            f"with {argument('encoding', repr('utf-8'))}"
+        ) from error
+    if encoding != "utf-8" and Path(path).suffix.lower() == ".dcm":  # XML says its encoding itself
+        with contextlib.suppress(DataError):
+            if decoded(raw, str(path)) == text:
+                return text
+        raise DataError(
+            f"{path}: its letters in {encoding} would be read as others: write it with "
+            f"{argument('encoding', repr('utf-8'))}"
+        )
+    return text
 
 
 def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
-    """Read the curves, maps and single values of a DCM file.
+    """Read the curves, maps and single values of a DCM or CDFX file.
 
     Parameters
     ----------
     path : path-like
-        Format 2.0, UTF-8 or Windows-1252. Axes have the names that ``*SSTX`` and ``*SSTY`` give, where an axis can be
-        called so, else ``x`` and ``y``.
+        DCM, format 2.0, UTF-8 or Windows-1252, or CDFX (ASAM CDF 2.0); its content says which. Axes have the names that
+        ``*SSTX`` and ``*SSTY`` give, or the axis that several maps share, where an axis can be called so, else ``x``
+        and ``y``.
 
     Returns
     -------
@@ -98,8 +134,8 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     FileNotFoundError
         No such file.
     mgdd.errors.DataError
-        Another format, a file that is cut off, counts that contradict each other, breakpoints that do not increase; the
-        message names file, line and remedy.
+        Another format, a file that is cut off, counts that contradict each other, breakpoints that do not increase, XML
+        that declares entities; the message names file, line and remedy.
 
     Examples
     --------
@@ -135,21 +171,30 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     ...     print(error.strerror)
     no such file: check the path
     """
-    file = Path(path)
-    blocks, skipped = dcm_blocks(read_plain_text(file), str(file))
-    maps, values = {}, {}
+    file = existing_file(path)
+    raw = file.read_bytes()
+    if is_xml(raw):
+        blocks, skipped = cdfx_blocks(raw, str(file))
+    else:
+        blocks, skipped = dcm_blocks(decoded(raw, str(file)), str(file))
+    maps: dict[str, CalibrationMap] = {}
+    values: dict[str, tuple[float, str]] = {}
+    breakpoints: dict[str, tuple[tuple[float, ...], str]] = {}
     for block in blocks:
+        if block.is_axis:
+            breakpoints[block.name] = (tuple(block.x), unit_from(block.unit_x, block.name))
+            continue
         if not block.x:
-            values[block.name] = (block.values[0][0], _unit_from(block.unit, block.name))
+            values[block.name] = (block.values[0][0], unit_from(block.unit, block.name))
             continue
         if not can_be_name(block.name):
-            skipped.append(f"{block.name}: a map is named by letters, digits, _ . [ and ]: rename the label")
+            skipped.append(f"{block.name}: a map is named by letters, digits, _ . % [ and ]: rename the label")
             continue
         try:
             maps[block.name] = _map_of(block)
         except Error as error:
             raise DataError(f"{file}, line {block.line}, {block.name}: {error}") from error
-    return DcmFile(maps=maps, values=values, skipped=tuple(skipped))
+    return DcmFile(maps=maps, values=values, skipped=tuple(skipped), breakpoints=breakpoints)
 
 
 def _block_of(name: str, table: CalibrationMap) -> DcmBlock:
@@ -166,9 +211,9 @@ def _block_of(name: str, table: CalibrationMap) -> DcmBlock:
         y=table.axes[y].tolist() if y else [],
         values=rows.tolist(),
         long_name=table.labels[table.name].long_name,
-        unit=table.unit,
-        unit_x=table.labels[x].units,
-        unit_y=table.labels[y].units if y else "",
+        unit=unit_to(table.unit),
+        unit_x=unit_to(table.labels[x].units),
+        unit_y=unit_to(table.labels[y].units) if y else "",
         axis_x=x,
         axis_y=y,
     )
@@ -182,17 +227,7 @@ def _map_of(block: DcmBlock) -> CalibrationMap:
         # The names of axes stand in comments, where other tools may write anything.
         name = said if can_be_name(said) and said not in (block.name, "x", "y", *axes) else plain
         axes[name] = points
-        labels[name] = (_unit_from(unit, name), said if said not in ("", name) else spoken_name(name))
-    labels[block.name] = (_unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
+        labels[name] = (unit_from(unit, name), said if said not in ("", name) else spoken_name(name))
+    labels[block.name] = (unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
     rows = np.array(block.values)
     return CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)
-
-
-def _unit_from(written: str, name: str) -> str:
-    """Give a unit of a file as mgdd prints it; a name that says the same unit settles how."""
-    unit = _DCM_UNITS.get(written, written) or "-"
-    try:
-        same = attribute_units(unit) == attribute_units(unit_of(name))
-    except ValueError:
-        return f"not given ({unit})"
-    return unit_of(name) if same else unit

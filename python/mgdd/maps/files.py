@@ -1,7 +1,8 @@
-"""Files of calibration maps: CSV grid, JSON, DCM and netCDF, each whole or as it was before."""
+"""Files of calibration maps: any form is read by its content; each is written whole or is as it was before."""
 
 from __future__ import annotations
 
+import codecs
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,13 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, Error, ParameterError, did_you_mean
+from mgdd.errors import DataError, Error, ParameterError, argument, did_you_mean
+from mgdd.io.any_table import cells_as_text, read_any_table
 from mgdd.io.binary_files import read_netcdf, write_netcdf
 from mgdd.io.files import existing_file, parsed, read_plain_text, write_whole_text
+from mgdd.io.point_table import POINT
+from mgdd.io.table import text_table
 from mgdd.maps.calibration_map import CalibrationMap, map_of
+from mgdd.maps.cdfx import is_xml
 from mgdd.maps.cells import NUMBERS, MapTask
-from mgdd.maps.dcm_files import read_dcm, write_dcm
-from mgdd.maps.grid_csv import csv_of_map, map_of_csv
+from mgdd.maps.dcm_files import read_dcm, write_labels
+from mgdd.maps.grid_csv import csv_of_map, is_map_csv, map_of_csv
+from mgdd.maps.plain_grid import map_of_grid
+from mgdd.maps.point_list import map_of_points
 from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:
@@ -27,7 +34,8 @@ if TYPE_CHECKING:
 __all__ = ["map_content", "read_map", "write_map"]
 
 _KIND, _FORMAT = "calibration_map", 1
-_ENDINGS = (".csv", ".json", ".dcm", ".nc")
+_ENDINGS = (".csv", ".json", ".dcm", ".cdfx", ".nc")
+_HEAD = 1 << 16  # bytes that tell a form
 
 
 def write_map(
@@ -35,27 +43,31 @@ def write_map(
     path: str | os.PathLike[str],
     *,
     values: Mapping[str, tuple[float, str]] | None = None,
+    encoding: str = "utf-8",
 ) -> None:
-    """Write a map in the form that the ending of the file says; a DCM file holds several, and single values.
+    """Write a map in the form that the ending of the file says; DCM and CDFX hold several, and single values.
 
     Parameters
     ----------
     table : CalibrationMap, or the Dataset of one
-        The map. For a DCM file also a sequence of maps, or a mapping of the names of their labels to them.
+        The map. For DCM and CDFX also a sequence of maps, or a mapping of the names of their labels to them.
     path : path-like
         ``.csv``: a grid with units that a spreadsheet shows as it is; ``.json`` and ``.nc`` (netCDF): these three hold
-        everything. ``.dcm``: axes (the first is x), values, units and long name, for calibration tools; the provenance
-        becomes comments, and source, support and standard deviation of the cells have no place. An existing file is
-        replaced in one step.
+        everything. ``.dcm`` and ``.cdfx`` (ASAM CDF 2.0): axes (the first is x), values, units and long name, for
+        calibration tools; the provenance becomes comments, and source, support and standard deviation of the cells have
+        no place. An existing file is replaced in one step.
     values : mapping of str to (float, str), optional
-        Single values with their units, for a DCM file.
+        Single values with their units, for DCM and CDFX.
+    encoding : {"utf-8", "latin-1", "cp1252"}
+        Of a DCM or CDFX file; older tools read Latin-1 only.
 
     Raises
     ------
     mgdd.errors.ParameterError
         Another ending, or several maps or values for a file that holds one map.
     mgdd.errors.DataError
-        In a DCM file a cell without a value, a text with a quote, a name twice. Nothing is written then.
+        In DCM or CDFX a cell without a value, a name twice, a letter that `encoding` does not have, in DCM a text with
+        a quote. Nothing is written then.
     OSError
         The file cannot be written; one that was there is as before.
 
@@ -85,11 +97,13 @@ def write_map(
     ending = _ending(path)
     several = isinstance(table, list | tuple) or (isinstance(table, Mapping) and not hasattr(table, "data_vars"))
     maps: Any = table if several else [map_of(table)]
-    if ending == ".dcm":
-        write_dcm(maps, path, values=values)
+    if ending in (".dcm", ".cdfx"):
+        write_labels(maps, path, values=values, encoding=encoding)
         return
     if several or values:
-        raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file")
+        raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file or a .cdfx file")
+    if encoding != "utf-8":
+        raise ParameterError.of("encoding", encoding, "'utf-8' in this form; a .dcm or .cdfx file may have others")
     (own,) = maps
     if ending == ".nc":
         write_netcdf(own.to_dataset(), path)
@@ -97,32 +111,55 @@ def write_map(
         write_whole_text(path, csv_of_map(own) if ending == ".csv" else _json_of(own))
 
 
-def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: str = ".") -> CalibrationMap:
-    r"""Read a map in the form that the ending of the file says.
+def read_map(
+    path: str | os.PathLike[str],
+    name: str | None = None,
+    *,
+    decimal: str = ".",
+    rows: str | None = None,
+    columns: str | None = None,
+) -> CalibrationMap:
+    r"""Read a map of any form by the content of the file, whatever its name.
 
     Parameters
     ----------
     path : path-like
-        ``.csv``, ``.json``, ``.nc`` or ``.dcm``, as `write_map` writes them.
+        What `write_map` writes; DCM and CDFX of other tools; a grid of a spreadsheet (text or XLSX) with breakpoints
+        above and in front of its values; a table with a row per point, or vectors and a matrix over them, in any format
+        that `mgdd.io.any_table.read_any_table` reads.
     name : str, optional
-        Which map or variable, where the file holds several.
+        Which map, variable or column of values, where the file holds several; in a grid what the values are.
     decimal : {".", ","}
-        Decimal mark of a CSV file.
+        Decimal mark of a text file.
+    rows : str, optional
+        Axis that runs down a grid, by its label in the corner or by the name that it gets; in a table the column of the
+        first axis; as the file says if left out.
+    columns : str, optional
+        The same of the axis that runs across, the second one.
 
     Returns
     -------
     CalibrationMap
-        Equal to the one that was written; of a DCM file what it holds.
+        Equal to the one that was written; of other files what they hold. Cells that are empty are ``unattainable``;
+        points of a table that are repeated count with their mean, which ``provenance`` says.
+
+    Warns
+    -----
+    UserWarning
+        A grid does not name an axis.
 
     Raises
     ------
     FileNotFoundError
         No such file.
     mgdd.errors.ParameterError
-        Another ending, or a name that the file does not have.
+        A name that the file does not have, `rows` or `columns` where a file names its axes.
     mgdd.errors.DataError
-        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than its names say, an empty cell
-        without a reason or another number of values; the message names file, line or field, and remedy.
+        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than its names say, another number
+        of values, a corner that leaves open which axis runs down, or points that are no grid; the message names file,
+        line or field, and remedy.
+    ImportError
+        The extra that reads the format is not installed; the message names it.
 
     Examples
     --------
@@ -138,31 +175,84 @@ def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: 
     ...         print(str(error).rpartition("/")[2])
     soc.csv: unit of fuel_mg = 'kg': must be 'mg', as the name says; convert the numbers or change the name
     """
-    ending, file = _ending(path), existing_file(path)
-    if ending == ".dcm":
-        content = read_dcm(file)
-        maps = content.maps
-        if name is None and len(maps) != 1:
-            raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
-        wanted = next(iter(maps)) if name is None else name
-        if wanted not in maps:
-            left_out = next((said for said in content.skipped if said.startswith(f"{wanted}: ")), None)
-            near = left_out or did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
-            raise ParameterError(f"{file}: no map {wanted!r}: {near}")
-        return maps[wanted]
+    file = existing_file(path)
+    if decimal not in (".", ","):
+        raise DataError.of("decimal", decimal, "'.' or ','")
+    form = _form_of(file)
     try:
-        if ending == ".nc":
-            return CalibrationMap.from_dataset(read_netcdf(file), name)
-        text = read_plain_text(file, only_utf8=ending == ".json")
-        made = map_of_csv(text, str(file), decimal) if ending == ".csv" else _map_of_json(text, str(file))
+        data = read_netcdf(file) if form == "nc" else None
+        if data is not None and len(data.dims) == 1 and (POINT in data.dims or not data.coords):
+            form = ""  # a list of points
+        if form != "" and (rows is not None or columns is not None):
+            which = argument("rows") if rows is not None else argument("columns")
+            raise ParameterError(f"{file}: names its axes itself: leave {which} out")
+        if form == "labels":
+            return _of_labels(file, name)
+        if form == "":
+            return _of_any(file, name=name, decimal=decimal, rows=rows, columns=columns)
+        if data is not None:
+            return CalibrationMap.from_dataset(data, name)
+        text = read_plain_text(file, only_utf8=form == "json")
+        made = map_of_csv(text, str(file), decimal) if form == "csv" else _map_of_json(text, str(file))
     except (Error, TypeError, ValueError, KeyError) as error:
         said = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
-        if isinstance(error, DataError) and said.startswith(str(file)):
+        if isinstance(error, DataError | ParameterError) and said.startswith(str(file)):
             raise
         raise DataError(f"{file}: {said}") from error
     if name is not None and name != made.name:
         raise ParameterError(f"{file}: holds {made.name!r}, not {name!r}")
     return made
+
+
+def _form_of(file: Path) -> str:
+    """Tell a form by its content, by the ending of the file only where that says nothing; "" for grids and points."""
+    with file.open("rb") as stream:
+        head = stream.read(_HEAD)
+    ending = file.suffix.lower()
+    if ending == ".toml":
+        _ending(file)  # a parameter file
+    if head.startswith(b"CDF") or (ending == ".nc" and not head.startswith(b"\x89HDF")):
+        return "nc"
+    if is_xml(head):
+        return "labels"
+    wide = head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    if b"\0" in head and not wide:
+        return ""
+    text = head.decode("utf-16" if wide else "utf-8", "replace").lstrip("\ufeff").lstrip()
+    first = next((line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "*!."), "")
+    if first.lstrip().startswith("KONSERVIERUNG_FORMAT") or ending in (".dcm", ".cdfx"):
+        return "labels"
+    if text.startswith("{") or ending == ".json":
+        return "json"
+    found = cells_as_text(file)
+    return "csv" if found is not None and not found[2] and is_map_csv(found[1]) else ""
+
+
+def _of_labels(file: Path, name: str | None) -> CalibrationMap:
+    content = read_dcm(file)
+    maps = content.maps
+    if name is None and len(maps) != 1:
+        raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
+    wanted = next(iter(maps)) if name is None else name
+    if wanted not in maps:
+        left_out = next((said for said in content.skipped if said.startswith(f"{wanted}: ")), None)
+        near = left_out or did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
+        raise ParameterError(f"{file}: no map {wanted!r}: {near}")
+    return maps[wanted]
+
+
+def _of_any(file: Path, *, name: str | None, decimal: str, rows: str | None, columns: str | None) -> CalibrationMap:
+    """Read a grid or a table of points."""
+    found = cells_as_text(file)
+    if found is None:
+        return map_of_points(read_any_table(file), name=name, rows=rows, columns=columns)
+    source, text, is_sheet = found
+    mark = "." if is_sheet else decimal  # the numbers of a sheet have no mark of their own
+    grid = map_of_grid(text, source, name=name, decimal=mark, rows=rows, columns=columns)
+    if grid is not None:
+        return grid
+    table = text_table(source, text, delimiter="\t" if is_sheet else None, decimal=mark)
+    return map_of_points(table, name=name, rows=rows, columns=columns, decimal=mark)
 
 
 def _ending(path: str | os.PathLike[str]) -> str:

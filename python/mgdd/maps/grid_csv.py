@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from mgdd.maps.cells import NUMBERS, TEXTS, MapTask, spoken_name
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["csv_of_map", "map_of_csv"]
+__all__ = ["csv_of_map", "is_map_csv", "map_of_csv", "require_rise", "trimmed"]
 
 _FORMAT = "1"
 _HEADS = ("mgdd_map", "value", "rows", "columns", "objective", "limit", "provenance")
@@ -47,6 +48,12 @@ def csv_of_map(table: CalibrationMap) -> str:
     return out.getvalue()
 
 
+def is_map_csv(text: str) -> bool:
+    """Whether a text is in the form of `csv_of_map`, or was meant to be: it names a table, rows or columns."""
+    first = [re.split(r"[;\t,]", line.strip().strip('"'), maxsplit=1)[0].strip() for line in text.splitlines()]
+    return not any(first) or bool({"mgdd_map", "table", "rows", "columns"} & set(first))
+
+
 def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
     """Read what `csv_of_map` wrote, or a spreadsheet or a person did in its form."""
     if decimal not in (".", ","):
@@ -61,6 +68,8 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
     except csv.Error as error:
         raise DataError(f"{origin}, line {reader.line_num}: {error}: correct the quotes and cells there") from error
     heads, blocks = _parts([(number, cells) for number, cells in lines if any(cells)], origin)
+    if not lines:
+        raise DataError(f"{origin}: the file is empty: no line {_VALUE!r}; write it again")
     if "mgdd_map" in heads and _END not in heads:
         raise DataError(f"{origin}: no line {_END!r} at its end: the file was cut off; write it again")
     names = [heads[head] for head in ("rows", "columns") if head in heads]
@@ -115,7 +124,7 @@ def _grid(table: CalibrationMap, column: NDArray[Any]) -> list[list[str]]:
     return [*head, *([own, *row] for own, row in zip(axes[0], written, strict=True))]
 
 
-def _trimmed(cells: list[str]) -> list[str]:
+def trimmed(cells: list[str]) -> list[str]:
     """Leave out the empty cells that a spreadsheet adds at the end of a row."""
     kept = len(cells)
     while kept and not cells[kept - 1]:
@@ -131,7 +140,7 @@ def _parts(
     blocks: dict[str, tuple[int, list[tuple[int, list[str]]]]] = {}
     known = (_VALUE, *NUMBERS, *TEXTS)
     for number, row in lines:
-        where, cells = f"{origin}, line {number}", _trimmed(row)
+        where, cells = f"{origin}, line {number}", trimmed(row)
         if cells[0].startswith("#"):
             continue
         if _END in heads:
@@ -183,13 +192,13 @@ def _read_grid(
                 f"{origin}, line {line}: {head[0]!r}: the first row of a table has an empty cell and the entries of "
                 f"{axes[1]}"
             )
-        own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in _trimmed(head)[1:]])
+        own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in trimmed(head)[1:]])
         for pair in itertools.pairwise(own[axes[1]]):
-            _require_rise(origin, line, axes[1], pair)
+            require_rise(origin, line, axes[1], pair)
         width, rows = own[axes[1]].size, rows[1:]
     first, cells = [], []
     for line, row in rows:
-        found = _trimmed(row)
+        found = trimmed(row)
         # A row without any value may end where a spreadsheet ends it; in any other a lost cell would shift the rest.
         if len(found) - 1 > width or (len(found) > 1 and len(row) - 1 < width):
             raise DataError(
@@ -199,14 +208,15 @@ def _read_grid(
         full = [*found, *[""] * (width + 1 - len(found))]
         first.append(_read(origin, line, full[0], decimal, axes[0]))
         if len(first) > 1:
-            _require_rise(origin, line, axes[0], first[-2:])
+            require_rise(origin, line, axes[0], first[-2:])
         cells.append(full[1:] if is_text else [_read(origin, line, c, decimal, "a value", gap=True) for c in full[1:]])
     own = {axes[0]: np.array(first), **own}
     shape = tuple(entries.size for entries in own.values())
     return own, np.array(cells, np.str_ if is_text else np.float64).reshape(shape)
 
 
-def _require_rise(origin: str, line: int, axis: str, pair: Sequence[float]) -> None:
+def require_rise(origin: str, line: int, axis: str, pair: Sequence[float]) -> None:
+    """Refuse two breakpoints of which the second is not above the first."""
     if not pair[1] > pair[0]:
         raise DataError(
             f"{origin}, line {line}: {axis} = {pair[1]:g} after {pair[0]:g}: breakpoints must increase and stand once"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from mgdd.errors import ConvergenceError, DataError, ParameterError, argument, d
 from mgdd.io.extras import import_extra
 from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cells import cell_at
+from mgdd.maps.smoothness import smoothness_of
+from mgdd.surrogate.points import EDGE, hull_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +28,7 @@ _NARROWEST = 0.05  # of the median range: an optimum is not held more tightly th
 _INSIDE = 1e-7  # of a slope limit or range: kept free for the tolerance of the solver
 _TOLERANCE = 1e-9
 _HEAVIEST = 1e6
+_SHOWN = 3  # cells that a note names
 _AT_END = 1e-4  # of the median range: a value this near to the end of its range is held there
 
 
@@ -34,8 +38,9 @@ def smooth_map(
     weight: float = 1.0,
     slope_limits: Mapping[str, float] | None = None,
     fill: bool = False,
+    tolerance: float | None = None,
 ) -> CalibrationMap:
-    """Smooth a map inside of the ranges of its cells, under limits on its slope along each axis.
+    """Smooth a map inside of the ranges of its cells or a tolerance, under limits on its slope along each axis.
 
     The distance from the cell-wise values, each measured by the half width of its range, plus `weight` times the second
     differences along the axes becomes least.
@@ -43,8 +48,8 @@ def smooth_map(
     Parameters
     ----------
     optimum : CalibrationMap, or the Dataset of one
-        With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`. With
-        `fill` a cell that has neither keeps its value and its source.
+        With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`, or any
+        with a `tolerance`. With `fill` alone a cell that has no range keeps its value and its source.
     weight : float
         Of the smoothness against the distance, 0 to 1e6. The second differences count in half widths of the median
         range per squared mean step of the axis.
@@ -52,20 +57,30 @@ def smooth_map(
         Largest change per unit of an axis [unit of the value / unit of the axis], > 0.
     fill : bool
         Give cells without a value what smoothness and slope limits make of their neighbours, with the source
-        ``interpolated``; they stay empty without it.
+        ``interpolated``, or ``extrapolated`` outside of the convex hull of the cells that have one; they stay empty
+        without it.
+    tolerance : float, optional
+        How far a value may move at most, in the unit of the map, >= 0; inside of its range too where it has one; as
+        far as the range if left out.
 
     Returns
     -------
     CalibrationMap
         Values with the source ``smoothed``, none outside of its range; ``active_limit`` says what holds a value:
-        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis.
+        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis. ``provenance`` says the
+        largest move, and which cells were filled.
+
+    Warns
+    -----
+    UserWarning
+        Cells that were filled are extrapolated.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        A weight or slope limit out of its domain, an unknown axis.
+        A weight, slope limit or tolerance out of its domain, an unknown axis.
     mgdd.errors.DataError
-        A cell with a value and without a range.
+        A cell with a value and without a range or tolerance.
     mgdd.errors.ConvergenceError
         Ranges and slope limits contradict each other; the message names the two cells that lie furthest apart.
     ImportError
@@ -82,12 +97,22 @@ def smooth_map(
     ...                       cells={"low": [-6, -11, -7], "high": [-2, -7, -3]})
     >>> smooth_map(best, slope_limits={"fuel_mg": 0.3}).values.round(2).tolist()
     [-5.67, -7.0, -6.67]
+    >>> torque = CalibrationMap({"speed_rpm": [1000, 2000, 3000]}, [80, float("nan"), 120], name="torque_nm",
+    ...                         cells={"source": ["given", "unattainable", "given"]})
+    >>> filled = smooth_map(torque, fill=True, tolerance=0)
+    >>> filled.values.round(3).tolist(), filled.provenance["filled"]
+    ([80.0, 100.0, 120.0], '1 cell: speed_rpm = 2000')
     """
     optimum = map_of(optimum, "optimum")
     slopes = _checked(optimum, weight, slope_limits or {})
     values, low, high = (_flat(optimum, name) for name in ("", "low", "high"))
     known = np.isfinite(values)
-    kept = known & np.isnan(low) & np.isnan(high) & fill  # what fills the gaps need not touch the rest
+    if tolerance is not None:
+        if isinstance(tolerance, bool) or not (np.isfinite(tolerance) and tolerance >= 0.0):
+            raise ParameterError.of("tolerance", tolerance, f">= 0, {optimum.unit}")
+        low, high = np.fmax(low, values - tolerance), np.fmin(high, values + tolerance)  # of no range: the tolerance
+    # What fills the gaps need not touch the rest.
+    kept = known & ((np.isnan(low) & np.isnan(high) & fill) | (tolerance == 0.0))
     _check_ranges(optimum, values, low, high, known, kept)
     ranged = known & ~kept
     scale, width = _half_widths(values, low, high, ranged, known)
@@ -99,21 +124,66 @@ def smooth_map(
     solved = _solve(optimum, values, width, scale, known, free_low, free_high, pairs, weight)
     held = _holds(solved, free_low, free_high, pairs, _AT_END * scale)
     solved[kept], held[kept] = values[kept], ""
+    if tolerance is not None:
+        solved[known] = _within(solved[known], values[known], tolerance)
     missing = ~known & (not fill)
+    outside = _outside(optimum, known) if fill else np.zeros(known.size, np.bool_)
+    gained = np.where(outside, "extrapolated", "interpolated")
     cells = {
-        "source": np.where(
-            missing | kept, optimum.cells["source"].ravel(), np.where(known, "smoothed", "interpolated")
-        ),
+        "source": np.where(missing | kept, optimum.cells["source"].ravel(), np.where(known, "smoothed", gained)),
         "active_limit": np.where(missing, "", held),
         "support": np.where(known | missing, optimum.cells["support"].ravel(), 0.0),
         "objective": np.where(kept, optimum.cells["objective"].ravel(), np.nan),
     }
     how = ", ".join(f"{name} at most {limit:g} per unit" for name, limit in slopes.items() if np.isfinite(limit))
+    notes = {"smoothed": f"weight {weight:g}, slope over {how or 'every axis free'}"}
+    if tolerance is not None:
+        move = np.where(known, np.abs(solved - values), 0.0)
+        notes["smoothed"] += (
+            f"; tolerance {tolerance:g} {optimum.unit}, largest move {move.max():.4g} {optimum.unit} at "
+            f"{cell_at(optimum.axes, int(np.argmax(move)))}"
+        )
+    if fill and not known.all():
+        notes["filled"] = _named(optimum, ~known)
+        if outside.any():
+            notes["extrapolated"] = f"{_named(optimum, outside)}: outside of the hull of the cells with a value"
+            warnings.warn(
+                f"{optimum.name}: extrapolated {notes['extrapolated']}: check them", UserWarning, stacklevel=2
+            )
     return optimum.replaced(
         np.where(missing, np.nan, solved).reshape(optimum.values.shape),
         cells={name: column.reshape(optimum.values.shape) for name, column in cells.items()},
-        provenance={"smoothed": f"weight {weight:g}, slope over {how or 'every axis free'}"},
+        provenance=notes,
     )
+
+
+def _within(found: Array, values: Array, tolerance: float) -> Array:
+    """Keep the tolerance to the last bit: the end of a range is rounded."""
+    while (beyond := np.abs(found - values) > tolerance).any():
+        found = np.where(beyond, np.nextafter(found, values), found)
+    return found
+
+
+def _outside(optimum: CalibrationMap, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Say which cells lie outside of the convex hull of those with a value."""
+    points = np.stack([entries.ravel() for entries in np.meshgrid(*optimum.axes.values(), indexing="ij")], axis=1)
+    own = points[known]
+    varies = np.ptp(own, axis=0) > 0.0
+    inside = (points[:, ~varies] == own[0, ~varies]).all(axis=1)
+    if varies.any():
+        try:
+            hull = hull_of(own[:, varies], [name for name, free in zip(optimum.axes, varies, strict=True) if free])
+        except DataError:  # a few cells on a slanted line: nothing lies between them
+            return ~known
+        inside &= hull.depth(points[:, varies])[0] >= -EDGE
+    return np.asarray(~inside & ~known)
+
+
+def _named(optimum: CalibrationMap, where: NDArray[np.bool_]) -> str:
+    places = np.flatnonzero(where)
+    shown = "; ".join(cell_at(optimum.axes, int(k)) for k in places[:_SHOWN])
+    more = f" and {places.size - _SHOWN} more" if places.size > _SHOWN else ""
+    return f"{places.size} cell{'s' if places.size > 1 else ''}: {shown}{more}"
 
 
 class _Pairs(NamedTuple):
@@ -157,7 +227,8 @@ def _check_ranges(
         raise DataError(
             f"{optimum.name} at {cell_at(optimum.axes, at)}: {values[at]:g} has the range {low[at]:g} to {high[at]:g}: "
             f"a value needs a range around it; an optimum with {argument('max_loss')} has one, or set the cells low "
-            f"and high; with {argument('fill', 'True')} cells that have no range keep their values"
+            f"and high, or give a {argument('tolerance')}; with {argument('fill', 'True')} cells that have no range "
+            "keep their values"
         )
 
 
@@ -215,27 +286,6 @@ def _neighbours(optimum: CalibrationMap, slopes: Mapping[str, float]) -> _Pairs:
     return _Pairs(np.concatenate(first), np.concatenate(second), np.concatenate(most), np.concatenate(axis))
 
 
-def _bends(optimum: CalibrationMap, scale: float) -> Any:
-    """Give the matrix of second differences along all axes, an axis counted in its mean steps."""
-    from scipy import sparse
-
-    index = np.arange(optimum.values.size).reshape(optimum.values.shape)
-    parts = []
-    for number, entries in enumerate(optimum.axes.values()):
-        if entries.size < 3:
-            continue
-        step = np.diff(entries) / (entries[-1] - entries[0]) * (entries.size - 1)
-        both = 0.5 * (step[:-1] + step[1:])
-        coefficients = np.stack([1.0 / (step[:-1] * both), -2.0 / (step[:-1] * step[1:]), 1.0 / (step[1:] * both)])
-        rows = np.moveaxis(index, number, 0)
-        columns = np.stack([rows[:-2], rows[1:-1], rows[2:]]).reshape(3, -1)
-        weights = np.repeat(coefficients, rows[0].size, axis=1) / scale
-        count = np.broadcast_to(np.arange(columns.shape[1]), columns.shape)
-        shape = (columns.shape[1], index.size)
-        parts.append(sparse.csc_matrix((weights.ravel(), (count.ravel(), columns.ravel())), shape=shape))
-    return sparse.vstack(parts, format="csc") if parts else sparse.csc_matrix((0, index.size))
-
-
 def _solve(
     optimum: CalibrationMap,
     values: Array,
@@ -252,11 +302,11 @@ def _solve(
     from scipy import sparse
 
     n, middle = values.size, float(np.median(values[known]))
-    pull = np.where(known, (scale / width) ** 2, 1e-9)  # the least, so that a cell without neighbours has one answer
+    pull = np.where(known, (scale / width) ** 2, 1e-10)  # the least, so that a cell without neighbours has one answer
     target = np.where(known, (values - middle) / scale, 0.0)
-    bends = _bends(optimum, 1.0)
     unit = 2.0 / (1.0 + weight)  # keeps the numbers near one, whatever the weight
-    quadratic = sparse.triu(unit * (sparse.diags(pull) + weight * (bends.T @ bends)), format="csc")
+    smoothness = smoothness_of(optimum, weight, has_gaps=not known.all())
+    quadratic = sparse.triu(unit * (sparse.diags(pull) + smoothness), format="csc")
     own = np.flatnonzero(known)
     pick = sparse.csc_matrix((np.ones(own.size), (np.arange(own.size), own)), shape=(own.size, n))
     rows = np.arange(pairs.first.size)

@@ -45,6 +45,8 @@ CONDITIONS = (
     "file,speed_rpm,soi_cad,fuel_mg,bmep_bar,intake_pressure_kpa\n"
     "a.csv,1200,-5.25,21.5,4.75,101.3\nb.csv,1800,-8,34,,150.25\nc.csv,2400.5,2.5,0,9.125,\n"
 )
+GRID = "BSFC [g/kWh]\nspeed [1/min]\\torque [Nm],10,20.5,40\n900,310,275,\n1500,300.25,250,231\n3000,320,270,240\n"
+POINTS = "speed_rpm,torque [Nm],bsfc_g_per_kwh\n900,10,310\n1500,10,300.25\n900,20.5,275\n1500,20.5,250\n900,10,312\n"
 EXPERIMENT = (
     'kind = "experiment"\nformat = 1\nseed = 5\ntask = "track"\n[track]\nreference = "step:20:35"\ncontroller = "pid"\n'
 )
@@ -161,6 +163,9 @@ SAMPLES: dict[str, Sample] = {
     "maps.read_map nc": Sample(read_map, "nc", lambda path: write_map(timing_table(), path)),
     "netcdf": Sample(read_netcdf, "nc", lambda path: write_map(timing_table(), path)),
     "maps.read_dcm": Sample(read_dcm, "dcm", _dcm),
+    "maps.read_dcm cdfx": Sample(read_dcm, "cdfx", _dcm),
+    "maps.read_map grid": Sample(read_map, "csv", _text(GRID)),
+    "maps.read_map points": Sample(read_map, "csv", _text(POINTS)),
     "guide.TimingMap.read_csv": Sample(TimingMap.read_csv, "csv", _timing),
     "optimize.Seeker.load": Sample(Seeker.load, "json", _seeker),
     "identify.load_throttle_model": Sample(

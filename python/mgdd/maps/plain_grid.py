@@ -1,0 +1,228 @@
+"""A grid as spreadsheets write it: a corner with the names of the axes, breakpoints above and in front."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import re
+from collections.abc import Mapping, Sized
+from typing import NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError, argument
+from mgdd.io.column_names import spelled_unit
+from mgdd.io.table import parse_number
+from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.corner import axes_of
+from mgdd.maps.grid_csv import require_rise, trimmed
+from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, unit_from, without_brackets
+
+__all__ = ["map_of_grid", "number_in", "require_two", "value_heading"]
+
+_EMPTY = frozenset({"", "-", "--", "–", "nan", "na", "n/a", "#n/a"})  # how a cell without a value is written
+_MARKS = (";", "\t", ",", None)  # None: blanks
+_LIKE_NUMBER = re.compile(r"[+-]?[.,]?\d(?!/)")  # 1/min is a unit
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(['’.,\s])\d{3})(?:\1\d{3})*([.,]\d+)?")
+_UNIT_KEYS = ("unit", "units", "einheit", "einheiten")
+
+Rows = list[tuple[int, list[str]]]
+
+
+class _Grid(NamedTuple):
+    above: Rows
+    head: tuple[int, list[str]]
+    units: tuple[int, list[str]] | None
+    body: Rows
+
+    @property
+    def width(self) -> int:
+        return len(self.head[1]) - 1
+
+
+def map_of_grid(
+    text: str, origin: str, *, name: str | None, decimal: str, rows: str | None, columns: str | None
+) -> CalibrationMap | None:
+    """Read the grid in a text, or give None where there is none."""
+    grids = [found for mark in _MARKS if mark != decimal for found in [_found(text, mark, origin)] if found]
+    if not grids:
+        return None
+    grid = max(grids, key=lambda each: each.width)  # the first of the widest
+    above, title, unit, remarks = _preamble(grid.above)
+    line, head = grid.head
+    value = value_heading(name, title, unit)
+    corner = "" if head[0].casefold() in _EMPTY else head[0]
+    down, across = axes_of(
+        corner, rows=rows, columns=columns, above=above, taken=(value.name,), where=f"{origin}, line {line}"
+    )
+    if grid.units is not None:
+        down, value = _with_units(grid.units, down, value, origin)
+    x = [
+        number_in(cell, decimal, f"{origin}, line {line}, cell {k}", across.name) for k, cell in enumerate(head[1:], 2)
+    ]
+    for pair in itertools.pairwise(x):
+        require_rise(origin, line, across.name, pair)
+    y, values = [], []
+    for at, row in grid.body:
+        found, where = trimmed(row), f"{origin}, line {at}"
+        if found and not _like_number(found[0]) and found[0].casefold() not in _EMPTY:
+            raise DataError(
+                f"{where}: {found[0][:60]!r} is no breakpoint of {down.name}: remove the line, or begin it with #"
+            )
+        if len(found) - 1 > len(x) or (len(found) > 1 and len(row) - 1 < len(x)):
+            raise DataError(
+                f"{where}: {len(row) - 1} values: {len(x)} are needed, one per column; an empty cell keeps its mark"
+            )
+        y.append(number_in(found[0], decimal, where, down.name))
+        if len(y) > 1:
+            require_rise(origin, at, down.name, y[-2:])
+        cells = [*found[1:], *[""] * (len(x) + 1 - len(found))]
+        values.append([number_in(cell, decimal, where, "a value", gap=True) for cell in cells])
+    require_two(origin, {down.name: y, across.name: x})
+    table = np.array(values)
+    return CalibrationMap(
+        {down.name: y, across.name: x},
+        table,
+        name=value.name,
+        labels={each.name: (each.unit, each.long_name) for each in (value, down, across)},
+        cells={"source": np.where(np.isnan(table), "unattainable", "given")},
+        provenance={"remarks": remarks} if remarks else {},
+    )
+
+
+def require_two(origin: str, axes: Mapping[str, Sized]) -> None:
+    """Refuse an axis of a single breakpoint."""
+    for name, entries in axes.items():
+        if len(entries) < 2:
+            raise DataError(
+                f"{origin}: {name} has one breakpoint: a map needs two along each axis; add one, or leave the axis out"
+            )
+
+
+def value_heading(name: str | None, label: str, unit: str = "") -> Heading:
+    """Give what the values are: called as asked for, else as the file labels them, else ``value``."""
+    words, own = without_brackets(label)
+    if name is None:
+        return heading_of(label, unit=unit, fallback="value")
+    made = heading_of(name, unit=unit or own, fallback=name)
+    return made._replace(long_name=words) if words and words != name else made
+
+
+def number_in(cell: str, decimal: str, where: str, what: str, *, gap: bool = False) -> float:
+    """Read a cell; one that is empty is NaN where `gap` allows it."""
+    if cell.casefold() in _EMPTY:
+        if gap:
+            return float("nan")
+        raise DataError(f"{where}: the breakpoint of {what} is empty: fill it, or remove its row or column")
+    number = parse_number(cell, decimal)
+    if number is not None and np.isfinite(number):
+        return number
+    thousands = _THOUSANDS.fullmatch(cell)
+    if thousands is not None:
+        remedy = f"{thousands[1]!r} looks like a separator of thousands: remove it"
+        if (decimal, thousands[1], thousands[2]) == (".", ",", None):
+            remedy += f", or pass {argument('decimal', repr(','))} if it is a decimal mark"
+    elif "," in cell and decimal == ".":
+        remedy = f"pass {argument('decimal', repr(','))} if the comma is a decimal mark"
+    else:
+        remedy = "correct it"
+    raise DataError(f"{where}: {cell[:60]!r} is not a finite number for {what}: {remedy}")
+
+
+def _like_number(cell: str) -> bool:
+    return _LIKE_NUMBER.match(cell) is not None
+
+
+def _found(text: str, mark: str | None, origin: str) -> _Grid | None:
+    """Find the row of breakpoints: numbers behind a corner that is none, above rows that begin with a number."""
+    lines = _cells(text, mark, origin)
+    for place, (line, cells) in enumerate(lines):
+        head = trimmed(cells)
+        if len(head) > 1 and all(map(_like_number, head[:2])):
+            return None  # rows of numbers begin here
+        if (
+            len(head) < 3
+            or _like_number(head[0])
+            or not all(_like_number(c) or c.casefold() in _EMPTY for c in head[1:])
+        ):
+            continue
+        if not any(map(_like_number, head[1:])) or place + 1 == len(lines):
+            continue
+        below = lines[place + 1]
+        units = below if not any(map(_like_number, below[1])) else None
+        start = place + 1 + (units is not None)
+        body = lines[start:]
+        if head[0].casefold() in _EMPTY and place and _names_columns(lines[place - 1][1], len(head)):
+            return None
+        if body and any(map(_like_number, body[0][1])):
+            return _Grid(lines[:place], (line, head), units, body)
+    return None
+
+
+def _names_columns(cells: list[str], width: int) -> bool:
+    """Whether a line has a name for every column of a table of points."""
+    said = trimmed(cells)
+    return len(said) == width and not any(_like_number(cell) or cell.casefold() in _EMPTY for cell in said)
+
+
+def _cells(text: str, mark: str | None, origin: str) -> Rows:
+    """Give the cells of every line that says something; of blanks only those behind a corner separate."""
+    if mark is None:
+        found = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            words = line.split()
+            first = next((k for k, word in enumerate(words) if _like_number(word)), len(words))
+            found.append((number, [" ".join(words[:first]), *words[first:]] if first else words))
+    else:
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
+        try:
+            found = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+        except csv.Error as error:
+            raise DataError(f"{origin}, line {reader.line_num}: {error}: correct the quotes and cells there") from error
+    return [
+        (number, cells)
+        for number, cells in found
+        if any(cells) and not cells[0].startswith("#") and not "".join(cells).startswith("sep=")
+    ]
+
+
+def _preamble(lines: Rows) -> tuple[str, str, str, str]:
+    """Sort the lines above the breakpoints: label of the columns, title, unit of the values, remarks."""
+    above = title = unit = ""
+    remarks: list[str] = []
+    for place, (_, cells) in enumerate(lines):
+        said = [cell for cell in cells if cell.casefold() not in _EMPTY]
+        words, own = without_brackets(said[0]) if said else ("", "")
+        if place == len(lines) - 1 and len(said) == 1 and cells[0] != said[0]:
+            above = said[0]
+        elif len(said) == 2 and said[0].casefold().strip(" :") in _UNIT_KEYS:
+            unit = said[1].strip("[]() ")
+        elif len(said) == 1 and not words and own and (place or spelled_unit(own) is not None):
+            unit = own
+        elif len(said) == 1 and not title:
+            title = said[0]
+        elif said:
+            remarks.append(" ".join(said))
+    return above, title, unit, " ".join("; ".join(remarks).split())
+
+
+def _with_units(row: tuple[int, list[str]], down: Heading, value: Heading, origin: str) -> tuple[Heading, Heading]:
+    """Take the units of a row below the breakpoints: first that of the rows, then that of the values."""
+    line, cells = row
+    first, *others = ["" if cell.casefold() in _EMPTY else cell.strip("[](){} ") for cell in cells]
+    said = sorted({cell for cell in others if cell})
+    if len(said) > 1:
+        raise DataError(
+            f"{origin}, line {line}: units {', '.join(map(repr, said[:3]))}: the values have one; correct them"
+        )
+    made = []
+    for heading, text in ((down, first), (value, said[0] if said else "")):
+        unit = unit_from(text, heading.name) if text else heading.unit
+        if not heading.unit.startswith(NOT_GIVEN) and unit != heading.unit:
+            raise DataError(
+                f"{origin}, line {line}: unit {text!r} of {heading.name}: its name or label says {heading.unit!r}; "
+                "correct one of them"
+            )
+        made.append(heading._replace(unit=unit))
+    return made[0], made[1]
