@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 
 import mgdd
 from map_cases import sweep as map_sweep
-from mgdd import datasets, identify, plot, presets
-from mgdd.engine import find_optimum, ignition_delay, simulate, trust
+from mgdd import datasets, identify, io, plot, presets
+from mgdd.engine import Indicating, analyze, find_optimum, ignition_delay, simulate, trust
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
@@ -198,6 +198,8 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "response_diagnostics": (response, ()),
     "convergence": (lambda: run_study("sensor-delay", quick=True, figures=False), ()),
     "pressure": (lambda: Drawn(simulate("puma_single")), ()),
+    "pressure of cycles": (lambda: Drawn(analyze(pressures(), "puma_single", quiet=True)), ()),
+    "cycles": (lambda: Drawn(record()), ("ca50_cad",)),
     "holding_duty": (lambda: MADE["ExcitationCheck"](Path()), ()),
     "log_pv": (lambda: Drawn(simulate("puma_single")), ()),
     "throttle_run": (lambda: MADE["ExcitationCheck"](Path()), ()),
@@ -209,9 +211,20 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
 
 DRAWN_BY = {
     "convergence": convergence,
+    "pressure of cycles": plot.pressure,
     "response_diagnostics": response_diagnostics,
     "log_pv": partial(plot.pressure, log_pv=True),
 }
+
+
+def pressures() -> xr.Dataset:
+    runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0) for mg in (20.0, 0.0, 12.0, 21.0, 20.5)]
+    return io.pressure_trace(runs[0]["crank_angle_cad"], [run["pressure_bar"] for run in runs])
+
+
+def record() -> xr.Dataset:
+    made = pressures()
+    return Indicating(made["crank_angle_cad"], "puma_single", speed_rpm=1500.0).record(made["pressure_bar"])
 
 
 class Drawn(Result):

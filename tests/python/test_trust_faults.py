@@ -212,5 +212,6 @@ def test_both_of_two_faults_are_named() -> None:
 
 if __name__ == "__main__":
     n = int(sys.argv[1])
-    for _fault, (_met, _many, _others) in counted(n).items():
-        pass
+    for fault, (met, many, others) in counted(n).items():
+        sys.stdout.write(f"{fault:36} {met:4} of {many:4}   {dict(others)}\n")
+    sys.stdout.write(f"pairs, both named {pairs(4 * n)}\n")

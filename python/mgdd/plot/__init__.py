@@ -8,6 +8,7 @@ title use the figure's `suptitle`.
 from __future__ import annotations
 
 from mgdd.plot.cycle import pressure
+from mgdd.plot.cycles import cycles
 from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.maps import map_cells, map_contour
 from mgdd.plot.seeking import seeking
@@ -19,6 +20,7 @@ from mgdd.plot.trade_off import trade_off
 
 __all__ = [
     "correlation_matrix",
+    "cycles",
     "holding_duty",
     "map_cells",
     "map_contour",

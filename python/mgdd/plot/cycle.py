@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
+from mgdd.plot.cycles import CYCLE, cloud
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, finished, minus, new_axes, require
 from mgdd.results.labels import ANGLE, label_of
 
@@ -36,7 +37,8 @@ def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | N
     ----------
     dataset : xarray.Dataset or Result
         ``pressure_bar(crank_angle_cad)`` [bar, °CA aTDC] of a measured trace, of `mgdd.engine.simulate` or of
-        `mgdd.engine.analyze`. Heat release rates [J/°CA] go to a twin axis,
+        `mgdd.engine.analyze`; of a record of cycles the mean is drawn over the cloud of the single ones, with the band
+        from their 5th to their 95th percentile. Heat release rates [J/°CA] go to a twin axis,
         ``motored_pressure_bar`` is dashed.
     log_pv : bool
         Over ``volume_l`` [L] instead, which `mgdd.engine.analyze` and `mgdd.engine.simulate` give, on logarithmic axes.
@@ -72,8 +74,10 @@ def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | N
     dataset = require("dataset", dataset, (ANGLE, "pressure_bar"), made_by, optional)
     rates = [name for name in _RATES if name in dataset]
     ax = new_axes(ax)
+    lines: list[Line2D] = cloud(ax, dataset) if CYCLE in dataset["pressure_bar"].dims else []
+    dataset = _mean(dataset)
     angle = dataset[ANGLE].to_numpy()
-    lines: list[Line2D] = ax.plot(angle, dataset["pressure_bar"], "-", color=BLACK, label=_name(dataset))
+    lines += ax.plot(angle, dataset["pressure_bar"], "-", color=BLACK, label=_name(dataset))
     if "motored_pressure_bar" in dataset:
         motored = dataset["motored_pressure_bar"]
         lines += ax.plot(angle, motored, "--", color=GREY, label=label_of(motored).long_name)
@@ -91,7 +95,7 @@ def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | N
 def _log_pv(dataset: xr.Dataset | Result, ax: Axes | None) -> Axes:
     """Draw pressure over volume on logarithmic axes, with the fitted polytropic slopes."""
     needed = (ANGLE, "pressure_bar", "volume_l")
-    dataset = require("dataset", dataset, needed, "mgdd.engine.analyze or mgdd.engine.simulate")
+    dataset = _mean(require("dataset", dataset, needed, "mgdd.engine.analyze or mgdd.engine.simulate"))
     angle = dataset[ANGLE].to_numpy()
     bar = dataset["pressure_bar"].to_numpy()
     litre = dataset["volume_l"].to_numpy()
@@ -116,6 +120,14 @@ def _log_pv(dataset: xr.Dataset | Result, ax: Axes | None) -> Axes:
     ax.set(xscale="log", yscale="log")
     _plain_ticks(ax)
     return finished(ax, dataset, "volume_l", "pressure_bar", lines, columns=1, grid=False)
+
+
+def _mean(dataset: xr.Dataset) -> xr.Dataset:
+    """Give the mean cycle of a record, its exponents those of the averaged pressure."""
+    if CYCLE not in dataset["pressure_bar"].dims:
+        return dataset
+    averaged = {name: dataset[f"cycle_mean_{name}"] for name in _WINDOWS if f"cycle_mean_{name}" in dataset}
+    return dataset.mean(CYCLE, keep_attrs=True).assign(averaged)
 
 
 def _name(dataset: xr.Dataset) -> str:

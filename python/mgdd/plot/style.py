@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 from mgdd._arguments import shown
@@ -26,6 +27,7 @@ __all__ = [
     "LINE_STYLES",
     "ORANGE",
     "axis_label",
+    "beside",
     "divide",
     "drawn",
     "finished",
@@ -82,6 +84,20 @@ def divide(ax: Axes, heights: Sequence[float]) -> list[Axes]:
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
     return panels
+
+
+def beside(ax: Axes, widths: Sequence[float]) -> list[Axes]:
+    """Divide axes into panels of these widths side by side, of which `ax` becomes the first."""
+    spec = ax.get_subplotspec()
+    if spec is not None:
+        inner = spec.subgridspec(1, len(widths), width_ratios=widths)
+        ax.set_subplotspec(inner[0])
+        return [ax, *(ax.figure.add_subplot(inner[place]) for place in range(1, len(widths)))]
+    left, bottom, width, height = ax.get_position().bounds
+    edges = [left + width * sum(widths[:place]) / sum(widths) for place in range(len(widths) + 1)]
+    boxes = [(a, bottom, 0.85 * (b - a), height) for a, b in itertools.pairwise(edges)]
+    ax.set_position(boxes[0])
+    return [ax, *(ax.figure.add_axes(box) for box in boxes[1:])]
 
 
 def residual_below(ax: Axes, data: xr.Dataset, x: str, residual: str) -> Axes:
