@@ -48,7 +48,7 @@ _REMEDIES = {
     "spike": "look for ignition noise and loose contacts; repair or drop the sample",
     "clipped": "lower the gain of the amplifier or widen its range, and measure again",
     "stuck": "look for lost samples, and measure again",
-    "slip": "take the angle of an encoder; look for lost pulses",
+    "slip": "look for lost pulses",
     "tdc": "shift the angles by tdc_offset_cad, or measure TDC by a motored run or a sensor",
     "level": "peg it: pegging='inlet' with the measured pressure, or 'two_point'; correct the unit",
     "pegging": "peg it: pegging='inlet' with the measured pressure, or 'two_point'; then look at TDC",
