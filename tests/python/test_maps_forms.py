@@ -149,6 +149,8 @@ def test_title_units_and_remarks_of_a_grid(tmp_path: Path) -> None:
         read(text, tmp_path, name="lift_s")
     with pytest.raises(DataError, match="line 2: units 'cm', 'mm': the values have one"):
         read(text.replace("mm", "cm", 1), tmp_path)
+    arrows = read(grid("speed [1/min] v", above=above.replace("fuel [mg]", "fuel [mg] >")), tmp_path)
+    assert arrows.labels == found.labels
 
 
 def test_empty_cells_are_named_and_can_be_filled(tmp_path: Path) -> None:

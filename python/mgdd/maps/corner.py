@@ -42,7 +42,7 @@ def axes_of(
     """
     down, across, is_open = _parts(corner)
     if above and not across:
-        across, is_open = above, False
+        across, is_open = _side(above)[0], False
     if is_open:
         down, across = _chosen(down, across, rows, columns, where)
     else:
