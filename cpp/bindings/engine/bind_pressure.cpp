@@ -76,20 +76,19 @@ py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const
 
 // Rows are cycles.
 py::dict bind_analyze_cycles(const InputArray& angle, const InputArray& pressure, const Cylinder& cylinder,
-                             const OperatingPoint& point, const TraceOptions& options, std::size_t threads) {
+                             const OperatingPoint& point, const TraceOptions& options, bool traces,
+                             std::size_t threads) {
   const std::vector<double> angles = to_column(angle, "crank_angle_cad");
-  if (pressure.ndim() != 2) throw about("pressure_bar", ShapeError("pressure_bar must have one row per cycle"));
-  const auto n = static_cast<std::size_t>(pressure.shape(0)), width = static_cast<std::size_t>(pressure.shape(1));
-  std::vector<std::vector<double>> rows(n);
-  for (std::size_t c = 0; c < n; ++c)
-    rows[c].assign(pressure.data() + c * width, pressure.data() + (c + 1) * width);
+  if (pressure.ndim() != 2 || static_cast<std::size_t>(pressure.shape(1)) != angles.size())
+    throw about("pressure_bar", ShapeError("pressure_bar must have one row per cycle, with a sample per crank angle"));
+  const std::span<const double> record{pressure.data(), static_cast<std::size_t>(pressure.size())};
   const std::vector<TraceAnalysis> all =
-      without_gil([&] { return analyze_cycles(angles, rows, cylinder, point, options, threads); });
+      without_gil([&] { return analyze_cycles(angles, record, cylinder, point, options, traces, threads); });
   py::dict out = common_part(all.front());
-  const auto samples = static_cast<py::ssize_t>(all.front().angle_cad.size());
-  for (std::size_t c = 0; c < n; ++c) {
+  const auto n = static_cast<py::ssize_t>(all.size()), samples = static_cast<py::ssize_t>(all.front().angle_cad.size());
+  for (std::size_t c = 0; traces && c < all.size(); ++c) {
     for (const auto& [name, column] : columns(all[c])) {
-      if (c == 0) out[name] = py::array_t<double>({static_cast<py::ssize_t>(n), samples});
+      if (c == 0) out[name] = py::array_t<double>({n, samples});
       auto matrix = out[name].cast<py::array_t<double>>();
       std::copy(column.begin(), column.end(), matrix.mutable_data(static_cast<py::ssize_t>(c), 0));
     }
@@ -172,7 +171,8 @@ void bind_pressure(py::module_& m) {
   m.def("analyze", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
   m.def("analyze_cycles", &bind_analyze_cycles, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"),
-        arg("point"), arg("options"), arg("threads") = 0, "The same of every row; warnings counted together.");
+        arg("point"), arg("options"), arg("traces") = true, arg("threads") = 0,
+        "The same of every row; warnings counted together.");
   py::class_<Stream>(m, "Indicating")
       .def(py::init([](const InputArray& angle, const Cylinder& cylinder, double speed_rpm, const O& how) {
              const std::vector<double> angles = to_column(angle, "crank_angle_cad");

@@ -81,7 +81,7 @@ def _analyze(args: argparse.Namespace) -> None:
         given["gamma"] = "cylinder"
     if args.intake_pressure_kpa is not None:
         given.setdefault("inlet_pressure_kpa", args.intake_pressure_kpa)
-    result = analyze(trace, cylinder, point=point, **given)
+    result = analyze(trace, cylinder, point=point, traces="cycle" not in trace.dims, **given)
     named = result.attrs["gamma"]
     if named == "cylinder":
         named = cylinder.gamma if args.gamma == "constant" else args.gamma

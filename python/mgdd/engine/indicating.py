@@ -23,8 +23,8 @@ class Indicating:
     """Work, peaks, burn angles, exponents and knock of cycle after cycle on the same crank angles.
 
     What the cycles share is prepared once; a cycle of 3600 samples then takes some 15 µs, alone or in a record, with
-    equal figures. `mgdd.engine.analyze` with ``traces=False`` is this with the burn window of the mean cycle and all
-    the doubts about it; use the class where cycles arrive one by one.
+    equal figures. Against `mgdd.engine.analyze` the burn window is given, nothing is smoothed and nothing doubted: for
+    cycles that arrive one by one, and records that were looked at before.
 
     Parameters
     ----------

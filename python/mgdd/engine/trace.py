@@ -113,9 +113,7 @@ def analyze(
     fuel_mg : float, optional
         Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.93 to 1.18 of its heat is doubted.
     traces : bool
-        False for the figures of a long record only, by `Indicating` in the burn window of the mean cycle and without
-        smoothing: several times quicker, and without the memory of the traces. The mean cycle is analysed and doubted
-        whole, the others are not.
+        False for the figures of a long record without its traces, which take the memory; the figures are the same.
     quiet : bool
         Leave the warnings to the attribute instead of logging them too.
 

@@ -48,39 +48,23 @@ def of_cycles(
     *,
     traces: bool = True,
 ) -> xr.Dataset:
-    """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV.
-
-    Without `traces` the cycles have figures only, all in the burn window of the mean one.
-    """
+    """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV."""
     angle, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
-    made = _core.engine.TraceOptions(**options)
     # Brake work and fuel are stated as means: they judge the mean cycle, not one that misfired.
     single = _core.engine.TraceOptions(**options | dict.fromkeys(("bmep_bar", "fuel_heat_j")))
+    raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, single, traces)
+    whole = _core.engine.TraceOptions(**options)
+    mean = _core.engine.analyze(angle, pressure.mean(axis=0), cylinder, point, whole)
     columns: dict[str, tuple[Any, ...]] = {}
-    lines: list[str] = []
-    kinds: list[str] = []
     if traces:
-        raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, single)
-        mean = _core.engine.analyze(angle, pressure.mean(axis=0), cylinder, point, made)
-        scalars, lines, kinds, smoothing = raw["scalars"], raw["warnings"], raw["doubts"], raw["smoothing"]
         columns = {ANGLE: (ANGLE, raw[ANGLE]), "volume_l": (ANGLE, raw["volume_l"])}
         columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in _COLUMNS}
-        window, motored = "found" if any(raw["window_found"]) else "no burn found", sum(raw["motored"])
-    else:
-        averaged = pressure.mean(axis=0)
-        if not np.isfinite(averaged).all():  # names the cycle
-            _core.engine.Indicating(angle, cylinder, point.speed_rpm, made).many(pressure)
-        mean = _core.engine.analyze(angle, averaged, cylinder, point, made)
-        found = {name: mean["scalars"][name] for name in ("heat_from_cad", "heat_to_cad")}
-        made = _core.engine.TraceOptions(**options | found)
-        scalars, smoothing = _core.engine.Indicating(angle, cylinder, point.speed_rpm, made).many(pressure), "none"
-        window = "found in the mean cycle" if mean["window_found"] else "no burn found"
-        motored = np.isnan(scalars["ca50_cad"]).sum()
+    scalars = raw["scalars"]
     n = len(pressure)
     marks = burn_marks(scalars)
     unburnt = burn_warnings(marks)
-    lines = [*lines, *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
-    kinds = [*kinds, *unburnt, *mean["doubts"]]
+    lines = [*raw["warnings"], *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
+    kinds = [*raw["doubts"], *unburnt, *mean["doubts"]]
     return labelled_dataset(
         {
             **columns,
@@ -93,11 +77,11 @@ def of_cycles(
         },
         attrs={
             **attrs,
-            "smoothing": smoothing,
-            "mass_source": mean["mass_source"],
-            "heat_window": given or window,
+            "smoothing": raw["smoothing"],
+            "mass_source": raw["mass_source"],
+            "heat_window": given or ("found" if any(raw["window_found"]) else "no burn found"),
             "cycles": n,
-            "motored": int(motored),
+            "motored": int(sum(raw["motored"])),
             "warnings": "\n".join(lines),
             "doubts": "\n".join(kinds),
         },

@@ -224,6 +224,7 @@ def trust(
             brake_torque_nm=brake_torque_nm,
             n_cylinders=n_cylinders,
             fuel_mg=fuel_mg,
+            traces=made.sizes.get(CYCLE, 1) == 1,
             quiet=True,
         )
     except DataError as error:

@@ -199,6 +199,8 @@ TEST(EngineIndicating, ACycleThatIsNotFiniteIsNamed) {
   TraceOptions o;
   o.gamma_source = AnalysisGamma::split;
   EXPECT_THROW(Indicating(angle, Cylinder{}, speed_rpm, o), ParameterError);
+  for (const double bad : {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    EXPECT_THROW(Indicating(angle, Cylinder{}, bad, {}), ParameterError);
 }
 
 TEST(EngineIndicating, AllocatesNothing) {

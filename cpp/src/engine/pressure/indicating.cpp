@@ -137,6 +137,8 @@ Indicating::Indicating(const std::vector<double>& angle_cad, const Cylinder& cyl
   compression_ = exponent(compression_from_cad, compression_to_cad);
   expansion_ = exponent(expansion_from_cad, expansion_to_cad);
 
+  if (!(speed_rpm >= 0.0 && speed_rpm < 1e6))
+    throw ParameterError("speed_rpm", speed_rpm, "must be in [0, 1e6)", "rpm");
   const double nyquist_hz = 0.5 * units::cad_per_s_per_rpm * speed_rpm / step_cad_;
   const double low = o.knock_low_hz / nyquist_hz, transition = transition_share * low;
   if (!(low + transition < 1.0) || !is_even(angle_cad, same_step)) return;

@@ -28,29 +28,45 @@ void naming_cycle(std::size_t cycle, Work work) {
   }
 }
 
+std::size_t cycles_in(std::span<const double> record, std::size_t samples) {
+  const std::size_t cycles = samples == 0 ? 0 : record.size() / samples;
+  if (cycles == 0 || cycles * samples != record.size()) {
+    throw about("pressure_bar", ShapeError("pressure_bar holds " + std::to_string(record.size()) +
+                                           " samples: whole cycles of " + std::to_string(samples) + " are needed"));
+  }
+  return cycles;
+}
+
+void drop_columns(TraceAnalysis& a, bool keep_grid) {
+  for (std::vector<double>* column : {&a.pressure_bar, &a.temperature_k, &a.net_step_j, &a.loss_step_j,
+                                      &a.heat_net_cumulative_j, &a.heat_gross_cumulative_j})
+    *column = {};
+  if (!keep_grid) a.angle_cad = {}, a.volume_l = {};
+}
+
 }  // namespace
 
-std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad,
-                                          const std::vector<std::vector<double>>& pressure_bar,
+std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad, std::span<const double> record,
                                           const Cylinder& cylinder, const OperatingPoint& point,
-                                          const TraceOptions& options, std::size_t threads) {
-  if (pressure_bar.empty()) throw about("pressure_bar", ShapeError("pressure_bar holds no cycle: give at least one"));
-  naming_cycle(0, [&] { check_trace(angle_cad, pressure_bar.front()); });
+                                          const TraceOptions& options, bool columns, std::size_t threads) {
+  const std::size_t samples = angle_cad.size(), cycles = cycles_in(record, samples);
+  const auto row = [&](std::size_t cycle) {
+    const auto part = record.subspan(cycle * samples, samples);
+    return std::vector<double>(part.begin(), part.end());
+  };
+  naming_cycle(0, [&] { check_trace(angle_cad, row(0)); });
   const TraceAnalyzer analyze(angle_cad, cylinder, point, options);
-  std::vector<TraceAnalysis> out(pressure_bar.size());
-  parallel_for(pressure_bar.size(), threads, [&](std::size_t cycle, std::size_t, StopRequest&) {
-    naming_cycle(cycle, [&] { out[cycle] = analyze(pressure_bar[cycle]); });
+  std::vector<TraceAnalysis> out(cycles);
+  parallel_for(cycles, threads, [&](std::size_t cycle, std::size_t, StopRequest&) {
+    naming_cycle(cycle, [&] { out[cycle] = analyze(row(cycle)); });
+    if (!columns) drop_columns(out[cycle], cycle == 0);
   });
   return out;
 }
 
 std::vector<CycleFigures> indicate_cycles(const Indicating& indicating, std::span<const double> record,
                                           std::size_t threads) {
-  const std::size_t samples = indicating.samples(), cycles = record.size() / samples;
-  if (cycles == 0 || cycles * samples != record.size()) {
-    throw about("pressure_bar", ShapeError("pressure_bar holds " + std::to_string(record.size()) +
-                                           " samples: whole cycles of " + std::to_string(samples) + " are needed"));
-  }
+  const std::size_t samples = indicating.samples(), cycles = cycles_in(record, samples);
   std::vector<CycleFigures> out(cycles);
   const std::size_t workers = thread_count(cycles, threads);
   std::vector<Indicating::Workspace> work(workers, indicating.make_workspace());

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -90,12 +91,12 @@ class TraceAnalyzer {
   std::shared_ptr<const Shared> shared_;
 };
 
-/// Every cycle of a record on the same angles, shared out over `threads` (0: one per core). An error names its cycle,
-/// counted from 1.
-std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad,
-                                          const std::vector<std::vector<double>>& pressure_bar,
+/// Every cycle of a record on the same angles, one below the other, shared out over `threads` (0: one per core).
+/// Without `columns` only the first keeps its angles and volumes, and none another column: a long record is small then.
+/// An error names its cycle, counted from 1; ShapeError for another length than a whole number of cycles.
+std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad, std::span<const double> record,
                                           const Cylinder& cylinder, const OperatingPoint& point,
-                                          const TraceOptions& options, std::size_t threads = 0);
+                                          const TraceOptions& options, bool columns = true, std::size_t threads = 0);
 
 /// One line per kind of warning, in the order of their first cycle: "12 of 60 cycles: ... (cycle 3)".
 std::vector<TraceWarning> count_warnings(const std::vector<TraceAnalysis>& cycles);
