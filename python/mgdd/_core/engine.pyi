@@ -862,7 +862,7 @@ def analyze(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     """
     Pegging, heat release, burn angles, work.
     """
-def analyze_cycles(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
+def analyze_cycles(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions, traces: bool = True, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
     """
     The same of every row; warnings counted together.
     """
