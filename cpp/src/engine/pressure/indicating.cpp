@@ -70,14 +70,13 @@ WeightedSum work_around(const Column& angle, const Geometry<double>& geometry, d
   return out;
 }
 
-const TraceOptions& checked(const TraceOptions& options) {
+double constant_gamma(const TraceOptions& options) {
   validate(options);
   if (options.gamma_source != AnalysisGamma::constant) {
     throw ParameterError(
-        "gamma must be a number for the figures of single cycles: the other forms belong to the whole "
-        "analysis");
+        "gamma must be a number for the figures of single cycles: the other forms belong to the whole analysis");
   }
-  return options;
+  return options.gamma;
 }
 
 MGDD_INLINE bool all_finite(const double* p, std::size_t n) noexcept {
@@ -95,7 +94,7 @@ MGDD_INLINE bool all_finite(const double* p, std::size_t n) noexcept {
 
 MGDD_INLINE std::size_t place_of_highest(const double* p, SampleRange range) noexcept {
   constexpr std::size_t side_by_side = 16;
-  std::array<double, side_by_side> most;
+  std::array<double, side_by_side> most{};
   most.fill(p[range.first]);
   std::size_t k = range.first;
   for (; k + side_by_side <= range.second; k += side_by_side) {
@@ -111,14 +110,13 @@ MGDD_INLINE std::size_t place_of_highest(const double* p, SampleRange range) noe
 }  // namespace
 
 Indicating::Indicating(const std::vector<double>& angle_cad, const Cylinder& cylinder, double speed_rpm,
-                       const TraceOptions& given)
+                       const TraceOptions& o)
     : angle_cad_(angle_cad),
       closed_(closed_part(angle_cad, cylinder.geometry)),
-      gamma_(checked(given).gamma),
+      gamma_(constant_gamma(o)),
       step_cad_(median_step(angle_cad)),
-      pegging_(pegging_of(angle_cad, cylinder, given)),
+      pegging_(pegging_of(angle_cad, cylinder, o)),
       rise_(std::span(angle_cad).subspan(closed_.first, closed_.second - closed_.first)) {
-  const TraceOptions& o = given;
   const Geometry<double> geometry(cylinder.geometry);
   volume_l_ = volumes_l(angle_cad, geometry);
   const double closed_from = angle_cad[closed_.first], closed_to = angle_cad[closed_.second - 1];

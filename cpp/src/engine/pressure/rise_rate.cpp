@@ -101,7 +101,7 @@ SteepestRise RiseRate::operator()(const double* pressure) const noexcept {
       if (slope > steepest) steepest = slope, at = line;
     };
     constexpr std::size_t block = 128;
-    std::array<double, block> slopes;
+    std::array<double, block> slopes{};
     for (std::size_t k = 0; alike_ && k < n; k += block) {
       const std::span<double> some = std::span(slopes).first(std::min(block, n - k));
       sliding_sums(weights, pressure + lines_[0].first + k, some);
