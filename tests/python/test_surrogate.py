@@ -435,3 +435,12 @@ def test_the_virtual_engine_scatters_like_the_log(measured):
         drawn.append([noisy[name] - clean[name] for name in measured.signals])
     spread = np.array(drawn).std(axis=0) / [signal.residual_sd for signal in measured.signals.values()]
     assert ((spread > 0.7) & (spread < 1.3)).all()
+
+
+def test_commands_of_the_records_hold_for_1_to_30_cycles() -> None:
+    records = random_step_records(20_000)
+    soi = records["soi_cad"].to_numpy()
+    changes = np.flatnonzero(np.diff(soi)) + 1
+    holds = np.diff(changes)  # two draws are never alike
+    assert (holds.min(), holds.max()) == (1, 30)
+    assert np.mean(holds) == pytest.approx(15.5, abs=4.0 * 8.66 / np.sqrt(holds.size))
