@@ -169,14 +169,14 @@ BAD = [
     (grid(r"rpm\mg").replace("3000;", "1000;"), "line 4: rpm = 1000 after 1400"),
     (grid(r"rpm\mg").replace("1400;", ";"), "line 3: the breakpoint of rpm is empty"),
     (grid(r"rpm\mg").replace(";14;", ";nan;"), "line 1, cell 4: the breakpoint of mg is empty"),
-    (grid(r"rpm\mg").replace("1400;", "inf;"), "line 3: 'inf' is no breakpoint of rpm"),
+    (grid(r"rpm\mg").replace("1400;", "inf;"), "line 3: 'inf' is not a breakpoint of rpm"),
     (grid(r"rpm\mg").replace("3000;", "3,000;"), "'3,000' .*',' looks like a separator of thousands: remove it, or"),
     (grid(r"rpm\mg").replace("3000;", "3'000;"), '"3\'000" is not a finite number for rpm: "\'" looks like a'),
     (grid(r"rpm\mg").replace("5.25", "5,25"), "line 3: '5,25' .* pass decimal=',' if the comma is a decimal mark"),
     (grid(r"rpm\mg").replace("5.25", "5.25;7"), "line 3: 6 values: 5 are needed"),
     (grid(r"rpm\mg").replace(";5.25", ""), "line 3: 4 values: 5 are needed"),
     (grid(r"rpm\mg").replace("5.25", "#DIV/0!"), "line 3: '#DIV/0!' is not a finite number for a value"),
-    (grid(r"rpm\mg") + "measured by hand\n", "line 5: 'measured by hand' is no breakpoint of rpm"),
+    (grid(r"rpm\mg") + "measured by hand\n", "line 5: 'measured by hand' is not a breakpoint of rpm"),
     (grid(r"rpm\mg")[: grid(r"rpm\mg").index("1400")], "rpm has one breakpoint: a map needs two along each axis"),
     ("rpm\\mg;10\n900;1\n1400;2\n", "'10' stands where a column has its name"),
     (grid("0"), "the columns have no names"),
@@ -431,7 +431,7 @@ def test_any_map_comes_back_from_dcm_and_cdfx_alike(
         for file in files:
             write_map([table, other], file, values={"n": (0.1, "rpm")}, encoding=encoding)
     except DataError as error:
-        assert "is no letter of" in str(error) or "would be read as others" in str(error)  # noqa: PT017
+        assert "is not a letter of" in str(error) or "would be read as others" in str(error)  # noqa: PT017
         return
     first, second = map(read_dcm, files)
     assert first == second
@@ -446,7 +446,7 @@ def test_a_letter_that_does_not_fit_is_named_before_anything_is_written(ending: 
     table = CalibrationMap({"fuel_mg": FUEL}, 1.0, name="air_ratio", labels={"air_ratio": ("-", "air ratio λ")})
     write_map(table, file)
     before = file.read_bytes()
-    with pytest.raises(DataError, match=r"line \d+: 'λ' in .* is no letter of latin-1: .* with encoding='utf-8'"):
+    with pytest.raises(DataError, match=r"line \d+: 'λ' in .* is not a letter of latin-1: .* with encoding='utf-8'"):
         write_map(table, file, encoding="latin-1")
     assert file.read_bytes() == before
     with pytest.raises(DataError, match="encoding = 'ascii': must be one of"):

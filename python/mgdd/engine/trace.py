@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.engine.trace_cycles import is_of_cycles, of_cycles
+from mgdd.engine.trace_cycles import COLUMNS, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.pressure import as_trace
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of
@@ -21,15 +21,6 @@ __all__ = ["analyze", "conditions"]
 
 _CONDITIONS = ("speed_rpm", "trapped_mass_g", "intake_temperature_k", "ivc_temperature_k")
 _LOG = logging.getLogger(__name__)
-_COLUMNS = (
-    "pressure_bar",
-    "temperature_k",
-    "heat_release_net_j_per_cad",
-    "heat_release_gross_j_per_cad",
-    "heat_loss_j_per_cad",
-    "heat_net_cumulative_j",
-    "heat_gross_cumulative_j",
-)
 # A point's intake pressure is often that of a preset at another load; what the caller states is judged closer.
 _POINT_FACTOR, _STATED_FACTOR = 3.0, 1.5
 _DP_MAX = "slope of the least-squares line over 2 °CA"
@@ -235,7 +226,7 @@ def _one(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
             "volume_l": (ANGLE, raw["volume_l"]),
-            **{name: (ANGLE, raw[name]) for name in _COLUMNS},
+            **{name: (ANGLE, raw[name]) for name in COLUMNS},
             **{name: ((), value) for name, value in raw["scalars"].items()},
         },
         attrs={

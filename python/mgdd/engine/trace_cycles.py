@@ -14,14 +14,14 @@ from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CYCLE", "burn_marks", "burn_warnings", "is_of_cycles", "of_cycles", "scatter"]
+__all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "is_of_cycles", "of_cycles", "scatter"]
 
 CYCLE = "cycle"
 # Net heat over the median of the record; own choices, in the spirit of a fifth and four fifths of the IMEP.
 _MISFIRE, _PARTIAL, _NAMED = 0.2, 0.8, 8
 _OFFSETS = ("pegging_bar", "compression_offset_bar", "pmep_bar")
 _ANGLES = ("°CA aTDC", "°CA")
-_COLUMNS = (
+COLUMNS = (
     "pressure_bar",
     "temperature_k",
     "heat_release_net_j_per_cad",
@@ -58,7 +58,7 @@ def of_cycles(
     columns: dict[str, tuple[Any, ...]] = {}
     if traces:
         columns = {ANGLE: (ANGLE, raw[ANGLE]), "volume_l": (ANGLE, raw["volume_l"])}
-        columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in _COLUMNS}
+        columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in COLUMNS}
     scalars = raw["scalars"]
     n = len(pressure)
     marks = burn_marks(scalars)

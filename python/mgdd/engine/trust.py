@@ -251,7 +251,9 @@ def _check(
         return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "pass")
     verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in own) else "doubt"
     remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in own if kind in _REMEDIES)
-    first = dict(reversed(own))
+    first: dict[str, str] = {}
+    for kind, text in own:  # each line of the reader is a doubt of its own
+        first.setdefault(text if kind == "reading" else kind, text)
     return Check(name, verdict, "; ".join(first.values()), "; ".join(remedies))
 
 
@@ -259,12 +261,15 @@ def _skipped(trace: xr.Dataset, found: xr.Dataset, stated: list[str]) -> dict[st
     """Name the checks that these data cannot decide, and what would."""
     out = {}
     cycles = trace.sizes.get(CYCLE, 1)
-    if int(found.attrs["motored"]) < max(cycles, 1):
+    motored = int(found.attrs["motored"]) == max(cycles, 1)
+    if motored:
+        out["burn"] = out["work and heat"] = ("no cycle burns", "")
+    else:
         out["top dead centre"] = (
             "a fired trace hardly shows an error",
             "mgdd.identify.estimate_tdc scans it; a motored record shows it",
         )
-    if not stated:
+    if not stated and not motored:
         out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
     if not np.isfinite(found["imep_net_bar"]).all():
         out["gas exchange"] = ("the record has no 720 degrees", "")

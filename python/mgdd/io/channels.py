@@ -248,7 +248,7 @@ def _source(table: Table, columns: Sequence[int]) -> str:
 
 
 def _printed(text: str) -> str:
-    """Return a unit as results print it; one that is no product of units is kept as a remark."""
+    """Return a unit as results print it; one that is not a product of units is kept as a remark."""
     known = spelled_unit(text)
     bare = text.strip().strip("[](){}").strip()
     if known in (None, "other"):

@@ -99,7 +99,7 @@ def _encoded(text: str, path: str | os.PathLike[str], encoding: str) -> str:
         letter, line = text[error.start], text.count("\n", 0, error.start) + 1
         said = text.splitlines()[line - 1].strip()
         raise DataError(
-            f"{path}, line {line}: {letter!r} in {said!r} is no letter of {encoding}: change the text, or write it "
+            f"{path}, line {line}: {letter!r} in {said!r} is not a letter of {encoding}: change the text, or write it "
             f"with {argument('encoding', repr('utf-8'))}"
         ) from error
     if encoding != "utf-8" and Path(path).suffix.lower() == ".dcm":  # XML says its encoding itself

@@ -68,7 +68,7 @@ def map_of_grid(
         found, where = trimmed(row), f"{origin}, line {at}"
         if found and not _like_number(found[0]) and found[0].casefold() not in _EMPTY:
             raise DataError(
-                f"{where}: {found[0][:60]!r} is no breakpoint of {down.name}: remove the line, or begin it with #"
+                f"{where}: {found[0][:60]!r} is not a breakpoint of {down.name}: remove the line, or begin it with #"
             )
         if len(found) - 1 > len(x) or (len(found) > 1 and len(row) - 1 < len(x)):
             raise DataError(

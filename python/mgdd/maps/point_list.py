@@ -169,7 +169,7 @@ def _column(table: Table, index: int, *, gap: bool) -> Array:
     if bad.any():
         at = int(np.argmax(bad))
         raise DataError(
-            f"{table.source}, column {label!r}, row {at}: {column[at]} is no finite number: remove or repair it"
+            f"{table.source}, column {label!r}, row {at}: {column[at]} is not a finite number: remove or repair it"
         )
     return column
 

@@ -119,7 +119,7 @@ TEST(EngineIndicating, FindsARinging) {
     const double x = ringing(a);
     largest = std::max(largest, std::abs(x)), integral += std::abs(x) * 1e-3, square += x * x * 1e-3;
   }
-  EXPECT_NEAR(f.mapo_bar / largest, 1.0, 0.05);  // the onset is no tone
+  EXPECT_NEAR(f.mapo_bar / largest, 1.0, 0.05);  // the onset is not a tone
   EXPECT_NEAR(f.impo_bar_cad / integral, 1.0, 0.03);
   EXPECT_NEAR(f.sepo_bar2_cad / square, 1.0, 0.03);
 
