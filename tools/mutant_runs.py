@@ -193,13 +193,18 @@ class Cpp:
             self._build,
         )  # fmt: skip
         entries = json.loads((self._build / "compile_commands.json").read_text(encoding="utf-8"))
-        outputs = {Path(entry["file"]): os.path.relpath(entry["output"], self._build) for entry in entries}
+        commands = _need(["ninja", "-t", "commands", "mgdd_tests"], self._build)
+        outputs = {
+            Path(entry["file"]): out
+            for entry in entries
+            if (out := os.path.relpath(entry["output"], self._build)) in commands  # other programs compile some again
+        }
         tests = self._copy.scratch / "tests/cpp"
         own = {file: out for file, out in outputs.items() if any(file.is_relative_to(tests / f) for f in self._folders)}
         if not own:
             raise RuntimeError(f"no tests in {' or '.join(f'tests/cpp/{name}' for name in self._folders)}")
         shared = [out for file, out in outputs.items() if file.is_relative_to(tests / "support")]
-        told = _need(["ninja", "-t", "commands", "mgdd_tests"], self._build).splitlines()[-1]
+        told = commands.splitlines()[-1]
         link = [word for word in shlex.split(told.removeprefix(": && ").removesuffix(" && :")) if word[-2:] != ".o"]
         archives = [word for word in link if word.endswith(".a") and not word.startswith("/")]
         self._link = [word for word in link if word not in archives]

@@ -38,7 +38,7 @@ PYBIND11_MODULE(_core, m) {
       {"control", "Controllers of a throttle plate.", {&bind_controllers, &bind_guided_predictive, &bind_supervisor}},
       {"engine",
        "Cycle model of one cylinder, emissions, performance, measured pressure.",
-       {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_batch, &bind_performance, &bind_pressure}},
+       {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_batch, &bind_performance, &bind_pressure, &bind_encoder}},
       {"throttle",
        "Throttle body, its sensors, pseudo-Wiener models, demand chain.",
        {&bind_throttle, &bind_sensors, &bind_stepper, &bind_pseudo_wiener, &bind_demand}},

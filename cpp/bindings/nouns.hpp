@@ -20,6 +20,7 @@ void bind_batch(pybind11::module_& m);
 void bind_cycle(pybind11::module_& m);
 void bind_performance(pybind11::module_& m);
 void bind_pressure(pybind11::module_& m);
+void bind_encoder(pybind11::module_& m);
 void bind_throttle(pybind11::module_& m);
 void bind_sensors(pybind11::module_& m);
 void bind_stepper(pybind11::module_& m);

@@ -25,7 +25,7 @@ from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibratio
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
-from mgdd.io import pressure_trace, read, read_pressure, read_throttle_log, throttle_log, write_csv
+from mgdd.io import Encoder, pressure_trace, read, read_pressure, read_throttle_log, throttle_log, write_csv
 from mgdd.loop import EngineBench, ThrottleFault, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results.fit_report import FitReport
@@ -214,6 +214,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "guide.TimingMap.to_dataset": lambda _: TimingMap({"fuel_mg": [6.0, 20.0]}, -5.0).to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "surrogate.random_step_records": lambda _: random_step_records(50),
+    "io.Encoder.angle": lambda _: wheel_angle(),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
     "io.read": whole_file,
     "io.read_pressure": pressures,
@@ -247,6 +248,12 @@ MADE: dict[str, Callable[[Path], Any]] = {
         simulate_throttle(Throttle(), 0.3, duration_s=0.2, start_deg=start) for start in (None, [0.0, 20.0])
     ],
 }  # fmt: skip
+
+
+def wheel_angle() -> Any:
+    time = np.arange(0.0, 0.3, 1e-5)
+    place = 9000.0 * time % 360.0 / 6.0
+    return Encoder(teeth=60, missing_teeth=2).angle(time, 1.0 * ((place < 58.0) & (place % 1.0 < 0.5)))
 
 
 def is_dataset(annotation: Any) -> bool:

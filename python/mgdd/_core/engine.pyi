@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'at_even_angles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'encoder_angle', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
@@ -866,6 +866,10 @@ def analyze_cycles(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, num
     """
     The same of every row; warnings counted together.
     """
+def at_even_angles(angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], from_deg: typing.SupportsFloat | typing.SupportsIndex, step_deg: typing.SupportsFloat | typing.SupportsIndex, count: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Samples at even angles.
+    """
 def batch(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], rows: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], outputs: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str, threads: typing.SupportsInt | typing.SupportsIndex = 0, form: str = 'automatic') -> dict:
     """
     Indicators of many cycles; `rows` is (cases, names). NaN where a cycle is not physical. Releases the GIL.
@@ -897,6 +901,10 @@ def convergence(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Suppo
 def differentiable_inputs() -> list[str]:
     """
     Names that `sensitivities` takes.
+    """
+def encoder_angle(time_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], signal: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], index: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, teeth: typing.SupportsInt | typing.SupportsIndex = 360, missing_teeth: typing.SupportsInt | typing.SupportsIndex = 0, falling: bool = False, level: typing.SupportsFloat | typing.SupportsIndex | None = None) -> dict:
+    """
+    Crank angle of every sample of an encoder.
     """
 def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], map: str, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex) -> NoxFit:
     """

@@ -12,7 +12,7 @@ import numpy as np
 
 from mgdd import datasets
 from mgdd.cli.from_library import Options, default_of
-from mgdd.cli.options import READING, add_command, add_group
+from mgdd.cli.options import READING, add_command, add_encoder, add_group, encoder_of
 from mgdd.cli.output import check_output, emit, wrote
 from mgdd.datasets.files import FILES, LICENCES, place
 from mgdd.errors import DataError, ParameterError
@@ -66,6 +66,7 @@ def add(commands: Any) -> None:
         group = parser.add_argument_group("what the file holds, where it does not say it or says it otherwise")
         for options in (_OWN, _SPEED, READING):
             options.add(group)
+        add_encoder(parser)
     add_command(
         verbs, "list", _list, help_text="name the public data sets, with licence and place", example="mgdd data list"
     )
@@ -78,7 +79,7 @@ def add(commands: Any) -> None:
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
-    return _OWN.given(args) | _SPEED.given(args) | READING.given(args)
+    return _OWN.given(args) | _SPEED.given(args) | READING.given(args) | encoder_of(args)
 
 
 def _info(args: argparse.Namespace) -> None:

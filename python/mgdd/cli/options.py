@@ -15,7 +15,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
 from mgdd.engine import analyze, simulate
 from mgdd.errors import ParameterError, hinted
-from mgdd.io import read_pressure
+from mgdd.io import Encoder, read_pressure
 from mgdd.io.point_table import CONDITIONS, conditions_of
 from mgdd.presets.preset import Preset
 
@@ -30,11 +30,13 @@ __all__ = [
     "Parser",
     "UsageError",
     "add_command",
+    "add_encoder",
     "add_engine",
     "add_files",
     "add_group",
     "assignments",
     "check_pegging",
+    "encoder_of",
     "engine_of",
     "number_pairs",
     "readers_of",
@@ -52,6 +54,10 @@ _COLUMNS = Options(read_pressure, "pressure_column", "angle_column")
 READING = Options(
     read_pressure, "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_unit", "firing_tdc_deg",
     "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
+)  # fmt: skip
+_ENCODER = Options(
+    Encoder, column="encoder", teeth="encoder_teeth", missing_teeth="encoder_missing_teeth",
+    index_column="encoder_index", falling="encoder_falling", level="encoder_level",
 )  # fmt: skip
 CYLINDER_CHOICES = {
     "burn": "burn_shape",
@@ -152,10 +158,25 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     group = parser.add_argument_group("what the files hold, where they do not say it or say it otherwise")
     for options in (_COLUMNS, READING):
         options.add(group)
+    add_encoder(parser)
     group.add_argument(
         "--conditions", metavar="FILE.csv",
         help=f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}",
     )  # fmt: skip
+
+
+def add_encoder(parser: argparse.ArgumentParser) -> None:
+    """Add the options of an encoder."""
+    _ENCODER.add(parser.add_argument_group("an encoder instead of an angle, with --firing-tdc-deg behind its mark"))
+
+
+def encoder_of(args: argparse.Namespace) -> dict[str, Any]:
+    """Give the encoder as the keyword of a reader, where one is given."""
+    given = _ENCODER.given(args)
+    if given and "column" not in given:
+        idle = as_option(_ENCODER.options[next(iter(given))])
+        raise ParameterError(f"{idle} acts with --encoder COLUMN only: give it")
+    return {"encoder": Encoder(**given)} if given else {}
 
 
 def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
@@ -199,10 +220,11 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
     rows = conditions_of(args.files, args.conditions)
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
 
+    encoder = encoder_of(args)
+
     def read(file: str) -> xr.Dataset:
-        trace = read_pressure(
-            file, speed_rpm=rows[file].get("speed_rpm", speed), **_COLUMNS.given(args), **READING.given(args)
-        )
+        angle = encoder or {"speed_rpm": rows[file].get("speed_rpm", speed)}
+        trace = read_pressure(file, **angle, **_COLUMNS.given(args), **READING.given(args))
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
         return trace.assign_attrs(**rows[file])

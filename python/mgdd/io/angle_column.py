@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.column_names import Heading, heading
+from mgdd.io.column_names import TIME_UNITS, Heading, heading
 from mgdd.io.cycle_phase import CYCLE_DEG, repetition
-from mgdd.io.reading import ANGLE_UNITS, TIME_UNITS, Reading
+from mgdd.io.encoder import Turning, turning_of
+from mgdd.io.reading import ANGLE_UNITS, Reading
 from mgdd.io.table import Table
 from mgdd.io.wrong_channel import no_angle
 
@@ -33,16 +34,26 @@ def headings(table: Table) -> list[Heading]:
 
 
 class Angle(NamedTuple):
-    """Column, degrees, the unit that they came in, and whether they were made from a step or a time."""
+    """Column, degrees, the unit that they came in, whether they were made from a step or a time, or by an encoder."""
 
     column: int | None
     degrees: NDArray[np.float64]
     unit: str
     made: bool
+    turning: Turning | None = None
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Return the columns that the angle comes from."""
+        if self.turning is not None:
+            return self.turning.columns
+        return () if self.column is None else (self.column,)
 
     @property
     def cycles(self) -> float:
         """Return how many cycles there are, a part of one counting as one."""
+        if self.turning is not None:
+            return float(np.nanmax(self.degrees) - np.nanmin(self.degrees)) / CYCLE_DEG
         step, span = np.diff(self.degrees), float(np.ptp(self.degrees))
         if not step.size or not np.isfinite(span):
             return np.inf  # the check of the trace says what is wrong with it
@@ -52,6 +63,9 @@ class Angle(NamedTuple):
 
 def angle_of(table: Table, heads: Sequence[Heading], how: Reading, *, samples: int | None = None) -> Angle:
     """Read the angle, or make it; `samples` is the length of the raster of a file without one."""
+    if how.encoder is not None:
+        found = turning_of(table, heads, how.encoder, how.angle_column)
+        return Angle(found.columns[0], found.degrees, "deg", False, found)
     if how.angle_step_deg is not None:
         _check_start(table.source, "a count of samples", how)
         count = np.arange(table.height if samples is None else samples, dtype=np.float64)

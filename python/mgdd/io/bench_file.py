@@ -12,16 +12,19 @@ import numpy as np
 from mgdd.errors import DataError, argument
 from mgdd.io.any_table import read_any_table
 from mgdd.io.channels import Channel, Layout, columns_shown, kept_channels, layout_of
+from mgdd.io.column_names import TIME_UNITS
 from mgdd.io.pressure import CYCLE, cycle_count, record_attrs
 from mgdd.io.pressure_checks import check_magnitude, to_bar
 from mgdd.io.pressure_file import Pressure, Record, pressure_of, record_of
-from mgdd.io.reading import TIME_UNITS, Reading
+from mgdd.io.reading import Reading
 from mgdd.io.table import Table
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
+
+    from mgdd.io.encoder import Encoder
 
 __all__ = ["bench_record", "read"]
 
@@ -42,6 +45,7 @@ def read(
     speed_rpm: float | None = None,
     gain_bar_per_v: float | None = None,
     offset_bar: float | None = None,
+    encoder: Encoder | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
 ) -> xr.Dataset:
@@ -71,6 +75,8 @@ def read(
         For files without an angle, as in `read_pressure`.
     gain_bar_per_v, offset_bar
         For cylinder pressures in volts, as in `read_pressure`.
+    encoder
+        For records over time beside the signal of an encoder, as in `read_pressure`.
     delimiter, decimal
         Of text, as in `read_pressure`.
 
@@ -120,6 +126,7 @@ def read(
         speed_rpm=speed_rpm,
         gain_bar_per_v=gain_bar_per_v,
         offset_bar=offset_bar,
+        encoder=encoder,
     )
     table = read_any_table(path, delimiter=delimiter, decimal=decimal)
     return bench_record(table, layout_of(table, how), channels, name=Path(path).name)

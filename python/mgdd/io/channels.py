@@ -11,10 +11,10 @@ import numpy as np
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.angle_column import Angle, angle_of, headings
-from mgdd.io.column_names import Heading, last_number, spelled_unit, stated_unit, stem, without_brackets
+from mgdd.io.column_names import TIME_UNITS, Heading, last_number, spelled_unit, stated_unit, stem, without_brackets
 from mgdd.io.pressure import CYCLE
 from mgdd.io.pressure_file import choose_pressure, odd_shape
-from mgdd.io.reading import TIME_UNITS, Reading
+from mgdd.io.reading import Reading
 from mgdd.io.table import Table
 from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.results.units import attribute_units
@@ -61,10 +61,10 @@ def layout_of(table: Table, how: Reading) -> Layout:
     heads = headings(table)
     times = _times(table, heads)
     numeric = table.numeric(range(table.width))
-    if how.angle_column is None and how.angle_step_deg is None and heads[0].quantity != "angle":
+    if how.encoder is None and how.angle_column is None and how.angle_step_deg is None and heads[0].quantity != "angle":
         how = replace(how, angle_column=next((i for i in numeric if heads[i].quantity == "angle"), None))
     samples, clock = None, None
-    if how.angle_step_deg is not None:
+    if how.encoder is None and how.angle_step_deg is not None:
         at = _first_pressure(table, heads, how, numeric)
         samples, clock = table.lengths[at], _clock(table, heads, times, at)
     angle = angle_of(table, heads, how, samples=samples)
@@ -73,7 +73,7 @@ def layout_of(table: Table, how: Reading) -> Layout:
     fast = [
         i
         for i in numeric
-        if i != angle.column and table.lengths[i] == samples and _clock(table, heads, times, i) == clock
+        if i not in angle.columns and table.lengths[i] == samples and _clock(table, heads, times, i) == clock
     ]
     groups = _pressures(table, heads, how, angle, fast)
     taken = {i for group in groups for i in group}
@@ -82,7 +82,7 @@ def layout_of(table: Table, how: Reading) -> Layout:
     for group in _series(table, heads, [i for i in fast if i not in taken], count):
         channels.append(_channel(table, heads, group, "fast", channels))
     for i in numeric:
-        if i in fast or i == angle.column or i in times or _numbers_cycles(table, heads[i], i):
+        if i in fast or i in angle.columns or i in times or _numbers_cycles(table, heads[i], i):
             continue
         clock = _clock(table, heads, times, i)
         channels.append(_channel(table, heads, (i,), "other" if clock is None else "slow", channels, clock))
@@ -149,7 +149,7 @@ def _pressures(
     said = [i for i in fast if heads[i].quantity == "pressure"]
     exact = [i for i in said if heads[i].name == "pressure_bar"]
     if how.pressure_column is not None or not said:
-        columns = choose_pressure(table, heads, how.pressure_column, angle.column)
+        columns = choose_pressure(table, heads, how.pressure_column, angle)
         if how.pressure_column is None:
             return [tuple(columns)]
     else:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
+    from mgdd.io.encoder import Encoder
     from mgdd.io.pressure_file import Record
 
 __all__ = [
@@ -115,6 +116,7 @@ def read_pressure(
     speed_rpm: float | None = None,
     gain_bar_per_v: float | None = None,
     offset_bar: float | None = None,
+    encoder: Encoder | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
 ) -> xr.Dataset:
@@ -149,7 +151,7 @@ def read_pressure(
         What the angles are too large by [°CA], within ±20: taken off, once they are in °CA aTDC. It is what
         `mgdd.identify.estimate_tdc` and ``tdc_offset_cad`` of a motored `mgdd.engine.analyze` give.
     angle_step_deg : float, optional
-        For files without an angle column: degrees between two samples.
+        For files without an angle column: degrees between two samples; with `encoder`: the degrees wanted.
     angle_start_deg : float, optional
         With `angle_step_deg` or a time: angle of the first sample [deg], in °CA aTDC, or counted as `firing_tdc_deg`
         is, where that is given; 0 then if left out.
@@ -161,6 +163,11 @@ def read_pressure(
         For a pressure in volts: bar per volt of the charge amplifier.
     offset_bar : float, optional
         For a pressure in volts: bar at 0 V; without it the pressure is relative.
+    encoder : mgdd.io.Encoder, optional
+        For a record over time beside the signal of an encoder or a toothed wheel: its column, its teeth, its mark.
+        `firing_tdc_deg` is the angle of TDC behind that mark then, in either turn: the firing one is the one with the
+        higher pressure. The samples are taken at even angles by a cubic, every `angle_step_deg`, or at about as many
+        as there are; cycles with miscounted edges are left out. ``attrs["speed_rpm"]`` is the mean speed.
     delimiter : str, optional
         Column separator; None detects it.
     decimal : {".", ","}
@@ -207,6 +214,7 @@ def read_pressure(
         speed_rpm=speed_rpm,
         gain_bar_per_v=gain_bar_per_v,
         offset_bar=offset_bar,
+        encoder=encoder,
     )
     return _dataset(cycles_of(read_any_table(path, delimiter=delimiter, decimal=decimal), how), Path(path).name)
 

@@ -12,6 +12,7 @@ from mgdd.io.angle_column import Angle, angle_of, at_the_speed_of_the_record, he
 from mgdd.io.column_names import Heading
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.io.cycles import Cycles, arranged
+from mgdd.io.encoder import on_even_angles
 from mgdd.io.pressure_checks import (
     MIN_SAMPLES,
     PRESSURE_UNITS,
@@ -67,10 +68,10 @@ class Record(NamedTuple):
 def cycles_of(table: Table, how: Reading) -> Record:
     """Read the cycles of one cylinder."""
     heads, samples = headings(table), None
-    if how.angle_step_deg is not None and len(set(table.lengths)) > 1:
-        samples = table.lengths[choose_pressure(table, heads, how.pressure_column, None)[0]]
+    if how.encoder is None and how.angle_step_deg is not None and len(set(table.lengths)) > 1:
+        samples = table.lengths[choose_pressure(table, heads, how.pressure_column)[0]]
     angle = angle_of(table, heads, how, samples=samples)
-    columns = choose_pressure(table, heads, how.pressure_column, angle.column)
+    columns = choose_pressure(table, heads, how.pressure_column, angle)
     return record_of(table, angle, pressure_of(table, heads, columns, how, angle), how)
 
 
@@ -110,7 +111,21 @@ def record_of(
 ) -> Record:
     """Cut a pressure into cycles, check it, and cut further channels (channel, column, sample) with it."""
     degrees, values, tdc, speed = angle.degrees, pressure.values, how.firing_tdc_deg, how.speed_rpm
-    notes = list(pressure.notes)
+    notes, rows, flagged = list(pressure.notes), table.lines, angle.turning is not None
+    if angle.turning is not None:
+        count, columns, samples = 0 if along is None else len(along), len(values), values.shape[1]
+        channels = values if along is None else np.concatenate([values[None], along]).reshape(-1, samples)
+        degrees, even, tdc = on_even_angles(
+            angle.turning,
+            channels,
+            step_deg=how.angle_step_deg,
+            tdc_deg=float(tdc or 0.0),
+            source=source or table.source,
+        )
+        values, flag = even[:columns], np.broadcast_to(even[-1], (1, columns, degrees.size))
+        along = np.concatenate([even[columns:-1].reshape(count, columns, degrees.size), flag])
+        speed, rows = angle.turning.speed_rpm, None
+        notes += angle.turning.notes
     if angle.made and tdc is None and degrees[-1] > 360.5:
         tdc = 0.0  # angle_start_deg is in °CA aTDC
     over_time = angle.made and how.angle_step_deg is None
@@ -127,7 +142,8 @@ def record_of(
         before_tdc=how.before_tdc,
         tdc_offset_cad=how.tdc_offset_cad,
         source=source or table.source,
-        rows=table.lines,
+        rows=rows,
+        flagged=flagged,
         level=pressure.level,
         unit_of_file=pressure.unit_of_file,
         over_time=over_time,
@@ -150,8 +166,12 @@ def checked(
     level: bool = True,
     unit_of_file: bool = False,
     over_time: bool = False,
+    flagged: bool = False,
 ) -> Record:
-    """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in."""
+    """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in.
+
+    Cycles in which the last channel of `along` is not 0 are left out, and the channel with them, where it is `flagged`.
+    """
     if not abs(tdc_offset_cad) <= _LARGEST_OFFSET_CAD:
         raise DataError.of("tdc_offset_cad", tdc_offset_cad, f"within ±{_LARGEST_OFFSET_CAD:g} °CA")
     cut = Cycles(degrees, values[None], np.arange(degrees.size))
@@ -160,6 +180,8 @@ def checked(
         place = Place(source, rows)
         together = cut.values if along is None else np.concatenate([cut.values, along])
         cut = arranged(degrees, together, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place)
+        if flagged:
+            cut = _without_flagged(cut, source)
         _check_turns(cut.degrees, cut.values[0], source)
         degrees, values = cut.degrees - tdc_offset_cad, cut.values[0]
         rows = place.only(cut.rows).rows
@@ -168,6 +190,23 @@ def checked(
     doubts = [*level_warning(angle, values, unit), *steep_warning(angle, bar)] if level else []
     doubts += phase_warnings(angle, np.atleast_2d(bar), over_time=over_time, source=source)
     return Record(angle, np.atleast_2d(bar), cut.values[1:], [*cut.notes, *doubts], cut.taken, cut.total)
+
+
+def _without_flagged(cut: Cycles, source: str) -> Cycles:
+    values, bad = cut.values[:-1], cut.values[-1].max(axis=1) > 0.0
+    if bad.all():
+        raise DataError(
+            f"{source}: in each of the {bad.size} cycle(s) the encoder's edges are miscounted: set the level of its "
+            "edges, or record it again"
+        )
+    if not bad.any():
+        return cut._replace(values=values)
+    numbers = ", ".join(str(k + 1) for k in np.flatnonzero(bad)[:8])
+    note = (
+        f"cycle {numbers}{', ...' if bad.sum() > 8 else ''} of {bad.size} left out: the encoder's edges are miscounted"
+    )
+    taken = tuple(int(k) for k in np.flatnonzero(~bad))
+    return cut._replace(values=values[:, ~bad], notes=(*cut.notes, note), taken=taken, total=bad.size)
 
 
 def _check_turns(degrees: NDArray[np.float64], rows: NDArray[np.float64], source: str) -> None:
@@ -189,17 +228,20 @@ def choose_pressure(
     table: Table,
     heads: Sequence[Heading],
     column: int | str | Sequence[int | str] | None,
-    angle: int | None,
+    crank: Angle | None = None,
 ) -> list[int]:
     """Return the columns of the cycles: those named, or all behind the angle that can be cycles by their header."""
+    beside = crank.columns if crank is not None else ()
+    angle = crank.column if crank is not None else None
     if column is not None:
         given = [column] if isinstance(column, int | str) else list(column)
         named = [table.index(one) for one in given]
-        if not named or len(set(named)) != len(named) or angle in named:
+        if not named or len(set(named)) != len(named) or set(beside) & set(named):
             raise DataError(f"{table.source}: pressure_column = {given}: give one or several columns beside the angle")
         return named
-    first = 0 if angle is None else angle + 1
-    possible = [i for i in range(first, table.width) if heads[i].quantity in (None, "pressure")]
+    first = 0 if angle is None or crank is None or crank.turning is not None else angle + 1
+    others = (i for i in range(first, table.width) if i not in beside)
+    possible = [i for i in others if heads[i].quantity in (None, "pressure")]
     if angle is not None:
         possible = [i for i in possible if table.lengths[i] == table.lengths[angle]]
     possible = [i for i in table.numeric(possible) if angle is not None or not _counts(table.numbers(i))]

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.column_names import check_choice
+from mgdd.io.column_names import TIME_UNITS, check_choice
+from mgdd.io.cycle_phase import CYCLE_DEG
+from mgdd.io.encoder import Encoder
 from mgdd.io.pressure_checks import PRESSURE_UNITS
 
-__all__ = ["ANGLE_UNITS", "TIME_UNITS", "Reading"]
+__all__ = ["ANGLE_UNITS", "Reading"]
 
-TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 ANGLE_UNITS = ("deg", "rad", *TIME_UNITS)
 
 
@@ -33,6 +34,7 @@ class Reading:
     speed_rpm: float | None
     gain_bar_per_v: float | None
     offset_bar: float | None
+    encoder: Encoder | None = None
 
     def __post_init__(self) -> None:
         if self.pressure_unit is not None:
@@ -49,11 +51,26 @@ class Reading:
                 "bar is what the pegging of the analysis finds"
             )
         for other, value in (("angle_column", self.angle_column), ("angle_unit", self.angle_unit)):
-            if self.angle_step_deg is not None and value is not None:
+            if self.encoder is None and self.angle_step_deg is not None and value is not None:
                 raise DataError(
                     f"{argument('angle_step_deg')} is for samples without an angle column, {argument(other)} for a "
                     "column: give one of them"
                 )
+        if self.encoder is not None:
+            self._check_encoder()
+
+    def _check_encoder(self) -> None:
+        given = {"angle_unit": self.angle_unit, "angle_start_deg": self.angle_start_deg, "speed_rpm": self.speed_rpm}
+        idle = next((name for name, value in given.items() if value is not None), "before_tdc")
+        if idle != "before_tdc" or self.before_tdc:
+            raise DataError(f"{argument(idle)} and {argument('encoder')} are two ways to an angle: leave one out")
+        if self.firing_tdc_deg is None:
+            raise DataError(
+                f"{argument('encoder')} says nothing of TDC: pass {argument('firing_tdc_deg', '')} with the angle of "
+                "TDC behind the mark of the turn, 0 to 360"
+            )
+        if not 0.0 <= self.firing_tdc_deg <= CYCLE_DEG:
+            raise DataError.of("firing_tdc_deg", self.firing_tdc_deg, "in [0, 720]")
 
 
 def _check_range(name: str, value: float | None, low: float, high: float) -> None:
