@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Cpp", "Outcome", "Python", "Runner", "fingerprint"]
 
 _PARTS = (
-    "cmake", "cpp", "docs", "python", "tests", "tools",
+    "cmake", "cpp", "docs", "notebooks", "python", "tests", "tools",
     "CMakeLists.txt", "CMakePresets.json", "pyproject.toml", "README.md", "references.bib", "CITATION.cff",
 )  # fmt: skip
 # Processor time, so that a busy machine kills no mutant: what the tests need without one, times this, and this more.

@@ -19,7 +19,17 @@ from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
-from mgdd.engine import Cylinder, Indicating, OperatingPoint, analyze, sensitivities, simulate, timing_sweep, trust
+from mgdd.engine import (
+    Cylinder,
+    Indicating,
+    OperatingPoint,
+    ThermalNo,
+    analyze,
+    sensitivities,
+    simulate,
+    timing_sweep,
+    trust,
+)
 from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
@@ -176,6 +186,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     **{f"datasets.read.{name}": lambda _, n=name: datasets.read(n) for name in NEEDS},
     "engine.Indicating.oscillation": lambda _: indicating().oscillation(np.ones((2, 361))),
     "engine.Indicating.record": lambda _: indicating().record(np.ones((2, 361))),
+    "engine.ThermalNo.cycle": lambda _: ThermalNo().cycle(simulate("puma_single"), "puma_single"),
     "engine.Trust.analysis": lambda _: trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144").analysis,
     "engine.Trust.dataset": lambda _: trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144").dataset,
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),

@@ -1,4 +1,4 @@
-// Binds engine/emissions.hpp: NOx proxy, NOx model, soft sensor and the fit to a sweep.
+// Binds engine/emissions.hpp and thermal_no.hpp: NOx proxy, NOx model, soft sensor, the fit to a sweep, thermal NO.
 #include <span>
 #include <string>
 #include <vector>
@@ -6,6 +6,7 @@
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/emissions.hpp"
+#include "mgdd/engine/thermal_no.hpp"
 #include "record_binding.hpp"
 
 namespace mgdd::bindings {
@@ -62,6 +63,24 @@ Examples
             return elementwise([&self](double x) { return self.arrhenius_ppm(x); }, t);
           },
           arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
+}
+
+py::dict thermal_no_of(const InputArray& angle, const InputArray& pressure, const InputArray& volume,
+                       const InputArray& temperature, const InputArray& burned, const Cylinder& cylinder,
+                       const OperatingPoint& point, const ThermalNo& model) {
+  const std::vector<double> a = to_column(angle, "crank_angle_cad"), p = to_column(pressure, "pressure_bar"),
+                            v = to_column(volume, "volume_l"), t = to_column(temperature, "temperature_k"),
+                            b = to_column(burned, "burned_fraction");
+  const ThermalNoCycle c = without_gil([&] { return thermal_no(a, p, v, t, b, cylinder, point, model); });
+  py::dict out;
+  out["nox_ppm"] = c.nox_ppm;
+  out["nox_g_per_kwh"] = c.nox_g_per_kwh;
+  out["lambda_global"] = c.lambda_global;
+  out["flame_max_k"] = c.flame_max_k;
+  out["no_ppm"] = to_array(c.no_ppm);
+  out["flame_k"] = to_array(c.flame_k);
+  out["unburned_k"] = to_array(c.unburned_k);
+  return out;
 }
 
 }  // namespace
@@ -185,6 +204,12 @@ Examples
         keywords["activation_temperature_stderr_k"] = self.activation_temperature_stderr_k;
         return representation("NoxFit", keywords);
       });
+
+  py::class_<ThermalNo> no(m, "ThermalNoModel");
+  bind_keywords<ThermalNo>(no, members_of(fields_of(ThermalNo{}), ThermalNo{}), [](ThermalNo made) { return made; });
+  m.def("thermal_no", &thermal_no_of, arg("crank_angle_cad"), arg("pressure_bar"), arg("volume_l"),
+        arg("temperature_k"), arg("burned_fraction"), arg("cylinder"), arg("point"), arg("model"),
+        "Thermal NO of one cycle.");
 
   m.def("fit_nox_proxy", &fit, arg("t_max_k"), arg("nox_ppm"), arg("map"), arg("reference_temperature_k"),
         "Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.");

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'at_even_angles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'encoder_angle', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'ThermalNoModel', 'TraceOptions', 'analyze', 'analyze_cycles', 'at_even_angles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'encoder_angle', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'thermal_no', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
@@ -677,6 +677,16 @@ class NoxFit:
         """
         Standard deviation of ln NOx about the fit [-].
         """
+class ThermalNoModel:
+    def __init__(self, *, lambda_burned: typing.SupportsFloat | typing.SupportsIndex = 1.1, mixing_time_ms: typing.SupportsFloat | typing.SupportsIndex = 2.0, intake_o2_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.209, hydrogen_to_carbon: typing.SupportsFloat | typing.SupportsIndex = 1.86, rates: str = 'hanson_salimian', calibration: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        """
+        lambda_burned : air over the need of the fuel where it burns; the one to fit
+        mixing_time_ms : in which burned gas takes on the bulk temperature [ms]
+        intake_o2_fraction : oxygen of the charge by volume; below air by burned gas
+        hydrogen_to_carbon : atoms of the fuel
+        rates : rate coefficients
+        calibration : factor on the result, to be fitted
+        """
 class PerformanceTerm:
     """
     One term of the performance J of a cycle.
@@ -945,6 +955,10 @@ def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, soi_cad: typi
 def start_of_injection(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     SOC to SOI.
+    """
+def thermal_no(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], volume_l: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], burned_fraction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, model: ThermalNoModel) -> dict:
+    """
+    Thermal NO of one cycle.
     """
 def volume_l(cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """

@@ -27,7 +27,7 @@ from mgdd.cli.output import Stopped, check_output, emit, lines
 from mgdd.cli.seek import add_seek
 from mgdd.cli.study import run_or_part
 from mgdd.cli.sweep import add_sweep
-from mgdd.engine import find_optimum, simulate, timing_sweep
+from mgdd.engine import ThermalNo, find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
 from mgdd.errors import ConvergenceError
 from mgdd.identify import best_timing, estimate_tdc, fit_cylinder
@@ -44,6 +44,10 @@ __all__ = ["add"]
 
 _TIMING = Options(simulate, "soc_cad")
 _SEARCH = Options(find_optimum, "objective", "bounds_cad")
+_NO = Options(
+    ThermalNo, "lambda_burned", "mixing_time_ms", "intake_o2_fraction", "hydrogen_to_carbon",
+    rates="no_rates", calibration="no_calibration",
+)  # fmt: skip
 _RANGED = ("soc_cad", "ca50_cad", "shift_cad", "gain_percent")
 
 
@@ -77,6 +81,9 @@ def _add_simulate(verbs: Any) -> None:
     )
     add_engine(parser)
     SCHEME.add(parser, "scheme")
+    group = parser.add_argument_group("thermal NO")
+    group.add_argument("--thermal-no", action="store_true", help="also NOx by the extended Zeldovich mechanism")
+    _NO.add(group)
 
 
 def _simulate(args: argparse.Namespace) -> None:
@@ -86,7 +93,13 @@ def _simulate(args: argparse.Namespace) -> None:
     if args.soi_cad is not None:
         timing["soc_cad"] = ignited_soc_cad(cylinder, point, soi_cad=args.soi_cad)
     scheme = SCHEME.of(args)
+    if not args.thermal_no:
+        refuse_idle(args, *_NO.options.values(), why="it is of --thermal-no: give that too")
     cycle = simulate(cylinder, point, **timing, **scheme)
+    if args.thermal_no:
+        with named_options(**_NO.options):
+            nox = ThermalNo(**_NO.given(args)).cycle(cycle, cylinder, point=point)
+        cycle = cycle.assign({name: nox[name] for name in nox.data_vars}).assign_attrs(cycle.attrs)
     scalars = {str(name): float(v) for name, v in cycle.data_vars.items() if v.ndim == 0}
     soi = reached_soi_cad(cylinder, point, **timing) if args.soi_cad is None else args.soi_cad
     known = {"soi_cad": soi, "motored": point.fuel_mg == 0.0}

@@ -9,8 +9,9 @@ from mgdd._core.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Perf
 from mgdd.engine.cycle import sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import ignition_delay
 from mgdd.engine.indicating import Indicating
-from mgdd.engine.nox import fit_nox_proxy
+from mgdd.engine.nox import fit_nox_proxy, nox_at_reference_humidity, nox_g_per_kwh
 from mgdd.engine.optimum import find_optimum
+from mgdd.engine.thermal_no import ThermalNo
 from mgdd.engine.trace import analyze
 from mgdd.engine.trust import Trust, trust
 
@@ -23,11 +24,14 @@ __all__ = [
     "Performance",
     "PerformanceTerm",
     "SoftSensor",
+    "ThermalNo",
     "Trust",
     "analyze",
     "find_optimum",
     "fit_nox_proxy",
     "ignition_delay",
+    "nox_at_reference_humidity",
+    "nox_g_per_kwh",
     "sensitivities",
     "simulate",
     "timing_sweep",

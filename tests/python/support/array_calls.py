@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,17 @@ import xarray as xr
 import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import Pid
-from mgdd.engine import Cylinder, Indicating, OperatingPoint, fit_nox_proxy, timing_sweep
+from mgdd.engine import (
+    Cylinder,
+    Indicating,
+    OperatingPoint,
+    ThermalNo,
+    fit_nox_proxy,
+    nox_at_reference_humidity,
+    nox_g_per_kwh,
+    simulate,
+    timing_sweep,
+)
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
@@ -156,6 +167,20 @@ def mapped_by_guide(fuel: Any) -> Any:
     return table.lookup({"fuel_mg": 21.0}).timing_cad
 
 
+def wheel(time: Any, signal: Any) -> Any:
+    return io.Encoder(teeth=4).angle(time, signal)["crank_angle_deg"].to_numpy()
+
+
+def no_factor(ppm: Any) -> Any:
+    cycles = [engine_cycle() for _ in ppm]
+    return [ThermalNo().fit(cycles, ppm, "puma_single").model.calibration]
+
+
+@cache
+def engine_cycle() -> xr.Dataset:
+    return simulate("puma_single", step_cad=5.0)
+
+
 def table(fuel: Any, timing: Any, sd: Any) -> CalibrationMap:
     return CalibrationMap({"fuel_mg": fuel}, timing, name="soc_cad", cells={"sd": sd})
 
@@ -189,7 +214,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "engine.Indicating.cycle": (lambda p: list(indicating(CRANK).cycle(p).values()), (BAR,)),
     "engine.Indicating.oscillation": (lambda p: indicating(CRANK).oscillation(p)["oscillation_bar"].to_numpy(), (BAR,)),
     "engine.Indicating.record": (lambda p: indicating(CRANK).record([p, p])["ca50_cad"].to_numpy(), (BAR,)),
+    "engine.nox_at_reference_humidity": (lambda ppm: nox_at_reference_humidity(ppm, 0.01), (PPM,)),
+    "engine.nox_g_per_kwh": (lambda ppm: nox_g_per_kwh(ppm, exhaust_kg_per_h=300.0, power_kw=50.0), (PPM,)),
     "engine.fit_nox_proxy": (lambda t, ppm: list(fit_nox_proxy(t, ppm).proxy.to_dict().values()), (KELVIN, PPM)),
+    "engine.ThermalNo.fit": (no_factor, (PPM[:2],)),
     "engine.timing_sweep": (
         lambda soc: timing_sweep(Cylinder(), OperatingPoint(), soc_cad=soc)["imep_gross_bar"].to_numpy(), (SOC,),
     ),
@@ -199,6 +227,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "guide.TimingMap.of_guide": (mapped_by_guide, (FUEL,)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
+    "io.Encoder.angle": (wheel, (np.arange(0.0, 0.4, 1e-3), np.sin(200.0 * np.arange(0.0, 0.4, 1e-3)))),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
