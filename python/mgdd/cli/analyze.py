@@ -35,7 +35,7 @@ _LOG = logging.getLogger(__name__)
 
 _ANALYSIS = Options(
     analyze, "heat_window_cad", "smoothing", "smoothing_width_cad", "smoothing_cutoff_hz", "fractions",
-    gamma="analysis_gamma", n_cylinders="cylinders",
+    "knock_band_hz", "knock_window_cad", "knock_threshold_bar", gamma="analysis_gamma", n_cylinders="cylinders",
 )  # fmt: skip
 _BRAKE = Options(analyze, "bmep_bar", "brake_torque_nm")
 # Columns of a record: what stands before and after the name of a figure.
@@ -45,6 +45,8 @@ _COLUMNS = {
     "COV [%]": ("cov_", "_percent"),
     "averaged cycle": ("cycle_mean_", ""),
 }
+# Figures of a record that a cycle does not have.
+_OF_RECORDS = ("lnv_", "ringing_", "tangential_", "knock_")
 
 
 def add_analyze(verbs: Any) -> None:
@@ -58,7 +60,7 @@ def add_analyze(verbs: Any) -> None:
     add_files(parser, nargs=1)
     group = parser.add_argument_group("analysis")
     PEGGING.add(group)
-    _ANALYSIS.add(group)
+    _ANALYSIS.add(group, knock_band_hz="4000 20000", knock_window_cad="-10 90")
     _BRAKE.add(group.add_mutually_exclusive_group())
     group.add_argument(
         "--tdc", action="store_true",
@@ -143,7 +145,9 @@ def _table(payload: dict[str, Any]) -> list[str | Table]:
         )
         for name in names
     )
-    said = {name: value for name, value in payload.items() if isinstance(value, str | int) or name.startswith("lnv_")}
+    said = {
+        name: value for name, value in payload.items() if isinstance(value, str | int) or name.startswith(_OF_RECORDS)
+    }
     return [lines(said), "", Table(columns=("figure", *_COLUMNS, "unit"), rows=rows)]
 
 

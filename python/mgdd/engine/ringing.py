@@ -1,0 +1,89 @@
+"""Ringing of a record of cycles: the spectrum of its pressure, the frequency that stands out, and who knocks."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["ringing"]
+
+# A peak rings where it stands this many times above both its shoulders, and above what noise reaches once in a hundred.
+_ABOVE, _BY_NOISE = 4.0, 0.01
+_SHOULDERS = ((0.75, 0.9), (1.1, 1.25))  # of its frequency
+_SHOWN = (0.5, 1.25)  # spectrum beyond the ends of the band
+_TAPER = 0.5  # of the window, half at each end: of the combustion 0.01 bar is left at 4 kHz
+_TANGENTIAL, _GAMMA, _J_PER_KGK = 1.841, 1.3, 287.05
+
+
+def ringing(
+    angle_cad: NDArray[np.float64],
+    pressure_bar: NDArray[np.float64],
+    scalars: dict[str, NDArray[np.float64]],
+    options: dict[str, Any],
+    *,
+    speed_rpm: float,
+    bore_mm: float,
+    threshold_bar: float | None,
+) -> tuple[dict[str, tuple[Any, ...]], dict[str, tuple[Any, ...]]]:
+    """Give figures of a record by name, and the spectrum of each cycle; neither where MAPO is not known."""
+    mapo = scalars["mapo_bar"]
+    figures: dict[str, tuple[Any, ...]] = {
+        "ringing_frequency_khz": ((), math.nan),
+        "tangential_mode_khz": ((), _tangential_khz(bore_mm, float(np.median(scalars["t_max_k"])))),
+    }
+    known = np.isfinite(mapo)
+    if threshold_bar is not None:
+        share = 100.0 * float(np.mean(mapo[known] > threshold_bar)) if known.any() else math.nan
+        figures["knock_share_percent"] = ((), share)
+    if not known.any():
+        return figures, {}
+    window_cad = (options["knock_from_cad"], options["knock_to_cad"])
+    khz, density, span_ms = _spectrum(angle_cad, pressure_bar, speed_rpm, window_cad)
+    low, high = 1e-3 * options["knock_low_hz"], 1e-3 * options["knock_high_hz"]
+    figures["ringing_frequency_khz"] = ((), _peak_khz(khz, density, (low, high), span_ms))
+    shown = (khz >= _SHOWN[0] * low) & (khz <= _SHOWN[1] * high)
+    name = "frequency_khz"
+    return figures, {name: (name, khz[shown]), "pressure_psd_bar2_per_khz": (("cycle", name), density[:, shown])}
+
+
+def _tangential_khz(bore_mm: float, kelvin: float) -> float:
+    """First tangential mode of a cylinder of gas (Draper 1938), of the air that the ringing intensity takes."""
+    return _TANGENTIAL * math.sqrt(_GAMMA * _J_PER_KGK * kelvin) / (math.pi * bore_mm)
+
+
+def _spectrum(
+    angle_cad: NDArray[np.float64], bar: NDArray[np.float64], speed_rpm: float, window_cad: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Frequencies [kHz], power spectral density [bar²/kHz] of each cycle, and the length of the window [ms]."""
+    from scipy.signal import periodogram
+
+    inside = (angle_cad >= window_cad[0] - 1e-9) & (angle_cad <= window_cad[1] + 1e-9)
+    per_ms = 6e-3 * speed_rpm / float(np.median(np.diff(angle_cad)))
+    count = int(np.count_nonzero(inside))
+    size = 2 ** math.ceil(math.log2(2 * count))
+    khz, density = periodogram(bar[:, inside], per_ms, window=("tukey", _TAPER), nfft=size, detrend="linear", axis=-1)
+    return khz, density, count / per_ms
+
+
+def _peak_khz(
+    khz: NDArray[np.float64], density: NDArray[np.float64], band_khz: tuple[float, float], span_ms: float
+) -> float:
+    """Highest peak of the mean spectrum in the band that stands out of both its shoulders; NaN where none does."""
+    from scipy.special import gammaincinv
+
+    n, mean = len(density), density.mean(axis=0)
+    apart = max((band_khz[1] - band_khz[0]) * span_ms, 1.0)  # frequencies that the window tells apart
+    above = max(_ABOVE, gammaincinv(n, 1.0 - _BY_NOISE / apart) / gammaincinv(n, 0.5))
+    peaks = 1 + np.flatnonzero((mean[1:-1] >= mean[:-2]) & (mean[1:-1] > mean[2:]))
+    peaks = peaks[(khz[peaks] > band_khz[0]) & (khz[peaks] < band_khz[1])]
+    for k in peaks[np.argsort(-mean[peaks])]:
+        shoulders = [mean[(khz >= low * khz[k]) & (khz <= high * khz[k])] for low, high in _SHOULDERS]
+        if all(side.size and mean[k] > above * np.median(side) for side in shoulders):
+            left, top, right = np.log(mean[k - 1 : k + 2])
+            return float(khz[k] + 0.5 * (left - right) / (left - 2.0 * top + right) * (khz[1] - khz[0]))
+    return math.nan
