@@ -62,6 +62,17 @@ def test_without_ringing_there_is_no_frequency(n: int, noise_bar: float) -> None
         assert np.isnan(figures(record(0.0, n=n, step_cad=step_cad, noise_bar=noise_bar))["ringing_frequency_khz"])
 
 
+def test_noise_of_few_cycles_passes_for_ringing_in_a_few_of_a_hundred_records_at_most() -> None:
+    rng = np.random.default_rng(8)
+    calm = record(0.0, n=2)
+    angle, rows = calm["crank_angle_cad"], calm["pressure_bar"].to_numpy()
+    noisy = (pressure_trace(angle, rows + rng.normal(0.0, 0.03, rows.shape)) for _ in range(100))
+    found = [
+        float(figures(trace.assign_attrs(speed_rpm=1400.0), traces=False)["ringing_frequency_khz"]) for trace in noisy
+    ]
+    assert np.count_nonzero(np.isfinite(found)) <= 3
+
+
 def test_ringing_outside_the_band_or_beyond_the_sampling_is_not_reported() -> None:
     trace = record(0.5)
     assert np.isnan(figures(trace, knock_band_hz=(8000.0, 20000.0))["ringing_frequency_khz"])

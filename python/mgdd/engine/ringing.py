@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ringing"]
 
-# A peak rings where it stands this many times above both its shoulders, and above what noise reaches once in a hundred.
-_ABOVE, _BY_NOISE = 4.0, 0.01
+# A peak must stand so many times above both its shoulders, and above what noise of a known level hardly reaches.
+_ABOVE, _BY_NOISE = 4.0, 0.001
 _SHOULDERS = ((0.75, 0.9), (1.1, 1.25))  # of its frequency
 _SHOWN = (0.5, 1.25)  # spectrum beyond the ends of the band
 _TAPER = 0.5  # of the window, half at each end: of the combustion 0.01 bar is left at 4 kHz
