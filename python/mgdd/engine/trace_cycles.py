@@ -65,7 +65,7 @@ def of_cycles(
     n = len(pressure)
     figures, spectrum = ringing(
         angle, pressure, scalars, options, speed_rpm=point.speed_rpm, bore_mm=cylinder.bore_mm,
-        threshold_bar=knock_threshold_bar,
+        threshold_bar=knock_threshold_bar, spectra=traces,
     )  # fmt: skip
     marks = burn_marks(scalars)
     unburnt = burn_warnings(marks)
@@ -78,7 +78,7 @@ def of_cycles(
             **{name: (CYCLE, values) for name, values in {**scalars, **marks}.items()},
             **scatter(scalars),
             **figures,
-            **(spectrum if traces else {}),
+            **spectrum,
             **{
                 f"cycle_mean_{name}": ((), v, *_label(name, "of the mean cycle")) for name, v in mean["scalars"].items()
             },
