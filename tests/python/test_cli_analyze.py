@@ -101,6 +101,28 @@ def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.Capt
     assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-4)
 
 
+def test_ringing_of_a_record_and_the_share_of_its_cycles_that_knock(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "record.csv"
+    runs = [simulate("puma_single", soc_cad=soc, step_cad=0.25) for soc in (-9.0, -6.0, -5.0, -2.0)]
+    angle = runs[0]["crank_angle_cad"].to_numpy()
+    ms = np.maximum(angle - 5.0, 0.0) / 9.0  # at 1500 rpm
+    ringing = np.exp(-ms) * np.sin(2.0 * np.pi * 6.5 * ms)
+    rows = [run["pressure_bar"] + size * ringing for run, size in zip(runs, (0.2, 0.6, 0.6, 0.6), strict=True)]
+    head = "angle,p_1,p_2,p_3,p_4"
+    np.savetxt(file, np.column_stack([angle, *rows]), delimiter=",", header=head, comments="", fmt="%.17g")
+    out = run_json(capsys, str(file), "--preset", "puma_single", "--knock-threshold-bar", "0.35")
+    assert out["ringing_frequency_khz"] == pytest.approx(6.5, rel=0.01)
+    assert out["knock_share_percent"] == 75.0
+    assert 5.0 < out["tangential_mode_khz"] < 7.0
+    high = run_json(capsys, str(file), "--preset", "puma_single", "--knock-band-hz", "8000", "17000")
+    assert high["ringing_frequency_khz"] is None
+    assert "knock_share_percent" not in high
+    assert main(["engine", "analyze", str(file), "--preset", "puma_single"]) == 0
+    assert "ringing_frequency_khz" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trace = datasets.read("hd_diesel_128x144")[1]

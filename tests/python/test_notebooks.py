@@ -15,6 +15,7 @@ import nbformat
 import pytest
 
 import mgdd
+from mgdd import datasets
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tools"))
@@ -33,11 +34,16 @@ def test_there_is_something_to_run() -> None:
     assert FENCE.search(PAGES[0].read_text(encoding="utf-8")), "README.md shows no Python"
 
 
+NEEDS = {"14_what_do_25000_cycles_teach.ipynb": "h2df_502"}  # a data set that is not in the package
+
+
 @pytest.mark.slow
 @pytest.mark.notebook
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
 def test_notebook_runs_and_prints_what_it_shows(path: Path, tmp_path: Path) -> None:
     """Words are the same, a number is off by one in its last digit at most; `tools/run_notebooks.py` renews both."""
+    if (needed := NEEDS.get(path.name)) and needed not in datasets.names():
+        pytest.skip(f"the data set {needed} is not at hand")
     shown, fresh = nbformat.read(path, as_version=4), run_notebooks.executed(path, tmp_path)
     for kept, new in zip(shown.cells, fresh.cells, strict=True):
         figures = [sum("image/png" in each.get("data", {}) for each in cell.get("outputs", [])) for cell in (kept, new)]

@@ -200,6 +200,8 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "pressure": (lambda: Drawn(simulate("puma_single")), ()),
     "pressure of cycles": (lambda: Drawn(analyze(pressures(), "puma_single", quiet=True)), ()),
     "cycles": (lambda: Drawn(record()), ("ca50_cad",)),
+    "spectrum of cycles": (lambda: Drawn(analysed()), ("pressure_psd_bar2_per_khz",)),
+    "map of cycles": (lambda: Drawn(analysed()), ("heat_release_net_j_per_cad",)),
     "holding_duty": (lambda: MADE["ExcitationCheck"](Path()), ()),
     "log_pv": (lambda: Drawn(simulate("puma_single")), ()),
     "throttle_run": (lambda: MADE["ExcitationCheck"](Path()), ()),
@@ -212,14 +214,21 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
 DRAWN_BY = {
     "convergence": convergence,
     "pressure of cycles": plot.pressure,
+    "spectrum of cycles": plot.cycles,
+    "map of cycles": plot.cycles,
     "response_diagnostics": response_diagnostics,
     "log_pv": partial(plot.pressure, log_pv=True),
 }
 
 
-def pressures() -> xr.Dataset:
-    runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0) for mg in (20.0, 0.0, 12.0, 21.0, 20.5)]
+def pressures(step_cad: float = 1.0) -> xr.Dataset:
+    fuels_mg = (20.0, 0.0, 12.0, 21.0, 20.5)
+    runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0, step_cad=step_cad) for mg in fuels_mg]
     return io.pressure_trace(runs[0]["crank_angle_cad"], [run["pressure_bar"] for run in runs])
+
+
+def analysed() -> xr.Dataset:
+    return analyze(pressures(step_cad=0.25), "puma_single", point={"speed_rpm": 1500.0}, quiet=True)
 
 
 def record() -> xr.Dataset:

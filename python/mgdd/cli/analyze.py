@@ -1,9 +1,10 @@
-"""`mgdd engine analyze`: one trace or a record of cycles."""
+"""`mgdd engine analyze`: pressure files, each one trace or a record of cycles, as numbers or as a page."""
 
 from __future__ import annotations
 
 import argparse
 import logging
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.from_library import Options
@@ -14,17 +15,21 @@ from mgdd.cli.options import (
     add_files,
     check_pegging,
     engine_of,
+    readers_of,
     refuse_idle,
-    traces_of,
 )
-from mgdd.cli.output import check_output, emit, lines
-from mgdd.engine import analyze
-from mgdd.errors import ParameterError
+from mgdd.cli.output import check_file, check_output, emit, error_of, lines, wrote
+from mgdd.engine import Cylinder, OperatingPoint, Trust, analyze, trust
+from mgdd.engine.trust import Check
+from mgdd.errors import DataError, ParameterError
 from mgdd.identify import estimate_tdc
 from mgdd.io.pressure import mean_cycle
+from mgdd.presets.preset import Preset
+from mgdd.report.page import write_page
+from mgdd.report.records import DRAWN_CYCLES, record_section
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
-from mgdd.studies.sections import Table
+from mgdd.studies.sections import Section, Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,9 +40,12 @@ _LOG = logging.getLogger(__name__)
 
 _ANALYSIS = Options(
     analyze, "heat_window_cad", "smoothing", "smoothing_width_cad", "smoothing_cutoff_hz", "fractions",
-    gamma="analysis_gamma", n_cylinders="cylinders",
+    "knock_band_hz", "knock_window_cad", "knock_threshold_bar", gamma="analysis_gamma", n_cylinders="cylinders",
 )  # fmt: skip
 _BRAKE = Options(analyze, "bmep_bar", "brake_torque_nm")
+_CHECKED = Options(trust, "pegging", "pegging_exponent", "inlet_pressure_kpa", "bmep_bar", "brake_torque_nm",
+                   n_cylinders="cylinders")  # fmt: skip
+_REFUSED = 2  # exit code where a file is refused
 # Columns of a record: what stands before and after the name of a figure.
 _COLUMNS = {
     "mean": ("", ""),
@@ -45,35 +53,42 @@ _COLUMNS = {
     "COV [%]": ("cov_", "_percent"),
     "averaged cycle": ("cycle_mean_", ""),
 }
+# Figures of a record that a cycle does not have.
+_OF_RECORDS = ("lnv_", "ringing_", "tangential_", "knock_")
 
 
 def add_analyze(verbs: Any) -> None:
     """Add the command."""
     parser = add_command(
         verbs, "analyze", _analyze,
-        help_text="analyse a measured pressure trace: pegging, heat release, burn angles, work",
+        help_text="analyse measured pressure, one file or many: pegging, heat release, burn angles, work; as a page",
         example="mgdd engine analyze mean.csv --preset hd_diesel_128x144 --pressure-unit Pa --json",
         endings=".json or .csv",
     )  # fmt: skip
-    add_files(parser, nargs=1)
+    add_files(parser, nargs="+")
     group = parser.add_argument_group("analysis")
     PEGGING.add(group)
-    _ANALYSIS.add(group)
+    _ANALYSIS.add(group, knock_band_hz="4000 20000", knock_window_cad="-10 90")
     _BRAKE.add(group.add_mutually_exclusive_group())
     group.add_argument(
         "--tdc", action="store_true",
         help="also estimate TDC, of a fired trace by calibrations over a scan of the angle (seconds), and doubt it",
     )  # fmt: skip
+    group.add_argument(
+        "--report", metavar="PAGE.html",
+        help="write a page that needs no network: of each file the checks, the figures and their pictures",
+    )  # fmt: skip
     add_engine(parser)
 
 
 def _analyze(args: argparse.Namespace) -> None:
-    check_output(args, ".json", ".csv")
+    several = len(args.files) > 1
+    check_output(args, ".json", *(() if several else (".csv",)))  # a CSV holds one file
+    check_file("--report", args.report, (".html",))
     cylinder, point, preset = engine_of(args)
     check_pegging(args)
     _check_analysis(args)
     refuse_idle(args, "fuel_mg", "burn", "burn_duration_cad", "ignition", why="an analysis takes no burn: leave it out")
-    (trace,) = traces_of(args)
     given = _ANALYSIS.given(args) | _BRAKE.given(args) | PEGGING.given(args)
     if args.gamma is not None:
         if args.analysis_gamma is not None:
@@ -81,6 +96,52 @@ def _analyze(args: argparse.Namespace) -> None:
         given["gamma"] = "cylinder"
     if args.intake_pressure_kpa is not None:
         given.setdefault("inlet_pressure_kpa", args.intake_pressure_kpa)
+    engine = (cylinder, point, preset)
+    step = args.progress.expect(len(args.files))
+    payloads: list[dict[str, Any]] = []
+    texts: list[str | Table] = []
+    sections: list[Section] = []
+    verdicts: list[str] = []
+    result = None
+    for file, read in readers_of(args).items():
+        step(f"analyse {Path(file).name}")
+        try:
+            trace = read()
+            own = given
+            if several and "cycle" not in trace.dims:  # the threshold is for the records among the files
+                own = {name: value for name, value in given.items() if name != "knock_threshold_bar"}
+            result, payload, text = _one(args, trace, engine, own)
+            checked = trust(trace, cylinder, point=point, **_CHECKED.given(args)) if args.report else None
+        except DataError as error:  # one that is refused does not stop the others
+            if not several and args.report is None:
+                raise
+            result, checked = None, Trust(Path(file).name, (Check("file", "fail", str(error)),))
+            payload = {"file": checked.file, "error": error_of(error, str(error))}
+            text = [f"{checked.file}: refused: {error}"]
+            _LOG.error("%s", error)
+            args.exit_code = _REFUSED
+        payloads.append(payload)
+        texts += [*text, ""]
+        if checked is not None and args.report:
+            traces = None if result is None else _drawn(trace, cylinder, point, own)
+            sections.append(record_section(checked, result, traces))
+            verdicts.append(_verdict(checked))
+    if args.report:
+        _write_report(args.report, sections, verdicts, preset)
+        texts.append(f"Report: {args.report}")
+    whole = {"files": payloads} if several else payloads[0]
+    if args.report:
+        whole["report"] = args.report
+    if result is not None and "cycles" in result.attrs:  # a CSV holds the figures of every cycle then
+        result = result[[name for name, v in result.data_vars.items() if v.dims == ("cycle",)]]
+    emit(args, whole, text=texts if args.report else texts[:-1], traces=result)
+
+
+def _one(
+    args: argparse.Namespace, trace: xr.Dataset, engine: tuple[Cylinder, OperatingPoint, Preset], given: dict[str, Any]
+) -> tuple[xr.Dataset, dict[str, Any], list[str | Table]]:
+    """Analyse one file: its figures, and what is printed of them."""
+    cylinder, point, preset = engine
     result = analyze(trace, cylinder, point=point, traces="cycle" not in trace.dims, **given)
     named = result.attrs["gamma"]
     if named == "cylinder":
@@ -94,19 +155,45 @@ def _analyze(args: argparse.Namespace) -> None:
         **{name: result.attrs[name] for name in ("fractions", "smoothing", "heat_window", "mass_source", "motored")},
         "warnings": result.attrs["warnings"].splitlines(),
     }
+    text: list[str | Table] = _table(payload) if "cycles" in payload else [lines(payload)]
     if args.tdc:
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
         payload["tdc"] = found.figures
         payload["warnings"] += found.doubts()
         for doubt in found.doubts():
             _LOG.warning("%s: %s", payload["file"], doubt)
-    if "cycles" in result.attrs:  # a CSV holds the figures of every cycle then
-        result = result[[name for name, v in result.data_vars.items() if v.dims == ("cycle",)]]
-    text: list[str | Table] = _table(payload) if "cycles" in payload else [lines(payload)]
-    if args.tdc:
         low, high = payload["tdc"]["low_cad"], payload["tdc"]["high_cad"]
         text.append(f"TDC offset {payload['tdc']['tdc_offset_cad']:+.2f} °CA, {low:+.2f} to {high:+.2f} possible")
-    emit(args, payload, text=text, traces=result)
+    return result, payload, text
+
+
+def _drawn(trace: xr.Dataset, cylinder: Cylinder, point: OperatingPoint, given: dict[str, Any]) -> xr.Dataset | None:
+    """Analyse with traces as many cycles as a picture shows; one cycle has its traces already."""
+    if "cycle" not in trace.dims:
+        return None
+    every = -(-trace.sizes["cycle"] // DRAWN_CYCLES)
+    return analyze(trace.isel(cycle=slice(None, None, every)), cylinder, point=point, quiet=True, **given)
+
+
+def _verdict(report: Trust) -> str:
+    """Name the worst of a file's checks."""
+    worst = ", ".join(check.name for check in report.checks if check.verdict == report.verdict)
+    return f"{report.file}: {report.verdict}" + ("" if report.verdict == "pass" else f" ({worst})")
+
+
+def _write_report(file: str, sections: list[Section], verdicts: list[str], preset: Preset) -> None:
+    """Write the page: what the checks came to first, then one section per file."""
+    c = preset.cylinder
+    geometry = f"{c.bore_mm:g} x {c.stroke_mm:g} mm, compression ratio {c.compression_ratio:g}"
+    write_page(
+        file,
+        "Measured pressure",
+        sections,
+        verdict=verdicts,
+        made_by="mgdd engine analyze",
+        facts={"Engine": f"{preset.name}, {geometry}"},
+    )
+    wrote(file)
 
 
 def _absolute(trace: xr.Dataset, offset_bar: float) -> xr.Dataset:
@@ -143,7 +230,9 @@ def _table(payload: dict[str, Any]) -> list[str | Table]:
         )
         for name in names
     )
-    said = {name: value for name, value in payload.items() if isinstance(value, str | int) or name.startswith("lnv_")}
+    said = {
+        name: value for name, value in payload.items() if isinstance(value, str | int) or name.startswith(_OF_RECORDS)
+    }
     return [lines(said), "", Table(columns=("figure", *_COLUMNS, "unit"), rows=rows)]
 
 

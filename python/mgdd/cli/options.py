@@ -16,6 +16,7 @@ from mgdd.cli.from_library import Options, as_option
 from mgdd.engine import analyze, simulate
 from mgdd.errors import ParameterError, hinted
 from mgdd.io import Encoder, read_pressure
+from mgdd.io.files import existing_file
 from mgdd.io.point_table import CONDITIONS, conditions_of
 from mgdd.presets.preset import Preset
 
@@ -217,6 +218,8 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
     """Give for each pressure file what reads it, so that one which is refused does not stop the others."""
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
+    for file in args.files:
+        existing_file(file)
     rows = conditions_of(args.files, args.conditions)
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
 

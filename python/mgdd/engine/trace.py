@@ -42,6 +42,7 @@ def analyze(
     smoothing_cutoff_hz: float = 3000.0,
     knock_band_hz: tuple[float, float] = (4000.0, 20000.0),
     knock_window_cad: tuple[float, float] = (-10.0, 90.0),
+    knock_threshold_bar: float | None = None,
     bmep_bar: float | None = None,
     brake_torque_nm: float | None = None,
     n_cylinders: int = 1,
@@ -94,6 +95,8 @@ def analyze(
         Band of the pressure oscillation [Hz], as in `Indicating`.
     knock_window_cad : tuple of float
         Where it is looked for [°CA aTDC].
+    knock_threshold_bar : float, optional
+        Of MAPO [bar]: a cycle of a record above it knocks.
     bmep_bar : float, optional
         Measured brake mean effective pressure [bar]. A cycle whose gross IMEP cannot reach it is refused; one that is
         too near to it, or too far, is doubted.
@@ -122,7 +125,12 @@ def analyze(
 
         Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand mean,
         deviation, percentiles and COV, ``misfire`` and ``partial_burn`` as `Indicating.record` gives them,
-        ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored`` counts cycles.
+        ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored`` counts cycles. The spectrum
+        ``pressure_psd_bar2_per_khz`` of each cycle in the knock window stands over ``frequency_khz``;
+        ``ringing_frequency_khz`` is where the mean of the spectra has its highest peak in the knock band, NaN where
+        none is four times as high as its surroundings (or more where few cycles leave much to noise). Beside it
+        stand ``tangential_mode_khz``, 1.841 c/(pi bore) with the speed of sound c of air at ``t_max_k``, and with
+        `knock_threshold_bar` ``knock_share_percent``.
 
     Raises
     ------
@@ -135,7 +143,7 @@ def analyze(
     References
     ----------
     Heywood (1988), chapter 9; Krieger and Borman (1966); Randolph (1990); Brunt and Pond (1997); Savitzky and Golay
-    (1964).
+    (1964); Draper (1938).
 
     Examples
     --------
@@ -184,6 +192,8 @@ def analyze(
         "knock_from_cad": knock_window_cad[0],
         "knock_to_cad": knock_window_cad[1],
     }
+    if knock_threshold_bar is not None and not knock_threshold_bar > 0.0:
+        raise ParameterError.of("knock_threshold_bar", knock_threshold_bar, "> 0 bar")
     attrs = {
         "file": trace.attrs.get("file", "trace"),
         "method": pegging,
@@ -194,7 +204,9 @@ def analyze(
     given = "given" if heat_window_cad else "whole" if simulated else None
     try:
         if is_of_cycles(trace):
-            result = of_cycles(trace, cylinder, own, options, attrs, given, traces=traces)
+            result = of_cycles(trace, cylinder, own, options, attrs, given, knock_threshold_bar, traces=traces)
+        elif knock_threshold_bar is not None:
+            raise ParameterError("knock_threshold_bar is for a record of cycles, and this is one cycle: leave it out")
         elif traces:
             result = _one(trace, cylinder, own, options, attrs, given)
         else:

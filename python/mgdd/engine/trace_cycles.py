@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.engine.ringing import ringing
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def of_cycles(
     options: dict[str, Any],
     attrs: dict[str, Any],
     given: str | None,
+    knock_threshold_bar: float | None,
     *,
     traces: bool = True,
 ) -> xr.Dataset:
@@ -61,6 +63,10 @@ def of_cycles(
         columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in COLUMNS}
     scalars = raw["scalars"]
     n = len(pressure)
+    figures, spectrum = ringing(
+        angle, pressure, scalars, options, speed_rpm=point.speed_rpm, bore_mm=cylinder.bore_mm,
+        threshold_bar=knock_threshold_bar, spectra=traces,
+    )  # fmt: skip
     marks = burn_marks(scalars)
     unburnt = burn_warnings(marks)
     lines = [*raw["warnings"], *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
@@ -71,6 +77,8 @@ def of_cycles(
             CYCLE: (CYCLE, trace[CYCLE].values if CYCLE in trace.coords else np.arange(1, n + 1)),
             **{name: (CYCLE, values) for name, values in {**scalars, **marks}.items()},
             **scatter(scalars),
+            **figures,
+            **spectrum,
             **{
                 f"cycle_mean_{name}": ((), v, *_label(name, "of the mean cycle")) for name, v in mean["scalars"].items()
             },
@@ -81,6 +89,7 @@ def of_cycles(
             "mass_source": raw["mass_source"],
             "heat_window": given or ("found" if any(raw["window_found"]) else "no burn found"),
             "cycles": n,
+            "knock_band_hz": (options["knock_low_hz"], options["knock_high_hz"]),
             "motored": int(sum(raw["motored"])),
             "warnings": "\n".join(lines),
             "doubts": "\n".join(kinds),

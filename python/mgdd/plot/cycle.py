@@ -25,6 +25,7 @@ _RATES = {
     "heat_release_net_j_per_cad": ("-.", ORANGE),
     "heat_release_gross_j_per_cad": (":", ORANGE),
 }
+_ANGLES = ("ca10_cad", "ca50_cad", "ca90_cad")
 # The windows in which the exponents are fitted, °CA aTDC.
 _WINDOWS = {"n_compression": (-100.0, -40.0), "n_expansion": (60.0, 120.0)}
 _SLOPE_STYLES = {"n_compression": ("o--", BLUE), "n_expansion": ("s-.", ORANGE)}
@@ -38,8 +39,8 @@ def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | N
     dataset : xarray.Dataset or Result
         ``pressure_bar(crank_angle_cad)`` [bar, °CA aTDC] of a measured trace, of `mgdd.engine.simulate` or of
         `mgdd.engine.analyze`; of a record of cycles the mean is drawn over the cloud of the single ones, with the band
-        from their 5th to their 95th percentile. Heat release rates [J/°CA] go to a twin axis,
-        ``motored_pressure_bar`` is dashed.
+        from their 5th to their 95th percentile. Heat release rates [J/°CA] go to a twin axis, with CA10, CA50 and CA90
+        on the first of them, ``motored_pressure_bar`` is dashed.
     log_pv : bool
         Over ``volume_l`` [L] instead, which `mgdd.engine.analyze` and `mgdd.engine.simulate` give, on logarithmic axes.
         ``n_compression`` and ``n_expansion`` [-], where present, are drawn as lines through the mean of their windows
@@ -70,7 +71,7 @@ def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | N
     """
     if log_pv:
         return _log_pv(dataset, ax)
-    optional, made_by = ("motored_pressure_bar", *_RATES), "mgdd.io.read_pressure or mgdd.engine.simulate"
+    optional, made_by = ("motored_pressure_bar", *_RATES, *_ANGLES), "mgdd.io.read_pressure or mgdd.engine.simulate"
     dataset = require("dataset", dataset, (ANGLE, "pressure_bar"), made_by, optional)
     rates = [name for name in _RATES if name in dataset]
     ax = new_axes(ax)
@@ -88,6 +89,12 @@ def pressure(dataset: xr.Dataset | Result, *, log_pv: bool = False, ax: Axes | N
             dash, color = _RATES[name]
             label = label_of(dataset[name]).long_name
             lines += twin.plot(angle, dataset[name], dash, color=color, linewidth=1.2, label=label)
+        if all(name in dataset and np.isfinite(dataset[name]) for name in _ANGLES):
+            burn = np.array([float(dataset[name]) for name in _ANGLES])
+            text = minus(f"CA10, CA50, CA90: {burn[0]:.1f}, {burn[1]:.1f}, {burn[2]:.1f} °CA")
+            lines += twin.plot(
+                burn, np.interp(burn, angle, dataset[rates[0]]), "o", color=ORANGE, markersize=4, label=text
+            )
         twin.set_ylabel(axis_label(dataset, rates[0]) if len(rates) == 1 else "heat release rate [J/°CA]")
     return finished(ax, dataset, ANGLE, "pressure_bar", lines, grid=False)
 

@@ -1,4 +1,4 @@
-"""Many cycles: the cloud of their pressures, and a figure of theirs from cycle to cycle."""
+"""Many cycles: the cloud of their pressures, a figure from cycle to cycle, traces as a map, and their spectrum."""
 
 from __future__ import annotations
 
@@ -7,11 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, beside, legend, new_axes, require
+from mgdd.plot.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREY,
+    ORANGE,
+    axis_label,
+    beside,
+    finished,
+    legend,
+    new_axes,
+    require,
+)
 from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
@@ -22,6 +35,9 @@ __all__ = ["CYCLE", "cloud", "cycles"]
 CYCLE = "cycle"
 _LINES = 60  # of a cloud; the band says the rest
 _MARKS = {"misfire": ("x", ORANGE), "partial_burn": ("+", BLUE)}
+_FREQUENCY = "frequency_khz"
+_RINGING, _MODE = "ringing_frequency_khz", "tangential_mode_khz"
+_BURN = (-40.0, 100.0)  # °CA aTDC of a map; the cycles do not differ elsewhere
 
 
 def cloud(ax: Axes, dataset: xr.Dataset) -> list[Line2D]:
@@ -36,27 +52,29 @@ def cloud(ax: Axes, dataset: xr.Dataset) -> list[Line2D]:
 
 
 def cycles(dataset: xr.Dataset | Result, figure: str = "imep_gross_bar", *, ax: Axes | None = None) -> Axes:
-    """Draw a figure of a record from cycle to cycle, its histogram, and each value over the one before it.
+    """Draw a figure of a record from cycle to cycle, with histogram and return map; or its traces, or their spectrum.
 
     Parameters
     ----------
     dataset : xarray.Dataset or Result
-        Figures over ``cycle``, of `mgdd.engine.analyze` or `mgdd.engine.Indicating.record`. Misfires and partial burns
-        are marked.
+        Of `mgdd.engine.analyze` or `mgdd.engine.Indicating`. Misfires and partial burns are marked.
     figure : str
-        Which one.
+        What is drawn: a figure over ``cycle`` from cycle to cycle, beside it its histogram and each value over the one
+        before; a trace over ``cycle`` and ``crank_angle_cad`` as colours, of ``pressure_bar`` what it differs from the
+        mean cycle; ``pressure_psd_bar2_per_khz`` as mean and band of the cycles, with the knock band, the frequency
+        of ringing and the first tangential mode.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
     Returns
     -------
     matplotlib.axes.Axes
-        The axes over the cycle; histogram and return map stand beside it.
+        The axes; histogram and return map, or the colour bar, stand beside it.
 
     Raises
     ------
     DataError
-        No such figure, not over ``cycle`` alone, or none of its values is a number.
+        No such figure, not over ``cycle`` alone or with angle or frequency, or none of its values is a number.
 
     Examples
     --------
@@ -69,10 +87,15 @@ def cycles(dataset: xr.Dataset | Result, figure: str = "imep_gross_bar", *, ax: 
     ('engine cycle', 'CA50, angle of 50 % heat released [°CA aTDC]')
     """
     made_by = "mgdd.engine.analyze or Indicating.record"
-    dataset = require("dataset", dataset, (CYCLE, figure), made_by, tuple(_MARKS))
+    dataset = require("dataset", dataset, (CYCLE, figure), made_by, (*_MARKS, _RINGING, _MODE))
+    if set(dataset[figure].dims) == {CYCLE, ANGLE}:
+        return _map(dataset, figure, new_axes(ax, height=4.4))
+    if set(dataset[figure].dims) == {CYCLE, _FREQUENCY}:
+        return _spectrum(dataset, figure, new_axes(ax))
     if dataset[figure].dims != (CYCLE,):
         over = ", ".join(map(str, dataset[figure].dims)) or "nothing"
-        raise DataError(f"{figure} is over {over}: a figure over {CYCLE} alone is drawn; of several cylinders take one")
+        alone = f"over {CYCLE} alone, or with {ANGLE} or {_FREQUENCY}"
+        raise DataError(f"{figure} is over {over}: a figure {alone} is drawn; of several cylinders take one")
     cycle, values = dataset[CYCLE].to_numpy(), dataset[figure].to_numpy()
     known = values[np.isfinite(values)]
     if not known.size:
@@ -100,3 +123,56 @@ def cycles(dataset: xr.Dataset | Result, figure: str = "imep_gross_bar", *, ax: 
     ax.grid(alpha=0.3)
     legend(ax, lines, columns=1)
     return ax
+
+
+def _map(dataset: xr.Dataset, figure: str, ax: Axes) -> Axes:
+    """Draw a trace of every cycle as a row of colours; of pressure what it differs from the mean cycle."""
+    angle, cycle = dataset[ANGLE].to_numpy(), dataset[CYCLE].to_numpy()
+    rows = dataset[figure].transpose(CYCLE, ANGLE).to_numpy()
+    label = label_of(dataset[figure])
+    name = label.long_name
+    if figure == "pressure_bar":
+        rows, name = rows - rows.mean(axis=0), f"{name} less its mean"
+    shown = (angle >= _BURN[0]) & (angle <= _BURN[1])
+    shown = shown if np.count_nonzero(shown) > 1 else np.full(angle.size, True)
+    rows, angle = rows[:, shown], angle[shown]
+    if not np.isfinite(rows).any():
+        raise DataError(f"{figure}: none of the {cycle.size} cycles has this trace between these angles")
+    low, high = np.nanpercentile(rows, (0.5, 99.5))
+    if figure == "pressure_bar":
+        low, high = min(low, -high), max(high, -low)  # zero in the middle
+    drawn = ax.pcolormesh(angle, cycle, rows, cmap=COLOURS, vmin=low, vmax=high, shading="nearest", rasterized=True)
+    bar = ax.figure.colorbar(drawn, ax=ax, extend="both")
+    bar.set_label(f"{name} [{label.units}]")
+    lines: list[Artist] = []
+    for mark, (marker, color) in _MARKS.items():
+        if mark in dataset and (at := dataset[mark].to_numpy().astype(bool)).any():
+            text = f"{label_of(dataset[mark]).long_name}: {np.count_nonzero(at)} cycles"
+            there = np.full(np.count_nonzero(at), angle[-1])
+            lines += ax.plot(there, cycle[at], marker, color=color, clip_on=False, label=text)
+    ax.set(xlabel=axis_label(dataset, ANGLE), ylabel="engine cycle")
+    if lines:
+        legend(ax, lines)
+    return ax
+
+
+def _spectrum(dataset: xr.Dataset, figure: str, ax: Axes) -> Axes:
+    """Draw mean and band of the cycles' spectra, with the band, the frequency and the mode that belong to them."""
+    khz, density = dataset[_FREQUENCY].to_numpy(), dataset[figure].transpose(CYCLE, _FREQUENCY).to_numpy()
+    low, high = np.percentile(density, (5.0, 95.0), axis=0)
+    mean = density.mean(axis=0)
+    cloud = ax.fill_between(khz, low, high, color=BLUE, alpha=0.25, linewidth=0.0, label="5th to 95th percentile")
+    lines: list[Artist] = [*ax.plot(khz, mean, "-", color=BLACK, linewidth=1.2, label=f"mean of {len(density)} cycles")]
+    lines.append(cloud)
+    for edge in dataset.attrs.get("knock_band_hz", ()):
+        ends = ax.axvline(1e-3 * edge, color=GREY, linewidth=1.0, linestyle="--", label="ends of the knock band")
+        lines[2:] = [ends]
+    at = {name: float(dataset[name]) for name in (_RINGING, _MODE) if name in dataset and np.isfinite(dataset[name])}
+    text = {name: f"{label_of(dataset[name]).long_name}: {where:.2f} kHz" for name, where in at.items()}
+    if _MODE in at:
+        lines.append(ax.axvline(at[_MODE], color=ORANGE, linewidth=1.2, linestyle="-.", label=text[_MODE]))
+    if _RINGING in at:
+        top = float(np.interp(at[_RINGING], khz, mean))
+        lines += ax.plot(at[_RINGING], top, "v", color=BLACK, markersize=7, label=text[_RINGING])
+    ax.set(yscale="log", xlim=(float(khz[0]), float(khz[-1])))
+    return finished(ax, dataset, _FREQUENCY, figure, lines)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, COLOURS, GREY, ORANGE, axis_label, legend, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["map_cells", "map_contour"]
 
 _MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.read"
-_COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
 # Beside a value in its cell; what is not named here needs no mark.
 _MARKS = {
     "predicted": "p", "extrapolated": "e", "interpolated": "i", "held": "h", "learned": "l",
@@ -86,7 +85,7 @@ def map_contour(
     ax = new_axes(ax, height=4.4)
     values = data[variable].transpose(y, x).to_numpy()
     lines: list[Artist] = []
-    filled = ax.contourf(data[x], data[y], values, levels=_levels(values, levels), cmap=_COLOURS, extend="both")
+    filled = ax.contourf(data[x], data[y], values, levels=_levels(values, levels), cmap=COLOURS, extend="both")
     drawn = ax.contour(data[x], data[y], values, levels=filled.levels, colors=BLACK, linewidths=0.6)
     ax.clabel(drawn, fmt="%g", fontsize="small")
     bar = ax.figure.colorbar(filled, ax=ax)
@@ -150,7 +149,7 @@ def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axe
     ax = new_axes(ax, height=4.6)
     values = data[own].transpose(x, y).to_numpy()
     widest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 1.0
-    how: dict[str, Any] = {"cmap": _COLOURS}
+    how: dict[str, Any] = {"cmap": COLOURS}
     if own == "difference":  # of two maps: zero in the middle
         how = {"cmap": "PuOr", "vmin": -widest, "vmax": widest}
     image = ax.imshow(values.T, origin="lower", aspect="auto", **how)

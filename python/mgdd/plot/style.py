@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BLACK",
     "BLUE",
+    "COLOURS",
     "GREEN",
     "GREY",
     "LINE_STYLES",
@@ -40,6 +41,7 @@ __all__ = [
 
 # Okabe and Ito's palette: apart for colour-blind eyes, and of different lightness in print.
 BLACK, BLUE, ORANGE, GREEN, GREY = "#000000", "#0072B2", "#D55E00", "#009E73", "#777777"
+COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
 LINE_STYLES: tuple[tuple[str, str], ...] = (
     ("-", BLACK),
     ("--", BLUE),

@@ -1,4 +1,4 @@
-"""A study as one self-contained HTML page, with its summary as JSON beside it."""
+"""One self-contained HTML page: of a study, with its summary as JSON beside it, or of any sections."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
 from mgdd.errors import DataError
+from mgdd.io.files import write_whole_text
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.registry import available_studies
 from mgdd.studies.sections import as_number
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from mgdd.studies.base import StudyResult
     from mgdd.studies.sections import Section
 
-__all__ = ["write_report"]
+__all__ = ["write_page", "write_report"]
 
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
@@ -77,43 +78,71 @@ def write_report(
     return folder / "index.html"
 
 
-def _page(result: StudyResult, *, interactive: bool) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+def write_page(
+    file: str | os.PathLike[str],
+    title: str,
+    sections: Sequence[Section],
+    *,
+    verdict: Sequence[str],
+    made_by: str,
+    facts: Mapping[str, str],
+) -> None:
+    """Write sections as one page, whole or not at all; `facts` stand behind the date and what made it."""
+    first, last = _first_and_last_fact(made_by)
+    page = _rendered(
+        title=title,
+        verdict=verdict,
+        facts=[first, *facts.items(), last],
+        sections=[_section(section, interactive=False) for section in sections],
+    )
+    write_whole_text(file, page)
 
+
+def _page(result: StudyResult, *, interactive: bool) -> str:
     script = ""
     if interactive:
         from mgdd.results.interactive import plotly_script
 
         script = plotly_script()
-    loader = PackageLoader("mgdd.report", "templates")
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    style, _, _ = loader.get_source(environment, "style.css")
     title = result.title or available_studies().get(result.name, result.name)
-    return environment.get_template("page.html").render(
+    first, last = _first_and_last_fact(f"study {result.name}")
+    return _rendered(
         title=title[:1].upper() + title[1:],
-        style=style,
         verdict=result.verdict,
         interrupted=bool(result.summary.get("interrupted")),
-        facts=list(_facts(result)),
+        facts=[first, *_inputs(result.summary), last],
         # What is seen at a glance stands before what is looked up.
         sections=sorted(
             (_section(section, interactive=interactive) for section in result.sections),
             key=lambda section: not section["figures"],
         ),
         script=script,
-        short=_SHORT,
+        numbers=" The numbers stand in summary.json beside this page.",
     )
 
 
-def _facts(result: StudyResult) -> Iterator[tuple[str, str]]:
-    """Give date, inputs and versions behind a page."""
-    yield "Written", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, study {result.name}"
+def _rendered(*, interrupted: bool = False, script: str = "", numbers: str = "", **parts: Any) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("mgdd.report", "templates")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
+    style, _, _ = loader.get_source(environment, "style.css")
+    page = environment.get_template("page.html")
+    return page.render(style=style, short=_SHORT, interrupted=interrupted, script=script, numbers=numbers, **parts)
+
+
+def _inputs(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name, head in _INPUTS.items():
-        if value := result.summary.get(name):
+        if value := summary.get(name):
             pairs = value.items() if isinstance(value, Mapping) else ()
             yield head, ", ".join(f"{key} {as_number(own)}" for key, own in pairs) or str(value)
+
+
+def _first_and_last_fact(made_by: str) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Give date and versions behind a page."""
     others = ", ".join(f"{name} {metadata.version(name)}" for name in _VERSIONS)
-    yield "Versions", f"mgdd {__version__}, Python {platform.python_version()}, {others}"
+    written = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {made_by}"
+    return ("Written", written), ("Versions", f"mgdd {__version__}, Python {platform.python_version()}, {others}")
 
 
 def _section(section: Section, *, interactive: bool) -> dict[str, Any]:
