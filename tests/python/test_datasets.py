@@ -120,6 +120,26 @@ def test_only_what_a_reader_reads_is_available(monkeypatch, tmp_path):
     assert datasets.names() == ("emps", NAME)
 
 
+def test_the_tanks_are_sampled_every_four_seconds(monkeypatch, tmp_path):
+    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
+    (tmp_path / "cascaded_tanks").mkdir()
+    rows = '"uEst","uVal","yEst","yVal","Ts",\n3.2,0.9,5.2,4.9,4,\n3.3,1.0,5.3,4.8,,\n3.4,1.1,5.4,4.7,,\n'
+    (tmp_path / "cascaded_tanks" / "dataBenchmark.csv").write_text(rows)
+    first, second = datasets.read("cascaded_tanks")
+    assert first["time_s"].values.tolist() == second["time_s"].values.tolist() == [0.0, 4.0, 8.0]
+    assert (first["pump_v"].values[1], second["level_v"].values[2]) == (3.3, 4.7)
+
+
+def test_another_export_of_the_hydrogen_engine_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
+    (tmp_path / "h2df_502").mkdir()
+    (tmp_path / "h2df_502" / datasets.files.FILES["h2df_502"][0]).write_text("cycle\n1\n2\n")
+    with pytest.raises(DataError, match="the file is another export; pass checked=False"):
+        datasets.read("h2df_502")
+    with pytest.raises(DataError, match="no column"):
+        datasets.read("h2df_502", checked=False)
+
+
 def test_a_data_folder_that_is_not_there_is_no_obstacle(monkeypatch, tmp_path):
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "nowhere"))
     assert datasets.names() == (NAME,)

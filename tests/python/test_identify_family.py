@@ -163,6 +163,8 @@ def test_the_residual_of_a_fired_trace_finds_tdc(offset: float) -> None:
     assert found.low_cad <= offset <= found.high_cad
     assert found.suspect == (offset != 0.0)
     check_labels(found.dataset)
+    scan = found.dataset["tdc_offset_cad"].to_numpy()
+    np.testing.assert_allclose([scan[0], scan[-1]], [-2.0, 2.0])
 
 
 def test_the_peak_of_a_motored_trace_finds_tdc() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import itertools
 import json
 import re
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from mgdd import datasets
 from mgdd.cli import main
@@ -44,6 +46,23 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
+def unlabelled(figure: Figure) -> list[str]:
+    """Name axes of numbers without a label of their own, of their row or column, of a shared axis, or of the figure."""
+    figure.canvas.draw()
+    drawn = [axes for axes in figure.axes if axes.has_data() and axes.axison and axes.get_label() != "<colorbar>"]
+    missing = []
+    for axes, way in itertools.product(drawn, "xy"):
+        side = (lambda each: each.get_position().x0) if way == "x" else (lambda each: each.get_position().y0)
+        row = [each for each in figure.axes if abs(side(each) - side(axes)) < 0.01]
+        row += getattr(axes, f"get_shared_{way}_axes")().get_siblings(axes)
+        ticks = [tick.get_text() for each in row for tick in getattr(each, f"get_{way}ticklabels")()]
+        names = any(re.search("[A-Za-z]", text.replace("mathdefault", "")) for text in ticks)
+        label = getattr(figure, f"get_sup{way}label")() or any(getattr(each, f"get_{way}label")() for each in row)
+        if not (label or names):
+            missing.append(f"{way} of {axes.get_title(loc='left') or axes}")
+    return missing
+
+
 DEAR = {
     "calibrated-guide", "guide-accuracy", "guided-transients", "identification-benchmarks", "model-validation",
     "throttle-pseudo-wiener",
@@ -68,8 +87,9 @@ def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Call
     assert page.count["h1"] == 1
     assert page.count["h2"] == len(result.sections)
     assert page.count["table"] >= 1
-    for caption in result.figures:
+    for caption, figure in result.figures.items():
         assert caption in html.unescape(text)
+        assert unlabelled(figure) == [], caption
     summary = json.loads((file.parent / "summary.json").read_text(encoding="utf-8"))
     assert summary["study"] == name
     # The answer comes first, and every long table is behind a fold.

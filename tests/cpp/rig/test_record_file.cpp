@@ -197,6 +197,22 @@ TEST_F(RecordFile, SamplesWhoseNamesAreLostAreKept) {
   EXPECT_EQ(all.tables[1].monotonic_ns.size(), 10u);
 }
 
+// With a checksum that fits: what a writer got wrong, or somebody made.
+TEST_F(RecordFile, ANameLongerThanItsRecordIsDamage) {
+  write_all();
+  Bytes bad = bytes_of(path_);
+  const std::size_t at = header_head + header.json.size() + 4;  // the names of the first table
+  const std::size_t size = bad[at] + 256u * bad[at + 1];
+  bad[at + record_head + body_head + 1] = 0xEA;  // their first length
+  const std::uint32_t sum = crc32(std::span(bad).subspan(at + record_head, size));
+  for (std::size_t i = 0; i < 4; ++i)
+    bad[at + 4 + i] = static_cast<std::uint8_t>(sum >> 8 * i);
+  put(path_, bad);
+  const std::string target = (folder_ / "mended.rec").string();
+  repair_record(path_, target);
+  EXPECT_EQ(read(target).tables[1].name, "table_0");
+}
+
 TEST_F(RecordFile, ZerosBehindAPowerFailureAreNoRecords) {
   write_all();
   Bytes bytes = bytes_of(path_);

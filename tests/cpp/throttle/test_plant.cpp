@@ -193,5 +193,23 @@ TEST(ThrottlePlant, TheSpanFallsWithTheFrequency) {
   }
 }
 
+// On both sides of limp-home, where the spring pulls the other way: between the two duties it holds, beyond it moves.
+TEST(ThrottlePlant, HeldPlateMovesBeyondItsBreakawayDuties) {
+  Throttle p;
+  p.backlash = Backlash::none;
+  for (const double angle : {3.0, 30.0, 60.0}) {
+    const DrivenThrottle rest(p, angle);
+    const auto [lower, upper] = rest.plant.breakaway(rest.state, rest.input);
+    EXPECT_LT(lower, upper);
+    for (const auto& [duty, moves] :
+         {std::pair{lower - 0.01, -1.0}, {lower + 0.01, 0.0}, {upper - 0.01, 0.0}, {upper + 0.01, 1.0}}) {
+      DrivenThrottle t(p, angle);
+      t.go(duty, 0.5);
+      const double moved = t.angle_deg() - angle;
+      EXPECT_TRUE(moves == 0.0 ? std::abs(moved) < 0.05 : moves * moved > 0.3) << angle << " " << duty << " " << moved;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace mgdd::throttle
