@@ -52,6 +52,19 @@ def test_the_middle_of_the_net_heat_comes_earlier():
         assert net.attrs["fractions"] == "net"
 
 
+def test_burn_angles_of_the_pressure_rise_need_no_gamma() -> None:
+    traces = datasets.read("hd_diesel_128x144")
+    for trace, apart in zip(traces, (0.51, 0.24, 0.14, -0.10), strict=True):  # against net heat at 1.33
+        found = [
+            analyze(trace, "hd_diesel_128x144", fractions="rassweiler_withrow", gamma=gamma, quiet=True)
+            for gamma in (1.28, 1.33)
+        ]
+        heat = analyze(trace, "hd_diesel_128x144", heat_window_cad=(-10.0, 90.0), quiet=True)
+        assert float(found[1]["ca50_cad"]) - float(heat["ca50_cad"]) == pytest.approx(apart, abs=0.05)
+        assert float(found[0]["ca50_cad"]) == pytest.approx(float(found[1]["ca50_cad"]), abs=0.01)
+        assert found[0].attrs["fractions"] == "rassweiler_withrow"
+
+
 def gross_error_percent(cycle, gamma):
     # The whole balance, not its peak: the apparent heat of compression counts too.
     back = analyze(cycle, CYLINDER, point=POINT, gamma=gamma, fractions="gross")
@@ -328,7 +341,7 @@ def test_conditions_come_from_the_trace_before_the_point():
         ({"pegging": "auto"}, "pegging = 'auto'.*two_point"),
         ({"pegging": "two_point", "pegging_exponent": 0.9}, r"pegging_exponent = 0\.9"),
         ({"pegging": "inlet", "inlet_pressure_kpa": -1.0}, "inlet_pressure_kpa = -1"),
-        ({"fractions": "both"}, "fractions = 'both'.*net or gross"),
+        ({"fractions": "both"}, "fractions = 'both'.*net, gross or rassweiler_withrow"),
         ({"smoothing": "wavelet"}, "smoothing = 'wavelet'.*savitzky_golay"),
         ({"smoothing": "automatic"}, "smoothing = 'automatic'.*savitzky_golay"),
         ({"smoothing": "savitzky_golay", "smoothing_width_cad": 2.0}, "smoothing_width_cad = 2 °CA.*take 4 or more"),

@@ -59,7 +59,7 @@ class ThermalNo:
     >>> early, late = (simulate("puma_single", soc_cad=soc) for soc in (-10.0, 0.0))
     >>> no = ThermalNo(calibration=0.4)
     >>> [round(float(no.cycle(c, "puma_single")["nox_ppm"]), -1) for c in (early, late)]
-    [830.0, 430.0]
+    [830.0, 440.0]
     """
 
     lambda_burned: float = 1.1

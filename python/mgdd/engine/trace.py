@@ -81,8 +81,9 @@ def analyze(
         Window of the cumulative heat [°CA aTDC]. Left out, it is found: from 5 CAD before the burn, searched from
         ``soi_cad`` or ``spark_cad`` on where the trace has it, to 20 CAD after its end; for a simulated trace it is the
         whole. The heat is the peak of the cumulative value for a measured trace, its end for a simulated one.
-    fractions : {"net", "gross"}
-        Heat that CA10, CA50 and CA90 refer to. Gross is net plus the modelled wall heat.
+    fractions : {"net", "gross", "rassweiler_withrow"}
+        What CA10, CA50 and CA90 are shares of: net heat, gross heat (net plus the modelled wall heat), or the pressure
+        rise by combustion (Rassweiler and Withrow 1938), which needs no gamma and no mass.
     smoothing : {"none", "savitzky_golay", "low_pass", "angle_window"}, optional
         Of the pressure before it is differentiated for the heat, without shift of phase; peak, work and temperature
         keep the measured pressure. Left out: ``savitzky_golay`` where at least 9 samples fall into the width, else
@@ -162,8 +163,8 @@ def analyze(
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake pressure")
-    if fractions not in ("net", "gross"):
-        raise ParameterError.of("fractions", fractions, "net or gross")
+    if fractions not in ("net", "gross", "rassweiler_withrow"):
+        raise ParameterError.of("fractions", fractions, "net, gross or rassweiler_withrow")
     own = conditions(trace, point)
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
@@ -179,7 +180,7 @@ def analyze(
         "earliest_burn_cad": _number(trace, "soi_cad", _number(trace, "spark_cad")),
         "burn_from_cad": float(trace["soc_cad"]) if simulated else None,
         "total_at_end": simulated,
-        "fractions_of_gross": fractions == "gross",
+        "fractions": fractions,
         "smoothing": _smoothing(smoothing, simulated),
         "smoothing_width_cad": smoothing_width_cad,
         "smoothing_cutoff_hz": smoothing_cutoff_hz,

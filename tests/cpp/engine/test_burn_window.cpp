@@ -63,7 +63,7 @@ TEST(EngineBurnWindow, AnEarlyBurnKeepsItsMiddle) {
     point.trapped_mass_g = mass_of_gas_g(cycle.charge.gas_j_per_k);
     TraceOptions o;
     o.gamma_source = AnalysisGamma::cylinder;
-    o.fractions_of_gross = true;
+    o.fractions = BurnFractions::gross;
     o.smoothing = Smoothing::none;
     const auto a = analyze_trace(cycle.angles(), cycle.pressures_bar(), c.cylinder, point, o);
     EXPECT_NEAR(a.ca50_cad, cycle.indicators.ca50_cad, 0.3) << soc;

@@ -67,7 +67,7 @@ TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
   EXPECT_EQ(o.intake_factor, 1.5);
   EXPECT_FALSE(o.intake_pressure_kpa || o.bmep_bar);
   EXPECT_FALSE(o.total_at_end);
-  EXPECT_FALSE(o.fractions_of_gross);
+  EXPECT_EQ(o.fractions, BurnFractions::net);
   EXPECT_EQ(NoxProxy{}, (NoxProxy{1900.0, 1200.0, 16000.0}));
   EXPECT_EQ(NoxModel{}, (NoxModel{NoxProxy{}, NoxMap::affine_log, 0.209, 3.0}));
   EXPECT_EQ(SoftSensor{}, (SoftSensor{NoxModel{}, 0.01}));

@@ -24,7 +24,7 @@ TraceOptions whole(double soc_cad) {
   o.heat_from_cad = -140.0;
   o.heat_to_cad = 130.0;
   o.burn_from_cad = soc_cad;
-  o.fractions_of_gross = true;
+  o.fractions = BurnFractions::gross;
   return o;
 }
 
@@ -62,7 +62,7 @@ TEST(EngineTrace, NetHeatPutsTheMiddleEarlier) {
     c.soc_cad = soc;
     TraceOptions o = whole(soc);
     o.heat_from_cad = soc;
-    o.fractions_of_gross = false;
+    o.fractions = BurnFractions::net;
     EXPECT_NEAR(analyze(c, o).ca50_cad, expected, 0.01);
   }
 }
@@ -228,13 +228,50 @@ TEST(EngineTrace, ASpikeIsToldFromASteepFlank) {
   EXPECT_TRUE(says(analyze_trace(cycle.angles(), pressure, c.cylinder, c.point, {}), "neighbours"));
 }
 
+// Without wall heat and at one gamma the exponent is gamma on both sides, and the pressure by combustion is (gamma - 1)
+// times the heat over the smallest volume.
+TEST(EngineTrace, PressureByCombustionGoesWithTheHeat) {
+  EngineCase c("wall_heat_scale=0 gamma=1.35 step_cad=0.1");
+  for (const double soc : {-15.0, -6.0, 3.0}) {
+    c.soc_cad = soc;
+    TraceOptions o = whole(soc);
+    o.fractions = BurnFractions::rassweiler_withrow;
+    const TraceAnalysis a = analyze(c, o);
+    EXPECT_NEAR(a.n_compression, 1.35, 1e-3);
+    EXPECT_NEAR(a.ca10_cad, soc + 30.0 * std::sqrt(0.05), 0.05) << soc;
+    EXPECT_NEAR(a.ca50_cad, soc + 15.0, 0.05) << soc;
+    EXPECT_NEAR(a.ca90_cad, soc + 30.0 * (1.0 - std::sqrt(0.05)), 0.05) << soc;
+    double sum = 0.0;
+    for (const double step : a.pressure_step_bar)
+      sum += step;
+    EXPECT_NEAR(sum * 1e5 * *std::ranges::min_element(a.volume_l) * 1e-3 / (0.35 * 856.0), 1.0, 3e-3);
+  }
+}
+
+TEST(EngineTrace, ShareOfPressureNeedsBothExponents) {
+  const Cycle cycle = run(EngineCase{});
+  std::vector<double> angle, pressure;
+  for (std::size_t k = 0; k < cycle.angles().size(); ++k) {
+    if (cycle.angles()[k] < -90.0 || cycle.angles()[k] > 50.0) continue;
+    angle.push_back(cycle.angles()[k]), pressure.push_back(cycle.pressures_bar()[k]);
+  }
+  TraceOptions o;
+  o.fractions = BurnFractions::rassweiler_withrow;
+  try {
+    analyze_trace(angle, pressure, Cylinder{}, OperatingPoint{}, o);
+    ADD_FAILURE();
+  } catch (const DataError& error) {
+    EXPECT_NE(std::string(error.what()).find("give the whole closed cycle"), std::string::npos) << error.what();
+  }
+}
+
 // The window ends while the burn goes on: the last step holds more than the last tenth of the heat, and CA90 lies in
 // it.
 TEST(EngineTrace, TheLastStepOfTheHeatBelongsToTheBurn) {
   for (const bool gross : {false, true}) {
     TraceOptions o = whole(-6.0);
     o.heat_to_cad = 5.0;
-    o.fractions_of_gross = gross;
+    o.fractions = gross ? BurnFractions::gross : BurnFractions::net;
     const TraceAnalysis a = analyze(EngineCase("step_cad=2.5"), o);
     const std::vector<double>& heat = gross ? a.heat_gross_cumulative_j : a.heat_net_cumulative_j;
     const auto last = static_cast<std::size_t>(std::ranges::find(a.angle_cad, 5.0) - a.angle_cad.begin());

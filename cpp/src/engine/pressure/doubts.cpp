@@ -143,7 +143,7 @@ void doubt_window(TraceAnalysis& a, const TraceOptions& o, const BurnWindow& bur
   for (const auto& [from, to] : {std::pair{-window_shift_cad, 0.0}, std::pair{window_shift_cad, 0.0},
                                  std::pair{0.0, -window_shift_cad}, std::pair{0.0, window_shift_cad}}) {
     const CumulativeHeat heat = accumulate_heat(a, a.heat_from_cad + from, a.heat_to_cad + to);
-    const double moved = burn_angle_cad(a, heat, o.fractions_of_gross, 0.5) - a.ca50_cad;
+    const double moved = burn_angle_cad(a, heat, o.fractions, 0.5) - a.ca50_cad;
     if (!(std::abs(moved) <= std::abs(largest))) largest = moved;
   }
   if (!(std::abs(largest) <= window_tolerance_cad)) {

@@ -24,8 +24,6 @@ constexpr double j_per_bar_l = units::pa_per_bar * units::m3_per_l;
 constexpr double same_step = 0.01;        // share by which steps of an even grid may differ
 constexpr double transition_share = 0.5;  // of the lower end of the band
 constexpr double least_knock_cad = 10.0;
-constexpr double compression_from_cad = -100.0, compression_to_cad = -40.0;
-constexpr double expansion_from_cad = 60.0, expansion_to_cad = 120.0;
 
 SampleRange closed_part(const Column& angle, const GeometryParameters<double>& g) {
   const SampleRange closed = samples_within(angle, g.ivc_cad, g.evo_cad);

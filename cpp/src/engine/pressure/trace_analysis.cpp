@@ -1,6 +1,7 @@
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
@@ -71,22 +72,29 @@ void release_heat(TraceAnalysis& a, const CycleModel<double>& model, const Charg
   }
 }
 
+void require_exponents(const TraceAnalysis& a) {
+  if (std::isfinite(a.n_compression) && std::isfinite(a.n_expansion)) return;
+  throw about("fractions", DataError("fractions = rassweiler_withrow needs the exponents of compression and expansion, "
+                                     "from -100 to -40 and 60 to 120 °CA aTDC: give the whole closed cycle, or take "
+                                     "net or gross"));
+}
+
 void sum_heat(TraceAnalysis& a, const TraceOptions& o) {
   CumulativeHeat heat = accumulate_heat(a, a.heat_from_cad, a.heat_to_cad);
   if (heat.empty) {
     throw DataError("no sample lies in the heat release window " + text(a.heat_from_cad) + " to " +
                     text(a.heat_to_cad) + " °CA aTDC");
   }
-  a.heat_net_j = o.total_at_end ? heat.net_j.back() : heat.net_best_j;
-  a.heat_gross_j = o.total_at_end ? heat.gross_j.back() : heat.gross_best_j;
+  a.heat_net_j = o.total_at_end ? heat.net_j.sum.back() : heat.net_j.best;
+  a.heat_gross_j = o.total_at_end ? heat.gross_j.sum.back() : heat.gross_j.best;
   a.ca10_cad = a.ca50_cad = a.ca90_cad = undefined<double>();
   if (!a.motored) {
-    a.ca10_cad = burn_angle_cad(a, heat, o.fractions_of_gross, 0.1);
-    a.ca50_cad = burn_angle_cad(a, heat, o.fractions_of_gross, 0.5);
-    a.ca90_cad = burn_angle_cad(a, heat, o.fractions_of_gross, 0.9);
+    a.ca10_cad = burn_angle_cad(a, heat, o.fractions, 0.1);
+    a.ca50_cad = burn_angle_cad(a, heat, o.fractions, 0.5);
+    a.ca90_cad = burn_angle_cad(a, heat, o.fractions, 0.9);
   }
-  a.heat_net_cumulative_j = std::move(heat.net_j);
-  a.heat_gross_cumulative_j = std::move(heat.gross_j);
+  a.heat_net_cumulative_j = std::move(heat.net_j.sum);
+  a.heat_gross_cumulative_j = std::move(heat.gross_j.sum);
 }
 
 }  // namespace
@@ -159,6 +167,10 @@ TraceAnalysis TraceAnalyzer::operator()(const std::vector<double>& pressure_bar)
   const double burn_from = options.burn_from_cad.value_or(
       options.heat_from_cad.value_or(a.window_found ? burn.start_cad : idle_heat_from_cad));
   release_heat(a, model, charge, smooth_bar, burn_from, options);
+  if (options.fractions == BurnFractions::rassweiler_withrow) {
+    require_exponents(a);
+    a.pressure_step_bar = combustion_pressure_bar(a, smooth_bar);
+  }
   sum_heat(a, options);
 
   add_warnings(a, cylinder, options, burn);

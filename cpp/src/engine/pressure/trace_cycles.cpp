@@ -39,7 +39,7 @@ std::size_t cycles_in(std::span<const double> record, std::size_t samples) {
 
 void drop_columns(TraceAnalysis& a, bool keep_grid) {
   for (std::vector<double>* column : {&a.pressure_bar, &a.temperature_k, &a.net_step_j, &a.loss_step_j,
-                                      &a.heat_net_cumulative_j, &a.heat_gross_cumulative_j})
+                                      &a.pressure_step_bar, &a.heat_net_cumulative_j, &a.heat_gross_cumulative_j})
     *column = std::vector<double>();
   if (!keep_grid) a.angle_cad = std::vector<double>(), a.volume_l = std::vector<double>();
 }

@@ -19,17 +19,31 @@ inline double net_heat(double gamma, double p0, double v0, double p1, double v1)
 double level_angle_cad(std::span<const double> angle_cad, std::span<const double> heat, std::size_t first,
                        std::size_t peak, double level) noexcept;
 
-/// Cumulative heat of the steps that lie in [from, to], one value per sample.
+/// What has come of something by each sample, and the highest of it, at least 0.
+struct Cumulative {
+  std::vector<double> sum;
+  std::size_t peak = 0;
+  double best = 0.0;
+
+  void add(double step, std::size_t sample) noexcept;
+};
+
+/// Of the steps that lie in [from, to].
 struct CumulativeHeat {
-  std::vector<double> net_j, gross_j;
-  std::size_t first = 0;                        ///< sample at which the window starts
-  std::size_t net_peak = 0, gross_peak = 0;     ///< samples of the highest values
-  double net_best_j = 0.0, gross_best_j = 0.0;  ///< those values, at least 0
-  bool empty = true;                            ///< no step lies in the window
+  Cumulative net_j, gross_j, pressure_bar;  ///< pressure: by combustion, at the volume of top dead centre
+  std::size_t first = 0;                    ///< sample at which the window starts
+  bool empty = true;                        ///< no step lies in the window
+
+  [[nodiscard]] const Cumulative& of(BurnFractions which) const noexcept;
 };
 CumulativeHeat accumulate_heat(const TraceAnalysis& analysis, double from_cad, double to_cad);
 
+/// Pressure rise of every step beyond a polytrope, times its volume over the smallest one (Rassweiler and Withrow 1938;
+/// Heywood 1988, section 9.2.2). The exponent is that of compression, then runs to that of expansion between the angles
+/// where they are fitted.
+std::vector<double> combustion_pressure_bar(const TraceAnalysis& analysis, std::span<const double> pressure_bar);
+
 /// Angle at which a share of the peak is released, linear between samples; NaN without heat.
-double burn_angle_cad(const TraceAnalysis& analysis, const CumulativeHeat& heat, bool gross, double share);
+double burn_angle_cad(const TraceAnalysis& analysis, const CumulativeHeat& heat, BurnFractions which, double share);
 
 }  // namespace mgdd::engine

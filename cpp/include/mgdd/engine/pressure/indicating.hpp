@@ -69,6 +69,9 @@ inline constexpr std::array<Figure<CycleFigures>, 18> cycle_figures{{
     {"sepo_bar2_cad", &CycleFigures::sepo_bar2_cad},
 }};
 
+/// Where the polytropic exponents are fitted.
+inline constexpr double compression_from_cad = -100.0, compression_to_cad = -40.0;
+inline constexpr double expansion_from_cad = 60.0, expansion_to_cad = 120.0;
 /// A cycle burns if its net heat exceeds this share of the internal energy of the charge where the window starts.
 inline constexpr double burning_share = 0.05;
 /// Window of the heat where the options give none.

@@ -30,7 +30,8 @@ struct TraceWarning {
 /// The burn angles and the heat are those of the smoothed pressure in the window that was found.
 struct TraceAnalysis : CycleFigures {
   std::vector<double> angle_cad, pressure_bar, volume_l, temperature_k;
-  std::vector<double> net_step_j, loss_step_j;                         ///< of the step that ends at the sample
+  std::vector<double> net_step_j, loss_step_j;  ///< of the step that ends at the sample
+  std::vector<double> pressure_step_bar;        ///< by combustion; filled for fractions of it only
   std::vector<double> heat_net_cumulative_j, heat_gross_cumulative_j;  ///< zero at the window's start
   double heat_from_cad = undefined<double>();                          ///< window of the cumulative heat
   double heat_to_cad = undefined<double>();                            ///< its end

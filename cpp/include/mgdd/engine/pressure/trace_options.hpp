@@ -10,6 +10,8 @@ namespace mgdd::engine {
 
 enum class Pegging { none, inlet, two_point, least_squares };
 enum class AnalysisGamma { constant, split, cylinder };
+/// What CA10, CA50 and CA90 are shares of: heat, or the pressure rise by combustion (Rassweiler and Withrow 1938).
+enum class BurnFractions { net, gross, rassweiler_withrow };
 enum class Smoothing { automatic, none, savitzky_golay, low_pass, angle_window };
 
 struct TraceOptions {
@@ -26,8 +28,8 @@ struct TraceOptions {
   std::optional<double> heat_to_cad;        ///< goes with `heat_from_cad`
   std::optional<double> earliest_burn_cad;  ///< injection or spark: the burn is searched from here on
   std::optional<double> burn_from_cad;      ///< Woschni's combustion term acts from here; unset: the found start
-  bool total_at_end = false;        ///< report the heat at the window's end, not its peak; burn angles keep the peak
-  bool fractions_of_gross = false;  ///< CA10/50/90 of gross heat instead of net
+  bool total_at_end = false;  ///< report the heat at the window's end, not its peak; burn angles keep the peak
+  BurnFractions fractions = BurnFractions::net;
 
   Smoothing smoothing = Smoothing::automatic;  ///< of the pressure before the heat release, never of peak and work
   double smoothing_width_cad = 4.0;            ///< `savitzky_golay` and `angle_window`: whole width
@@ -60,7 +62,7 @@ constexpr auto fields_of(const TraceOptions&) {
       field<&O::earliest_burn_cad>(cad("earliest_burn_cad", "the burn is searched from here on")),
       field<&O::burn_from_cad>(cad("burn_from_cad", "the combustion term of the wall heat acts from here")),
       field<&O::total_at_end>("total_at_end", "report the heat at the end of the window, not its peak"),
-      field<&O::fractions_of_gross>("fractions_of_gross", "burn angles of gross heat"),
+      field<&O::fractions>("fractions", "what the burn angles are shares of"),
       field<&O::smoothing>("smoothing", "of the pressure before the heat release"),
       field<&O::smoothing_width_cad>({"smoothing_width_cad", "°CA", {}, "whole width"}),
       field<&O::smoothing_cutoff_hz>({"smoothing_cutoff_hz", "Hz", {}, "where the gain is 1/2"}),
