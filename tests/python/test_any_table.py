@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -224,3 +225,20 @@ def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:
             refused.add(file.stem)
     hdf5 = "testhdf5_7.4_GLNX86"
     assert refused == {"bad_miuint32", "corrupted_zlib_checksum", "corrupted_zlib_data", "malformed1", hdf5}
+
+
+def test_an_unfinalised_bus_log_of_a_vehicle() -> None:
+    folder = os.environ.get("MGDD_DATA_DIR")
+    file = Path(folder or "", "j1939_mf4", "00000001.MF4")
+    if not folder or not file.is_file():
+        pytest.skip("the folder j1939_mf4 is not in MGDD_DATA_DIR")
+    pytest.importorskip("asammdf")
+    table = read_any_table(file)
+    column = {name: table.numbers(at) for at, name in enumerate(table.header or ())}
+    assert table.height == 57849
+    identifier = column["CAN_DataFrame.ID"].astype(np.int64)
+    speed = (identifier >> 8) & 0xFFFF == 61444  # electronic engine controller 1
+    low, high = (column[f"CAN_DataFrame.DataBytes {k}"][speed] for k in (4, 5))
+    rpm = 0.125 * (low + 256.0 * high)
+    assert (int(speed.sum()), rpm.min(), rpm.max()) == (12719, 646.5, 653.75)
+    assert rpm.mean() == pytest.approx(650.05, abs=0.005)

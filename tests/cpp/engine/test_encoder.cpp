@@ -198,7 +198,7 @@ TEST(EngineEncoder, AnotherWheelIsRefusedByWhatItIs) {
 }
 
 TEST(EngineEncoder, BadInputIsRefusedByName) {
-  Case c = record(60, 2, 4.0, hall);
+  const Case c = record(60, 2, 4.0, hall);
   EXPECT_NE(refusal(c, {.teeth = 1}).find("teeth = 1: must be in [2, 36000]"), std::string::npos);
   EXPECT_NE(refusal(c, {.teeth = 60, .missing_teeth = 30}).find("missing_teeth = 30"), std::string::npos);
   EXPECT_NE(refusal(c, {.teeth = 60, .missing_teeth = 2}, true).find("the gap or the index"), std::string::npos);
