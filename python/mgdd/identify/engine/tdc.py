@@ -1,14 +1,16 @@
-"""Top dead centre from pressure: by the peak of motored traces, by the residual of a calibration of fired ones."""
+"""Top dead centre from pressure: by the strokes of motored traces, by the residual of a calibration of fired ones."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.engine import analyze, simulate
+from mgdd.engine import analyze
+from mgdd.engine.motored import MODEL_CAD, motored_tdc
 from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.identify.engine.cylinder import fit_request
@@ -26,13 +28,11 @@ if TYPE_CHECKING:
 
 __all__ = ["TdcEstimate", "estimate_tdc"]
 
-_SCALES = (0.3, 1.0, 1.5)  # of the wall heat, for the loss angle: the plausible range of a ModelFamily
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
 _MODEL_CAD = 0.3  # what another burn law or gamma law moves the least RMSE, seen on simulated and measured traces
 _ENDS = (("low_cad", "lowest"), ("high_cad", "highest"))
 _PEAK_CAD = 5.0
 _STEP_CAD = 0.25
-_NOISE_CAD, _LEAK_CAD = 0.1, 0.3  # what noise and a leak past the rings add to the modelled loss angle
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -46,10 +46,10 @@ class TdcEstimate(Result):
         `mgdd.io.read_pressure` takes it off.
     low_cad, high_cad : float
         Range of offsets that the traces do not separate [°CA].
-    method : {"motored peak", "residual of the calibration"}
+    method : {"motored strokes", "residual of the calibration"}
         How it was found.
-    loss_angle_cad : tuple of float
-        Motored: lowest, textbook and highest angle by which wall heat puts the peak before TDC [°CA]; empty if fired.
+    loss_angle_cad : float
+        Motored: by what the peak comes before TDC [°CA]; NaN if fired.
     others_cad : tuple of float
         Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
@@ -69,7 +69,7 @@ class TdcEstimate(Result):
     low_cad: float
     high_cad: float
     method: str
-    loss_angle_cad: tuple[float, ...] = ()
+    loss_angle_cad: float = math.nan
     others_cad: tuple[float, ...] = ()
     dataset: xr.Dataset = field(repr=False)
 
@@ -114,7 +114,7 @@ class TdcEstimate(Result):
         from mgdd.plot.calibration import tdc_scan
 
         if "rmse_percent" not in self.dataset:
-            raise DataError("a motored estimate has no scan to draw: its peak and loss angle say all")
+            raise DataError("a motored estimate has no scan to draw: its offset and loss angle say all")
         return tdc_scan(self, ax=ax)
 
 
@@ -149,7 +149,7 @@ def estimate_tdc(
     Raises
     ------
     mgdd.errors.DataError
-        Motored and fired traces together, or a trace without its peak.
+        Motored and fired traces together, or a trace without its peak or its strokes.
     mgdd.errors.ParameterError
         A span outside its range.
     mgdd.errors.ConvergenceError
@@ -157,15 +157,12 @@ def estimate_tdc(
 
     Notes
     -----
-    Motored: the peak of a parabola through ±5 CAD, plus the loss angle that the cycle model has for this geometry and
-    speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD. Fired: the double
+    Motored: with d degrees to each side of TDC, ln p(d)/p(-d) is a scale times what wall heat makes of it in the cycle
+    model, and the offset times 2 n d ln V/d phi, by least squares from 5 to 60; on engines with another wall heat and
+    gas that is good to 0.1 CAD (Pipitone et al. 2007 ask for that). Fired: the double
     Wiebe law with gamma and wall heat fitted at each offset;
     offsets whose RMSE stays within a quarter of the least are possible, and 0.3 CAD to each side, by which another burn
     or gamma law moves the least.
-
-    References
-    ----------
-    Pipitone et al. (2007) on the accuracy that TDC needs, 0.1 CAD.
 
     Examples
     --------
@@ -193,25 +190,22 @@ def estimate_tdc(
 
 
 def _of_motored(request: Request) -> TdcEstimate:
-    offsets, losses = [], []
+    offsets, errors, losses = [], [], []
     for trace, label in zip(request.traces, request.labels, strict=True):
         angle, pressure = closed(trace, request.cylinder)
         peak = _peak_cad(angle, pressure, label)
-        point = conditions(trace, request.point)
-        point = point.replace(fuel_mg=0.0, intake_pressure_kpa=100.0 * float(pressure[0]))
-        loss = [
-            -float(simulate(request.cylinder.replace(wall_heat_scale=scale), point, soc_cad=0.0)["p_max_cad"])
-            for scale in _SCALES
-        ]
-        losses.append(loss)
-        offsets.append([peak + own for own in loss])
-    low, middle, high = (float(np.mean([own[k] for own in offsets])) for k in range(3))
+        found = motored_tdc(angle, pressure, request.cylinder, conditions(trace, request.point))
+        offsets.append(found.offset_cad)
+        errors.append(found.stderr_cad)
+        losses.append(found.offset_cad - peak)
+    offset = float(np.mean(offsets))
+    wide = MODEL_CAD + 2.0 * max(float(np.mean(errors)), float(np.std(offsets)))
     return TdcEstimate(
-        tdc_offset_cad=middle,
-        low_cad=low - _NOISE_CAD - _LEAK_CAD,
-        high_cad=high + _NOISE_CAD,
-        method="motored peak",
-        loss_angle_cad=tuple(float(value) for value in np.mean(losses, axis=0)),
+        tdc_offset_cad=offset,
+        low_cad=offset - wide,
+        high_cad=offset + wide,
+        method="motored strokes",
+        loss_angle_cad=float(np.mean(losses)),
         dataset=labelled_dataset({}),
     )
 
