@@ -205,6 +205,22 @@ def test_tdc_of_motored_engines_that_share_no_code(seed: int) -> None:
         assert found.high_cad - found.low_cad < 0.3
 
 
+@pytest.mark.parametrize("seed", [0, 3, 4])
+def test_tdc_of_fired_engines_that_share_no_code(seed: int) -> None:
+    """A gas whose gamma falls with temperature, by a cylinder that says nothing of it."""
+    random = np.random.default_rng(seed)
+    engine = draw(random)
+    angle, bar, fuel = record(random, engine, 30, step=0.5)
+    offset = (-0.8, 0.0, 0.6)[seed % 3]
+    point = OperatingPoint(
+        speed_rpm=engine.speed, fuel_mg=float(fuel.mean()), intake_pressure_kpa=100.0 * engine.intake_bar
+    )
+    trace = pressure_trace(angle + offset, bar.mean(axis=0))
+    found = estimate_tdc([trace], engine.cylinder(), point=point, fuel_heat_j=42.8 * float(fuel.mean()))
+    assert found.tdc_offset_cad == pytest.approx(offset, abs=0.3)
+    assert found.low_cad <= offset <= found.high_cad
+
+
 def test_tdc_of_one_kind_of_trace_only() -> None:
     motored = simulate(TRUTH, PRESET.point.replace(fuel_mg=0.0), soc_cad=0.0)
     cold = pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values, name="cold")

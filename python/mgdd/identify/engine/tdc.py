@@ -135,7 +135,8 @@ def estimate_tdc(
     traces, point, fuel_heat_j, bounds
         As in `mgdd.identify.fit_cylinder`; absolute pressure, all motored or all fired.
     cylinder : Cylinder, Preset, str or path-like
-        As in `mgdd.engine.simulate`: geometry; of a fired trace also the gamma law, whose parameter is fitted.
+        As in `mgdd.engine.simulate`: geometry; of a fired trace also the gamma law, linear in place of a constant
+        one, whose parameter is fitted.
     span_cad : float
         Offsets up to this size are tried on fired traces, 0.5 to 10 [°CA].
     progress : callable, optional
@@ -220,8 +221,10 @@ def _peak_cad(angle: np.ndarray, pressure: np.ndarray, label: str) -> float:
 
 
 def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None] | None) -> TdcEstimate:
-    gamma = GAMMA_PARAMETER[request.cylinder.gamma_model]
-    request = of_law(request, request.cylinder, (gamma, "wall_heat_scale"))
+    cylinder = request.cylinder
+    if cylinder.gamma_model == "constant":  # that of a real charge falls as it burns: a constant one moves TDC by 1 CAD
+        cylinder = cylinder.replace(gamma_model="linear")
+    request = of_law(request, cylinder, (GAMMA_PARAMETER[cylinder.gamma_model], "wall_heat_scale"))
     fits: dict[float, CylinderFit] = {}
     count = round(span_cad / _STEP_CAD)
     for step in sorted(range(-count, count + 1), key=abs):
