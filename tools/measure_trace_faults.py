@@ -119,7 +119,7 @@ def calibrated(random, angle_cad, *, motored=False):
     cylinder, point, cycle = draw_cycle(random, motored=motored, step_cad=0.5)
     trace = trace_of(random, cycle, angle_cad=angle_cad)
     found = estimate_tdc([trace], cylinder, point=point, span_cad=4.0)
-    inside = found.low_cad <= -angle_cad <= found.high_cad
+    inside = found.low_cad <= angle_cad <= found.high_cad
     if angle_cad == 0.0:
         return "right" if not found.suspect else "other"
     return "found" if inside and found.suspect else "silent" if not found.suspect else "other"
