@@ -242,7 +242,8 @@ def _line_changes(line: str, whole: bool, *, python: bool) -> Iterator[tuple[str
     body = line.rstrip()
     if not body.endswith(end):
         return
-    right = re.match(_RIGHT_SIDE, body[: len(body) - len(end)])
+    remark = python and "  #" in body  # a bracket would close behind it
+    right = None if remark else re.match(_RIGHT_SIDE, body[: len(body) - len(end)])
     plain = right and (re.search(r", | and | or ", right[2]) or not re.search(r" [-+*/] ", right[2]))
     if right and right[2].count("(") == right[2].count(")") and not (python and plain):
         yield "sign", f"{right[1]}-({right[2]}){end}"

@@ -225,8 +225,8 @@ import sys, time
 from mgdd.rig import Recorder
 with Recorder(sys.argv[1]) as record:
     record.sample("plate", {"angle_deg": 40.0})
-    print("ready", flush=True)
     try:
+        print("ready", flush=True)  # whoever reads it may stop us at once
         time.sleep(60.0)
     except KeyboardInterrupt:
         record.event("note", "ended by Ctrl-C")
