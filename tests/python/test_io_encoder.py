@@ -152,6 +152,16 @@ def test_what_is_wrong_is_said(bench, tmp_path: Path, options, said: str) -> Non
     assert said in str(caught.value)
 
 
+def test_a_short_record_and_a_hole_are_named(bench, tmp_path: Path) -> None:
+    short = bench[bench["behind"].between(300.0, 900.0)]
+    with pytest.raises(DataError, match=r"the encoder tells [56]\d\d\.?\d* degrees: a cycle of 720 is needed"):
+        read_pressure(saved(short, tmp_path, "time [s]", "crank", "pcyl [bar]"), encoder=WHEEL, firing_tdc_deg=TDC_DEG)
+    holed = bench.copy()
+    holed.loc[777, "pcyl [bar]"] = np.nan
+    with pytest.raises(DataError, match=r"777"):
+        read_pressure(saved(holed, tmp_path, "time [s]", "crank", "pcyl [bar]"), encoder=WHEEL, firing_tdc_deg=TDC_DEG)
+
+
 def test_arrays_give_the_angle_of_each_sample_and_the_speed_of_each_turn(bench) -> None:
     found = Encoder(teeth=60, missing_teeth=2).angle(bench["time [s]"], bench["crank"])
     off = found["crank_angle_deg"] + 360.0 - bench["behind"].to_numpy()

@@ -63,7 +63,7 @@ void check_cycle(std::span<const double> angle, std::span<const double> p, std::
   require("temperature_k", t, true);
   require("burned_fraction", burned, false);
   if (!(point.fuel_mg > 0.0))
-    throw ParameterError("fuel_mg", point.fuel_mg, "must be > 0: without fuel there is no NO", "mg");
+    throw ParameterError("fuel_mg", point.fuel_mg, "must be > 0: a motored cycle forms no nitric oxide", "mg");
   if (*std::ranges::max_element(burned) < least_burned)
     throw about("burned_fraction", DataError("nothing burns in the trace: give a fired cycle"));
 }

@@ -8,20 +8,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from mgdd.engine.motored import motored_tdc
-from mgdd.engine.trace import analyze, conditions
+from mgdd.engine.record_doubts import record_doubts
+from mgdd.engine.trace import analyze
 from mgdd.engine.trace_cycles import CYCLE
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.cycle_phase import phase_warnings
 from mgdd.io.pressure import as_trace
 from mgdd.presets.meant import cylinder_of, point_of
 from mgdd.results.describe import Row
-from mgdd.results.labels import ANGLE, labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
     from mgdd.presets.meant import CylinderLike, PointLike
 
@@ -68,13 +66,7 @@ _REMEDIES = {
     "odd_level": "peg every cycle; look at the charge amplifier and the connectors",
     "drift": "peg every cycle; warm the sensor up, and let the amplifier settle",
 }
-# Error of TDC of a motored record [°CA] that is told from what the model leaves, at most 0.08 of 100 engines.
-_TDC_CAD, _COARSE_CAD = 0.12, 2.5
 _ONE = "one cycle: nothing to compare it with"
-# Level of a cycle [bar]: off the median by more than this and six robust deviations, or drifting from first to last.
-_OFF_BAR, _OFF_SCATTERS, _DRIFT_BAR, _DRIFT_STDERRS = 0.1, 6.0, 0.1, 5.0
-# Over gas exchange: absolute pressures and pumping work that engines have, and the step at intake bottom dead centre.
-_EXCHANGE_BAR, _PMEP_BAR, _STEP = (0.15, 8.0), (-3.0, 1.5), (0.6, 1.7)
 
 
 @dataclass(frozen=True)
@@ -235,7 +227,7 @@ def trust(
         return Trust(name, (Check("file", "fail", str(error)),))
     said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
     said = [(kind, text) for kind, text in said if not (kind == "reading" and "crank angle slips" in text)]
-    said += _slips(made) + _of_levels(made, found) + _of_exchange(made, found) + _of_tdc(made, found, cylinder, point)
+    said += record_doubts(made, found, cylinder_of(cylinder), point_of(point))
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
     stated = [key for key, value in judged.items() if value is not None or _stated(made, key)]
     skipped = _skipped(made, found, stated)
@@ -279,79 +271,4 @@ def _skipped(trace: xr.Dataset, found: xr.Dataset, stated: list[str]) -> dict[st
         out["gas exchange"] = ("the record has no 720 degrees", "")
     if cycles == 1:
         out["cycles"] = out["crank angle"] = (_ONE, "")
-    return out
-
-
-def _of_tdc(
-    trace: xr.Dataset, found: xr.Dataset, cylinder: CylinderLike, point: PointLike | None
-) -> list[tuple[str, str]]:
-    """Place TDC of a motored record by its mean cycle."""
-    angle, bar = _columns(trace)
-    if int(found.attrs["motored"]) < len(bar) or np.median(np.diff(angle)) > _COARSE_CAD:
-        return []
-    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
-    engine = cylinder_of(cylinder)
-    closed = (angle >= engine.ivc_cad) & (angle <= engine.evo_cad)
-    tdc = motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point_of(point)))
-    if abs(tdc.offset_cad) <= _TDC_CAD + 2.0 * tdc.stderr_cad:
-        return []
-    return [("tdc", f"the two strokes have the angles {tdc.offset_cad:+.2f} °CA too large")]
-
-
-def _columns(trace: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    bar = trace["pressure_bar"]
-    return trace[ANGLE].to_numpy(), np.atleast_2d(bar.transpose(..., ANGLE).to_numpy())
-
-
-def _slips(trace: xr.Dataset) -> list[tuple[str, str]]:
-    angle, bar = _columns(trace)
-    return [("slip", text) for text in phase_warnings(angle, bar, over_time=False, source="trace")]
-
-
-def _of_levels(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
-    """Compare the cycles' levels early in compression with each other, pegged as they were analysed."""
-    angle, bar = _columns(trace)
-    if len(bar) < 4:
-        return []
-    start = max(float(angle[0]), -150.0)
-    early = (angle >= start - 1e-9) & (angle <= start + 20.0)
-    level = bar[:, early].mean(axis=1) + np.atleast_1d(found["pegging_bar"].to_numpy())
-    off = level - np.median(level)
-    usual = 1.4826 * float(np.median(np.abs(off)))
-    out = []
-    odd = np.flatnonzero(np.abs(off) > max(_OFF_BAR, _OFF_SCATTERS * usual))
-    if odd.size and odd.size < 0.2 * len(bar):
-        worst = int(odd[np.argmax(np.abs(off[odd]))])
-        text = f"{odd.size} of {len(bar)} cycles start at another level: cycle {worst + 1} by {off[worst]:+.2g} bar"
-        out.append(("odd_level", text))
-    count = np.arange(len(bar)) - 0.5 * (len(bar) - 1)
-    slope = float(count @ off / (count @ count))
-    rest = off - off.mean() - slope * count
-    stderr = math.sqrt(float(rest @ rest) / max(len(bar) - 2, 1) / float(count @ count))
-    drift = slope * (len(bar) - 1)
-    if abs(drift) > max(_DRIFT_BAR, _DRIFT_STDERRS * stderr * (len(bar) - 1)):
-        out.append(("drift", f"the level moves by {drift:+.2g} bar from cycle 1 to cycle {len(bar)}"))
-    return out
-
-
-def _of_exchange(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
-    """Judge levels and work between the valves' events, of records of 720 degrees."""
-    if not np.isfinite(found["imep_net_bar"]).all():
-        return []
-    angle, bar = _columns(trace)
-    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
-
-    def level(low: float, high: float) -> float:
-        return float(mean[(angle >= low) & (angle <= high)].mean())
-
-    intake, exhaust, end = level(-300.0, -200.0), level(220.0, 300.0), level(-190.0, -170.0)
-    out = []
-    for text, value in (("intake", intake), ("exhaust", exhaust)):
-        if not _EXCHANGE_BAR[0] < value < _EXCHANGE_BAR[1]:
-            out.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
-    pmep = float(np.mean(found["pmep_bar"]))
-    if not _PMEP_BAR[0] < pmep < _PMEP_BAR[1]:
-        out.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
-    if not out and not _STEP[0] < end / intake < _STEP[1]:
-        out.append(("exchange", f"the intake stroke runs at {intake:.3g} bar and ends at {end:.3g} bar"))
     return out

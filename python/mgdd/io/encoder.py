@@ -11,6 +11,7 @@ import numpy as np
 from mgdd._core import engine as _core
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import TIME_UNITS, Heading
+from mgdd.io.cycle_phase import CYCLE_DEG
 from mgdd.io.table import Table
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
@@ -189,6 +190,13 @@ def on_even_angles(
     step: float = step_deg or max((each for each in _STEPS_DEG if each <= usual * 1.001), default=_STEPS_DEG[0])
     first = int(np.ceil(degrees[0] / step))
     count = int(np.floor(degrees[-1] / step)) - first + 1
+    if count * step < CYCLE_DEG:
+        raise DataError(f"{source}: the encoder tells {max(count * step, 0.0):.4g} degrees: a cycle of 720 is needed")
+    bad = np.flatnonzero(~np.isfinite(channels[0]))
+    if bad.size:
+        raise DataError(
+            f"{source}: pressure, sample {bad[0]}: {channels[0, bad[0]]}: must be finite; remove or repair it"
+        )
     even = np.linspace(first * step, (first + count - 1) * step, count)
     out = np.empty((len(channels) + 1, count))
     for row, values in zip(out, channels, strict=False):

@@ -203,6 +203,9 @@ TEST(EngineEncoder, BadInputIsRefusedByName) {
   EXPECT_NE(refusal(c, {.teeth = 60, .missing_teeth = 30}).find("missing_teeth = 30"), std::string::npos);
   EXPECT_NE(refusal(c, {.teeth = 60, .missing_teeth = 2}, true).find("the gap or the index"), std::string::npos);
   EXPECT_NE(refusal(c, {.teeth = 3600}).find("edges are less than a turn"), std::string::npos);
+  EXPECT_NE(
+      refusal(record(60, 2, 1.2, hall), {.teeth = 60, .missing_teeth = 2}).find("two are needed: record more turns"),
+      std::string::npos);
   Case flat = c;
   std::ranges::fill(flat.signal, 2.5);
   EXPECT_NE(refusal(flat, {.teeth = 60}).find("signal stands at 2.5"), std::string::npos);

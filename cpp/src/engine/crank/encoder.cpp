@@ -228,6 +228,8 @@ Places by_marks(const Counts& at, const Counts& candidates, double behind, const
 Places by_gaps(const Counts& at, const EncoderOptions& o) {
   const auto turn = static_cast<long>(o.teeth);
   const Counts found = marks_behind_gaps(at, static_cast<long>(o.missing_teeth));
+  if (found.size() == 1)
+    refuse_wheel(o, "one gap of that width is in the record, and two are needed: record more turns");
   const long usual = usual_distance(found);
   if (usual == 0 || usual % turn != 0) refuse_wheel(o, other_wheel(at));
   return by_marks(at, found, 0.0, o);

@@ -30,7 +30,7 @@ struct EncoderAngle {
 };
 
 /// `time_s` rises; `index` is empty, or has one pulse a turn at each sample. ParameterError for a wheel that cannot be;
-/// DataError for a signal that does not move or is no such wheel, with what was counted instead.
+/// DataError for a signal that does not move, or that is of another wheel, with what was counted instead.
 EncoderAngle encoder_angle(std::span<const double> time_s, std::span<const double> signal,
                            std::span<const double> index, const EncoderOptions& options);
 
