@@ -15,7 +15,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
 from mgdd.engine import analyze, simulate
 from mgdd.errors import ParameterError, hinted
-from mgdd.io import Encoder, read_pressure
+from mgdd.io import Encoder, pressure_chunks, read_pressure
 from mgdd.io.files import existing_file
 from mgdd.io.point_table import CONDITIONS, conditions_of
 from mgdd.presets.preset import Preset
@@ -214,8 +214,11 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     return [read() for read in readers_of(args).values()]
 
 
-def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
-    """Give for each pressure file what reads it, so that one which is refused does not stop the others."""
+def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], Any]]:
+    """Give for each pressure file what reads it, so that one which is refused does not stop the others.
+
+    It reads a Dataset, or with --chunk-cycles one after the other.
+    """
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
     for file in args.files:
@@ -224,10 +227,16 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
 
     encoder = encoder_of(args)
+    cycles = getattr(args, "chunk_cycles", None)
 
-    def read(file: str) -> xr.Dataset:
+    def read(file: str) -> Any:
         angle = encoder or {"speed_rpm": rows[file].get("speed_rpm", speed)}
-        trace = read_pressure(file, **angle, **_COLUMNS.given(args), **READING.given(args))
+        how = angle | _COLUMNS.given(args) | READING.given(args)
+        if cycles is not None:
+            return (noted(chunk, file) for chunk in pressure_chunks(file, cycles=cycles, **how))
+        return noted(read_pressure(file, **how), file)
+
+    def noted(trace: xr.Dataset, file: str) -> xr.Dataset:
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
         return trace.assign_attrs(**rows[file])
