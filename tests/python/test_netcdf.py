@@ -168,6 +168,10 @@ def loop_samples() -> xr.Dataset:
     return loop.samples()
 
 
+def whole_cycles() -> Indicating:
+    return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0)
+
+
 def indicating() -> Indicating:
     return Indicating(np.arange(-180.0, 181.0), Cylinder(), speed_rpm=6000.0)
 
@@ -193,6 +197,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
     **{f"datasets.read.{name}": lambda _, n=name: datasets.read(n) for name in NEEDS},
+    "engine.Indicating.noise": lambda _: whole_cycles().noise(np.eye(2, 720), attenuation_db={500: 90, 2000: 80}),
     "engine.Indicating.oscillation": lambda _: indicating().oscillation(np.ones((2, 361))),
     "engine.Indicating.record": lambda _: indicating().record(np.ones((2, 361))),
     "engine.ThermalNo.cycle": lambda _: ThermalNo().cycle(simulate("puma_single"), "puma_single"),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
+from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.column_names import spelled_unit
 from mgdd.io.files import existing_file, read_plain_text
 from mgdd.results.units import unit_of
@@ -137,7 +137,8 @@ class Table(ABC):
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"
                 names = ", ".join(map(repr, self.header))
-                raise DataError(f"{self.source}: {what} {column!r}: the header has {names}")
+                near = did_you_mean(column, self.header) if what == "no column" else ""
+                raise DataError(f"{self.source}: {what} {column!r}: {near}{' ' if near else ''}the header has {names}")
             column = self.header.index(column)
         if isinstance(column, bool) or not 0 <= column < self.width:
             raise DataError(f"{self.source}: no column {column}: the {self.width} column(s) are numbered from 0")
