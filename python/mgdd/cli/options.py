@@ -49,6 +49,7 @@ __all__ = [
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
+_GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 SCHEME = Options(simulate, "integrator", "step_cad")
 PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
 _COLUMNS = Options(read_pressure, "pressure_column", "angle_column")
@@ -183,15 +184,12 @@ def encoder_of(args: argparse.Namespace) -> dict[str, Any]:
 def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
     """Make cylinder and point from a preset and the options over it."""
     preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
-    if args.preset is None and getattr(args, "files", None):
-        c = preset.cylinder
-        _LOG.warning(
-            "no --preset: the traces are read with the geometry of %s (%g x %g mm, compression ratio %g)",
-            preset.name, c.bore_mm, c.stroke_mm, c.compression_ratio,
-        )  # fmt: skip
     given = assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
     point = {name: value for name, value in given.items() if name in _POINT}
     cylinder = {name: value for name, value in given.items() if name not in _POINT}
+    taken = [f"{name} = {getattr(preset.cylinder, name):g}" for name in _GEOMETRY if name not in cylinder]
+    if args.preset is None and getattr(args, "files", None) and taken:
+        _LOG.warning("no --preset: the traces are read with %s of %s", ", ".join(taken), preset.name)
     for option, field in CYLINDER_CHOICES.items():
         if getattr(args, option) is not None:
             if field in cylinder:
