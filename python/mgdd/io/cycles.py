@@ -15,10 +15,10 @@ from mgdd.signals.even_grid import wide_steps
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Cycles", "arranged", "several_cycles"]
+__all__ = ["SAME_ANGLE", "Cycles", "arranged", "several_cycles"]
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
-_SAME = 0.01
+SAME_ANGLE = 0.01
 # Sums of steps end this much [deg] beside the angle that was meant.
 _ROUNDING = 1e-6
 
@@ -94,7 +94,7 @@ def arranged(
 def several_cycles(degrees: NDArray[np.float64]) -> tuple[NDArray[np.intp], bool]:
     """Return where an angle falls back to its start, and whether it runs on over more than one cycle."""
     step, span = np.diff(degrees), float(np.ptp(degrees))
-    return np.flatnonzero(step < -0.5 * span) + 1, bool(np.all(step > 0.0)) and span > 720.0 + _SAME
+    return np.flatnonzero(step < -0.5 * span) + 1, bool(np.all(step > 0.0)) and span > 720.0 + SAME_ANGLE
 
 
 def _turned(
@@ -173,7 +173,7 @@ def _stacked(
     kept = [b for b, complete in zip(blocks, whole, strict=True) if complete]
     grid = degrees[kept[0]]
     for b in kept:
-        if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > _SAME * step:
+        if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > SAME_ANGLE * step:
             raise DataError(
                 f"{place.row(b.start)}: the cycle that starts here has other crank angles than the one at "
                 f"{place.row(kept[0].start)}: give all cycles the same angles"
@@ -211,13 +211,13 @@ def _running(
     first = float(degrees[0])
     if _splits_a_burn(degrees, firing_tdc_deg):
         first += (-360.0 - _seam(first, firing_tdc_deg)) % 720.0
-    count = int((degrees[-1] + step * (1.0 + _SAME) - first) // 720.0)
+    count = int((degrees[-1] + step * (1.0 + SAME_ANGLE) - first) // 720.0)
     if count < 1:
         raise DataError(
             f"{place.source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
             f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
         )
-    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _SAME * step)
+    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - SAME_ANGLE * step)
     head, tail = int(starts[0]), degrees.size - int(starts[-1])
     grid = degrees[starts[0] : starts[1]]
     at = grid + 720.0 * np.arange(count)[:, None]
@@ -227,14 +227,14 @@ def _running(
         notes.append(f"{' and '.join(parts)} of the record left out: incomplete cycles")
     same = np.all(np.diff(starts) == grid.size)
     cut = degrees[starts[0] : starts[0] + at.size].reshape(at.shape) if same else at
-    if same and np.abs(cut - at).max() <= _SAME * step:
+    if same and np.abs(cut - at).max() <= SAME_ANGLE * step:
         values = values[:, starts[0] : starts[0] + at.size].reshape(-1, *at.shape)
     else:
-        at = at[at[:, -1] <= degrees[-1] + _SAME * step]
+        at = at[at[:, -1] <= degrees[-1] + SAME_ANGLE * step]
         values = np.stack([np.interp(at, degrees, row) for row in values])
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
     past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
-    cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
+    cad = np.where(past > 360.0 - SAME_ANGLE * step, past - 720.0, past)
     order = np.argsort(cad, kind="stable")
     return Cycles(
         cad[order], np.ascontiguousarray(values[..., order]), rows[starts[0] : starts[1]][order], tuple(notes)
