@@ -56,6 +56,7 @@ def ours() -> list[Row]:
     """Seekers of the package; those under test are set beside the best of the others."""
     return [
         Row("SPSA, scaled", by_hand(untouched(optimize.Spsa))),
+        Row("Gaussian process seeking", untouched(optimize.GaussianProcessSeeking), must_arrive=True, is_tested=True),
         Row("SPSA by tune, scaled", by_hand(tuned("spsa")), must_arrive=True),
     ]
 

@@ -34,8 +34,8 @@ def test_every_public_name_has_a_signature(name: str) -> None:
 
 def test_public_names_are_few_and_none_stands_twice() -> None:
     names = [each for name in PACKAGES for each in package(name).__all__]
-    # 160 since whole files of a test cell are read and their cycles indicated; a file and a data set are both read.
-    assert len(names) <= 160, "unexport or merge a name before one is added"
+    # 165 since inputs have names, a process seeks over several, and files larger than memory are read in chunks.
+    assert len(names) <= 165, "unexport or merge a name before one is added"
     assert {name for name in names if names.count(name) > 1} == {"read"}
 
 

@@ -16,6 +16,7 @@ from mgdd.loop import EngineBench, Measurement, monte_carlo, run_seeker
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
+    GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Input,
@@ -40,6 +41,7 @@ SEVERAL: dict[str, Make] = {
     "batch": lambda **own: ExtremumSeeking(**DITHER, **own),
     "washout": lambda **own: ExtremumSeeking(form="washout", **DITHER, **own),
     "newton": lambda **own: NewtonSeeking(time_constant_cycles=120.0, **DITHER, **own),
+    "gaussian process": lambda **own: GaussianProcessSeeking(seed=2, **own),
     "bounded": lambda **own: BoundedSeeking(**DITHER, **own),
 }
 

@@ -15,8 +15,9 @@ namespace {
 
 using namespace guide;
 using BoundGuided = Guarded<GuidedEngine>;
-using AnySeeker = std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking,
-                               optimize::Spsa, optimize::GradientDescent, optimize::GoldenSection, CurveSeeking>;
+using AnySeeker =
+    std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking, optimize::Spsa,
+                 optimize::GradientDescent, optimize::GoldenSection, optimize::GaussianProcessSeeking, CurveSeeking>;
 
 GuidedEngine::Seeking seeking_of(const py::object& seeker, const FeedForwardSettings& settings) {
   AnySeeker any = seeker_of<AnySeeker>(seeker, "seeker");

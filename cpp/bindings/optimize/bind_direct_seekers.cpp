@@ -72,6 +72,25 @@ void bind_golden_section(py::module_& m) {
   bind_seeking(cls);
 }
 
+void bind_gaussian_process(py::module_& m) {
+  using B = BoundSeeker<GaussianProcessSeeking>;
+  py::class_<B> cls(m, "GaussianProcessSeeking", "By Gaussian processes; see mgdd.optimize.GaussianProcessSeeking.");
+  bind_settings<GaussianProcessSeeking>(cls, "GaussianProcessSeeking");
+  cls.def_property_readonly(
+         "noise_sd", [](const B& b) { return b.use()->seeker().noise_sd(); },
+         "Standard deviation of one reading of J, as learnt.")
+      .def_property_readonly(
+          "expected", [](const B& b) { return b.use()->seeker().expected(); },
+          "J that is expected at the estimate; 0 before there are readings enough.")
+      .def_property_readonly(
+          "expected_sd", [](const B& b) { return b.use()->seeker().expected_sd(); },
+          "Standard deviation of that expectation, without the noise of a reading.")
+      .def_property_readonly(
+          "doubts", [](const B& b) { return b.use()->seeker().doubts(); },
+          "How often the readings were not what the process expects, and what was known was aged.");
+  bind_seeking(cls);
+}
+
 void bind_tuner(py::module_& m) {
   m.def(
       "tune",
@@ -121,6 +140,7 @@ void bind_direct_seekers(py::module_& m) {
   bind_spsa(m);
   bind_gradient_descent(m);
   bind_golden_section(m);
+  bind_gaussian_process(m);
   bind_tuner(m);
 }
 

@@ -321,6 +321,11 @@ def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GoldenSection, cycl
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
 @typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GaussianProcessSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
 def run_loop(bench: EngineBench, seeker: mgdd._core.guide.CurveSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -1386,6 +1386,151 @@ class GoldenSection:
     def misfires(self) -> int:
         """
         Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class GaussianProcessSeeking:
+    """
+    By Gaussian processes; see mgdd.optimize.GaussianProcessSeeking.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, kept: typing.SupportsInt | typing.SupportsIndex = 100, first_step: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+        """
+        start : first estimate, per input
+        lower : least applied input, per input
+        upper : largest applied input, per input
+        inputs : names, units, bounds and scales
+        noise_sd : of one reading of J
+        horizon : cycles for which what is learnt pays
+        memory_cycles : time constant with which readings fade
+        kept : readings at most
+        first_step : of the first readings, share of the bounds
+        limit_probability : with which a limit holds at every input asked for
+        delay_cycles : between the plant and J
+        lag_cycles : the same
+        seed : of the inputs that are compared
+        maximize : False to minimise J
+        limits : measured quantities to keep
+        """
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> typing.Any:
+        """
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def doubts(self) -> int:
+        """
+        How often the readings were not what the process expects, and what was known was aged.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def expected(self) -> float:
+        """
+        J that is expected at the estimate; 0 before there are readings enough.
+        """
+    @property
+    def expected_sd(self) -> float:
+        """
+        Standard deviation of that expectation, without the noise of a reading.
+        """
+    @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def limit_states(self) -> dict:
+        """
+        State of every limit by name: 'free' holds nothing back, 'active' turned the last step or is broken,
+        'infeasible' cannot be met together with the other limits and the bounds, as far as the learnt slopes tell;
+        the estimate goes to where the largest excess, counted in scales, is smallest.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def noise_sd(self) -> float:
+        """
+        Standard deviation of one reading of J, as learnt.
         """
     @property
     def settings(self) -> dict:

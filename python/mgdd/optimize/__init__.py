@@ -38,6 +38,7 @@ from mgdd.optimize.fit_options import FitOptions
 from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import least_squares
 from mgdd.optimize.measured_map import measure_map
+from mgdd.optimize.process_seeking import GaussianProcessSeeking
 from mgdd.optimize.seeker import Seeker
 from mgdd.optimize.tuning import tune
 
@@ -46,6 +47,7 @@ __all__ = [
     "ComponentLag",
     "ExtremumSeeking",
     "FitOptions",
+    "GaussianProcessSeeking",
     "GoldenSection",
     "GradientDescent",
     "Input",

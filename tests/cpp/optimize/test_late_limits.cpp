@@ -75,7 +75,7 @@ Outcome late_run(S& seeker, ComponentLag truth, double noise_sd, std::uint64_t s
     out.above += (value > 104.0 + 1e-6 ? 1.0 : 0.0) / (cycles - from);
     out.mean += seeker.estimate()[0] / (cycles - from);
   }
-  out.state = seeker.filter().state(0);
+  out.state = limit_state_of(seeker, 0);
   return out;
 }
 
@@ -185,8 +185,8 @@ TEST(LateLimits, LimitsThatContradictEndInTheLeastExcessAndSayInfeasible) {
               if (k >= 1500) mean += seeker.estimate()[0] / 1000.0;
             }
             EXPECT_NEAR(mean, 0.5, 0.5);
-            EXPECT_EQ(seeker.filter().state(0), LimitState::infeasible);
-            EXPECT_EQ(seeker.filter().state(1), LimitState::infeasible);
+            EXPECT_EQ(limit_state_of(seeker, 0), LimitState::infeasible);
+            EXPECT_EQ(limit_state_of(seeker, 1), LimitState::infeasible);
           },
           any);
     }
@@ -204,8 +204,8 @@ TEST(LateLimits, ALimitOutOfReachIsFreeAndOneBeyondTheBoundsInfeasible) {
             const double j[] = {quadratic(x - 8.0)}, values[] = {100.0 + x, -2.0 * x};  // -2 x <= -50: x >= 25
             seeker.tell({j, values});
           }
-          EXPECT_EQ(seeker.filter().state(0), LimitState::free) << who;
-          EXPECT_EQ(seeker.filter().state(1), LimitState::infeasible) << who;
+          EXPECT_EQ(limit_state_of(seeker, 0), LimitState::free) << who;
+          EXPECT_EQ(limit_state_of(seeker, 1), LimitState::infeasible) << who;
           EXPECT_GT(seeker.estimate()[0], 7.0) << who;
         },
         any);

@@ -6,6 +6,7 @@
 
 #include "mgdd/optimize/seekers/bounded_seeking.hpp"
 #include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
 #include "mgdd/optimize/seekers/golden_section.hpp"
 #include "mgdd/optimize/seekers/gradient_descent.hpp"
 #include "mgdd/optimize/seekers/newton_seeking.hpp"
@@ -28,9 +29,10 @@ concept AnySeeker = requires(S seeker, const S constant, const Reading& reading,
   { constant.limit_count() } noexcept -> std::same_as<std::size_t>;
 };
 
-using Seeker = std::variant<ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection>;
+using Seeker = std::variant<ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection,
+                            GaussianProcessSeeking>;
 
 static_assert(AnySeeker<ExtremumSeeking> && AnySeeker<NewtonSeeking> && AnySeeker<BoundedSeeking> && AnySeeker<Spsa> &&
-              AnySeeker<GradientDescent> && AnySeeker<GoldenSection>);
+              AnySeeker<GradientDescent> && AnySeeker<GoldenSection> && AnySeeker<GaussianProcessSeeking>);
 
 }  // namespace mgdd::optimize

@@ -1,0 +1,106 @@
+// A Gaussian process of one measured quantity over the inputs (Rasmussen and Williams 2006, ch. 2 and 5), for seekers:
+// level, slope and bends with a prior that grows with one number, the bend, and a Matern 5/2 term for what they miss, a
+// length scale per input. The variance of a reading grows with its age by exp(age/memory). Bend, noise, size and
+// lengths of the rest go to where the evidence of the readings, with priors, is largest, a few trials per reading.
+// Inputs are counted in their ranges, 0 to 1. noexcept and allocation-free after construction.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mgdd/optimize/seekers/inputs.hpp"
+
+namespace mgdd::optimize {
+
+using InputTable = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // a row per point
+
+class ProcessModel {
+ public:
+  struct Settings {
+    Eigen::Index inputs = 1;
+    int kept = 100;                    ///< readings, 10 at least
+    int most_points = 100;             ///< that `predict` is asked for at once
+    double memory = 143.0;             ///< [readings]
+    bool bends_down = true;            ///< whether a maximum is expected, as of J
+    std::optional<double> noise_sd{};  ///< of a reading, > 0; none: learnt
+    std::uint64_t seed = 0;
+  };
+  explicit ProcessModel(const Settings& settings);
+
+  int count() const noexcept { return static_cast<int>(count_); }
+  double noise_sd() const noexcept;
+
+  /// Takes a reading at `z`; where all places are taken, the oldest of those near `about` makes room.
+  void record(const Inputs& z, double value, const Inputs& about) noexcept;
+  /// Looks for better numbers of the process and makes predictions possible; 2 readings at least.
+  void fit(const Inputs& about) noexcept;
+
+  /// Mean of the quantity at the first `points` rows of `at`.
+  void predict_means(const InputTable& at, int points) noexcept;
+  /// The same, and what `covariance` needs.
+  void predict(const InputTable& at, int points) noexcept;
+  double mean(int point) const noexcept { return mean_[point]; }
+  /// Of the quantity, without the noise of a reading, at two of these points.
+  double covariance(int i, int j) const noexcept;
+
+  /// Every reading so far counts as if it were this much older.
+  void age(double cycles) noexcept;
+  void forget() noexcept;
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v, const std::string& name) {
+    v(name + "_count", self.count_, self.settings_.kept + 1);
+    v(name + "_told", self.told_);
+    v(name + "_begun", self.begun_);
+    v(name + "_points", self.points_);
+    v(name + "_values", self.values_);
+    v(name + "_ages", self.ages_);
+    v(name + "_numbers", self.numbers_);
+    v(name + "_settled_bend", self.settled_bend_);
+  }
+
+ private:
+  // Logarithms: bend, noise over bend, size of the rest over bend, lengths.
+  using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3 + max_inputs, 1>;
+  struct Scales {
+    double squared_bend, noise, rest;
+    Inputs inverse_length;
+  };
+  Scales scales_of(const Numbers& numbers) const noexcept;
+  double prior_mean(const double* z, const Scales& s) const noexcept;
+  double kernel(const double* a, const double* b, const Scales& s) const noexcept;
+  void choose_readings(const Inputs& about) noexcept;
+  double evidence(const Numbers& numbers) noexcept;
+  void begin_numbers() noexcept;
+  void try_numbers(int trials) noexcept;
+  void factor() noexcept;
+  int crowded_reading(const Inputs& about) noexcept;
+  bool noise_known() const noexcept { return settings_.noise_sd.has_value(); }
+
+  Settings settings_;
+  std::int64_t count_ = 0, told_ = 0;
+  bool begun_ = false;  // the numbers have been made of readings
+  InputTable points_;
+  Eigen::VectorXd values_, ages_;
+  Numbers numbers_;
+  std::optional<double> settled_bend_{};  // logarithm, as the first readings gave it
+  // Made anew by every fit and prediction.
+  double level_ = 0.0;
+  InputTable factor_, small_;  // lower triangles
+  Eigen::VectorXd weights_, small_rest_, distance_, mean_;
+  std::vector<int> order_, chosen_;
+  InputTable kernels_;  // a row per point: of the readings, solved with the factor
+  InputTable asked_;
+  Scales now_;
+};
+
+/// How much the largest of several quantities with these means is expected to rise once a reading of a quantity shows:
+/// E max(mean + effect Z) - max mean, Z standard normal (Frazier, Powell and Dayanik 2009). `order` and `breaks` are
+/// scratch of the same size.
+double knowledge_gradient(std::span<const double> mean, std::span<const double> effect, std::span<int> order,
+                          std::span<double> breaks) noexcept;
+
+}  // namespace mgdd::optimize

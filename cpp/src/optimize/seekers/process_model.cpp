@@ -1,0 +1,332 @@
+#include "mgdd/optimize/seekers/process_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "mgdd/common/random.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+// Priors, in bends: J = level - bend/2 |z - 1/2|^2 + slopes (sd 0.4) + bends (0.6) + couplings (0.5) + the rest.
+constexpr double level_sd = 3.0, slope_sd = 0.4, bend_sd = 0.6, coupling_sd = 0.5;
+constexpr double noise_prior = -5.3, noise_prior_sd = 1.5;
+constexpr double rest_prior = -4.5, rest_prior_sd = 1.5;
+constexpr double length_prior = -0.7, length_prior_sd = 0.7;
+constexpr double settled_sd = 0.4;  // of the bend, once the first readings have shown it
+constexpr double bend_search_sd = 1.5;
+constexpr int settling_readings = 30;
+constexpr int evidence_readings = 60;
+constexpr double crowd = 0.75;  // share of the readings, those nearest to the estimate, of which the oldest goes
+constexpr double jitter = 1e-10;
+constexpr int first_trials = 60, more_trials = 20, late_trials = 3;
+constexpr int first_readings = 15, more_readings = 40;
+constexpr double coarse_step = 0.8, fine_step = 0.25;
+constexpr double lowest_log = -12.0, highest_log = 3.0;
+
+double squared_distance(const InputTable& points, Eigen::Index row, const Inputs& from) noexcept {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < from.size(); ++i) {
+    const double off = points(row, i) - from[i];
+    sum += off * off;
+  }
+  return sum;
+}
+
+double dot(const double* a, const double* b, Eigen::Index n) noexcept {
+  return Eigen::Map<const Eigen::VectorXd>(a, n).dot(Eigen::Map<const Eigen::VectorXd>(b, n));
+}
+
+// The lower triangle of rows of a positive definite matrix becomes that of its Cholesky factor.
+void cholesky(InputTable& m, Eigen::Index n) noexcept {
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double size = m(i, i);
+    for (Eigen::Index j = 0; j < i; ++j)
+      m(i, j) = (m(i, j) - dot(&m(i, 0), &m(j, 0), j)) / m(j, j);
+    m(i, i) = std::sqrt(std::max(size - dot(&m(i, 0), &m(i, 0), i), jitter * size));
+  }
+}
+
+void solve_lower(const InputTable& factor, Eigen::Index n, double* x) noexcept {
+  for (Eigen::Index i = 0; i < n; ++i)
+    x[i] = (x[i] - dot(&factor(i, 0), x, i)) / factor(i, i);
+}
+
+void solve_upper(const InputTable& factor, Eigen::Index n, double* x) noexcept {
+  for (Eigen::Index i = n - 1; i >= 0; --i) {
+    x[i] /= factor(i, i);
+    for (Eigen::Index j = 0; j < i; ++j)
+      x[j] -= factor(i, j) * x[i];
+  }
+}
+
+double log_prior(double value, double middle, double sd) noexcept {
+  const double off = (value - middle) / sd;
+  return -0.5 * off * off;
+}
+
+}  // namespace
+
+ProcessModel::ProcessModel(const Settings& settings)
+    : settings_(settings),
+      points_(InputTable::Zero(settings.kept, settings.inputs)),
+      values_(Eigen::VectorXd::Zero(settings.kept)),
+      ages_(values_),
+      numbers_(Numbers::Zero(3 + settings.inputs)),
+      factor_(settings.kept, settings.kept),
+      small_(evidence_readings, evidence_readings),
+      weights_(values_),
+      small_rest_(Eigen::VectorXd::Zero(evidence_readings)),
+      distance_(values_),
+      mean_(Eigen::VectorXd::Zero(settings.most_points)),
+      order_(static_cast<std::size_t>(settings.kept), 0),
+      chosen_(evidence_readings, 0),
+      kernels_(settings.most_points, settings.kept),
+      asked_(InputTable::Zero(settings.most_points, settings.inputs)),
+      now_{1.0, 0.0, 0.0, Inputs::Ones(settings.inputs)} {}
+
+double ProcessModel::noise_sd() const noexcept {
+  return settings_.noise_sd.value_or(std::exp(numbers_[0] + numbers_[1]));
+}
+
+ProcessModel::Scales ProcessModel::scales_of(const Numbers& numbers) const noexcept {
+  const double bend = std::exp(numbers[0]);
+  Scales out{bend * bend, settings_.noise_sd.value_or(bend * std::exp(numbers[1])), std::exp(numbers[2]),
+             Inputs(settings_.inputs)};
+  out.noise *= out.noise;
+  out.rest *= out.rest;
+  for (Eigen::Index i = 0; i < settings_.inputs; ++i)
+    out.inverse_length[i] = std::exp(-numbers[3 + i]);
+  return out;
+}
+
+double ProcessModel::prior_mean(const double* z, const Scales& s) const noexcept {
+  if (!settings_.bends_down) return 0.0;
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < settings_.inputs; ++i)
+    sum += (z[i] - 0.5) * (z[i] - 0.5);
+  return -0.5 * std::sqrt(s.squared_bend) * sum;
+}
+
+double ProcessModel::kernel(const double* a, const double* b, const Scales& s) const noexcept {
+  double slopes = 0.0, bends = 0.0, couplings = 0.0, squares = 0.0;
+  for (Eigen::Index i = 0; i < settings_.inputs; ++i) {
+    const double both = (a[i] - 0.5) * (b[i] - 0.5);
+    couplings += slopes * both;  // of every pair once
+    slopes += both;
+    bends += 0.25 * both * both;
+    const double off = (a[i] - b[i]) * s.inverse_length[i];
+    squares += off * off;
+  }
+  const double r = std::sqrt(5.0 * squares);
+  const double matern = (1.0 + r + r * r / 3.0) * std::exp(-r);
+  return s.squared_bend * (level_sd * level_sd + slope_sd * slope_sd * slopes + bend_sd * bend_sd * bends +
+                           coupling_sd * coupling_sd * couplings + s.rest * matern);
+}
+
+// Of the readings nearest to `about` the oldest one.
+int ProcessModel::crowded_reading(const Inputs& about) noexcept {
+  for (std::int64_t i = 0; i < count_; ++i)
+    distance_[i] = squared_distance(points_, i, about);
+  const auto begin = order_.begin(), end = begin + count_;
+  std::iota(begin, end, 0);
+  const auto near = begin + static_cast<std::ptrdiff_t>(crowd * static_cast<double>(count_));
+  std::nth_element(begin, near, end, [&](int a, int b) {
+    return distance_[a] < distance_[b] || (distance_[a] == distance_[b] && a < b);
+  });
+  return *std::max_element(begin, near, [&](int a, int b) { return ages_[a] < ages_[b]; });
+}
+
+void ProcessModel::record(const Inputs& z, double value, const Inputs& about) noexcept {
+  const int at = count_ < settings_.kept ? static_cast<int>(count_++) : crowded_reading(about);
+  ages_.head(count_).array() += 1.0;
+  points_.row(at) = z.transpose();
+  values_[at] = value;
+  ages_[at] = 0.0;
+  ++told_;
+}
+
+void ProcessModel::age(double cycles) noexcept {
+  ages_.head(count_).array() += cycles;
+}
+
+void ProcessModel::forget() noexcept {
+  count_ = told_ = 0;
+  begun_ = false;
+  points_.setZero();
+  values_.setZero();
+  ages_.setZero();
+  numbers_.setZero();
+  settled_bend_.reset();
+}
+
+// The newest half of those that the evidence is taken of, and of the others those farthest away: these show the bend.
+void ProcessModel::choose_readings(const Inputs& about) noexcept {
+  const auto begin = order_.begin(), end = begin + count_;
+  std::iota(begin, end, 0);
+  const auto most = std::min<std::int64_t>(count_, evidence_readings);
+  if (count_ > most) {
+    std::sort(begin, end, [&](int a, int b) { return ages_[a] < ages_[b] || (ages_[a] == ages_[b] && a < b); });
+    for (std::int64_t i = 0; i < count_; ++i)
+      distance_[i] = squared_distance(points_, i, about);
+    std::sort(begin + most / 2, end,
+              [&](int a, int b) { return distance_[a] > distance_[b] || (distance_[a] == distance_[b] && a < b); });
+  }
+  std::copy(begin, begin + most, chosen_.begin());
+}
+
+// Logarithm of the likelihood of the chosen readings times the priors.
+double ProcessModel::evidence(const Numbers& numbers) noexcept {
+  const Scales s = scales_of(numbers);
+  const auto n = std::min<std::int64_t>(count_, evidence_readings);
+  for (std::int64_t a = 0; a < n; ++a) {
+    const int i = chosen_[static_cast<std::size_t>(a)];
+    small_rest_[a] = values_[i] - level_ - prior_mean(&points_(i, 0), s);
+    for (std::int64_t b = 0; b <= a; ++b)
+      small_(a, b) = kernel(&points_(i, 0), &points_(chosen_[static_cast<std::size_t>(b)], 0), s);
+    small_(a, a) += s.noise * std::exp(ages_[i] / settings_.memory) + jitter * s.squared_bend;
+  }
+  cholesky(small_, n);
+  solve_lower(small_, n, small_rest_.data());
+  double out = -0.5 * dot(small_rest_.data(), small_rest_.data(), n);
+  for (std::int64_t a = 0; a < n; ++a) {
+    // A faded reading counts as a power of its likelihood; without this term it would speak for less noise.
+    const double faded = 1.0 - std::exp(-ages_[chosen_[static_cast<std::size_t>(a)]] / settings_.memory);
+    out += 0.5 * faded * std::log(s.noise) - std::log(small_(a, a));
+  }
+  const double noise = noise_known() ? std::log(*settings_.noise_sd) - numbers[0] : numbers[1];
+  out += log_prior(noise, noise_prior, noise_prior_sd) + log_prior(numbers[2], rest_prior, rest_prior_sd);
+  for (Eigen::Index i = 0; i < settings_.inputs; ++i)
+    out += log_prior(numbers[3 + i], length_prior, length_prior_sd);
+  if (settled_bend_) out += log_prior(numbers[0], *settled_bend_, settled_sd);
+  return std::isfinite(out) ? out : -std::numeric_limits<double>::infinity();
+}
+
+// The bend that the spread of the readings suggests.
+void ProcessModel::begin_numbers() noexcept {
+  const double spread = values_.head(count_).maxCoeff() - values_.head(count_).minCoeff();
+  const double highest = values_.head(count_).cwiseAbs().maxCoeff();
+  double farthest = 1e-6;
+  for (std::int64_t i = 0; i < count_; ++i)
+    for (std::int64_t j = 0; j < i; ++j)
+      farthest = std::max(farthest, (points_.row(i) - points_.row(j)).norm());
+  const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), 1e-300});
+  numbers_[0] = std::log(rise / (0.3 * farthest));
+  numbers_[1] = noise_prior;
+  numbers_[2] = rest_prior;
+  numbers_.tail(settings_.inputs).setConstant(length_prior);
+  begun_ = true;
+}
+
+void ProcessModel::try_numbers(int trials) noexcept {
+  const Eigen::Index sizes = 3 + settings_.inputs;
+  double best = evidence(numbers_);
+  for (std::int64_t t = told_ * trials; t < (told_ + 1) * trials; ++t) {
+    const Eigen::Index which = t % sizes;
+    const std::int64_t round = t / sizes;
+    if (which == 1 && noise_known()) continue;
+    const double width = round % 2 == 0 ? coarse_step : fine_step;
+    const double step = width * random::normal(settings_.seed, 100, static_cast<std::uint64_t>(t));
+    Numbers trial = numbers_;
+    if (told_ < more_readings && t % 4 == 3) {  // anew from the priors: the evidence has more than one top
+      const auto normal = [&](std::uint64_t stream) {
+        return random::normal(settings_.seed, stream, static_cast<std::uint64_t>(t));
+      };
+      trial[0] += bend_search_sd * normal(101);
+      trial[1] = noise_prior + noise_prior_sd * normal(102);
+      trial[2] = rest_prior + rest_prior_sd * normal(103);
+      trial.tail(settings_.inputs).setConstant(length_prior);
+    } else {
+      trial[which] += step;
+      if (which == 0 && round % 3 == 0) trial[1] -= step;  // the noise stays
+    }
+    if (trial.tail(sizes - 1).minCoeff() < lowest_log || trial.tail(sizes - 1).maxCoeff() > highest_log) continue;
+    const double found = evidence(trial);
+    if (found <= best) continue;
+    best = found;
+    numbers_ = trial;
+  }
+}
+
+void ProcessModel::factor() noexcept {
+  for (std::int64_t i = 0; i < count_; ++i) {
+    weights_[i] = values_[i] - level_ - prior_mean(&points_(i, 0), now_);
+    for (std::int64_t j = 0; j <= i; ++j)
+      factor_(i, j) = kernel(&points_(i, 0), &points_(j, 0), now_);
+    factor_(i, i) += now_.noise * std::exp(ages_[i] / settings_.memory) + jitter * now_.squared_bend;
+  }
+  cholesky(factor_, count_);
+  solve_lower(factor_, count_, weights_.data());
+  solve_upper(factor_, count_, weights_.data());
+}
+
+void ProcessModel::fit(const Inputs& about) noexcept {
+  level_ = values_.head(count_).mean();
+  const auto enough = settings_.inputs + 1;
+  if (!begun_ || told_ <= enough) begin_numbers();
+  choose_readings(about);
+  if (told_ >= enough) {
+    try_numbers(told_ < first_readings ? first_trials : told_ < more_readings ? more_trials : late_trials);
+    if (told_ == enough + settling_readings) settled_bend_ = numbers_[0];
+  }
+  now_ = scales_of(numbers_);
+  factor();
+}
+
+void ProcessModel::predict(const InputTable& at, int points) noexcept {
+  predict_means(at, points);
+  for (int p = 0; p < points; ++p)
+    solve_lower(factor_, count_, &kernels_(p, 0));
+}
+
+void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
+  for (int p = 0; p < points; ++p) {
+    asked_.row(p) = at.row(p).head(settings_.inputs);
+    double* const own = &kernels_(p, 0);
+    for (std::int64_t i = 0; i < count_; ++i)
+      own[i] = kernel(&points_(i, 0), &asked_(p, 0), now_);
+    mean_[p] = level_ + prior_mean(&asked_(p, 0), now_) + dot(own, weights_.data(), count_);
+  }
+}
+
+double ProcessModel::covariance(int i, int j) const noexcept {
+  return kernel(&asked_(i, 0), &asked_(j, 0), now_) - dot(&kernels_(i, 0), &kernels_(j, 0), count_);
+}
+
+double knowledge_gradient(std::span<const double> mean, std::span<const double> effect, std::span<int> order,
+                          std::span<double> breaks) noexcept {
+  std::iota(order.begin(), order.end(), 0);
+  const auto at = [](int i) { return static_cast<std::size_t>(i); };
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return effect[at(a)] < effect[at(b)] || (effect[at(a)] == effect[at(b)] && mean[at(a)] < mean[at(b)]);
+  });
+  // The upper envelope of the lines mean + effect Z; breaks[k] is where line k + 1 of it takes over.
+  std::size_t lines = 0;
+  for (const int next : order) {
+    while (lines > 0) {
+      const int last = order[lines - 1];
+      const double steeper = effect[at(next)] - effect[at(last)];
+      if (steeper > 0.0) {
+        const double crossing = (mean[at(last)] - mean[at(next)]) / steeper;
+        if (lines == 1 || crossing > breaks[lines - 2]) {
+          breaks[lines - 1] = crossing;
+          break;
+        }
+      }
+      --lines;
+    }
+    order[lines++] = next;
+  }
+  double out = 0.0;
+  for (std::size_t k = 0; k + 1 < lines; ++k) {
+    const double off = -std::abs(breaks[k]);
+    const double density = std::exp(-0.5 * off * off) / std::sqrt(2.0 * std::numbers::pi);
+    const double below = 0.5 * std::erfc(-off / std::numbers::sqrt2);
+    out += (effect[at(order[k + 1])] - effect[at(order[k])]) * (density + off * below);
+  }
+  return out;
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,80 @@
+"""Seeking with a Gaussian process of J and of every limit."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mgdd import _core
+from mgdd.optimize.seeker import Seeker
+
+__all__ = ["GaussianProcessSeeking"]
+
+
+class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
+    """Seek with a Gaussian process: few readings, several inputs, limits with a stated probability.
+
+    Bayesian optimisation made for an engine that runs while it is sought on. After a reading at the start and one to
+    the side per input, the next input is the one whose J, and what a few readings there would teach about the best
+    input, is worth most over `horizon` cycles. Nothing is asked farther from the start than half as far again as what
+    has been. Level, slopes and bends of J have a prior that takes its scale from the readings, so any unit of J and of
+    the inputs does. All arguments are keywords.
+
+    Parameters
+    ----------
+    start : float or array_like, shape (inputs,), or mapping
+        First estimate, in the unit of the input; one to eight inputs. Limits should hold there.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds and rates of the inputs; `ask` then gives a mapping. A rate bounds the applied input.
+    lower, upper : float or array_like
+        Bounds of the applied input, per input, finite, where `inputs` does not say them.
+    noise_sd : float, optional
+        Standard deviation of one reading, > 0 [unit of J]; learnt without.
+    horizon : float
+        Cycles for which what is learnt pays: more looks farther, 0 only at J.
+    memory_cycles : float
+        Readings fade with this time constant, >= 10: their variance grows by exp(age/memory_cycles).
+    kept : int
+        Readings at most, 10 to 200; the oldest of those near the estimate makes room.
+    first_step : float
+        Of the readings to the side, as a share of the bounds; half of it where there are limits [-].
+    limit_probability : float
+        With which every limit holds at every input asked for, in [0.5, 1), as far as the processes know [-].
+    delay_cycles, lag_cycles : float
+        Transport delay and time constant between the plant and J [cycles]; behind a lag an input is held for two time
+        constants. The delay is taken as told.
+    seed : int
+        Of the inputs that are compared: the same seed gives the same run.
+    maximize : bool
+        False to minimise J.
+    limits : sequence of Limit, or mapping of str to float
+        Measured quantities to keep, each with a process of its own; ``tell(J, limits)`` then takes their values.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, an infinite bound, or bounds that exclude the start.
+    mgdd.errors.ShapeError
+        Entries that are not one per input.
+
+    Notes
+    -----
+    Readings that the process does not explain age what was known by three times `memory_cycles`; `doubts` counts that.
+
+    References
+    ----------
+    Rasmussen and Williams (2006), Gaussian processes for machine learning.
+    Frazier, Powell and Dayanik (2009), The knowledge-gradient policy for correlated normal beliefs.
+    Sui, Gotovos, Burdick and Krause (2015), Safe exploration for optimization with Gaussian processes.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import GaussianProcessSeeking
+    >>> seeker = GaussianProcessSeeking(
+    ...     start={"soc_cad": -16.0, "egr": 0.3}, inputs={"soc_cad": (-25.0, 15.0), "egr": (0.0, 0.4)}
+    ... )
+    >>> history = seeker.run(lambda x: -0.03 * (x["soc_cad"] + 4) ** 2 - 300 * (x["egr"] - 0.15) ** 2, 20)
+    >>> bool(abs(seeker.estimate[0] + 4.0) < 1.0 and abs(seeker.estimate[1] - 0.15) < 0.02)
+    True
+    """
+
+    kind: ClassVar[str] = "GaussianProcessSeeking"

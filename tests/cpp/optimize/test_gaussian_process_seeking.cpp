@@ -1,0 +1,224 @@
+// Seeking with Gaussian processes: few readings to the best of several inputs, limits, drift, restarts.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/state.hpp"
+#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+using test_support::AllocationCounter;
+
+// Timing and EGR: unlike scales, coupled.
+GaussianProcessSeekingSettings two_inputs(std::uint64_t seed) {
+  GaussianProcessSeekingSettings s;
+  s.space.inputs = {{.name = "soc_cad", .lower = -25.0, .upper = 15.0}, {.name = "egr", .lower = 0.0, .upper = 0.4}};
+  s.space.start = Inputs(2);
+  s.space.start << 4.0, 0.31;
+  s.seed = seed;
+  return s;
+}
+
+double lost(const Inputs& x, double best_soc = -4.0) {
+  const double a = x[0] - best_soc, b = 100.0 * (x[1] - 0.2);
+  return 0.03 * (a * a + b * b + 1.2 * a * b);
+}
+
+double noise(std::uint64_t seed, int cycle, double sd = 0.3) {
+  return sd * random::normal(seed, 9, static_cast<std::uint64_t>(cycle));
+}
+
+TEST(GaussianProcessSeeking, ArrivesInAboutTenReadingsAndStays) {
+  std::vector<int> arrivals;
+  double late = 0.0, within = 0.0;
+  constexpr int seeds = 20, cycles = 120, from = 60;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    GaussianProcessSeeking seeker(two_inputs(seed));
+    int arrived = cycles;
+    for (int k = 0; k < cycles; ++k) {
+      if (arrived == cycles && lost(seeker.estimate()) < 0.06) arrived = k;
+      const double j[] = {50.0 - lost(seeker.ask()) + noise(seed, k)};
+      ASSERT_EQ(seeker.tell({j, {}}), TellStatus::accepted);
+      if (k >= from) late += lost(seeker.applied()) / (seeds * (cycles - from));
+    }
+    arrivals.push_back(arrived);
+    const double off = std::abs(seeker.expected() - (50.0 - lost(seeker.estimate())));
+    within += off < 2.0 * seeker.expected_sd() + 0.02 ? 1.0 : 0.0;
+    EXPECT_NEAR(seeker.noise_sd(), 0.3, 0.12) << seed;
+  }
+  std::sort(arrivals.begin(), arrivals.end());
+  EXPECT_LE(arrivals[seeds / 2], 12);
+  EXPECT_LT(arrivals[seeds - 1], cycles) << "one run never arrived";
+  EXPECT_LT(late, 0.1);
+  EXPECT_GE(within / seeds, 0.75) << "the stated expectation";
+}
+
+TEST(GaussianProcessSeeking, MinimisingIsMaximisingTheNegative) {
+  GaussianProcessSeeking up(two_inputs(1));
+  auto s = two_inputs(1);
+  s.maximize = false;
+  GaussianProcessSeeking down(s);
+  for (int k = 0; k < 60; ++k) {
+    ASSERT_EQ(up.ask(), down.ask()) << k;
+    const double j[] = {-lost(up.ask()) + noise(1, k)}, minus[] = {-j[0]};
+    up.tell({j, {}});
+    down.tell({minus, {}});
+  }
+  EXPECT_EQ(up.expected(), -down.expected());
+}
+
+// J is best at +8 by 0.1; the limited quantity is 100 + 2 x + 60 egr with a limit that holds the timing back.
+TEST(GaussianProcessSeeking, KeepsALimitOnItsWay) {
+  double above = 0.0, far = 0.0;
+  constexpr int seeds = 10, cycles = 150;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    auto s = two_inputs(seed);
+    s.space.start << -18.0, 0.3;
+    s.limits = {{.name = "p_max_bar", .upper = 110.0}};
+    GaussianProcessSeeking seeker(s);
+    for (int k = 0; k < cycles; ++k) {
+      const Inputs x = seeker.ask();
+      const double value = 100.0 + 2.0 * x[0] + 60.0 * x[1];
+      const double j[] = {-lost(x, 8.0) + noise(seed, k)}, limits[] = {value + noise(seed, 1000 + k, 0.5)};
+      seeker.tell({j, limits});
+      above += value > 110.0 ? 1.0 / (seeds * cycles) : 0.0;
+    }
+    const Inputs x = seeker.estimate();
+    EXPECT_EQ(seeker.limit_state(0), LimitState::active) << seed;
+    far += (110.0 - (100.0 + 2.0 * x[0] + 60.0 * x[1])) / seeds;
+  }
+  EXPECT_LE(above, 0.01);
+  EXPECT_LT(far, 5.0) << "it keeps away from the limit";
+}
+
+TEST(GaussianProcessSeeking, FollowsABestInputThatJumps) {
+  double late = 0.0;
+  constexpr int seeds = 8;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    GaussianProcessSeeking seeker(two_inputs(seed));
+    for (int k = 0; k < 300; ++k) {
+      const double best = k < 100 ? -4.0 : 5.0;
+      const double j[] = {-lost(seeker.ask(), best) + noise(seed, k)};
+      seeker.tell({j, {}});
+      if (k >= 200) late += lost(seeker.applied(), best) / (100.0 * seeds);
+    }
+    EXPECT_GE(seeker.doubts(), 1) << seed;
+  }
+  EXPECT_LT(late, 0.4);  // 2.4 where it stays
+}
+
+TEST(GaussianProcessSeeking, TakesReadingsThatComeLateToTheirInputs) {
+  auto s = two_inputs(3);
+  s.sensor = {12.0, 0.0};
+  GaussianProcessSeeking seeker(s);
+  std::vector<double> on_their_way(12, -lost(s.space.start));
+  for (int k = 0; k < 160; ++k) {
+    on_their_way.push_back(-lost(seeker.ask()) + noise(3, k));
+    const double j[] = {on_their_way[static_cast<std::size_t>(k)]};
+    seeker.tell({j, {}});
+  }
+  EXPECT_LT(lost(seeker.estimate()), 0.1);
+}
+
+TEST(GaussianProcessSeeking, GoesOnBitForBitAndAllocatesNothing) {
+  auto s = two_inputs(5);
+  s.kept = 20;
+  s.limits = {{.name = "p", .upper = 200.0}};
+  GaussianProcessSeeking seeker(s);
+  const auto cycle = [](GaussianProcessSeeking& one, int k) {
+    const Inputs x = one.ask();
+    const double j[] = {-lost(x) + noise(5, k)}, limits[] = {100.0 + x[0]};
+    one.tell({j, limits, k % 9 == 4});
+  };
+  static_assert(noexcept(seeker.ask()) && noexcept(seeker.tell(std::declval<const Reading&>())));
+  const AllocationCounter counter;
+  for (int k = 0; k < 40; ++k)
+    cycle(seeker, k);
+  EXPECT_EQ(counter.count(), 0u);
+  GaussianProcessSeeking again(s);
+  restore_state(again, save_state(seeker));
+  for (int k = 40; k < 60; ++k) {
+    cycle(seeker, k);
+    cycle(again, k);
+    ASSERT_EQ(seeker.applied(), again.applied()) << k;
+    ASSERT_EQ(seeker.estimate(), again.estimate()) << k;
+  }
+  StateColumns wrong = save_state(seeker);
+  wrong["estimate"] = {-26.0, 0.1};
+  EXPECT_THROW(restore_state(again, wrong), ParameterError);
+}
+
+TEST(GaussianProcessSeeking, ANewPointBeginsAnewAndRatesHold) {
+  auto s = two_inputs(6);
+  s.space.inputs[0].rate = 1.5;
+  GaussianProcessSeeking seeker(s);
+  Inputs before = s.space.start;
+  for (int k = 0; k < 80; ++k) {
+    if (k == 40) seeker.restart();
+    const Inputs x = seeker.ask();
+    ASSERT_LE(std::abs(x[0] - before[0]), 1.5 + 1e-12) << k;
+    before = x;
+    const double j[] = {-lost(x, k < 40 ? -4.0 : -1.0) + noise(6, k, 0.05)};
+    seeker.tell({j, {}});
+  }
+  EXPECT_NEAR(seeker.estimate()[0], -1.0, 1.0);
+}
+
+TEST(GaussianProcessSeeking, KeepsOutOfInputsThatFail) {
+  auto s = two_inputs(7);
+  GaussianProcessSeeking seeker(s);
+  int failed = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Inputs x = seeker.ask();
+    const bool fails = x[1] < 0.22;  // the best input lies in there
+    const double j[] = {-lost(x) + noise(7, k)};
+    seeker.tell({j, {}, fails});
+    if (k >= 100) failed += fails ? 1 : 0;
+  }
+  EXPECT_LE(failed, 10);
+  EXPECT_GE(seeker.estimate()[1], 0.2);
+}
+
+TEST(GaussianProcessSeeking, AJWithoutAnythingInItIsBorne) {
+  for (const double level : {0.0, 1e12, -3e-200}) {
+    GaussianProcessSeeking seeker(two_inputs(8));
+    for (int k = 0; k < 40; ++k) {
+      const Inputs x = seeker.ask();
+      ASSERT_TRUE(x.allFinite()) << level;
+      const double j[] = {level};
+      ASSERT_EQ(seeker.tell({j, {}}), TellStatus::accepted);
+    }
+    EXPECT_TRUE(seeker.estimate().allFinite());
+  }
+}
+
+TEST(GaussianProcessSeeking, RefusesByName) {
+  const auto refused = [](auto change, const std::string& field) {
+    auto s = two_inputs(0);
+    change(s);
+    try {
+      const GaussianProcessSeeking made(s);
+      ADD_FAILURE() << field;
+    } catch (const ParameterError& error) {
+      EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+    }
+  };
+  refused([](auto& s) { s.space.inputs[1].upper = unlimited; }, "upper of egr");
+  refused([](auto& s) { s.noise_sd = 0.0; }, "noise_sd");
+  refused([](auto& s) { s.horizon = -1.0; }, "horizon");
+  refused([](auto& s) { s.memory_cycles = 1.0; }, "memory_cycles");
+  refused([](auto& s) { s.kept = 201; }, "kept");
+  refused([](auto& s) { s.first_step = 0.0; }, "first_step");
+  refused([](auto& s) { s.limit_probability = 1.0; }, "limit_probability");
+  refused([](auto& s) { s.sensor.delay_cycles = -1.0; }, "delay_cycles");
+  refused([](auto& s) { s.space.start[1] = 0.5; }, "start");
+}
+
+}  // namespace
+}  // namespace mgdd::optimize

@@ -1,0 +1,120 @@
+// The process against plain Bayesian algebra written anew, and the knowledge gradient against a sum over many draws.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <vector>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/optimize/seekers/process_model.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+Inputs at(double a, double b) {
+  Inputs z(2);
+  z << a, b;
+  return z;
+}
+
+// A plane, bends and a coupling, none of them symmetric.
+double surface(const Inputs& z) {
+  return 7.0 + 3.0 * z[0] - 2.0 * z[1] - 20.0 * z[0] * z[0] - 11.0 * z[1] * z[1] + 6.0 * z[0] * z[1];
+}
+
+ProcessModel told(int readings, double noise_sd, ProcessModel::Settings settings) {
+  settings.inputs = 2;
+  ProcessModel model(settings);
+  const Inputs about = at(0.4, 0.6);
+  for (int k = 0; k < readings; ++k) {
+    const auto index = static_cast<std::uint64_t>(k);
+    const Inputs z = at(random::uniform(1, 1, index), random::uniform(1, 2, index));
+    model.record(z, surface(z) + noise_sd * random::normal(1, 3, index), about);
+    if (model.count() > 2) model.fit(about);
+  }
+  return model;
+}
+
+TEST(ProcessModel, ReadsASurfaceOfSecondOrderOffItsReadings) {
+  for (const bool bends_down : {true, false}) {
+    ProcessModel model = told(30, 0.05, {.bends_down = bends_down});
+    InputTable points(3, 2);
+    points << 0.2, 0.7, 0.9, 0.1, 0.5, 0.5;
+    model.predict(points, 3);
+    for (int p = 0; p < 3; ++p) {
+      const Inputs z = points.row(p).transpose();
+      EXPECT_NEAR(model.mean(p), surface(z), 0.25) << p;
+      EXPECT_LT(std::sqrt(model.covariance(p, p)), 0.25) << p;
+    }
+    EXPECT_NEAR(model.noise_sd(), 0.05, 0.04);
+  }
+}
+
+TEST(ProcessModel, CovariancesAreThoseOfOneNormalDistribution) {
+  ProcessModel model = told(12, 0.1, {});
+  InputTable points(5, 2);
+  points << 0.1, 0.1, 0.9, 0.3, 0.5, 0.8, 0.4, 0.6, 0.0, 1.0;
+  model.predict(points, 5);
+  Eigen::MatrixXd c(5, 5);
+  for (int i = 0; i < 5; ++i)
+    for (int j = 0; j < 5; ++j)
+      c(i, j) = model.covariance(i, j);
+  EXPECT_LT((c - c.transpose()).cwiseAbs().maxCoeff(), 1e-9 * c.cwiseAbs().maxCoeff());
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(c).eigenvalues().minCoeff(), -1e-8 * c.maxCoeff());
+}
+
+// One more reading with known noise changes mean and variance as the rule of Bayes says for two normal numbers.
+TEST(ProcessModel, AReadingChangesItsOwnPointAsBayesSays) {
+  ProcessModel::Settings settings{.memory = 1e12, .noise_sd = 0.3};
+  ProcessModel model = told(80, 0.3, settings);  // so many that the numbers of the process hardly move any more
+  InputTable point(1, 2);
+  point << 0.95, 0.95;
+  model.predict(point, 1);
+  const double mean = model.mean(0), variance = model.covariance(0, 0);
+  model.record(at(0.95, 0.95), mean + 1.0, at(0.4, 0.6));
+  model.fit(at(0.4, 0.6));
+  model.predict(point, 1);
+  const double share = variance / (variance + 0.09);
+  EXPECT_NEAR(model.mean(0) - mean, share, 0.15 * share + 0.01);
+  EXPECT_NEAR(model.covariance(0, 0), variance * (1.0 - share), 0.15 * variance);
+}
+
+TEST(ProcessModel, FullItForgetsOldReadingsNearTheEstimateAndKeepsFarOnes) {
+  ProcessModel::Settings settings{.inputs = 1, .kept = 10};
+  ProcessModel model(settings);
+  const Inputs about = scalar_input(0.5);
+  model.record(scalar_input(0.0), -5.0, about);
+  model.record(scalar_input(1.0), -6.0, about);
+  for (int k = 0; k < 40; ++k) {
+    model.record(scalar_input(0.5 + 1e-3 * k), 0.0, about);
+    model.fit(about);
+  }
+  EXPECT_EQ(model.count(), 10);
+  InputTable ends(2, 1);
+  ends << 0.0, 1.0;
+  model.predict(ends, 2);
+  EXPECT_NEAR(model.mean(0), -5.0, 0.5);
+  EXPECT_NEAR(model.mean(1), -6.0, 0.5);
+}
+
+TEST(KnowledgeGradient, IsTheMeanRiseOfTheLargest) {
+  const std::vector<double> mean{1.0, 0.4, 0.9, -3.0, 1.0}, effect{0.2, -0.7, 1.1, 0.05, 0.2};
+  std::vector<int> order(5);
+  std::vector<double> breaks(5);
+  const double found = knowledge_gradient(mean, effect, order, breaks);
+  double sum = 0.0;
+  constexpr int cells = 200'000;
+  for (int k = 0; k < cells; ++k) {  // over even shares of probability
+    const double z = random::normal_quantile((k + 0.5) / cells);
+    double largest = -1e9;
+    for (std::size_t i = 0; i < mean.size(); ++i)
+      largest = std::max(largest, mean[i] + effect[i] * z);
+    sum += largest / cells;
+  }
+  EXPECT_NEAR(found, sum - 1.0, 1e-4);
+  const std::vector<double> same{0.3, 0.3, 0.3};
+  EXPECT_EQ(knowledge_gradient(std::vector<double>{1.0, 2.0, 0.0}, same, {order.data(), 3}, {breaks.data(), 3}), 0.0);
+}
+
+}  // namespace
+}  // namespace mgdd::optimize
