@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,6 @@ from mgdd.optimize.measured_surface import Surface, fewest, fit_surface, narrowe
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["MeasuredMap", "measure_map"]
@@ -76,10 +75,11 @@ class MeasuredMap(InputNumbers):
 
 def _columns(theta: Any) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Read inputs of shape (n,) or (n, inputs), or columns by name, as (n, inputs) and names."""
-    if not (hasattr(theta, "keys") and hasattr(theta, "__getitem__")):
+    names = theta if isinstance(theta, Mapping) else getattr(theta, "columns", None)  # a mapping gives its keys
+    if names is None:
         x = np.asarray(theta, dtype=np.float64)
         return x[:, None] if x.ndim == 1 else x, ()
-    columns = {str(name): np.asarray(theta[name], dtype=np.float64) for name in theta.keys()}  # noqa: SIM118
+    columns = {str(name): np.asarray(theta[name], dtype=np.float64) for name in names}
     shapes = {name: column.shape for name, column in columns.items()}
     if not columns or len(set(shapes.values())) > 1 or len(next(iter(shapes.values()))) != 1:
         raise ShapeError(f"theta has columns of shape {shapes}: must be columns of one length")
