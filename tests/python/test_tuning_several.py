@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import pytest
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.optimize import ExtremumSeeking, Input, Spsa, measure_map, tune
-from mgdd.optimize.tuning_several import harmonics_of, tune_several
+from mgdd.optimize.tuning_several import harmonics_of, spsa_moments, tune_several
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -142,6 +142,18 @@ def test_coupling_slows_the_approach_and_is_told() -> None:
     assert "coupled" not in plain.summary()
 
 
+def test_the_moments_of_spsa_are_those_of_all_signs() -> None:
+    bend = np.array([[1.0, 0.7, -0.2], [0.7, 1.0, 0.1], [-0.2, 0.1, 1.0]])
+    c, q = np.array([0.5, 1.2, 3.0]), 0.3
+    given = np.array([[2.0, -0.4, 0.3], [-0.4, 1.0, 0.6], [0.3, 0.6, 3.0]])
+    mean = np.zeros((3, 3))
+    for signs in product([-1.0, 1.0], repeat=3):
+        step = np.eye(3) - q * np.outer(np.array(signs) / c, np.array(signs) * c) @ bend
+        mean += step @ given @ step.T / 8.0
+    size = np.outer(c, c)
+    np.testing.assert_allclose(spsa_moments(bend, q, c) @ (given * size).ravel(), (mean * size).ravel(), rtol=1e-12)
+
+
 # --- harmonics ----------------------------------------------------------------------------------------------
 def mixes(harmonics: tuple[int, ...], period: int) -> bool:
     """Whether an echo of a curvature is seen at the frequency of a slope."""
@@ -158,6 +170,14 @@ def test_harmonics_do_not_mix_on_the_shortest_period(inputs: int, period: int) -
     for shorter in range(6, period):
         assert all(mixes(own, shorter) for own in combinations(range(1, (shorter + 1) // 2), inputs))
     ExtremumSeeking(start=[0.0] * inputs, period=period, harmonics=list(harmonics_of(inputs, least=6)[1]))
+
+
+@pytest.mark.parametrize("inputs", [1, 2, 3])
+def test_harmonics_do_not_mix_on_any_period(inputs: int) -> None:
+    for least in range(6, 31):
+        period, harmonics = harmonics_of(inputs, least=least)
+        assert period >= least
+        assert not mixes(harmonics, period)
 
 
 @pytest.mark.parametrize("inputs", [1, 2, 3, 8])

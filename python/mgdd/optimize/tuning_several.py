@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["coupling_of", "harmonics_of", "tune_several"]
+__all__ = ["coupling_of", "harmonics_of", "spsa_moments", "tune_several"]
 
 _RMS, _DISTANCE, _ARRIVAL, _AMPLITUDE_MAX = 0.2, 5.0, 0.45, 1.8  # of sqrt(noise_sd/abs(J''))
 _CYCLES = 50.0
@@ -210,6 +210,17 @@ def _dither(
     return out, final
 
 
+def spsa_moments(bend: Array, q: float, c: Array) -> Array:
+    """Return what an iteration makes of the second moments of c z, row by row: each slope bears those of all inputs."""
+    count = c.size
+    slopes, eye = bend * np.outer(c, 1.0 / c), np.eye(count)
+    squares = np.kron(slopes, slopes).reshape(count, count, count * count)
+    spread = 2.0 * squares
+    spread[np.arange(count), np.arange(count)] = np.trace(squares)
+    kept = np.eye(count * count) - q * (np.kron(slopes, eye) + np.kron(eye, slopes))
+    return np.asarray(kept + q * q * spread.reshape(count * count, -1))
+
+
 def _spsa(
     noise_sd: float, coupling: tuple[Array, Array], spec: Mapping[str, Array], cycles: float | None
 ) -> tuple[dict[str, Any], Array]:
@@ -218,18 +229,8 @@ def _spsa(
     decades = float(np.log(spec["distance"] / spec["arrival"]).max())
     bend = _matrix(coupling)
 
-    def moments(q: float, c: Array) -> Array:
-        """Return what an iteration makes of the second moments of c z: each slope bears those of all inputs."""
-        slopes = bend * np.outer(c, 1.0 / c)
-        eye = np.eye(count)
-        squares = np.kron(slopes, slopes).reshape(count, count, count * count)
-        spread = 2.0 * squares
-        spread[np.arange(count), np.arange(count)] = np.trace(squares)
-        kept = np.eye(count * count) - q * (np.kron(slopes, eye) + np.kron(eye, slopes))
-        return np.asarray(kept + q * q * spread.reshape(count * count, -1))
-
     def shrinks(q: float) -> float:
-        return float(np.abs(np.linalg.eigvals(moments(q, spec["amplitude_max"]))).max())
+        return float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, spec["amplitude_max"]))).max())
 
     # Steps above 1/(inputs + 1) gain little: the slopes of the other inputs scatter them.
     steps = np.linspace(0.0, 1.0 / (count + 1), 201)[1:]
@@ -244,11 +245,11 @@ def _spsa(
 
     def scatter(c: Array) -> Array:
         noise = (0.5 * (q * noise_sd) ** 2 * np.eye(count)).ravel()
-        own = np.linalg.solve(np.eye(count * count) - moments(q, c), noise).reshape(count, count)
+        own = np.linalg.solve(np.eye(count * count) - spsa_moments(bend, q, c), noise).reshape(count, count)
         return np.asarray(own / np.outer(c, c))
 
     c = _amplitudes(spec["amplitude_max"], spec, scatter)
-    time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(moments(q, c))).max()))
+    time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, c))).max()))
     out = {
         "amplitude": c,
         "period": 2,
