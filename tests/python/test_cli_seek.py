@@ -225,6 +225,12 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert "does not exist; make it" in refused(capsys, "--figure", "nowhere/run.png")
 
 
+def test_bounds_by_name_are_those_of_lower_and_upper(capsys: pytest.CaptureFixture[str]) -> None:
+    by_name = seek(capsys, "--input", "soc_cad=-22:-9", "--cycles", "300")
+    assert by_name == seek(capsys, "--lower-cad", "-22", "--upper-cad", "-9", "--cycles", "300")
+    assert -10.0 <= by_name["final_cad"] < -9.0  # the free optimum is -5.6
+
+
 @pytest.mark.parametrize(
     ("wrong", "right", "message", "code"),
     [
@@ -234,6 +240,24 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         (["--lower-cad", "-61"], ["--lower-cad", "-60"], "--lower-cad -61: must be in [-60, 20]", 2),
         (["--upper-cad", "-25"], ["--upper-cad", "-5"], "--start-cad -20: must be in [-29, -26]", 2),
         (["--upper-cad", "-30"], ["--upper-cad", "0"], "--lower-cad -30: must be below --upper-cad -30", 2),
+        (["--input", "soc_cad=-61:5"], ["--input", "soc_cad=-60:5"], "--lower-cad -61: must be in [-60, 20]", 2),
+        (["--input", "soc_cad=5:-25"], ["--input", "soc-cad=-25:5"], "LOW and HIGH must be finite and LOW < HIGH", 2),
+        (["--input", "soc_cad=-25:5:7"], ["--input", "soc_cad=-25:5"], "write NAME=LOW:HIGH", 2),
+        (["--input", "soc_cad"], ["--input", "soc_cad=-25:5"], "--input soc_cad: write NAME=LOW:HIGH", 2),
+        (["--input", "egr=0:0.4"], ["--input", "soc_cad=-25:5"], "--input egr: the bench has soc_cad", 2),
+        (["--input", "soc=-25:5"], ["--input", "soc_cad=-25:5"], "did you mean 'soc_cad'?", 2),
+        (
+            ["--input", "soc_cad=-25:5", "--upper-cad", "5"],
+            ["--upper-cad", "5"],
+            "--input soc_cad and --upper-cad contradict each other: give one",
+            2,
+        ),
+        (
+            ["--input", "soc_cad=-25:5", "--input", "soc_cad=-20:5"],
+            ["--input", "soc_cad=-25:5"],
+            "--input soc_cad is given twice",
+            2,
+        ),
         (["--cycles", "0"], ["--cycles", "1"], "--cycles 0: must be in [1, ", 2),
         (["--cycles", "-5"], ["--cycles", "1"], "--cycles -5", 2),
         (["--seed", "-1"], ["--seed", "1"], "--seed -1: must be in [0, 2**64)", 2),

@@ -72,6 +72,12 @@ def response() -> Any:
     return fit_response(points, "imep_bar", degree=1)
 
 
+def two_inputs() -> Any:
+    rng = np.random.default_rng(2)
+    tried = {"soc_cad": rng.uniform(-15.0, 5.0, 40), "egr": rng.uniform(0.0, 0.3, 40)}
+    return measure_map(tried, -0.03 * (tried["soc_cad"] + 4.0) ** 2 - 300.0 * (tried["egr"] - 0.15) ** 2)
+
+
 def timing() -> Any:
     family = identify.ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
     traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
@@ -111,7 +117,9 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "Optimum": lambda _: find_optimum("puma_single", limits={"p_max_bar": 95.0}),
     "Timing": lambda _: ignition_delay("puma_single", soi_cad=-10.0),
     "MeasuredMap": lambda _: measure_map([-2, -1, 0, 1, 2], [-4.0, -1.1, 0.0, -0.9, -4.0]),
+    "several MeasuredMap": lambda _: two_inputs(),
     "optimize Tuning": lambda _: tune(0.25, -0.051, cycles=10.0),
+    "several Tuning": lambda _: tune(0.25, {"soc_cad": -0.06, "egr": -600.0, "rail_bar": -1e-4}, cycles=10.0),
     "loop Tuning": lambda _: tune_controller("mgdd1", "P1", n_throttles=1, budget=30),
     "ConvergenceReport": lambda _: IterativeLearning([0.0] * 5, impulse_response=[1.0, 0.5], k_p=0.9).convergence(),
     "ParameterVerdict": lambda _: OnlineCalibration("puma_single").verdicts["wall_heat_scale"],
@@ -132,7 +140,7 @@ def test_every_class_of_results_is_here() -> None:
         if not module.name.endswith(("__main__", "._core")):
             importlib.import_module(module.name)
     kinds = {kind.__name__ for kind in subclasses(Result) if kind.__module__.startswith("mgdd.")}
-    kinds -= {"Result", "NumbersResult", "MapForms"} | ELSEWHERE
+    kinds -= {"Result", "NumbersResult", "InputNumbers", "MapForms"} | ELSEWHERE
     assert kinds == {name.split()[-1] for name in MADE}
 
 

@@ -45,12 +45,23 @@ def test_a_file_comes_back_equal(text: str) -> None:
     assert known.mode == "simulate"
 
 
+def test_bounds_by_name_are_those_of_lower_and_upper() -> None:
+    by_name = experiment(SEEK + "[seek.inputs]\nsoc_cad = [-20, 5.5]\n")
+    assert by_name == experiment(SEEK.replace("cycles", "lower_cad = -20.0\nupper_cad = 5.5\ncycles"))
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         (TRACK.replace('"experiment"', '"signal_map"'), r"file: kind = 'signal_map': must be 'experiment'"),
         (TRACK.replace("format = 1", "format = 2"), r"format = 2: must be 1"),
         (TRACK.replace('task = "track"', 'task = "drive"'), r"task = 'drive': must be one of identify, track, seek"),
+        (SEEK + "[seek.inputs]\nsoc_cad = [-20]\n", r"seek.inputs.soc_cad = \[-20\]: must be \[lower, upper\]"),
+        (SEEK + "[seek.inputs]\negr = [0, 1]\n", r"seek.inputs.egr = .*must be one of the keys soc_cad"),
+        (
+            SEEK.replace("cycles", "upper_cad = 5.0\ncycles") + "[seek.inputs]\nsoc_cad = [-20, 5]\n",
+            r"seek.upper_cad = 5: must be left out, since seek.inputs.soc_cad gives the bounds",
+        ),
         (TRACK + "speed = 3\n", r"track.speed = 3: must be one of the keys reference"),
         (TRACK + "controllr = 'pid'\n", r"track.controllr = 'pid': .*did you mean 'controller'"),
         (TRACK.replace('"pid"', '"bang"'), r"track.controller = 'bang': must be one of guided"),

@@ -1,4 +1,4 @@
-"""`--over NAME=LOW:HIGH:N` and `--over NAME=VALUE,VALUE`: the axes of a grid, and the factors of a design."""
+"""Ranges by name: `--over NAME=LOW:HIGH:N` or `NAME=VALUE,VALUE` of grids and designs, `--input NAME=LOW:HIGH`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["add_over", "factors_of", "grid_of"]
+__all__ = ["add_over", "bounds_of", "factors_of", "grid_of"]
 
 _FORM = "write NAME=LOW:HIGH:N, for example soc_cad=-20:5:51, or NAME=VALUE,VALUE"
 _FACTOR_FORM = "write NAME=LOW:HIGH, for example fuel_mg=6:36, NAME=LOW:HIGH:N or NAME=VALUE,VALUE"
+_INPUT_FORM = "write NAME=LOW:HIGH, for example soc_cad=-20:5"
 
 
 def add_over(parser: Any, *, what: str) -> None:
@@ -64,13 +65,25 @@ def factors_of(given: Sequence[str]) -> dict[str, Any]:
     return factors
 
 
-def _split(item: str, known: Any, form: str) -> tuple[str, str]:
+def bounds_of(given: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Read the bounds of inputs, repeated ``--input``."""
+    bounds: dict[str, tuple[float, float]] = {}
+    for item in given:
+        name, span = _split(item, bounds, _INPUT_FORM, "--input")
+        low, high, count = _range(item, span, _INPUT_FORM, "--input")
+        if count is not None or not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ParameterError(f"--input {item}: LOW and HIGH must be finite and LOW < HIGH; {_INPUT_FORM}")
+        bounds[name] = (low, high)
+    return bounds
+
+
+def _split(item: str, known: Any, form: str, option: str = "--over") -> tuple[str, str]:
     name, sign, span = item.partition("=")
     name = name.strip().replace("-", "_")
     if not (sign and name and span.strip()):
-        raise ParameterError(f"--over {item}: {form}")
+        raise ParameterError(f"{option} {item}: {form}")
     if name in known:
-        raise ParameterError(f"--over {name} is given twice: give it once")
+        raise ParameterError(f"{option} {name} is given twice: give it once")
     return name, span
 
 
@@ -84,7 +97,7 @@ def _listed(item: str, span: str) -> NDArray[np.float64] | None:
         raise ParameterError(f"--over {item}: the values must be numbers with commas between them") from None
 
 
-def _range(item: str, span: str, form: str) -> tuple[float, float, int | None]:
+def _range(item: str, span: str, form: str, option: str = "--over") -> tuple[float, float, int | None]:
     parts = span.split(":")
     try:
         low, high = float(parts[0]), float(parts[1])
@@ -92,5 +105,5 @@ def _range(item: str, span: str, form: str) -> tuple[float, float, int | None]:
     except (ValueError, IndexError):
         parts = []
     if len(parts) not in (2, 3):
-        raise ParameterError(f"--over {item}: {form}")
+        raise ParameterError(f"{option} {item}: {form}")
     return low, high, count

@@ -12,8 +12,9 @@ from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
 from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
+from mgdd.cli.ranges import bounds_of
 from mgdd.engine import Performance
-from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.errors import ConvergenceError, ParameterError, hinted
 from mgdd.loop import EngineBench
 from mgdd.loop.seek_limits import COV, SCATTER, limit_report
 from mgdd.loop.timing_search import TimingSearch, TimingSearchRun
@@ -49,6 +50,10 @@ def add_seek(verbs: Any) -> None:
     )  # fmt: skip
     _SEARCH.add(parser)
     parser.add_argument(
+        "--input", action="append", default=[], metavar="NAME=LOW:HIGH",
+        help="bounds of an input of the bench by its name, in place of --lower-cad and --upper-cad",
+    )  # fmt: skip
+    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help=f"keep an indicator, or {COV}, below X; repeatable",
     )  # fmt: skip
@@ -71,7 +76,7 @@ def _seek(args: argparse.Namespace) -> None:
     with _option_names():
         bench, preset = _bench(args, limits)
         guide = guide_of(args, bench.settings["cylinder"])
-        search = TimingSearch(bench=bench, limits=limits, **guide, **_SEARCH.given(args))
+        search = TimingSearch(bench=bench, limits=limits, **guide, **_SEARCH.given(args) | _bounds(args, bench))
         found = search.run()
         doubts = found.doubts()
     run, table = found.run, search.guide_table
@@ -103,6 +108,20 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[Engin
         **_BENCH.given(args),
     )
     return bench, preset.name
+
+
+def _bounds(args: argparse.Namespace, bench: EngineBench) -> dict[str, float]:
+    """Read ``--input`` as the bounds of the search."""
+    out: dict[str, float] = {}
+    for name, (low, high) in bounds_of(args.input).items():
+        if name not in bench.input_names:
+            known = ", ".join(bench.input_names)
+            raise ParameterError(hinted(f"--input {name}: the bench has {known}", name, bench.input_names))
+        for option in ("lower_cad", "upper_cad"):
+            if getattr(args, option) is not None:
+                raise ParameterError(f"--input {name} and {as_option(option)} contradict each other: give one")
+        out = {"lower_cad": low, "upper_cad": high}
+    return out
 
 
 def _payload(args: argparse.Namespace, preset: str, found: TimingSearchRun) -> dict[str, Any]:

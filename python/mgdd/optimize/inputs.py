@@ -55,11 +55,10 @@ def inputs_of(inputs: Any) -> tuple[Input, ...]:
     )
 
 
-def named_values(argument: str, values: Any, inputs: Sequence[Input]) -> Any:
+def named_values(argument: str, values: Any, names: Sequence[str]) -> Any:
     """Put numbers by name into the order of the inputs; anything that is no mapping stays as it is."""
     if not isinstance(values, Mapping):
         return values
-    names = [one.name for one in inputs]
     if not names:
         raise ParameterError(f"{argument} = {dict(values)!r}: names need `inputs`, which say what they are")
     if set(values) != set(names):
@@ -72,7 +71,8 @@ def named_values(argument: str, values: Any, inputs: Sequence[Input]) -> Any:
 def with_inputs(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Give the settings of a seeker with inputs as `Input` objects, and with numbers in their order."""
     inputs = inputs_of(settings.get("inputs"))
-    own = {name: named_values(name, value, inputs) for name, value in settings.items() if name != "inputs"}
+    names = [one.name for one in inputs]
+    own = {name: named_values(name, value, names) for name, value in settings.items() if name != "inputs"}
     return {**own, "inputs": list(inputs)}
 
 

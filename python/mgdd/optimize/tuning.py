@@ -3,59 +3,79 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mgdd import _core
+from mgdd.errors import ParameterError
 from mgdd.optimize.direct_seekers import Spsa
 from mgdd.optimize.dither_seekers import ExtremumSeeking
+from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
+from mgdd.optimize.inputs import inputs_of, named_values
 from mgdd.optimize.optimum import limits_of
-from mgdd.results.result import NumbersResult
+from mgdd.optimize.tuning_inputs import check_several, hessian_of, numbered, per_input, single
+from mgdd.optimize.tuning_several import coupling_of, tune_several
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from numpy.typing import ArrayLike, NDArray
+
+    PerInput = float | ArrayLike | Mapping[str, float]
 
 __all__ = ["Tuning", "tune"]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Tuning(NumbersResult):
+_COUPLED = 0.5  # of the curvature of the flattest direction beside that of the inputs
+
+
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Tuning(InputNumbers):
     """Settings of a seeker, what averaging theory predicts for them, and whether that meets the specification.
+
+    Where it says "per input", a float for one input and an array for several.
 
     Attributes
     ----------
     method : str
         ``"batch"``, ``"moving_average"`` or ``"spsa"``.
-    amplitude : float
-        Of the dither, or perturbation c of SPSA [unit of the input].
+    amplitude : float or numpy.ndarray
+        Of the dither, or perturbation c of SPSA, per input [unit of the input].
     period : int
         Cycles per period, or measurements per iteration of SPSA.
-    gain : float
-        Adaptation gain [unit of the input per unit of J; SPSA: squared].
-    rate : float
-        Largest change of the estimate per cycle (SPSA: per iteration) [unit of the input].
+    gain : float or numpy.ndarray
+        Adaptation gain, per input [unit of the input per unit of J; SPSA: squared].
+    rate : float or numpy.ndarray
+        Largest change of the estimate per cycle (SPSA: per iteration), per input [unit of the input].
     time_constant_cycles : float
-        Of the approach near the optimum [cycles].
-    rms : float
-        Predicted error of the estimate once arrived [unit of the input].
+        Of the approach near the optimum, in the slowest direction [cycles].
+    rms : float or numpy.ndarray
+        Predicted error of the estimate once arrived, per input [unit of the input].
     cycles : float
-        Predicted cycles from `distance` to `arrival` of the specification.
+        Predicted cycles from `distance` to `arrival` of the specification, of all inputs.
     dither_cost, jitter_cost : float
         Mean loss of J by the perturbation and by that error [unit of J].
-    sensor_gain, sensor_phase_deg : float
-        What delay and lag leave of the dither's echo [-], and how far they turn it [deg].
+    sensor_gain, sensor_phase_deg : float or numpy.ndarray
+        What delay and lag leave of the dither's echo [-], and how far they turn it [deg], per input.
     delay_uncertainty : float
         Error of the delay that the period allows for [cycles].
     met : bool
         Whether the specification is met.
     reasons : tuple of str
         Why not, with the figures that would do.
-    noise_sd, curvature : float
+    noise_sd : float
         What it was made from.
+    curvature : float or numpy.ndarray, shape (inputs, inputs)
+        What it was made from, for several inputs as a matrix.
     delay_cycles, lag_cycles : float
         Between the plant and J [cycles].
     compensated : bool
         Whether the seeker turns its demodulation back by that phase.
+    inputs : tuple of str
+        Names of the inputs; empty where they have none.
+    harmonics : numpy.ndarray of int, shape (inputs,)
+        Oscillations of each input per period; None for one input and for SPSA.
 
     See Also
     --------
@@ -70,25 +90,27 @@ class Tuning(NumbersResult):
     """
 
     method: str
-    amplitude: float
+    amplitude: Any
     period: int
-    gain: float
-    rate: float
+    gain: Any
+    rate: Any
     time_constant_cycles: float
-    rms: float
+    rms: Any
     cycles: float
     dither_cost: float
     jitter_cost: float
-    sensor_gain: float
-    sensor_phase_deg: float
+    sensor_gain: Any
+    sensor_phase_deg: Any
     delay_uncertainty: float
     met: bool
     reasons: tuple[str, ...]
     noise_sd: float
-    curvature: float
+    curvature: Any
     delay_cycles: float
     lag_cycles: float
     compensated: bool
+    inputs: tuple[str, ...] = field(default=(), metadata=SEVERAL_ONLY)
+    harmonics: NDArray[np.int64] | None = field(default=None, metadata=SEVERAL_ONLY)
 
     def summary(self) -> str:
         """Say settings, prediction and verdict as text.
@@ -106,18 +128,25 @@ class Tuning(NumbersResult):
         """
         spsa = self.method == "spsa"
         period = f"{self.period} measurements per iteration" if spsa else f"period {self.period} cycles"
+        if self.harmonics is not None:
+            period += f" at {_joined(self.harmonics)} oscillations"
         size, unit = ("perturbation", "iteration") if spsa else ("amplitude", "cycle")
+        of = f" of {' and '.join(self.inputs)}" if self.inputs else ""
         lines = [
-            f"{self.method}: {size} {self.amplitude:.4g}, {period}",
-            f"gain {self.gain:.4g}, at most {self.rate:.4g} per {unit}",
-            f"expect an rms error of {self.rms:.3g}, and arrival after {self.cycles:.0f} cycles",
+            f"{self.method}{of}: {size} {_joined(self.amplitude)}, {period}",
+            f"gain {_joined(self.gain)}, at most {_joined(self.rate)} per {unit}",
+            f"expect an rms error of {_joined(self.rms, 3)}, and arrival after {self.cycles:.0f} cycles",
             f"cost in J: {self.dither_cost:.3g} by the perturbation, {self.jitter_cost:.3g} by the error",
         ]
         if self.delay_cycles > 0.0 or self.lag_cycles > 0.0:
             known = "turned back" if self.compensated else "not compensated"
+            shares = " and ".join(f"{100.0 * share:.0f} %" for share in np.ravel(self.sensor_gain))
+            turns = " and ".join(f"{phase:.0f} deg" for phase in np.ravel(self.sensor_phase_deg))
+            lines.append(f"the sensor leaves {shares} of the echo and turns it by {turns} ({known})")
+        if np.ndim(self.curvature) and (flattest := coupling_of(self.curvature)[0][0]) < _COUPLED:
             lines.append(
-                f"the sensor leaves {100.0 * self.sensor_gain:.0f} % of the echo and turns it by "
-                f"{self.sensor_phase_deg:.0f} deg ({known})"
+                f"the inputs are coupled: in the flattest direction J bends {flattest:.2g} of what it does along the "
+                f"inputs, and the approach takes {1.0 / flattest:.2g} times as long"
             )
         if self.delay_uncertainty > 0.0:
             lines.append(f"the delay may be wrong by {self.delay_uncertainty:.3g} cycles either way")
@@ -130,22 +159,26 @@ class Tuning(NumbersResult):
     def seeker(
         self,
         *,
-        start: float,
-        lower: float = -math.inf,
-        upper: float = math.inf,
+        start: PerInput,
+        lower: PerInput = -math.inf,
+        upper: PerInput = math.inf,
+        inputs: Mapping[str, tuple[float, float]] | Sequence[_core.optimize.Input] | None = None,
         maximize: bool = True,
         limits: Mapping[str, float] | Sequence[_core.optimize.Limit] = (),
         hold_cycles: int | None = None,
         seed: int = 0,
     ) -> ExtremumSeeking | Spsa:
-        """Make the tuned seeker of one input.
+        """Make the tuned seeker.
 
         Parameters
         ----------
-        start : float
-            First estimate, in the unit of the input.
-        lower, upper : float
+        start : float, array_like or mapping of str to float
+            First estimate, in the unit of the input and the order of this tuning.
+        lower, upper : float, array_like or mapping of str to float
             Bounds of the applied input; the start must lie inside by `amplitude`.
+        inputs : mapping of str to (float, float), or sequence of Input, optional
+            Bounds by name, in place of `lower` and `upper`; in any order where this tuning has names. Without, inputs
+            have the names of this tuning.
         maximize : bool
             False to minimise J.
         limits : mapping of str to float, or sequence of Limit
@@ -163,78 +196,113 @@ class Tuning(NumbersResult):
         Raises
         ------
         ParameterError
-            Bounds that exclude the start.
+            Bounds that exclude the start, or inputs of other names.
+        ShapeError
+            Not one number per input.
 
         Examples
         --------
         >>> from mgdd.optimize import tune
         >>> tune(0.25, -0.051).seeker(start=-15.0, lower=-30.0, upper=10.0)
         <ExtremumSeeking cycle 0, estimate [-15.]>
+        >>> tuning = tune(0.25, {"soc_cad": -0.06, "egr": -600.0})
+        >>> tuning.seeker(start={"soc_cad": -12.0, "egr": 0.3}, inputs={"egr": (0.0, 0.4), "soc_cad": (-25.0, 15.0)})
+        <ExtremumSeeking cycle 0, estimate egr 0.3, soc_cad -12>
         """
+        given = inputs_of(inputs)
+        names = tuple(one.name for one in given)
+        if self.inputs and not given:
+            low, high = (named_values("bounds", bound, self.inputs) for bound in (lower, upper))
+            names = self.inputs
+            bounds = zip(names, *np.broadcast_arrays(low, high, np.zeros(len(names)))[:2], strict=True)
+            given = tuple(_core.optimize.Input(name, float(a), float(b)) for name, a, b in bounds)
+        elif given and not all(isinstance(bound, float) and math.isinf(bound) for bound in (lower, upper)):
+            raise ParameterError("lower and upper: inputs hold the bounds: leave these out")
+        if self.inputs and set(names) != set(self.inputs):
+            raise ParameterError(f"inputs are {', '.join(names)}: this was tuned for {', '.join(self.inputs)}")
+        own = [self.inputs.index(name) for name in names] if self.inputs else slice(None)
+
+        def each(value: Any) -> Any:
+            return np.asarray(value)[own].tolist() if np.ndim(value) else value
+
+        space: dict[str, Any] = {"start": start, "lower": lower, "upper": upper}
+        if given:
+            space = {"start": start if isinstance(start, Mapping) else each(start), "inputs": list(given)}
+        one = not np.ndim(self.curvature)
         if self.method == "spsa":
             return Spsa(
-                start=start,
-                lower=lower,
-                upper=upper,
+                **space,
                 schedule="constant",
-                gain=self.gain,
-                perturbation=self.amplitude,
-                step_max=self.rate,
+                gain=each(self.gain),
+                perturbation=each(self.amplitude),
+                step_max=each(self.rate),
                 noise_sd=self.noise_sd,
                 seed=seed,
                 maximize=maximize,
                 limits=list(limits_of(limits)),
-                curvature=self.curvature,
+                curvature=self.curvature if one else None,
             )
         lag = _core.optimize.ComponentLag()
-        seen = self.curvature
+        seen = self.curvature if one else None
         if self.compensated:
             lag = _core.optimize.ComponentLag(delay_cycles=self.delay_cycles, lag_cycles=self.lag_cycles)
-        else:  # the demodulation sees what the sensor leaves in phase
+        elif one:  # the demodulation sees what the sensor leaves in phase
             seen *= self.sensor_gain * math.cos(math.radians(self.sensor_phase_deg))
         return ExtremumSeeking(
-            start=start,
-            lower=lower,
-            upper=upper,
+            **space,
             form=self.method,
-            amplitude=self.amplitude,
+            amplitude=each(self.amplitude),
             period=self.period,
-            gain=self.gain,
-            rate=self.rate,
+            gain=each(self.gain),
+            rate=each(self.rate),
             components=[lag],
             hold_cycles=hold_cycles,
             maximize=maximize,
             limits=list(limits_of(limits)),
             curvature=seen,
+            **({} if self.harmonics is None else {"harmonics": each(self.harmonics)}),
         )
+
+
+def _joined(numbers: Any, digits: int = 4) -> str:
+    return " and ".join(f"{number:.{digits}g}" for number in np.ravel(numbers))
 
 
 def tune(
     noise_sd: float,
-    curvature: float,
+    curvature: PerInput,
     *,
+    inputs: Sequence[str] = (),
     method: str = "batch",
     delay_cycles: float = 0.0,
     lag_cycles: float = 0.0,
     compensated: bool = True,
     delay_uncertainty: float | None = None,
-    rms: float | None = None,
+    rms: PerInput | None = None,
     cycles: float | None = None,
-    distance: float | None = None,
-    arrival: float | None = None,
-    amplitude_max: float | None = None,
+    distance: PerInput | None = None,
+    arrival: PerInput | None = None,
+    amplitude_max: PerInput | None = None,
 ) -> Tuning:
     """Choose amplitude, period and gain of a seeker from noise, curvature and sensor delay.
 
     What is left open scales with L = sqrt(noise_sd/abs(curvature)), the distance from the optimum at which J
     has fallen by half a standard deviation of its noise.
 
+    Several inputs share one period on harmonics that do not mix, or the perturbations of SPSA; `curvature` is then one
+    number per input, or the matrix that `measure_map` finds. In its flattest direction, if all inputs are scaled to a
+    curvature of one, coupled inputs approach more slowly, by the smallest eigenvalue, and scatter more; the
+    predictions hold that. Without the cross terms they are too good where the coupling is strong.
+
     Parameters
     ----------
     noise_sd : float
         Standard deviation of J from cycle to cycle, > 0 [unit of J].
-    curvature : float
-        J'' at the optimum; the sign is not used [unit of J per squared unit of the input].
+    curvature : float, array_like or mapping of str to float
+        J'' at the optimum; the sign is not used [unit of J per squared unit of the input]. For several inputs one
+        number each, also by name, or a matrix of shape (inputs, inputs).
+    inputs : sequence of str
+        Names of the inputs, where `curvature` has none.
     method : {"batch", "moving_average", "spsa"}
         Extremum seeking in one of two forms, or SPSA with constant gains.
     delay_cycles, lag_cycles : float
@@ -245,14 +313,15 @@ def tune(
         How far delay and lag may be from the truth, >= 0 [cycles]: the period is long enough that such an error turns
         the echo by at most 60 deg. A fifth of their sum and 2 at least where there is one, else 0. 0 asks for the
         shortest period; then an error of a quarter of the period makes the seeker run away.
-    rms : float, optional
+    rms : float, array_like or mapping of str to float, optional
         Specified error of the estimate after arrival [unit of the input]; 0.2 L.
     cycles : float, optional
         Specified cycles to arrive; 50, more where a lag asks for it.
-    distance, arrival : float, optional
+    distance, arrival : float, array_like or mapping of str to float, optional
         Error at the start, and what counts as arrived [unit of the input]; 5 L and 0.45 L.
-    amplitude_max : float, optional
-        Largest perturbation that may be applied [unit of the input]; 1.8 L.
+    amplitude_max : float, array_like or mapping of str to float, optional
+        Largest perturbation that may be applied [unit of the input]; 1.8 L. As `rms`, `distance` and `arrival`, one
+        number per input.
 
     Returns
     -------
@@ -262,7 +331,10 @@ def tune(
     Raises
     ------
     ParameterError
-        Noise, curvature or a specification that is not positive; a negative uncertainty; SPSA behind a delayed sensor.
+        Noise, curvature or a specification that is not positive; a negative uncertainty; SPSA behind a delayed sensor;
+        a matrix of curvatures that is no maximum or minimum.
+    ShapeError
+        Not one number per input.
 
     References
     ----------
@@ -277,28 +349,37 @@ def tune(
     The specification is met.
     >>> [tune(0.25, -0.051, delay_cycles=20.0, delay_uncertainty=u).period for u in (None, 0.0)]
     [24, 6]
+    >>> tuning = tune(0.25, {"soc_cad": -0.06, "egr": -600.0})
+    >>> tuning.inputs, tuning.period, tuning.harmonics.tolist(), tuning.rms.round(4).tolist()
+    (('soc_cad', 'egr'), 8, [1, 3], [0.4082, 0.0041])
     """
-    found = _core.optimize.tune(
-        noise_sd=noise_sd,
-        curvature=curvature,
-        method=method,
-        delay_cycles=delay_cycles,
-        lag_cycles=lag_cycles,
-        compensated=compensated,
-        delay_uncertainty=delay_uncertainty,
-        rms=rms,
-        cycles=cycles,
-        distance=distance,
-        arrival=arrival,
-        amplitude_max=amplitude_max,
-    )
+    hessian, names = hessian_of(curvature, inputs)
+    lengths = {"rms": rms, "distance": distance, "arrival": arrival, "amplitude_max": amplitude_max}
+    lengths = {name: named_values(name, value, names) for name, value in lengths.items()}
+    how: dict[str, Any] = {
+        "method": method,
+        "delay_cycles": delay_cycles,
+        "lag_cycles": lag_cycles,
+        "compensated": compensated,
+        "delay_uncertainty": delay_uncertainty,
+        "cycles": cycles,
+    }
+    found: Mapping[str, Any]
+    if np.ndim(hessian):
+        check_several(noise_sd, method, delay_uncertainty, cycles)
+        each = {name: per_input(name, value, len(hessian), names) for name, value in lengths.items()}
+        found = tune_several(noise_sd, hessian, names or numbered(len(hessian)), lengths=each, **how)
+    else:
+        one: dict[str, Any] = {name: single(name, value) for name, value in lengths.items()}
+        found = _core.optimize.tune(noise_sd=noise_sd, curvature=hessian, **one, **how)
     values: dict[str, Any] = dict(found)
     values["reasons"] = tuple(values["reasons"])
     return Tuning(
         **values,
         noise_sd=noise_sd,
-        curvature=curvature,
+        curvature=hessian,
         delay_cycles=delay_cycles,
         lag_cycles=lag_cycles,
         compensated=compensated,
+        inputs=names,
     )

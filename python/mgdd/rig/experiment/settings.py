@@ -165,6 +165,21 @@ class SeekTask(Settings):
     cycles: int = _key("integer", 300, low=1, high=2_000_000)
     limits: Mapping[str, float] = _key("scales", {})
 
+    @classmethod
+    def read(cls, table: TomlTable) -> Self:
+        """Take all keys; a table ``inputs`` gives the bounds by name."""
+        inputs, left = table.table("inputs"), table.items()
+        inputs.only(("soc_cad",))
+        bounds = inputs.anything("soc_cad")
+        if bounds is not None:
+            if not (isinstance(bounds, list) and len(bounds) == 2 and all(fits(one, "number") for one in bounds)):
+                raise inputs.error("soc_cad", bounds, "[lower, upper], two numbers")
+            for key, bound in zip(("lower_cad", "upper_cad"), bounds, strict=True):
+                if key in left:
+                    raise table.error(key, left[key], f"left out, since {inputs.key('soc_cad')} gives the bounds")
+                left[key] = bound
+        return super().read(TomlTable(left, origin=table.origin, path=table.path))
+
 
 def beside(folder: Path, name: str) -> Path | str:
     """Return the file of that name beside an experiment; where there is none, the name."""
