@@ -146,6 +146,7 @@ X_Value\tduty\tangle_deg\tComment
         ("Operator;Smith\nEngine;V8\nangle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
         ("speed = 1500\nload = 40 %\nangle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
         ("Date;2018-01-01;3\nRun;17\n\nangle;p\n", ("angle", "p"), None),
+        ("Test 4\nangle;fuel\ndeg;g/kWh\n", ("angle", "fuel"), ("deg", "g/kWh")),
     ],
 )
 def test_what_stands_above_the_rows(above: str, header: Any, units: Any, tmp_path: Path) -> None:
@@ -163,9 +164,17 @@ def test_labview_text(tmp_path: Path) -> None:
     assert table.matrix([0, 2]).tolist() == [[0.0, 0.001, 0.002, 0.003], [20.0, 20.5, 21.0, 21.5]]
 
 
+def test_labview_text_with_commas(tmp_path: Path) -> None:
+    (tmp_path / "t.lvm").write_text(LABVIEW.replace("Header***\t\t", "Header***\t\t\t").replace("\t", ","))
+    table = read_any_table(tmp_path / "t.lvm")
+    assert table.header == ("X_Value", "duty", "angle_deg")
+    assert table.matrix([0, 2]).tolist() == [[0.0, 0.001, 0.002, 0.003], [20.0, 20.5, 21.0, 21.5]]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (";1.5;2\n;2;3\n;3;4\n;4;5\nend;a;b\n;5;6\n", "line 5, column 1: 'a' is not a number"),
         ("angle;p\n1;2;3\n2;3\n3;4\n4;5\n", "line 3: 2 cell(s) where line 2 has 3"),
         ("angle;p\n1;2\n2;x\n3;4\n4;5\n", "line 3, column 'p': 'x' is not a number"),
         ("angle;p\nP1;20;35\nP2;3.5\nP3;4.5\nP4;5.5\n", "line 3: 2 cell(s) where line 2 has 3"),
