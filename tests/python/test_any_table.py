@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,39 @@ def test_a_waveform_of_tdms_gets_its_time(tmp_path: Path) -> None:
     table = read_any_table(tmp_path / "w.tdms")
     assert table.header == ("time", "duty", "angle_deg")
     np.testing.assert_allclose(table.numbers(0), TIME, rtol=1e-12)
+
+
+def test_a_channel_called_time_keeps_its_name_beside_a_waveform(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    timed = nptdms.ChannelObject("g", "duty", LOG["duty"], properties={"wf_increment": 0.001, "wf_start_offset": 0.0})
+    with nptdms.TdmsWriter(str(tmp_path / "w.tdms")) as writer:
+        writer.write_segment([timed, nptdms.ChannelObject("g", "time", np.arange(3.0))])
+    table = read_any_table(tmp_path / "w.tdms")
+    assert table.header == ("time (duty)", "duty", "time")
+    assert table.numbers(table.index("time")).tolist() == [0.0, 1.0, 2.0]
+
+
+def test_an_index_of_tdms_that_is_of_another_record_changes_nothing(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    for name, values in (("b.tdms", np.arange(9.0)), ("a.tdms", np.arange(7, dtype="i4"))):
+        with nptdms.TdmsWriter(str(tmp_path / name), index_file=True) as writer:
+            writer.write_segment([nptdms.ChannelObject("g", "v", values)])
+    (tmp_path / "b.tdms_index").replace(tmp_path / "a.tdms_index")
+    assert read_any_table(tmp_path / "a.tdms").numbers(0).tolist() == list(range(7))
+
+
+def test_a_damaged_length_of_tdms_takes_no_memory(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", "duty", LOG["duty"], properties={"note": "warm"})])
+    whole = (tmp_path / "a.tdms").read_bytes()
+    at = whole.index(b"\4\0\0\0note")
+    (tmp_path / "a.tdms").write_bytes(whole[:at] + b"\xff\xff\xff\x7f" + whole[at + 4 :])
+    tracemalloc.start()
+    with pytest.raises(DataError, match=r"cannot be read"):
+        read_any_table(tmp_path / "a.tdms")
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
 
 
 def test_rasters_of_mdf_keep_their_own_times(tmp_path: Path) -> None:

@@ -169,6 +169,15 @@ def test_cycles_below_each_other_that_do_not_match(write: Write) -> None:
         read_pressure(twice)
 
 
+@pytest.mark.parametrize("step", [0.25, 0.5, 1.5])
+def test_angles_that_run_on_in_radians_of_three_digits_lose_no_cycle(write: Write, step: float) -> None:
+    angle = np.arange(0.0, 3600.0, step)
+    path = write([np.round(np.deg2rad(angle), 3), np.interp(angle, RUN, CYCLES.ravel())], "angle [rad],p [bar]")
+    trace = read_pressure(path, firing_tdc_deg=360.0)
+    wanted = np.interp(angle, RUN, CYCLES.ravel()).reshape(5, -1)
+    np.testing.assert_allclose(trace["pressure_bar"], wanted, atol=0.05 * wanted.max() * step)
+
+
 @pytest.mark.parametrize("form", ["running", "stacked", "columns"])
 def test_records_that_start_at_firing_tdc_join_each_compression_to_its_own_burn(write: Write, form: str) -> None:
     late = CYCLES.ravel()[720:-720]  # from the firing TDC of cycle 1 to that of cycle 5

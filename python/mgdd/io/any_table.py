@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
@@ -26,7 +27,6 @@ from mgdd.io.table import Table, parse_number, read_table, text_table
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
@@ -239,9 +239,19 @@ def _of_numpy(file: Path) -> Iterator[_Column]:
         return _flat([_Column(name, content[name]) for name in content.files])
 
 
+class _Bounded(io.BufferedReader):
+    """A file that takes no memory for more than it holds, whatever a damaged length says."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > io.DEFAULT_BUFFER_SIZE:
+            size = min(size, max(os.fstat(self.fileno()).st_size - self.tell(), 0))
+        return super().read(size)
+
+
 def _of_tdms(file: Path) -> Iterator[_Column]:
     nptdms = import_extra("nptdms", "formats", "a TDMS file")
-    content = nptdms.TdmsFile.read(file)
+    with _Bounded(io.FileIO(file)) as stream:  # not by its path: an index beside it may be of another record
+        content = nptdms.TdmsFile.read(stream)
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
@@ -251,7 +261,8 @@ def _of_tdms(file: Path) -> Iterator[_Column]:
         name = channel.name if alone else f"{channel.group_name}.{channel.name}"
         timed = "wf_increment" in channel.properties and len(channel)
         if timed and not any(len(each.values) == len(channel) and each.unit == "s" for each in found):
-            found.append(_Column(f"time ({name})" if found else "time", channel.time_track(), "s"))
+            plain = not found and all(other.name != "time" for other in channels)
+            found.append(_Column("time" if plain else f"time ({name})", channel.time_track(), "s"))
         unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
         found.append(_Column(name, np.asarray(channel[:]), str(unit)))
     return _flat(found)

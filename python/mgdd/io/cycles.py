@@ -19,6 +19,8 @@ __all__ = ["Cycles", "arranged", "several_cycles"]
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
 _SAME = 0.01
+# Share of a step by which the end of a cycle may be missed: angles of three digits in radians are rounded by as much.
+_ROUNDED = 0.3
 # Sums of steps end this much [deg] beside the angle that was meant.
 _ROUNDING = 1e-6
 
@@ -211,13 +213,13 @@ def _running(
     first = float(degrees[0])
     if _splits_a_burn(degrees, firing_tdc_deg):
         first += (-360.0 - _seam(first, firing_tdc_deg)) % 720.0
-    count = int((degrees[-1] + step * (1.0 + _SAME) - first) // 720.0)
+    count = int((degrees[-1] + step * (1.0 + _ROUNDED) - first) // 720.0)
     if count < 1:
         raise DataError(
             f"{place.source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
             f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
         )
-    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _SAME * step)
+    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _ROUNDED * step)
     head, tail = int(starts[0]), degrees.size - int(starts[-1])
     grid = degrees[starts[0] : starts[1]]
     at = grid + 720.0 * np.arange(count)[:, None]
@@ -230,7 +232,7 @@ def _running(
     if same and np.abs(cut - at).max() <= _SAME * step:
         values = values[:, starts[0] : starts[0] + at.size].reshape(-1, *at.shape)
     else:
-        at = at[at[:, -1] <= degrees[-1] + _SAME * step]
+        at = at[at[:, -1] <= degrees[-1] + _ROUNDED * step]
         values = np.stack([np.interp(at, degrees, row) for row in values])
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
     past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
