@@ -252,6 +252,23 @@ def test_a_damaged_matlab_file_never_ends_the_process(compressed: bool, tmp_path
             read_any_table(file)
 
 
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_a_damaged_mdf_file_never_ends_the_process(version: str, tmp_path: Path) -> None:
+    """In its C code asammdf believes the sizes in a file: of a channel within its record, of a large block."""
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version=version) as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a"))
+        channel = content.groups[0].channels[1]
+        at = channel.address + (186 if version < "4" else 92)  # bytes, or bits, from the start of a record
+        assert read_any_table(file).header == ("time", "duty")
+    whole = bytearray(file.read_bytes())
+    whole[at : at + 2] = b"\xf0\xff"
+    file.write_bytes(whole)
+    with pytest.raises(DataError, match=r"cannot be read \(ValueError channel 'duty' ends at byte \d+ of a record of 16"):
+        read_any_table(file)
+
+
 def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:
     """Objects, functions, strings and tables of MATLAB stand in the files of SciPy's own tests."""
     import scipy.io.matlab

@@ -271,7 +271,11 @@ def _of_tdms(file: Path) -> Iterator[_Column]:
 def _of_mdf(file: Path) -> Iterator[_Column]:
     asammdf = import_extra("asammdf", "mdf", "an MDF file")
     found: list[_Column] = []
-    with asammdf.MDF(file) as content:
+    # Not by its path: in large blocks of a file asammdf believes every size. A record that was not finished is mended,
+    # and that in memory.
+    with file.open("rb") as stream:
+        whole = stream.read(8).startswith(b"MDF ")
+    with _Bounded(io.FileIO(file)) if whole else io.BytesIO(file.read_bytes()) as source, asammdf.MDF(source) as content:
         for number in range(len(content.groups)):
             for signal in content.select([(None, number, k) for k in _channels(content, number)]):
                 if not any(np.array_equal(each.values, signal.timestamps) for each in found if each.unit == "s"):
@@ -281,8 +285,26 @@ def _of_mdf(file: Path) -> Iterator[_Column]:
 
 
 def _channels(content: Any, number: int) -> list[int]:
-    master = content.masters_db.get(number)
-    return [k for k in range(len(content.groups[number].channels)) if k != master]
+    """Give the channels of a group that hold numbers; one that is not within its record is refused.
+
+    On such a channel asammdf ends the process. Numbers of the types stand in "MDF" by ASAM, versions 3.3 and 4.2.
+    """
+    master, group, out = content.masters_db.get(number), content.groups[number], []
+    size, old = int(group.channel_group.samples_byte_nr), content.version < "4"
+    for k, channel in enumerate(group.channels):
+        if not old and channel.channel_type in (3, 6):  # virtual ones stand in no record
+            first = bits = 0
+        elif old:
+            first, bits = channel.start_offset // 8 + channel.additional_byte_offset, channel.bit_count
+        else:
+            first, bits = channel.byte_offset, channel.bit_offset + channel.bit_count
+        end = first + (bits + 7) // 8
+        if end > size:
+            raise ValueError(f"channel {channel.name!r} ends at byte {end} of a record of {size}")
+        numeric = channel.data_type != 7 if old else channel.data_type in (*range(6), 10)  # or the bytes of a bus
+        if k != master and numeric and not group.channel_dependencies[k]:
+            out.append(k)
+    return out
 
 
 def _of_parquet(file: Path) -> Iterator[_Column]:
