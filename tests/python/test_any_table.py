@@ -265,8 +265,23 @@ def test_a_damaged_mdf_file_never_ends_the_process(version: str, tmp_path: Path)
     whole = bytearray(file.read_bytes())
     whole[at : at + 2] = b"\xf0\xff"
     file.write_bytes(whole)
-    with pytest.raises(DataError, match=r"cannot be read \(ValueError channel 'duty' ends at byte \d+ of a record of 16"):
+    with pytest.raises(
+        DataError, match=r"cannot be read \(ValueError channel 'duty' ends at byte \d+ of a record of 16"
+    ):
         read_any_table(file)
+
+
+def test_blocks_of_mdf_in_a_circle_are_refused(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a"))
+        group, channels = content.groups[0].data_group.address, content.groups[0].channel_group.address
+    whole = file.read_bytes()
+    for at in (group + 24, channels + 24):  # where the next one stands: each is its own
+        file.write_bytes(whole[:at] + (at - 24).to_bytes(8, "little") + whole[at + 8 :])
+        with pytest.raises(DataError, match="its blocks name each other in a circle"):
+            read_any_table(file)
 
 
 def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:

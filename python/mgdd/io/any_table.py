@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
@@ -27,6 +26,7 @@ from mgdd.io.table import Table, parse_number, read_table, text_table
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["ArrayTable", "cells_as_text", "format_of", "read_any_table"]
 
 _HEAD = 128  # bytes that tell a format
+_CIRCLES = 10_000  # that a reader may go; what many channels share is read as often
 
 
 _Reader = Callable[[Path], "Table | Iterable[_Column]"]
@@ -239,19 +240,27 @@ def _of_numpy(file: Path) -> Iterator[_Column]:
         return _flat([_Column(name, content[name]) for name in content.files])
 
 
-class _Bounded(io.BufferedReader):
-    """A file that takes no memory for more than it holds, whatever a damaged length says."""
+class _Watched(io.BytesIO):
+    """A file in memory: of a damaged length it gives what there is, and it notices who reads in a circle."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(file.read_bytes())
+        self._count, self._mark, self._met = 0, -1, 0
 
     def read(self, size: int | None = -1, /) -> bytes:
-        if size is not None and size > io.DEFAULT_BUFFER_SIZE:
-            size = min(size, max(os.fstat(self.fileno()).st_size - self.tell(), 0))
+        self._count += 1
+        if self.tell() == self._mark:
+            self._met += 1
+            if self._met > _CIRCLES:
+                raise ValueError(f"its blocks name each other in a circle, the one at byte {self._mark} among them")
+        if self._count.bit_count() == 1:  # a power of two: within the circle in the end (Brent 1980)
+            self._mark, self._met = self.tell(), 0
         return super().read(size)
 
 
 def _of_tdms(file: Path) -> Iterator[_Column]:
     nptdms = import_extra("nptdms", "formats", "a TDMS file")
-    with _Bounded(io.FileIO(file)) as stream:  # not by its path: an index beside it may be of another record
-        content = nptdms.TdmsFile.read(stream)
+    content = nptdms.TdmsFile.read(_Watched(file))  # not by its path: an index beside it may be of another record
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
@@ -271,11 +280,8 @@ def _of_tdms(file: Path) -> Iterator[_Column]:
 def _of_mdf(file: Path) -> Iterator[_Column]:
     asammdf = import_extra("asammdf", "mdf", "an MDF file")
     found: list[_Column] = []
-    # Not by its path: in large blocks of a file asammdf believes every size. A record that was not finished is mended,
-    # and that in memory.
-    with file.open("rb") as stream:
-        whole = stream.read(8).startswith(b"MDF ")
-    with _Bounded(io.FileIO(file)) if whole else io.BytesIO(file.read_bytes()) as source, asammdf.MDF(source) as content:
+    # Not by its path: in large blocks of a file asammdf believes every size.
+    with asammdf.MDF(_Watched(file)) as content:
         for number in range(len(content.groups)):
             for signal in content.select([(None, number, k) for k in _channels(content, number)]):
                 if not any(np.array_equal(each.values, signal.timestamps) for each in found if each.unit == "s"):

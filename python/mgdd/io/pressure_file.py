@@ -196,15 +196,14 @@ def _without_flagged(cut: Cycles, source: str) -> Cycles:
     values, bad = cut.values[:-1], cut.values[-1].max(axis=1) > 0.0
     if bad.all():
         raise DataError(
-            f"{source}: in each of the {bad.size} cycle(s) the encoder's edges are miscounted: set the level of its "
-            "edges, or record it again"
+            f"{source}: in each of the {bad.size} cycle(s) the encoder's edges are miscounted or displaced: set the "
+            "level of its edges, or record it again"
         )
     if not bad.any():
         return cut._replace(values=values)
     numbers = ", ".join(str(k + 1) for k in np.flatnonzero(bad)[:8])
-    note = (
-        f"cycle {numbers}{', ...' if bad.sum() > 8 else ''} of {bad.size} left out: the encoder's edges are miscounted"
-    )
+    which = f"cycle {numbers}{', ...' if bad.sum() > 8 else ''} of {bad.size}"
+    note = f"{which} left out: the encoder's edges are miscounted or displaced"
     taken = tuple(int(k) for k in np.flatnonzero(~bad))
     return cut._replace(values=values[:, ~bad], notes=(*cut.notes, note), taken=taken, total=bad.size)
 
