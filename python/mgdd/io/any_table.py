@@ -21,6 +21,7 @@ from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.extras import import_extra
 from mgdd.io.files import existing_file, read_plain_text
+from mgdd.io.hdf5_heaps import check_heaps
 from mgdd.io.matlab_tags import check_tags
 from mgdd.io.table import Table, parse_number, read_table, text_table
 from mgdd.results.labels import ANGLE
@@ -207,6 +208,7 @@ def _of_struct(name: str, value: Any) -> Iterator[_Column]:
 def _of_hdf5(file: Path) -> Iterator[_Column]:
     h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
     found: list[_Column] = []
+    check_heaps(file)
     with h5py.File(file, "r") as content:
         matlab = any("MATLAB_class" in item.attrs for item in content.values())
 
@@ -297,6 +299,9 @@ def _channels(content: Any, number: int) -> list[int]:
     """
     master, group, out = content.masters_db.get(number), content.groups[number], []
     size, old = int(group.channel_group.samples_byte_nr), content.version < "4"
+    rows, held = group.channel_group.cycles_nr, sum(block.original_size for block in group.get_data_blocks())
+    if rows * size > held:
+        raise ValueError(f"{rows} records of {size} bytes in a group of {held}")
     for k, channel in enumerate(group.channels):
         if not old and channel.channel_type in (3, 6):  # virtual ones stand in no record
             first = bits = 0
