@@ -117,6 +117,22 @@ def test_a_struct_of_matlab_has_fields(tmp_path: Path) -> None:
     assert set(read_any_table(tmp_path / "s.mat").header or ()) == {"bench.angle", "bench.p"}
 
 
+@pytest.mark.parametrize("above", [[], [["Operator", "Öz"]]])
+def test_a_sheet_may_be_indented_below_remarks(above: list[list[Any]], tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    rows = [[None, "angle", "p", "note"], *([None, a, a + 0.5, None] for a in range(5))]
+    for row in (*above, *rows):
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    table = read_any_table(tmp_path / "a.xlsx")
+    assert [table.numbers(table.index(name)).tolist() for name in ("angle", "p")] == [
+        [*range(5)],
+        [0.5, 1.5, 2.5, 3.5, 4.5],
+    ]
+    assert table.numeric(range(table.width)) == [1, 2]
+
+
 # --- what is refused ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("form", WRITERS)
 def test_a_cut_file_is_refused_by_name(form: str, tmp_path: Path) -> None:
@@ -269,6 +285,21 @@ def test_a_damaged_mdf_file_never_ends_the_process(version: str, tmp_path: Path)
         DataError, match=r"cannot be read \(ValueError channel 'duty' ends at byte \d+ of a record of 16"
     ):
         read_any_table(file)
+
+
+def test_a_damaged_heap_of_hdf5_is_refused(tmp_path: Path) -> None:
+    """On an object without bytes the library would stay for ever; on one that is too long it reads what is behind."""
+    file = tmp_path / "a.h5"
+    WRITERS["hdf5"](file, LOG, {"duty": "-", "angle_deg": "deg"})
+    assert read_any_table(file).units is not None
+    whole = file.read_bytes()
+    heap = whole.index(b"GCOL")
+    for size in (0, 1 << 40):
+        file.write_bytes(whole[: heap + 16] + bytes(8) + size.to_bytes(8, "little") + whole[heap + 32 :])
+        with pytest.raises(
+            DataError, match=rf"the heap at byte {heap} has an object of {size} bytes where 4080 are left"
+        ):
+            read_any_table(file)
 
 
 def test_blocks_of_mdf_in_a_circle_are_refused(tmp_path: Path) -> None:

@@ -353,14 +353,16 @@ def _sheet_text(file: Path) -> tuple[str, str]:
         raise DataError(f"{file}: no sheet has a number in it")
     rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheets[title]]
     width = max(1 + k for row in rows for k, cell in enumerate(row) if cell)
-    text = "\n".join("\t".join(_filled(row[:width])) for row in rows if any(row))
+    rows = [row[:width] for row in rows if any(row)]
+    holds = [any(k < len(row) and parse_number(row[k]) is not None for row in rows) for k in range(width)]
+    text = "\n".join("\t".join(_filled(row, holds)) for row in rows)
     return f"{file}, sheet {title!r}", text
 
 
-def _filled(row: list[str]) -> list[str]:
+def _filled(row: list[str], holds_numbers: list[bool]) -> list[str]:
     """Mark empty cells: a tab at an end of the line would be lost."""
-    mark = "nan" if any(parse_number(cell) is not None for cell in row) else "-"
-    return [cell or mark for cell in row]
+    data = any(parse_number(cell) is not None for cell in row)
+    return [cell or ("nan" if data and number else "-") for cell, number in zip(row, holds_numbers, strict=False)]
 
 
 def _as_text(cell: Any) -> str:

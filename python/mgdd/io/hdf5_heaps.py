@@ -1,4 +1,4 @@
-"""A check of the heaps of an HDF5 file, where its texts stand, before the library reads it: damaged ones hold it for ever.
+"""A check of the heaps of an HDF5 file, where its texts stand: on damaged ones the library would stay for ever.
 
 The layout stands in "HDF5 File Format Specification" by The HDF Group, version 3.0, III.E.
 """

@@ -338,6 +338,8 @@ def _names_and_units(
     whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
     wide = [cells for cells in whole if len(cells) == width or (len(cells) > width and cells[0] == "X_Value")]
     aligned = [cells[len(cells) - width :] for cells in wide]
+    if len(aligned) == 2 and aligned[0].count("-") > aligned[1].count("-") and not _spells_units(aligned[1]):
+        return aligned[1], None  # below a remark of a sheet, made as wide
     if len(heads) <= 2 and (len(aligned) == len(heads) or len(heads) == 1):
         return next(iter(aligned), None), heads[1] if len(heads) == 2 else None
     rows = [at for at, cells in enumerate(aligned) if at and _spells_units(cells)]
