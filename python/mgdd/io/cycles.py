@@ -46,10 +46,12 @@ def arranged(
     firing_tdc_deg: float | None,
     before_tdc: bool,
     place: Place,
+    counts_turns: bool = False,
 ) -> Cycles:
     """Turn angles as in the file [deg] to °CA aTDC and cut channels (channel, column, sample) into complete cycles.
 
-    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle.
+    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle; an angle
+    that `counts_turns` by a mark of the shaft need not prove that.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def arranged(
         values, runs_on = values[..., keep].reshape(len(values), 1, -1), True
     if runs_on:
         _check_tdc(degrees, firing_tdc_deg, place)
-        cut = _running(degrees, values[:, 0], rows, float(firing_tdc_deg or 0.0), place)
+        cut = _running(degrees, values[:, 0], rows, float(firing_tdc_deg or 0.0), place, counts_turns)
         return cut._replace(notes=notes + cut.notes)
     return _turned(degrees, values, rows, firing_tdc_deg, place)._replace(notes=notes)
 
@@ -193,6 +195,7 @@ def _running(
     rows: NDArray[np.intp],
     firing_tdc_deg: float,
     place: Place,
+    counts_turns: bool,
 ) -> Cycles:
     """Cut angles that run on into cycles of 720 degrees, at the start of the record or at gas-exchange TDC."""
     wide, step = wide_steps(degrees)
@@ -202,7 +205,7 @@ def _running(
             f"{place.row(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual "
             f"step is {step:g}; fill it or cut the record there"
         )
-    found = repetition(degrees, values[0], firing_tdc_deg)
+    found = None if counts_turns else repetition(degrees, values[0], firing_tdc_deg)
     if found is not None and found.differs:
         factor = CYCLE_DEG / found.degrees
         raise DataError(

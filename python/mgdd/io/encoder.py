@@ -156,6 +156,7 @@ class Turning(NamedTuple):
     speed_rpm: float | None
     slipped_deg: list[tuple[float, float]]
     notes: list[str]
+    has_mark: bool
 
 
 def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: int | str | None) -> Turning:
@@ -184,11 +185,12 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
     ):
         if count:
             notes.append(f"{table.called(column)}: {count} {what.format('s' if count > 1 else '')}")
-    if not encoder.missing_teeth and index is None:
+    has_mark = encoder.missing_teeth > 0 or index is not None
+    if not has_mark:
         notes.append(f"{table.called(column)} has no mark of the turn: that no edge is missing is taken for granted")
     speed = 60.0 * (len(marks) - 1) / float(marks[-1] - marks[0]) if clock is not None and len(marks) > 1 else None
     used = tuple(i for i in (column, index, clock) if i is not None)
-    return Turning(found["angle_deg"], used, speed, found["slipped_deg"], notes)
+    return Turning(found["angle_deg"], used, speed, found["slipped_deg"], notes, has_mark)
 
 
 def _time(table: Table, heads: Sequence[Heading], size: int, column: int) -> int | None:

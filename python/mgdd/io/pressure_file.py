@@ -144,6 +144,7 @@ def record_of(
         source=source or table.source,
         rows=rows,
         flagged=flagged,
+        counts_turns=angle.turning is not None and angle.turning.has_mark,
         level=pressure.level,
         unit_of_file=pressure.unit_of_file,
         over_time=over_time,
@@ -167,6 +168,7 @@ def checked(
     unit_of_file: bool = False,
     over_time: bool = False,
     flagged: bool = False,
+    counts_turns: bool = False,
 ) -> Record:
     """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in.
 
@@ -179,7 +181,14 @@ def checked(
         check_span(degrees, angle_unit, source, several=firing_tdc_deg is not None)
         place = Place(source, rows)
         together = cut.values if along is None else np.concatenate([cut.values, along])
-        cut = arranged(degrees, together, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place)
+        cut = arranged(
+            degrees,
+            together,
+            firing_tdc_deg=firing_tdc_deg,
+            before_tdc=before_tdc,
+            place=place,
+            counts_turns=counts_turns,
+        )
         if flagged:
             cut = _without_flagged(cut, source)
         _check_turns(cut.degrees, cut.values[0], source)

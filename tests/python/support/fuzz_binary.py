@@ -152,7 +152,7 @@ def npy(rng: Random, path: Path) -> Case:
         }  # fmt: skip
         if made.shape[1] >= made.shape[0] or made.shape[1] == 1:
             return npy(rng, path)  # which side is which does not stand in the file
-        content.rename(lambda name: str(1 + names.index(name)) if name in names else name)
+        content.columns = [each._replace(name=str(1 + at)) for at, each in enumerate(columns)]
     np.save(path, made)
     return case_of(content, path.with_suffix(".npy").read_bytes(), pick(rng, ["a.npy", "a"]))
 
