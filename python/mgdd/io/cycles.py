@@ -50,8 +50,8 @@ def arranged(
 ) -> Cycles:
     """Turn angles as in the file [deg] to °CA aTDC and cut channels (channel, column, sample) into complete cycles.
 
-    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle; an angle
-    that `counts_turns` by a mark of the shaft need not prove that.
+    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle, unless
+    the angle `counts_turns` by a mark of the shaft.
 
     Raises
     ------
