@@ -302,6 +302,17 @@ def test_a_damaged_heap_of_hdf5_is_refused(tmp_path: Path) -> None:
             read_any_table(file)
 
 
+def test_a_unit_of_hdf5_that_is_no_text_is_not_read(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        for name, unit in {"a": "bar", "b": np.bytes_("bar"), "c": np.array(["bar"], dtype=object), "d": 7.0}.items():
+            content[name] = np.arange(3.0)
+            content[name].attrs["units"] = unit
+        content["e"] = np.arange(3.0)
+        content["e"].attrs.create("units", [np.arange(2), np.arange(3)], dtype=h5py.vlen_dtype("i4"))
+    assert read_any_table(tmp_path / "a.h5").units == ("bar", "bar", "bar", "", "")
+
+
 def test_blocks_of_mdf_in_a_circle_are_refused(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(version="4.10") as content:

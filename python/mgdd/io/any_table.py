@@ -215,13 +215,20 @@ def _of_hdf5(file: Path) -> Iterator[_Column]:
         def visit(name: str, item: Any) -> None:
             if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" and not name.startswith("#"):
                 values = item[()]
-                unit = next((item.attrs[key] for key in ("units", "unit") if key in item.attrs), "")
-                unit = unit.decode() if isinstance(unit, bytes) else str(unit)
+                unit = next((text for key in ("units", "unit") if (text := _text_of_hdf5(h5py, item.attrs, key))), "")
                 turned = np.transpose(values) if matlab else np.asarray(values)  # MATLAB writes columns first
                 found.append(_Column(name.replace("/", "."), turned, unit))
 
         content.visititems(visit)
     return _flat(found)
+
+
+def _text_of_hdf5(h5py: Any, attributes: Any, key: str) -> str:
+    """Read an attribute that is a text; one that is damaged to a list of numbers would end the process."""
+    if key not in attributes or not isinstance(attributes.get_id(key).get_type(), h5py.h5t.TypeStringID):
+        return ""
+    text = np.ravel(attributes[key])[0]
+    return text.decode() if isinstance(text, bytes) else str(text)
 
 
 def _of_netcdf(file: Path) -> Iterator[_Column]:
