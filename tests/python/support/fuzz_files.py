@@ -23,21 +23,8 @@ __all__ = [
 Random = np.random.Generator
 TYPES = ("f8", "f8", "f8", "f4", "i2", "i4", "u1", "u2", ">f8", ">i2", "i8", "?")
 WORDS = (
-    "torque",
-    "T_oil",
-    "lambda",
-    "p intake",
-    "Drehmoment",
-    "note 7",
-    "Öl",
-    "x",
-    "v_1",
-    "Ne",
-    "k/f",
-    "a.b",
-    "µ",
-    "q",
-)
+    "torque", "T_oil", "lambda", "p intake", "Drehmoment", "note 7", "Öl", "x", "v_1", "Ne", "k/f", "a.b", "µ", "q"
+)  # fmt: skip
 UNITS = ("Nm", "1/min", "°C", "kPa", "A", "", "-", "m/s", "g/kWh", "%", "V")
 
 
@@ -286,10 +273,8 @@ def text(rng: Random, _: Path) -> Case:
     encoding = pick(rng, ["utf-8", "utf-8", "utf-8-sig", "utf-16", "cp1252"])
     whole = end.join(lines) + end * int(rng.integers(0, 3))
     name = pick(rng, ["a.csv", "a.txt", "a.asc", "a", "a.dat", "a b.CSV"])
-    return _text_case(content, whole, name, encoding)
-
-
-def _text_case(content: Content, whole: str, name: str, encoding: str) -> Case:
+    if decimal == "," and len(cells) > 1 and chance(rng, 0.1):
+        content.text["decimal"] = "."  # told wrong
     return case_of(content, whole.encode(encoding), name, encoding, read_text)
 
 
