@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tracemalloc
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,15 @@ def test_an_array_of_numpy_has_columns_by_number(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.column_stack([ANGLE, *CYCLES]))
     trace = read_pressure(tmp_path / "a.npy", pressure_column=[1, 2, 3])
     np.testing.assert_array_equal(trace["pressure_bar"], CYCLES)
+
+
+def test_decimals_and_empty_truths_of_parquet_are_numbers(tmp_path: Path) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    held = {"d": arrow.array([Decimal("1.25"), None]), "b": arrow.array([None, True]), "n": arrow.array(["a", "b"])}
+    parquet.write_table(arrow.table(held), tmp_path / "a.parquet")
+    table = read_any_table(tmp_path / "a.parquet")
+    assert table.header == ("d", "b")
+    np.testing.assert_array_equal(table.matrix([0, 1]), [[1.25, np.nan], [np.nan, 1.0]])
 
 
 def test_a_struct_of_matlab_has_fields(tmp_path: Path) -> None:

@@ -328,11 +328,12 @@ def _channels(content: Any, number: int) -> list[int]:
 def _of_parquet(file: Path) -> Iterator[_Column]:
     parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
     table = parquet.read_table(file)
-    notes = {field.name: field.metadata or {} for field in table.schema}
-    return _flat(
-        _Column(name, table[name].to_numpy(), (notes[name].get(b"units") or notes[name].get(b"unit") or b"").decode())
-        for name in table.column_names
-    )
+    for field in table.schema:
+        column, notes = table[field.name], field.metadata or {}
+        if str(field.type).startswith(("decimal", "bool")):  # else objects, where cells are empty
+            column = column.cast("double")
+        unit = notes.get(b"units") or notes.get(b"unit") or b""
+        yield from _flat([_Column(field.name, column.to_numpy(), unit.decode())])
 
 
 def _of_zip(file: Path) -> Table | Iterable[_Column]:
