@@ -1,9 +1,10 @@
-"""Bayesian optimisation of one noisy input as engineers run it, for `guided_seeking.py`.
+"""Bayesian optimisation of noisy inputs as engineers run it, for the benchmarks of seeking.
 
-Contenders as in `peer_seekers.py`. What is called defaults ends after 40 evaluations at the best reading it has seen:
-that is what both packages hand back. By hand: the noise is told, the length scale bounded; the start and one reading
-in either half come first; the answer is the best of the model's mean. Those settings were found by trying on the maps
-of the benchmark, and the trying is not counted.
+Contenders as in `peer_seekers.py`, of one input or several. What is called defaults ends after 40 evaluations at the
+best reading it has seen: that is what both packages hand back. By hand: the noise is told; the start and one reading
+in every part of each input come first; the answer is the best of the model's mean; hyperparameters are fitted for 40
+evaluations and kept from then on. Those settings were found by trying on the maps of the benchmark, and the trying is
+not counted.
 """
 
 from __future__ import annotations
@@ -11,17 +12,18 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from peers.peer_seekers import like, stay
 
 if TYPE_CHECKING:
-    from peers.peer_seekers import Contender, Plant
+    from peers.peer_seekers import Contender, Plant, Point
 
 PACKAGES = {"bayes_opt": "bayesian-optimization", "skopt": "scikit-optimize"}
 EVALUATIONS, RANDOM_FIRST, SPREAD_FIRST = 40, 5, 2
-GRID = 161
+GRID = {1: 161, 2: 17, 3: 7}  # points along each input, by the number of inputs
 
 
 @contextlib.contextmanager
@@ -32,96 +34,194 @@ def quietly() -> Iterator[None]:
         yield
 
 
-def stay(plant: Plant) -> None:
-    while True:
-        plant(plant.estimate)
+def edges(lower: Point, upper: Point) -> np.ndarray:
+    """Return lower and upper bounds, shape (inputs, 2)."""
+    return np.column_stack([np.atleast_1d(lower), np.atleast_1d(upper)]).astype(float)
 
 
-def bayes_opt(lower: float, upper: float) -> Contender:
+def spread_points(rng: np.random.RandomState, bounds: np.ndarray, count: int) -> np.ndarray:
+    """Draw a Latin hypercube, shape (count, inputs)."""
+    return np.column_stack(
+        [low + (high - low) * (rng.permutation(count) + rng.uniform(size=count)) / count for low, high in bounds]
+    )
+
+
+def mesh(bounds: np.ndarray) -> np.ndarray:
+    """Return the points of the grid, shape (points, inputs)."""
+    axes = [np.linspace(low, high, GRID[len(bounds)]) for low, high in bounds]
+    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(bounds))
+
+
+def highest(mean: Callable[[np.ndarray], np.ndarray], points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Return the input of the highest mean: of the grid of one input, of several by a search from its best point."""
+    best = points[int(np.argmax(mean(points)))]
+    if len(bounds) == 1:
+        return best
+    from scipy.optimize import minimize
+
+    low, high = bounds.T
+
+    def below(share: np.ndarray) -> float:
+        return -float(mean((low + share * (high - low))[None])[0])
+
+    found = minimize(below, (best - low) / (high - low), method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(bounds))
+    return low + found.x * (high - low)
+
+
+def bayes_opt(lower: Point, upper: Point) -> Contender:
     """`BayesianOptimization` as it comes: five random readings, upper confidence bound, the best reading."""
     from bayes_opt import BayesianOptimization
 
-    def run(plant: Plant, start: float, seed: int) -> None:
+    bounds = edges(lower, upper)
+    names = [f"x{k}" for k in range(len(bounds))]
+
+    def run(plant: Plant, start: Point, seed: int) -> None:
         rng = np.random.default_rng([seed, 2])
         search = BayesianOptimization(
-            None, {"x": (lower, upper)}, random_state=seed, verbose=0, allow_duplicate_points=True
+            None, dict(zip(names, bounds, strict=True)), random_state=seed, verbose=0, allow_duplicate_points=True
         )
-        x = start
+        x = np.atleast_1d(start)
         for count in range(1, EVALUATIONS + 1):
-            j = plant(x)
+            j = plant(like(start, x))
             with quietly():
-                search.register({"x": x}, j)
-                plant.estimate = float(search.max["params"]["x"])
-                x = rng.uniform(lower, upper) if count < RANDOM_FIRST else float(search.suggest()["x"])
+                search.register(x, j)
+                plant.estimate = like(start, np.array([search.max["params"][name] for name in names]))
+                x = rng.uniform(*bounds.T) if count < RANDOM_FIRST else np.array(list(search.suggest().values()))
         stay(plant)
 
     return run
 
 
 def bayes_opt_by_hand(
-    lower: float,
-    upper: float,
+    lower: Point,
+    upper: Point,
     noise_sd: float,
     *,
     goes_on: bool = False,
     kappa: float = 1.0,
     scale: tuple[float, float] = (8.0, 40.0),
+    spread_first: int = SPREAD_FIRST,
+    searches: int = 2,
 ) -> Contender:
-    """Tell it the noise; hyperparameters are fitted for 40 evaluations and kept from then on."""
+    """Length scales are bounded, one for each input, in the unit of the inputs: let several be alike."""
     from bayes_opt import BayesianOptimization, acquisition
     from sklearn.gaussian_process.kernels import Matern
 
-    grid = np.linspace(lower, upper, GRID)
+    bounds = edges(lower, upper)
+    names = [f"x{k}" for k in range(len(bounds))]
+    points = mesh(bounds)
 
-    def run(plant: Plant, start: float, seed: int) -> None:
+    def run(plant: Plant, start: Point, seed: int) -> None:
         rng = np.random.RandomState(seed)
         bound = acquisition.UpperConfidenceBound(kappa=kappa)
         search = BayesianOptimization(
-            None, {"x": (lower, upper)}, bound, random_state=seed, verbose=0, allow_duplicate_points=True
+            None,
+            dict(zip(names, bounds, strict=True)),
+            bound,
+            random_state=seed,
+            verbose=0,
+            allow_duplicate_points=True,
         )
-        search.set_gp_params(kernel=Matern(nu=2.5, length_scale=10.0, length_scale_bounds=scale))
+        lengths = np.full(len(bounds), 10.0)
+        search.set_gp_params(kernel=Matern(nu=2.5, length_scale=lengths, length_scale_bounds=scale))
         search.set_gp_params(n_restarts_optimizer=0)
         model = search._gp  # the package offers no other way to its model
-        spread = (
-            lower + (upper - lower) * (rng.permutation(SPREAD_FIRST) + rng.uniform(size=SPREAD_FIRST)) / SPREAD_FIRST
-        )
-        count, x = 0, start
+        spread = spread_points(rng, bounds, spread_first)
+        count, x = 0, np.atleast_1d(start)
         while True:
-            j = plant(x)
+            j = plant(like(start, x))
             with quietly():
-                search.register({"x": x}, j)
+                search.register(x, j)
             count += 1
-            if count <= SPREAD_FIRST:
-                x = float(spread[count - 1])
+            if count <= spread_first:
+                x = spread[count - 1]
                 continue
             told = (noise_sd / float(np.std(search.space.target))) ** 2  # the model sees readings scaled to one
             search.set_gp_params(alpha=told)
             if count == EVALUATIONS:
                 search.set_gp_params(kernel=model.kernel_, optimizer=None)
             with quietly():
-                suggested = bound.suggest(model, search.space, n_random=400, n_smart=2, random_state=rng)
-            plant.estimate = float(grid[int(np.argmax(model.predict(grid[:, None])))])
+                suggested = bound.suggest(model, search.space, n_random=400, n_smart=searches, random_state=rng)
+            plant.estimate = like(start, highest(model.predict, points, bounds))
             if count >= EVALUATIONS and not goes_on:
                 stay(plant)
-            x = float(suggested[0])
+            x = np.asarray(suggested, float)
 
     return run
 
 
-def skopt(lower: float, upper: float) -> Contender:
+def skopt(lower: Point, upper: Point) -> Contender:
     """`Optimizer` as it comes: ten random readings, three acquisitions by turns, the noise fitted, the best reading."""
     from skopt import Optimizer
 
-    def run(plant: Plant, start: float, seed: int) -> None:
-        search = Optimizer([(lower, upper)], random_state=seed)
-        x, best = start, -np.inf
+    bounds = edges(lower, upper)
+
+    def run(plant: Plant, start: Point, seed: int) -> None:
+        search = Optimizer([(low, high) for low, high in bounds], random_state=seed)
+        x, best = np.atleast_1d(start), -np.inf
         for _ in range(EVALUATIONS):
-            j = plant(x)
+            j = plant(like(start, x))
             if j > best:
-                best, plant.estimate = j, x
+                best, plant.estimate = j, like(start, x)
             with quietly():
-                search.tell([x], -j)
-                x = float(search.ask()[0])
+                search.tell(x.tolist(), -j)
+                x = np.array(search.ask(), float)
         stay(plant)
+
+    return run
+
+
+def skopt_by_hand(
+    lower: Point,
+    upper: Point,
+    noise_sd: float,
+    *,
+    goes_on: bool = False,
+    acquisition: str = "EI",
+    spread_first: int = SPREAD_FIRST,
+    **acquisition_settings: float,
+) -> Contender:
+    """Search an acquisition once, from 300 random points, not five times from 10 000; the package scales inputs."""
+    from skopt import Optimizer
+
+    bounds = edges(lower, upper)
+    points = mesh(bounds)
+
+    def run(plant: Plant, start: Point, seed: int) -> None:
+        search = Optimizer(
+            [(low, high) for low, high in bounds],
+            n_initial_points=spread_first + 1,
+            acq_func=acquisition,
+            acq_func_kwargs=acquisition_settings,
+            acq_optimizer_kwargs={"n_points": 300, "n_restarts_optimizer": 1},
+            model_queue_size=1,
+            random_state=seed,
+        )
+        gp = search.base_estimator_
+        gp.set_params(n_restarts_optimizer=0)
+        spread = spread_points(np.random.RandomState(seed), bounds, spread_first)
+        readings: list[float] = []
+        x = np.atleast_1d(start)
+
+        def mean(at: np.ndarray) -> np.ndarray:
+            return -search.models[-1].predict((at - bounds[:, 0]) / (bounds[:, 1] - bounds[:, 0]))
+
+        while True:
+            readings.append(plant(like(start, x)))
+            count = len(readings)
+            if count > spread_first:
+                gp.set_params(noise=(noise_sd / float(np.std(readings))) ** 2)  # it sees readings scaled to one
+            if count == EVALUATIONS:
+                gp.set_params(kernel=search.models[-1].kernel_.k1, optimizer=None)  # k2 is the noise
+            with quietly():
+                search.tell(x.tolist(), -readings[-1])
+            if count <= spread_first:
+                x = spread[count - 1]
+                continue
+            with quietly():
+                plant.estimate = like(start, highest(mean, points, bounds))
+                x = np.array(search.ask(), float)
+            if count >= EVALUATIONS and not goes_on:
+                stay(plant)
 
     return run

@@ -1,4 +1,4 @@
-"""What others would take as a seeker, for `seekers_vs_peers.py` and `loop_speed.py`.
+"""What others would take as a seeker, for the benchmarks of seekers and `loop_speed.py`.
 
 Each contender is `contender(plant, start, seed)`: it sets `plant.estimate`, then calls `plant(x)` for one noisy J that
 is to be maximised, again and again until the plant raises `FinishedError`. Peers minimise -J. A peer that is not
@@ -19,15 +19,16 @@ from typing import Protocol
 
 import numpy as np
 
+Point = float | np.ndarray  # a number for one input, one entry per input for several
 PACKAGES = {"noisyopt": "noisyopt", "nevergrad": "nevergrad", "cernml": "cernml-extremum-seeking"}
 
 
 class Plant(Protocol):
     """What a contender is run on."""
 
-    estimate: float
+    estimate: Point
 
-    def __call__(self, x: float) -> float:
+    def __call__(self, x: Point) -> float:
         """Return J at x, or raise FinishedError."""
 
 
@@ -35,7 +36,47 @@ class FinishedError(Exception):
     """The plant has seen enough."""
 
 
-Contender = Callable[[Plant, float, int], None]
+Contender = Callable[[Plant, Point, int], None]
+
+
+def like(start: Point, x: np.ndarray) -> Point:
+    """Return x as the plant takes it: a number where the start is one."""
+    return float(x[0]) if np.ndim(start) == 0 else np.array(x, float)
+
+
+def stay(plant: Plant) -> None:
+    while True:
+        plant(plant.estimate)
+
+
+class ScaledPlant:
+    """A plant whose inputs are z of x = middle + unit z."""
+
+    def __init__(self, plant: Plant, middle: Point, unit: Point) -> None:
+        self._plant, self._middle, self._unit = plant, middle, unit
+
+    @property
+    def estimate(self) -> Point:
+        """Best input so far, scaled."""
+        return (self._plant.estimate - self._middle) / self._unit
+
+    @estimate.setter
+    def estimate(self, z: Point) -> None:
+        self._plant.estimate = self._middle + self._unit * z
+
+    def __call__(self, z: Point) -> float:
+        """Return J at z, or raise FinishedError."""
+        return self._plant(self._middle + self._unit * z)
+
+
+def scaled(contender: Contender, lower: Point, upper: Point, width: float) -> Contender:
+    """Let a contender seek between bounds that are `width` apart in every input, with zero in the middle."""
+    middle, unit = (lower + upper) / 2, (upper - lower) / width
+
+    def run(plant: Plant, start: Point, seed: int) -> None:
+        contender(ScaledPlant(plant, middle, unit), (start - middle) / unit, seed)
+
+    return run
 
 
 class NullPlant:
@@ -52,7 +93,7 @@ class NullPlant:
         return 0.0
 
 
-def run_to_end(contender: Contender, plant: Plant, start: float, seed: int) -> None:
+def run_to_end(contender: Contender, plant: Plant, start: Point, seed: int) -> None:
     with contextlib.suppress(FinishedError):
         contender(plant, start, seed)
 
@@ -76,20 +117,52 @@ def installed(packages: Mapping[str, str] = PACKAGES) -> dict[str, str | None]:
     return found
 
 
-def noisyopt(a: float = 1.0, c: float = 1.0, iterations: int = 6000) -> Contender:
+def noisyopt(
+    a: float = 1.0, c: float = 1.0, iterations: int = 6000, bounds: tuple[Point, Point] | None = None
+) -> Contender:
     """`minimizeSPSA`, unpaired: an engine does not repeat its noise. Its stability constant is 0.01 iterations."""
     from noisyopt import minimizeSPSA
 
-    def run(plant: Plant, start: float, seed: int) -> None:
+    limits = None if bounds is None else np.column_stack(bounds)
+
+    def run(plant: Plant, start: Point, seed: int) -> None:
         np.random.seed(seed)  # noqa: NPY002 - the generator that the package draws from
         plant.estimate = start
 
         def told(x: np.ndarray) -> None:
-            plant.estimate = float(x[0])
+            plant.estimate = like(start, x)
+
+        def lost(x: np.ndarray) -> float:
+            return -plant(like(start, x))
 
         while True:
-            at = np.array([plant.estimate])
-            minimizeSPSA(lambda x: -plant(x[0]), at, niter=iterations, paired=False, a=a, c=c, callback=told)
+            at = np.array(plant.estimate, float, ndmin=1)
+            minimizeSPSA(lost, at, bounds=limits, niter=iterations, paired=False, a=a, c=c, callback=told)
+
+    return run
+
+
+def cobyqa(lower: Point, upper: Point, *, goes_on: bool = False, **options: object) -> Contender:
+    """`minimize(method="COBYQA")` of SciPy; it stays at its end, or goes on from there with another search."""
+    from scipy.optimize import Bounds, minimize
+
+    def run(plant: Plant, start: Point, seed: int) -> None:  # noqa: ARG001 - no chance in it
+        plant.estimate = start
+
+        def told(x: np.ndarray) -> None:
+            plant.estimate = like(start, x)
+
+        def lost(x: np.ndarray) -> float:
+            return -plant(like(start, x))
+
+        while True:
+            at = np.array(plant.estimate, float, ndmin=1)
+            found = minimize(
+                lost, at, method="COBYQA", bounds=Bounds(lower, upper), callback=told, options=dict(options)
+            )
+            plant.estimate = like(start, found.x)
+            if not goes_on:
+                stay(plant)
 
     return run
 

@@ -1,4 +1,4 @@
-"""Maps of J over one input that seekers are judged on, and the plant that keeps count of a run on them."""
+"""Maps of J over one input that seekers are judged on, and the plant that keeps count of a run on any map."""
 
 from __future__ import annotations
 
@@ -7,29 +7,34 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from peers.peer_seekers import FinishedError
+from peers.peer_seekers import FinishedError, Point
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, ModelOptimum
 from mgdd.loop import EngineBench
 
-CYCLES, NEAR = 300, 1.0
+CYCLES, EARLY, NEAR = 300, 40, 1.0
 WIDTH, AWAY = 40.0, 12.0
 NOISE, CURVATURE = 0.3, -0.06
 ENGINE_BOUNDS, ENGINE_STARTS = (-30.0, 10.0), (-20.0, 0.0)
 ENGINE_NOISE, ENGINE_SCATTER = 0.25, 0.3
 
-Readings = Callable[[float], float]
+Readings = Callable[[Point], float]
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One run: where it starts, where the best input is, what is read at an input."""
+    """One run: where it starts, which inputs are near the best one, what is read at an input."""
 
-    start: float
-    best: float
+    start: Point
+    near: Callable[[Point], bool]
     read: Readings
-    lost: Callable[[float], float]  # J below that of the best input, without noise
+    lost: Readings  # J below that of the best input, without noise
+
+
+def within(best: float) -> Callable[[Point], bool]:
+    """Whether an input is within 1 of the best one."""
+    return lambda x: abs(x - best) <= NEAR
 
 
 @dataclass(frozen=True)
@@ -37,8 +42,8 @@ class SeekingMap:
     """A map and what may be told of it."""
 
     name: str
-    lower: float
-    upper: float
+    lower: Point
+    upper: Point
     noise_sd: float
     curvature: float
     setting: Callable[[int, bool], Setting]  # of this seed, with or without noise
@@ -50,11 +55,11 @@ class CountedPlant:
     """Adds up J lost by what is applied, knows when the estimate arrived, and ends the run after 300 cycles."""
 
     def __init__(self, setting: Setting) -> None:
-        self.estimate, self.cycles, self.lost = setting.start, 0, 0.0
+        self.estimate, self.cycles, self.lost, self.lost_early = setting.start, 0, 0.0, 0.0
         self.arrived = math.inf
         self._setting = setting
 
-    def __call__(self, x: float) -> float:
+    def __call__(self, x: Point) -> float:
         """Return what is read at x, or raise FinishedError."""
         if self.arrived == math.inf and self.near():
             self.arrived = self.cycles
@@ -62,11 +67,17 @@ class CountedPlant:
             raise FinishedError
         self.cycles += 1
         self.lost += self._setting.lost(x)
+        if self.cycles == EARLY:
+            self.lost_early = self.lost
         return self._setting.read(x)
 
     def near(self) -> bool:
-        """Whether the estimate is within 1 of the best input."""
-        return abs(self.estimate - self._setting.best) <= NEAR
+        """Whether the estimate is near the best input."""
+        return self._setting.near(self.estimate)
+
+    def lost_by_estimate(self) -> float:
+        """J lost where the estimate is applied."""
+        return self._setting.lost(self.estimate)
 
 
 def drawn(name: str, drop: Callable[[float], float], *, noise_sd: float = NOISE) -> SeekingMap:
@@ -77,7 +88,7 @@ def drawn(name: str, drop: Callable[[float], float], *, noise_sd: float = NOISE)
         best = (1 if seed % 4 < 2 else -1) * rng.uniform(4.0, 5.0)
         noise = ((noise_sd if noisy else 0.0) * rng.standard_normal(CYCLES)).tolist()
         start = best + (AWAY if seed % 2 == 0 else -AWAY)
-        return Setting(start, best, lambda x: drop(x - best) + noise.pop(), lambda x: -drop(x - best))
+        return Setting(start, within(best), lambda x: drop(x - best) + noise.pop(), lambda x: -drop(x - best))
 
     parabola = Curve.parabola(curvature=-0.05, best=0.0, reach=1.5 * WIDTH)
     return SeekingMap(name, -WIDTH / 2, WIDTH / 2, noise_sd, CURVATURE, setting, {"parabola": parabola}, prior_sd=12.0)
@@ -101,7 +112,7 @@ def engine() -> SeekingMap:
         )
         return Setting(
             ENGINE_STARTS[seed % 2],
-            best,
+            within(best),
             lambda x: bench.step(x)["j"],
             lambda x: float(true.max() - np.interp(x, timings, true)),
         )

@@ -369,3 +369,9 @@ def test_an_unfinalised_bus_log_of_a_vehicle() -> None:
     rpm = 0.125 * (low + 256.0 * high)
     assert (int(speed.sum()), rpm.min(), rpm.max()) == (12719, 646.5, 653.75)
     assert rpm.mean() == pytest.approx(650.05, abs=0.005)
+
+
+def test_a_misspelt_column_is_told_the_near_one(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("angle;p\n" + ROWS)
+    with pytest.raises(DataError, match=r"no column 'angel': did you mean 'angle'\? the header has 'angle', 'p'"):
+        read_pressure(tmp_path / "t.csv", angle_column="angel")

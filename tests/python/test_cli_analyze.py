@@ -139,3 +139,14 @@ def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, caps
     assert abs(back["tdc"]["tdc_offset_cad"]) < 0.1
     right = run_json(capsys, file, *HD, *said, "--tdc")
     assert not right["tdc"]["suspect"]
+
+
+def test_only_geometry_that_nobody_gave_is_warned_of(file: str, caplog: pytest.LogCaptureFixture) -> None:
+    given = ["bore_mm=128", "stroke_mm=144", "compression_ratio=17.3", "connecting_rod_mm=230", "evo_cad=124"]
+    options = [word for each in given for word in ("--set", each)]
+    assert main(["engine", "analyze", file, *options]) == 0
+    (said,) = [record.message for record in caplog.records if "no --preset" in record.message]
+    assert said == "no --preset: the traces are read with ivc_cad = -140 of puma_single"
+    caplog.clear()
+    assert main(["engine", "analyze", file, *options, "--set", "ivc_cad=-143"]) == 0
+    assert not any("no --preset" in record.message for record in caplog.records)

@@ -83,7 +83,9 @@ def figures(name: str) -> Figures:
         noise = 0.25 * np.random.default_rng(seed).standard_normal(SETTLED + AFTER)
         gain = 2.0 / (0.051 * 40.0)
         ff = FeedForward(
-            ExtremumSeeking(start=-20.0, lower=-50.0, upper=18.0, form="moving_average", gain=gain, rate=math.inf),
+            ExtremumSeeking(
+                start=-20.0, lower=-50.0, upper=18.0, form="moving_average", gain=gain, amplitude=1.0, rate=math.inf
+            ),
             guide,
         )
         verdict = ""

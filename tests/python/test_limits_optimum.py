@@ -159,6 +159,6 @@ def test_j_never_falls_after_the_first_arrival(name: str) -> None:
     arrival = int(np.argmax((rooms < 0.7).any(axis=1)))
     assert 0 < arrival < 6000
     j = np.array([mixed(x) for x in estimate[arrival:]])
-    # Newton seeking moves in every cycle, on what the dither makes of the slope within a window.
+    # Newton seeking moves in every cycle, on what the dither makes of the slope within a window; else rounding.
     assert np.diff(j).min() > (-2e-3 if name == "newton" else -1e-9)
-    assert (np.maximum.accumulate(j) - j).max() < (0.01 if name == "newton" else 1e-9)
+    assert (np.maximum.accumulate(j) - j).max() < (0.01 if name == "newton" else 5e-9)

@@ -35,7 +35,16 @@ from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibratio
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
-from mgdd.io import Encoder, pressure_trace, read, read_pressure, read_throttle_log, throttle_log, write_csv
+from mgdd.io import (
+    Encoder,
+    pressure_chunks,
+    pressure_trace,
+    read,
+    read_pressure,
+    read_throttle_log,
+    throttle_log,
+    write_csv,
+)
 from mgdd.loop import EngineBench, ThrottleFault, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results.fit_report import FitReport
@@ -73,11 +82,11 @@ def whole_file(folder: Path) -> Any:
     return read(folder / "whole.npz")
 
 
-def pressures(folder: Path) -> xr.Dataset:
+def pressure_file(folder: Path) -> Path:
     trace = datasets.read("hd_diesel_128x144")[0]
     columns = np.column_stack([trace["crank_angle_cad"], trace["pressure_bar"]])
     np.savetxt(folder / "trace.csv", columns, delimiter=",")
-    return read_pressure(folder / "trace.csv")
+    return folder / "trace.csv"
 
 
 def bench_run() -> xr.Dataset:
@@ -159,6 +168,10 @@ def loop_samples() -> xr.Dataset:
     return loop.samples()
 
 
+def whole_cycles() -> Indicating:
+    return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0)
+
+
 def indicating() -> Indicating:
     return Indicating(np.arange(-180.0, 181.0), Cylinder(), speed_rpm=6000.0)
 
@@ -184,6 +197,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.read": lambda _: datasets.read("hd_diesel_128x144"),
     **{f"datasets.read.{name}": lambda _, n=name: datasets.read(n) for name in NEEDS},
+    "engine.Indicating.noise": lambda _: whole_cycles().noise(np.eye(2, 720), attenuation_db={500: 90, 2000: 80}),
     "engine.Indicating.oscillation": lambda _: indicating().oscillation(np.ones((2, 361))),
     "engine.Indicating.record": lambda _: indicating().record(np.ones((2, 361))),
     "engine.ThermalNo.cycle": lambda _: ThermalNo().cycle(simulate("puma_single"), "puma_single"),
@@ -226,9 +240,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "surrogate.random_step_records": lambda _: random_step_records(50),
     "io.Encoder.angle": lambda _: wheel_angle(),
+    "io.pressure_chunks": lambda folder: list(pressure_chunks(pressure_file(folder))),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
     "io.read": whole_file,
-    "io.read_pressure": pressures,
+    "io.read_pressure": lambda folder: read_pressure(pressure_file(folder)),
     "io.read_throttle_log": written_log,
     "io.throttle_log": lambda _: log(),
     "rig.RealtimeLoop.samples": lambda _: loop_samples(),

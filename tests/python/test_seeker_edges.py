@@ -182,4 +182,4 @@ def test_what_is_not_given_is_none_and_no_number_stands_for_it() -> None:
 def test_the_advice_of_spsa_names_a_gain_that_meets_it() -> None:
     with pytest.warns(UserWarning, match="a gain of 10 meets it"):
         Spsa(schedule="constant", gain=20.0, curvature=-0.1, **SPACE)
-    assert Spsa(schedule="constant", gain=10.0, curvature=-0.1, **SPACE).settings["gain"] == 10.0
+    assert Spsa(schedule="constant", gain=10.0, curvature=-0.1, **SPACE).settings["gain"] == [10.0]

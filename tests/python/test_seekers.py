@@ -119,7 +119,7 @@ def test_a_misfire_is_counted_and_not_read(make: Any) -> None:
     [
         (lambda: ExtremumSeeking(start=30.0, upper=10.0), r"start = 30: must lie in \[-inf, 9\]"),
         (lambda: ExtremumSeeking(start=0.0, lower=5.0), "start = 0: must lie in"),
-        (lambda: ExtremumSeeking(start=0.0, lower=-0.5, upper=0.5), "room for the perturbation"),
+        (lambda: ExtremumSeeking(start=0.0, lower=-0.5, upper=0.5, amplitude=1.0), "room for the perturbation"),
         (lambda: ExtremumSeeking(start=0.0, period=3), "period = 3: must be at least 4"),
         (lambda: ExtremumSeeking(start=[0, 0, 0], period=40, harmonics=[3, 4, 7]), "sum or difference"),
         (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),

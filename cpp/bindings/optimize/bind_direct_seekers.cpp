@@ -24,8 +24,8 @@ void bind_spsa(py::module_& m) {
           "iteration", [](const B& b) { return b.use()->seeker().iteration(); },
           "Iterations since the start or restart.")
       .def_property_readonly(
-          "gain", [](const B& b) { return b.use()->seeker().gain(); },
-          "Gain in use; None while the first readings are taken.")
+          "gain", [](const B& b) { return list_or_none(b.use()->seeker().gain()); },
+          "Gain in use, per input; None while the first readings are taken.")
       .def_property_readonly(
           "blocked", [](const B& b) { return b.use()->seeker().blocked(); }, "Steps that blocking refused.")
       .def_property_readonly(
@@ -42,8 +42,8 @@ void bind_gradient_descent(py::module_& m) {
   cls.def_property_readonly(
          "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
       .def_property_readonly(
-          "step_size", [](const B& b) { return b.use()->seeker().step_size(); },
-          "Step size in use; None while the first readings are taken.")
+          "step_size", [](const B& b) { return list_or_none(b.use()->seeker().step_size()); },
+          "Step size in use, per input; None while the first readings are taken.")
       .def_property_readonly(
           "converged_at",
           [](const B& b) {

@@ -14,6 +14,38 @@ namespace {
 
 using namespace optimize;
 
+void bind_input(py::module_& m) {
+  py::class_<Input> cls(m, "Input", R"(One input of a plant: its name, unit and bounds, and what counts as a step of it.
+
+Parameters
+----------
+name : str
+    What is set, for example ``soc_cad``; plants with this input are steered by it.
+lower, upper : float
+    What may be applied, in the unit of the input; infinite for none.
+unit : str
+    Of the input; empty for the one that the name says.
+scale : float
+    What dithers, perturbations and tolerances of a seeker count in where they are left open, in the unit of the input;
+    0 for a fortieth of the bounds, or 1 where there are none.
+rate : float
+    Largest change of the estimate per step of the seeker, in the unit of the input, > 0.
+
+Raises
+------
+mgdd.errors.ParameterError
+    An empty name, bounds that do not enclose anything, a negative scale, or a rate that is not > 0.
+
+Examples
+--------
+>>> from mgdd.optimize import Input, Spsa
+>>> seeker = Spsa(start={"soc_cad": -8.0, "egr": 0.1}, inputs=[Input("soc_cad", -20.0, 5.0), Input("egr", 0.0, 0.4)])
+>>> sorted(seeker.ask())
+['egr', 'soc_cad']
+)");
+  bind_record(cls, "Input", [](const Input& input) { validate(std::vector<Input>{input}); }, 3);
+}
+
 void bind_limit(py::module_& m) {
   py::class_<Limit> cls(m, "Limit", R"(An upper limit on a measured quantity, kept by a seeker.
 
@@ -97,6 +129,7 @@ Examples
 }  // namespace
 
 void bind_limits(py::module_& m) {
+  bind_input(m);
   bind_limit(m);
   bind_component_lag(m);
 }

@@ -74,8 +74,13 @@ template <class T>
 void bind_asking(py::class_<Guarded<T>>& cls) {
   using B = Guarded<T>;
   cls.def(
-         "ask", [](B& b) { return input_array(b.use()->ask()); },
-         "The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.")
+         "ask",
+         [](B& b) {
+           const auto r = b.use();
+           return asked_inputs(r->ask(), b.constant().settings().space.inputs);
+         },
+         "The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking "
+         "again\nbefore tell gives the same.")
       .def(
           "tell",
           [](B& b, const py::object& j, const py::object& limits, bool misfire, const py::object& applied) {
@@ -90,7 +95,8 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
           "Accept what was measured at the input of the last ask.\n\n"
           "J: float, or one number per component; limits: one value per limit, in order or by name;\n"
           "misfire: the cycle is counted and its J and limits are not read;\n"
-          "applied: what the plant really applied, one number per input; None where it is what was asked for.\n"
+          "applied: what the plant really applied, one number per input or by name; None where it is what was asked "
+          "for.\n"
           "Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond\n"
           "1e30 in magnitude); the state is unchanged then.")
       .def(
@@ -114,6 +120,15 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
       .def_property_readonly(
           "failing_everywhere", [](const B& b) { return b.use()->protocol().failures.failing_everywhere(); },
           "True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.")
+      .def_property_readonly(
+          "input_names",
+          [](const B& b) {
+            std::vector<std::string> names;
+            for (const optimize::Input& input : b.constant().settings().space.inputs)
+              names.push_back(input.name);
+            return names;
+          },
+          "Names of the inputs, in the order of the estimate; empty where they have none.")
       .def_property_readonly(
           "component_count", [](const B& b) { return b.constant().component_count(); },
           "Components of J that tell takes.")

@@ -43,6 +43,15 @@ inline optimize::Inputs inputs_from(const py::object& value, std::string_view na
   return Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size()));
 }
 
+/// What is applied: one number per name where inputs have names, else an array of shape (inputs,).
+inline py::object asked_inputs(const optimize::Inputs& values, const std::vector<optimize::Input>& inputs) {
+  if (inputs.empty()) return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+  py::dict named;
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    named[as_str(inputs[i].name)] = values[static_cast<Eigen::Index>(i)];
+  return named;
+}
+
 inline py::array_t<double> input_array(const optimize::Inputs& values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
@@ -59,8 +68,28 @@ struct ReadingBuffer {
   std::vector<double> components, limits, applied;
 };
 
+/// The numbers of a dict in the order of what they belong to, one for each of them.
+template <class Named>
+std::vector<double> by_name(const py::object& given, const std::vector<Named>& known, const char* argument,
+                            const char* what) {
+  const auto dict = py::reinterpret_borrow<py::dict>(given);
+  if (dict.size() > known.size()) {
+    throw about(argument, ShapeError(std::string(argument) + " has " + std::to_string(dict.size()) +
+                                     " names: the settings have " + std::to_string(known.size())));
+  }
+  std::vector<double> out;
+  for (const Named& one : known) {
+    if (!dict.contains(one.name)) {
+      throw about(argument, ShapeError(std::string(argument) + ": '" + one.name +
+                                       "' is missing: tell one value for every " + what + " of the settings"));
+    }
+    out.push_back(as_number(py::str(one.name), dict[one.name.c_str()]));
+  }
+  return out;
+}
+
 /// J as a number or one number per component; limits as a sequence in the order of the settings, or by name; what was
-/// applied as a number or one number per input.
+/// applied as a number or one number per input, or by name.
 template <class S>
 optimize::Reading reading_from(const S& seeker, const py::object& j, const py::object& limits, bool misfire,
                                const py::object& applied, ReadingBuffer& buffer) {
@@ -73,22 +102,13 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
     }
   }
   if (py::isinstance<py::dict>(limits)) {
-    const auto by_name = py::reinterpret_borrow<py::dict>(limits);
-    if (by_name.size() > seeker.settings().limits.size()) {
-      throw about("limits", ShapeError("limits has " + std::to_string(by_name.size()) + " names: the settings have " +
-                                       std::to_string(seeker.settings().limits.size())));
-    }
-    for (const optimize::Limit& limit : seeker.settings().limits) {
-      if (!by_name.contains(limit.name)) {
-        throw about("limits", ShapeError("limits: '" + limit.name +
-                                         "' is missing: tell one value for every limit of the settings"));
-      }
-      buffer.limits.push_back(as_number(py::str(limit.name), by_name[limit.name.c_str()]));
-    }
+    buffer.limits = by_name(limits, seeker.settings().limits, "limits", "limit");
   } else if (!limits.is_none()) {
     buffer.limits = numbers_from(limits, "limits");
   }
-  if (!applied.is_none()) {
+  if (py::isinstance<py::dict>(applied)) {
+    buffer.applied = by_name(applied, seeker.settings().space.inputs, "applied", "input");
+  } else if (!applied.is_none()) {
     buffer.applied = numbers_from(applied, "applied");
     if (buffer.applied.empty()) {
       throw about("applied", ShapeError("applied is empty: give one number per input, or leave it out"));

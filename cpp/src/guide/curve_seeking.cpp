@@ -57,12 +57,14 @@ CurveSeekingSettings checked(CurveSeekingSettings s) {
     throw about("start",
                 ShapeError("start has " + std::to_string(s.space.size()) + " entries: a curve guides one input"));
   }
+  s.space = resolved(std::move(s.space));
   for (const auto& [name, bound] : {std::pair{"lower", &s.space.lower}, std::pair{"upper", &s.space.upper}}) {
     if (bound->size() == 1 && !std::isfinite((*bound)[0])) {
       throw ParameterError(name, (*bound)[0], "must be finite: the guide's curve is placed between the bounds");
     }
   }
   validate(s.space, scalar_input(0.0));
+  if (!s.rate && !s.space.inputs.empty() && std::isfinite(s.space.inputs[0].rate)) s.rate = s.space.inputs[0].rate;
   const double width = s.space.upper[0] - s.space.lower[0];
   if (s.prior_sd == 0.0) s.prior_sd = prior_share * width;
   require_in(above(0.0, 1e12), "prior_sd", s.prior_sd);

@@ -25,11 +25,13 @@ ModelOptimumSettings checked(const ModelOptimumSettings& s) {
 
 optimize::GradientDescent ascent_of(const ModelOptimumSettings& s) {
   optimize::GradientDescentSettings g;
-  g.space = {optimize::scalar_input(0.5 * (s.lower_cad + s.upper_cad)), optimize::scalar_input(s.lower_cad),
-             optimize::scalar_input(s.upper_cad)};
-  g.step_size = s.step_size;
-  g.difference = s.difference_cad;
-  g.tolerance = s.tolerance_cad;
+  g.space = {optimize::scalar_input(0.5 * (s.lower_cad + s.upper_cad)),
+             optimize::scalar_input(s.lower_cad),
+             optimize::scalar_input(s.upper_cad),
+             {}};
+  g.step_size = optimize::scalar_input(s.step_size);
+  g.difference = optimize::scalar_input(s.difference_cad);
+  g.tolerance = optimize::scalar_input(s.tolerance_cad);
   g.iterations = s.iterations;
   return optimize::GradientDescent(std::move(g));
 }

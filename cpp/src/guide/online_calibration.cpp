@@ -27,8 +27,8 @@ std::optional<optimize::ExtremumSeeking> seeker_of(const OnlineCalibrationSettin
   const Domain& domain = info_of(Calibrated::wall_heat_scale).field.domain;
   optimize::ExtremumSeekingSettings e;
   const double inside = std::clamp(start, domain.lower + calibration_amplitude, domain.upper - calibration_amplitude);
-  e.space = {optimize::scalar_input(inside), optimize::scalar_input(domain.lower),
-             optimize::scalar_input(domain.upper)};
+  e.space = {
+      optimize::scalar_input(inside), optimize::scalar_input(domain.lower), optimize::scalar_input(domain.upper), {}};
   e.form = optimize::MeanRemoval::moving_average;
   e.dither = {.amplitude = optimize::scalar_input(calibration_amplitude), .period = seeking_period, .harmonics = {1}};
   e.gain = optimize::scalar_input(2.0 / (calibration_amplitude * seeking_time_constant));  // J is scaled to J'' = -1

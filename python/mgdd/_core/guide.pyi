@@ -94,11 +94,12 @@ class CurveSeeking:
     """
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[mgdd._core.optimize.Input] | None = None, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
+        inputs : names, units, bounds and scales
         curve : the guide's J
         prior_sd : how far the best input may lie from the guide's
         scale_sd : of the plant's curvature over the guide's
@@ -127,9 +128,10 @@ class CurveSeeking:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def guide(self, curve: Curve) -> bool:
         """
@@ -145,7 +147,7 @@ class CurveSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -204,6 +206,11 @@ class CurveSeeking:
     def handed_over(self) -> bool:
         """
         Whether plain extremum seeking is at work, because the guide kept failing.
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def limit_delays(self) -> dict:
@@ -274,9 +281,10 @@ class FeedForward:
         """
         History of the seeker, as its _history_columns gave it.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -288,7 +296,7 @@ class FeedForward:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -355,6 +363,11 @@ class FeedForward:
     def guide_optimum(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last valid optimum of the guide, shape (inputs,); NaN before there is one.
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def limit_delays(self) -> dict:
@@ -535,9 +548,10 @@ class GuidedEngine:
         """
         tell, with the pressure.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -549,7 +563,7 @@ class GuidedEngine:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -603,6 +617,11 @@ class GuidedEngine:
     def failing_everywhere(self) -> bool:
         """
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def limit_delays(self) -> dict:

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -264,6 +264,98 @@ class FitReport:
         """
         Estimates.
         """
+class Input:
+    """
+    One input of a plant: its name, unit and bounds, and what counts as a step of it.
+    
+    Parameters
+    ----------
+    name : str
+        What is set, for example ``soc_cad``; plants with this input are steered by it.
+    lower, upper : float
+        What may be applied, in the unit of the input; infinite for none.
+    unit : str
+        Of the input; empty for the one that the name says.
+    scale : float
+        What dithers, perturbations and tolerances of a seeker count in where they are left open, in the unit of the input;
+        0 for a fortieth of the bounds, or 1 where there are none.
+    rate : float
+        Largest change of the estimate per step of the seeker, in the unit of the input, > 0.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An empty name, bounds that do not enclose anything, a negative scale, or a rate that is not > 0.
+    
+    Examples
+    --------
+    >>> from mgdd.optimize import Input, Spsa
+    >>> seeker = Spsa(start={"soc_cad": -8.0, "egr": 0.1}, inputs=[Input("soc_cad", -20.0, 5.0), Input("egr", 0.0, 0.4)])
+    >>> sorted(seeker.ask())
+    ['egr', 'soc_cad']
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, name: str, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., *, unit: str = '', scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, rate: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        """
+        name : what is set
+        lower : least applied value
+        upper : largest applied value
+        unit : of the input
+        scale : what steps are counted in; 0: a fortieth of the bounds, or 1
+        rate : largest change of the estimate per step
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def replace(self, **kwargs) -> Input:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
+    @property
+    def lower(self) -> float:
+        """
+        least applied value [-]
+        """
+    @property
+    def name(self) -> str:
+        """
+        what is set
+        """
+    @property
+    def rate(self) -> float:
+        """
+        largest change of the estimate per step [-]
+        """
+    @property
+    def scale(self) -> float:
+        """
+        what steps are counted in; 0: a fortieth of the bounds, or 1 [-]
+        """
+    @property
+    def unit(self) -> str:
+        """
+        of the input
+        """
+    @property
+    def upper(self) -> float:
+        """
+        largest applied value [-]
+        """
 class Limit:
     """
     An upper limit on a measured quantity, kept by a seeker.
@@ -463,11 +555,12 @@ class ExtremumSeeking:
     """
     Extremum seeking; see mgdd.optimize.ExtremumSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'batch', amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = None, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, form: str = 'batch', amplitude: typing.Any = None, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = None, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
+        inputs : names, units, bounds and scales
         form : how the mean of J is removed
         amplitude : of the dither, per input
         period : cycles of the common window
@@ -498,9 +591,10 @@ class ExtremumSeeking:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -512,7 +606,7 @@ class ExtremumSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -563,6 +657,11 @@ class ExtremumSeeking:
         Last estimate of the slope of the maximised objective, shape (inputs,).
         """
     @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
+        """
+    @property
     def limit_delays(self) -> dict:
         """
         The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
@@ -602,11 +701,12 @@ class NewtonSeeking:
     """
     Newton extremum seeking; see mgdd.optimize.NewtonSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 2.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = None, initial_inverse: typing.Any = None, largest_inverse: typing.SupportsFloat | typing.SupportsIndex | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, amplitude: typing.Any = None, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = None, initial_inverse: typing.Any = None, largest_inverse: typing.SupportsFloat | typing.SupportsIndex | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
+        inputs : names, units, bounds and scales
         amplitude : of the dither, per input
         period : cycles of the common window
         harmonics : oscillations per window, one per input
@@ -635,9 +735,10 @@ class NewtonSeeking:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -649,7 +750,7 @@ class NewtonSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -693,6 +794,11 @@ class NewtonSeeking:
     def hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Filtered Hessian of the maximised objective, shape (inputs, inputs).
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def inverse_hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -739,11 +845,12 @@ class BoundedSeeking:
     """
     Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, amplitude: typing.Any = None, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
+        inputs : names, units, bounds and scales
         amplitude : of the dither, per input
         period : cycles of the common window
         harmonics : oscillations per window, one per input
@@ -764,9 +871,10 @@ class BoundedSeeking:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -778,7 +886,7 @@ class BoundedSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -812,6 +920,11 @@ class BoundedSeeking:
     def failing_everywhere(self) -> bool:
         """
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def kappa(self) -> float | None:
@@ -858,23 +971,24 @@ class Spsa:
     """
     Simultaneous perturbation; see mgdd.optimize.Spsa.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex | None = None, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, form: str = 'first_order', schedule: str = 'decreasing', gain: typing.Any = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.Any = None, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.Any = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.Any = None, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
+        inputs : names, units, bounds and scales
         form : order of the step
         schedule : how gain and perturbation change
-        gain : of the step
+        gain : of the step, per input
         stability : iterations that the first gains count for
         gain_exponent : decay of the gain
-        perturbation : of the input
+        perturbation : of every input
         perturbation_exponent : decay of the perturbation
-        step_max : largest change per iteration and input
+        step_max : largest change per iteration, per input
         averaging : gradients per iteration
         blocking : refuse steps that lose
         noise_sd : of one measurement of J
-        initial_hessian : curvature to begin with
+        initial_hessian : diagonal to begin with
         hessian_prior : iterations that it counts for
         limit_amplitude : share of the dither while a limit holds the estimate back
         seed : of the random signs
@@ -894,9 +1008,10 @@ class Spsa:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -908,7 +1023,7 @@ class Spsa:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -949,9 +1064,9 @@ class Spsa:
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
         """
     @property
-    def gain(self) -> float | None:
+    def gain(self) -> list[float] | None:
         """
-        Gain in use; None while the first readings are taken.
+        Gain in use, per input; None while the first readings are taken.
         """
     @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -962,6 +1077,11 @@ class Spsa:
     def hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         Averaged Hessian of the second-order form, shape (inputs, inputs).
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def iteration(self) -> int:
@@ -1013,15 +1133,16 @@ class GradientDescent:
     """
     Two-sided differences; see mgdd.optimize.GradientDescent.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., step_size: typing.SupportsFloat | typing.SupportsIndex | None = None, difference: typing.SupportsFloat | typing.SupportsIndex = 1.0, rate: typing.Any = None, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, step_size: typing.Any = None, difference: typing.Any = None, rate: typing.Any = None, tolerance: typing.Any = None, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
-        step_size : of the step
-        difference : of the input
+        inputs : names, units, bounds and scales
+        step_size : of the step, per input
+        difference : of the two measurements to the estimate, per input
         rate : largest change per step, per input
-        tolerance : converged once every entry of a step is below
+        tolerance : converged once every entry of a step is below, per input
         iterations : steps after which a search that has not converged says so
         maximize : False to minimise J
         limits : measured quantities to keep
@@ -1039,9 +1160,10 @@ class GradientDescent:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -1053,7 +1175,7 @@ class GradientDescent:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -1099,6 +1221,11 @@ class GradientDescent:
         Last estimate of the slope of the maximised objective, shape (inputs,).
         """
     @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
+        """
+    @property
     def iteration(self) -> int:
         """
         Steps made.
@@ -1140,19 +1267,20 @@ class GradientDescent:
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
     @property
-    def step_size(self) -> float | None:
+    def step_size(self) -> list[float] | None:
         """
-        Step size in use; None while the first readings are taken.
+        Step size in use, per input; None while the first readings are taken.
         """
 class GoldenSection:
     """
     Golden-section search; see mgdd.optimize.GoldenSection.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
         upper : largest applied input, per input
+        inputs : names, units, bounds and scales
         noise_sd : of one measurement of J
         significance : standard errors that decide a comparison
         samples_max : measurements of each inner point
@@ -1172,9 +1300,10 @@ class GoldenSection:
         """
         Columns behind .history, as _history_columns gave them.
         """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+    def ask(self) -> typing.Any:
         """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        The input to apply in this cycle: an array of shape (inputs,), or a dict where inputs have names. Asking again
+        before tell gives the same.
         """
     def restart(self) -> None:
         """
@@ -1186,7 +1315,7 @@ class GoldenSection:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -1230,6 +1359,11 @@ class GoldenSection:
     def failing_everywhere(self) -> bool:
         """
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def input_names(self) -> list[str]:
+        """
+        Names of the inputs, in the order of the estimate; empty where they have none.
         """
     @property
     def limit_delays(self) -> dict:

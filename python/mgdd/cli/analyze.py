@@ -75,6 +75,10 @@ def add_analyze(verbs: Any) -> None:
         help="also estimate TDC, of a fired trace by calibrations over a scan of the angle (seconds), and doubt it",
     )  # fmt: skip
     group.add_argument(
+        "--chunk-cycles", type=int, metavar="N",
+        help="read N cycles at a time, for files larger than memory: the figures are those of the whole file",
+    )  # fmt: skip
+    group.add_argument(
         "--report", metavar="PAGE.html",
         help="write a page that needs no network: of each file the checks, the figures and their pictures",
     )  # fmt: skip
@@ -108,9 +112,10 @@ def _analyze(args: argparse.Namespace) -> None:
         try:
             trace = read()
             own = given
-            if several and "cycle" not in trace.dims:  # the threshold is for the records among the files
+            record = args.chunk_cycles is not None or "cycle" in trace.dims
+            if several and not record:  # the threshold is for the records among the files
                 own = {name: value for name, value in given.items() if name != "knock_threshold_bar"}
-            result, payload, text = _one(args, trace, engine, own)
+            result, payload, text = _one(args, trace, engine, own, traces=not record)
             checked = trust(trace, cylinder, point=point, **_CHECKED.given(args)) if args.report else None
         except DataError as error:  # one that is refused does not stop the others
             if not several and args.report is None:
@@ -138,11 +143,16 @@ def _analyze(args: argparse.Namespace) -> None:
 
 
 def _one(
-    args: argparse.Namespace, trace: xr.Dataset, engine: tuple[Cylinder, OperatingPoint, Preset], given: dict[str, Any]
+    args: argparse.Namespace,
+    trace: Any,
+    engine: tuple[Cylinder, OperatingPoint, Preset],
+    given: dict[str, Any],
+    *,
+    traces: bool,
 ) -> tuple[xr.Dataset, dict[str, Any], list[str | Table]]:
     """Analyse one file: its figures, and what is printed of them."""
     cylinder, point, preset = engine
-    result = analyze(trace, cylinder, point=point, traces="cycle" not in trace.dims, **given)
+    result = analyze(trace, cylinder, point=point, traces=traces, **given)
     named = result.attrs["gamma"]
     if named == "cylinder":
         named = cylinder.gamma if args.gamma == "constant" else args.gamma
@@ -237,6 +247,11 @@ def _table(payload: dict[str, Any]) -> list[str | Table]:
 
 
 def _check_analysis(args: argparse.Namespace) -> None:
+    whole = "--tdc" if args.tdc else "--report" if args.report else None
+    if args.chunk_cycles is not None and whole:
+        raise ParameterError(f"--chunk-cycles and {whole}, which needs the whole record, contradict each other")
+    if args.chunk_cycles is not None and args.chunk_cycles < 1:
+        raise ParameterError.of("--chunk-cycles", args.chunk_cycles, ">= 1")
     if args.smoothing_width_cad is not None and args.smoothing in ("none", "low_pass"):
         raise ParameterError("--smoothing-width-cad acts with --smoothing savitzky_golay or angle_window: choose one")
     if args.smoothing_cutoff_hz is not None and args.smoothing != "low_pass":

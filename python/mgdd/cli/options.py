@@ -15,7 +15,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
 from mgdd.engine import analyze, simulate
 from mgdd.errors import ParameterError, hinted
-from mgdd.io import Encoder, read_pressure
+from mgdd.io import Encoder, pressure_chunks, read_pressure
 from mgdd.io.files import existing_file
 from mgdd.io.point_table import CONDITIONS, conditions_of
 from mgdd.presets.preset import Preset
@@ -49,6 +49,7 @@ __all__ = [
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
+_GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 SCHEME = Options(simulate, "integrator", "step_cad")
 PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
 _COLUMNS = Options(read_pressure, "pressure_column", "angle_column")
@@ -183,15 +184,12 @@ def encoder_of(args: argparse.Namespace) -> dict[str, Any]:
 def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
     """Make cylinder and point from a preset and the options over it."""
     preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
-    if args.preset is None and getattr(args, "files", None):
-        c = preset.cylinder
-        _LOG.warning(
-            "no --preset: the traces are read with the geometry of %s (%g x %g mm, compression ratio %g)",
-            preset.name, c.bore_mm, c.stroke_mm, c.compression_ratio,
-        )  # fmt: skip
     given = assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
     point = {name: value for name, value in given.items() if name in _POINT}
     cylinder = {name: value for name, value in given.items() if name not in _POINT}
+    taken = [f"{name} = {getattr(preset.cylinder, name):g}" for name in _GEOMETRY if name not in cylinder]
+    if args.preset is None and getattr(args, "files", None) and taken:
+        _LOG.warning("no --preset: the traces are read with %s of %s", ", ".join(taken), preset.name)
     for option, field in CYLINDER_CHOICES.items():
         if getattr(args, option) is not None:
             if field in cylinder:
@@ -214,8 +212,11 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     return [read() for read in readers_of(args).values()]
 
 
-def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
-    """Give for each pressure file what reads it, so that one which is refused does not stop the others."""
+def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], Any]]:
+    """Give for each pressure file what reads it, so that one which is refused does not stop the others.
+
+    It reads a Dataset, or with --chunk-cycles one after the other.
+    """
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
     for file in args.files:
@@ -224,10 +225,16 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], xr.Dataset]]:
     speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
 
     encoder = encoder_of(args)
+    cycles = getattr(args, "chunk_cycles", None)
 
-    def read(file: str) -> xr.Dataset:
+    def read(file: str) -> Any:
         angle = encoder or {"speed_rpm": rows[file].get("speed_rpm", speed)}
-        trace = read_pressure(file, **angle, **_COLUMNS.given(args), **READING.given(args))
+        how = angle | _COLUMNS.given(args) | READING.given(args)
+        if cycles is not None:
+            return (noted(chunk, file) for chunk in pressure_chunks(file, cycles=cycles, **how))
+        return noted(read_pressure(file, **how), file)
+
+    def noted(trace: xr.Dataset, file: str) -> xr.Dataset:
         for warning in trace.attrs["warnings"].splitlines():
             _LOG.warning("%s: %s", trace.attrs["file"], warning)
         return trace.assign_attrs(**rows[file])

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
+from mgdd.engine.noise import noise_levels, pressure_levels
 from mgdd.engine.trace_cycles import CYCLE, burn_marks, scatter
-from mgdd.errors import ShapeError
+from mgdd.errors import DataError, ShapeError
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["Indicating"]
 
@@ -103,6 +106,7 @@ class Indicating:
             knock_to_cad=knock_window_cad[1],
         )
         self._core = _core.engine.Indicating(crank_angle_cad, cylinder_of(cylinder), speed_rpm, options)
+        self._angle, self._speed_rpm = np.array(crank_angle_cad, np.float64), float(speed_rpm)
 
     def cycle(self, pressure_bar: ArrayLike) -> dict[str, float]:
         """Give the figures of one cycle.
@@ -194,3 +198,73 @@ class Indicating:
                 "oscillation_bar": ((CYCLE, ANGLE), sound["pressure_bar"]),
             }
         )
+
+    def noise(self, pressure_bar: ArrayLike, *, attenuation_db: Mapping[float, float] | None = None) -> xr.Dataset:
+        """Give the third-octave levels of the pressure, and with a structure's attenuation the combustion noise.
+
+        Parameters
+        ----------
+        pressure_bar : array_like
+            Pressure [bar], (cycle, angle), of whole cycles of 720 degrees that follow each other.
+        attenuation_db : mapping of float to float, optional
+            What the structure of the engine takes away between the pressure and the sound [dB], by frequency [Hz],
+            nominal ones of bands included; between them it is linear over the logarithm of frequency. It is a property
+            of an engine and a microphone, and there is no default.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``pressure_level_db(cycle, frequency_hz)``, re 20 µPa, in bands of IEC 61260-1 (base ten), as far as the
+            sampling reaches and no narrower than the harmonics of a cycle are apart; ``mean_pressure_level_db`` is the
+            level of their mean square. With `attenuation_db` also ``noise_level_dba(cycle)``, the A-weighted sum (IEC
+            61672-1) over the bands that the table spans, and ``mean_noise_level_dba``.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            Crank angles that are not a whole cycle in even steps, a sample that is not finite.
+        mgdd.errors.ParameterError
+            A table of fewer than two numbers, or of other frequencies than the bands.
+        mgdd.errors.ShapeError
+            Another number of samples than angles.
+
+        Notes
+        -----
+        What each cycle begins higher or lower than the next one is taken off along it, so that a drift of the sensor is
+        no sound.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mgdd.engine import Indicating
+        >>> angle = np.arange(-360.0, 360.0, 0.2)
+        >>> indicating = Indicating(angle, "puma_single", speed_rpm=1500.0)
+        >>> tone = 20.0 + 0.2 * np.sqrt(2.0) * np.sin(2.0 * np.pi * angle / 9.0)  # 1 kHz; 0.2 bar are 180 dB
+        >>> made = indicating.noise([tone], attenuation_db={500.0: 90.0, 2000.0: 70.0})
+        >>> round(float(made["noise_level_dba"][0]), 3)
+        100.0
+        """
+        pressure = np.atleast_2d(np.ascontiguousarray(pressure_bar, np.float64))
+        if pressure.ndim != 2 or pressure.shape[1] != self._angle.size:
+            raise ShapeError(f"pressure_bar has shape {pressure.shape}: must be (cycle, {self._angle.size} angles)")
+        if not np.isfinite(pressure).all():
+            cycle, sample = np.argwhere(~np.isfinite(pressure))[0]
+            raise DataError(f"cycle {cycle + 1}: pressure_bar[{sample}] = {pressure[cycle, sample]}: must be finite")
+        hz, level = pressure_levels(self._angle, pressure, self._speed_rpm)
+        made: dict[str, tuple[Any, ...]] = {
+            CYCLE: (CYCLE, np.arange(1, len(pressure) + 1)),
+            "frequency_hz": ("frequency_hz", hz),
+            "pressure_level_db": ((CYCLE, "frequency_hz"), level),
+            "mean_pressure_level_db": ("frequency_hz", _mean_db(level)),
+        }
+        if attenuation_db is not None:
+            noise = noise_levels(hz, level, attenuation_db)
+            made |= {"noise_level_dba": (CYCLE, noise), "mean_noise_level_dba": ((), _mean_db(noise))}
+        return labelled_dataset(made)
+
+
+def _mean_db(level_db: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Level of the mean square over the cycles."""
+    with np.errstate(divide="ignore"):
+        found: NDArray[np.float64] = 10.0 * np.log10(np.mean(10.0 ** (0.1 * level_db), axis=0))
+    return found

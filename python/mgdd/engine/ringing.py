@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["ringing"]
+__all__ = ["Spectrum", "ringing", "spectrum_of"]
 
 # A peak must stand so many times above both its shoulders, and above what noise of a known level hardly reaches.
 _ABOVE, _BY_NOISE = 4.0, 0.001
@@ -21,13 +21,20 @@ _TOGETHER = 256  # cycles, for the memory of a long record
 _TANGENTIAL, _GAMMA, _J_PER_KGK = 1.841, 1.3, 287.05
 
 
+class Spectrum(NamedTuple):
+    """Frequencies [kHz], density summed over the cycles [bar²/kHz], length of the window [ms], and each density."""
+
+    khz: NDArray[np.float64]
+    total: NDArray[np.float64]
+    span_ms: float
+    density: NDArray[np.float64]
+
+
 def ringing(
-    angle_cad: NDArray[np.float64],
-    pressure_bar: NDArray[np.float64],
+    spectrum: Spectrum | None,
     scalars: dict[str, NDArray[np.float64]],
     options: dict[str, Any],
     *,
-    speed_rpm: float,
     bore_mm: float,
     threshold_bar: float | None,
     spectra: bool,
@@ -42,17 +49,17 @@ def ringing(
     if threshold_bar is not None:
         share = 100.0 * float(np.mean(mapo[known] > threshold_bar)) if known.any() else math.nan
         figures["knock_share_percent"] = ((), share)
-    if not known.any():
+    if spectrum is None:
         return figures, {}
-    window_cad = (options["knock_from_cad"], options["knock_to_cad"])
-    khz, mean, span_ms, density = _spectrum(angle_cad, pressure_bar, speed_rpm, window_cad, keep=spectra)
     low, high = 1e-3 * options["knock_low_hz"], 1e-3 * options["knock_high_hz"]
-    figures["ringing_frequency_khz"] = ((), _peak_khz(khz, mean, (low, high), span_ms, len(mapo)))
+    khz, mean = spectrum.khz, spectrum.total / mapo.size
+    figures["ringing_frequency_khz"] = ((), _peak_khz(khz, mean, (low, high), spectrum.span_ms, mapo.size))
     if not spectra:
         return figures, {}
     shown = (khz >= _SHOWN[0] * low) & (khz <= _SHOWN[1] * high)
     name = "frequency_khz"
-    return figures, {name: (name, khz[shown]), "pressure_psd_bar2_per_khz": (("cycle", name), density[:, shown])}
+    density = spectrum.density[:, shown]
+    return figures, {name: (name, khz[shown]), "pressure_psd_bar2_per_khz": (("cycle", name), density)}
 
 
 def _tangential_khz(bore_mm: float, kelvin: float) -> float:
@@ -60,31 +67,27 @@ def _tangential_khz(bore_mm: float, kelvin: float) -> float:
     return _TANGENTIAL * math.sqrt(_GAMMA * _J_PER_KGK * kelvin) / (math.pi * bore_mm)
 
 
-def _spectrum(
-    angle_cad: NDArray[np.float64],
-    bar: NDArray[np.float64],
-    speed_rpm: float,
-    window_cad: tuple[float, float],
-    *,
-    keep: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float, NDArray[np.float64]]:
-    """Frequencies [kHz], mean density [bar²/kHz], length of the window [ms], and the density of each cycle to keep."""
+def spectrum_of(
+    angle_cad: NDArray[np.float64], bar: NDArray[np.float64], options: dict[str, Any], speed_rpm: float, *, keep: bool
+) -> Spectrum:
+    """Take the spectrum of each cycle in the window of knock."""
     from scipy.signal import periodogram
 
-    inside = (angle_cad >= window_cad[0] - 1e-9) & (angle_cad <= window_cad[1] + 1e-9)
+    low, high = options["knock_from_cad"], options["knock_to_cad"]
+    inside = (angle_cad >= low - 1e-9) & (angle_cad <= high + 1e-9)
     per_ms = 6e-3 * speed_rpm / float(np.median(np.diff(angle_cad)))
     count = int(np.count_nonzero(inside))
     size = 2 ** math.ceil(math.log2(2 * count))
-    mean = np.zeros(size // 2 + 1)
-    khz = np.arange(mean.size) * (per_ms / size)
+    total = np.zeros(size // 2 + 1)
+    khz = np.arange(total.size) * (per_ms / size)
     kept = np.empty((len(bar) if keep else 0, khz.size))
     for at in range(0, len(bar), _TOGETHER):
         window = bar[at : at + _TOGETHER, inside]
         _, density = periodogram(window, per_ms, window=("tukey", _TAPER), nfft=size, detrend="linear")
-        mean += density.sum(axis=0) / len(bar)
+        total += density.sum(axis=0)
         if keep:
             kept[at : at + _TOGETHER] = density
-    return khz, mean, count / per_ms, kept
+    return Spectrum(khz, total, count / per_ms, kept)
 
 
 def _peak_khz(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
@@ -54,12 +56,13 @@ def analyze(
 
     Parameters
     ----------
-    trace : Dataset, DataFrame, mapping, DataArray, Series, pair of array_like, or path-like
+    trace : Dataset, DataFrame, mapping, DataArray, Series, pair of array_like, path-like, or iterator of Dataset
         ``pressure_bar(crank_angle_cad)``, or ``pressure_bar(cycle, crank_angle_cad)`` for a record of cycles, from
         `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`; a table with these columns [°CA aTDC, bar], a
         column over crank angle, angle and pressure as a pair, or a file that `mgdd.io.read_pressure` reads without
-        options. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k intake_pressure_kpa soi_cad spark_cad
-        bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
+        options; or chunks of a record one after another, as of `mgdd.io.pressure_chunks`, with ``traces=False``: the
+        figures are those of the whole. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k intake_pressure_kpa
+        soi_cad spark_cad bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
@@ -159,7 +162,12 @@ def analyze(
     14.9
     """
     cylinder, point = cylinder_of(cylinder), point_of(point)
-    trace = trace if is_of_cycles(trace) else as_trace(trace)
+    if isinstance(trace, Iterator):
+        trace, chunks = _first_of(trace, traces=traces)
+    else:
+        trace = trace if is_of_cycles(trace) else as_trace(trace)
+        chunks = iter([trace])
+    doubted: list[str] = []  # by who read it, and logged there
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake pressure")
@@ -205,7 +213,9 @@ def analyze(
     given = "given" if heat_window_cad else "whole" if simulated else None
     try:
         if is_of_cycles(trace):
-            result = of_cycles(trace, cylinder, own, options, attrs, given, knock_threshold_bar, traces=traces)
+            result = of_cycles(
+                _noting(chunks, doubted), cylinder, own, options, attrs, given, knock_threshold_bar, traces=traces
+            )
         elif knock_threshold_bar is not None:
             raise ParameterError("knock_threshold_bar is for a record of cycles, and this is one cycle: leave it out")
         elif traces:
@@ -218,11 +228,31 @@ def analyze(
         raise error.reworded(f"{error}; the torque was taken as that of its cylinders: see n_cylinders") from None
     for warning in () if quiet else result.attrs["warnings"].splitlines():
         _LOG.warning("%s: %s", attrs["file"], warning)
-    read = str(trace.attrs.get("warnings", "")).splitlines()  # what reading doubted was logged by the reader
+    if not is_of_cycles(trace):
+        doubted = str(trace.attrs.get("warnings", "")).splitlines()
     return result.assign_attrs(
-        warnings="\n".join([*read, *result.attrs["warnings"].splitlines()]),
-        doubts="\n".join([*("reading" for _ in read), *result.attrs["doubts"].splitlines()]),
+        warnings="\n".join([*doubted, *result.attrs["warnings"].splitlines()]),
+        doubts="\n".join([*("reading" for _ in doubted), *result.attrs["doubts"].splitlines()]),
     )
+
+
+def _first_of(chunks: Iterator[Any], *, traces: bool) -> tuple[Any, Iterator[Any]]:
+    """Give the first chunk, and all of them."""
+    if traces:
+        raise ParameterError("traces = True: chunks of a record are analysed for their figures: pass traces=False")
+    first = next(chunks, None)
+    if first is None or not is_of_cycles(first):
+        have = "no chunk" if first is None else f"a chunk of type {type(first).__name__}"
+        raise DataError(f"{have}: each must be pressure_bar(cycle, {ANGLE}), as of mgdd.io.pressure_chunks")
+    return first, itertools.chain([first], chunks)
+
+
+def _noting(chunks: Iterator[Any], doubted: list[str]) -> Iterator[xr.Dataset]:
+    """Pass chunks on, and keep what their reader doubted."""
+    for chunk in chunks:
+        lines = str(chunk.attrs.get("warnings", "")).splitlines()
+        doubted += [line for line in lines if line not in doubted]
+        yield chunk
 
 
 def _one(

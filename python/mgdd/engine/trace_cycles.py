@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,13 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.engine.ringing import ringing
+from mgdd.engine.ringing import ringing, spectrum_of
+from mgdd.errors import DataError
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import xarray as xr
 
 __all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "is_of_cycles", "of_cycles", "scatter"]
@@ -20,6 +24,7 @@ __all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "is_of_cycles", "o
 CYCLE = "cycle"
 # Net heat over the median of the record; own choices, in the spirit of a fifth and four fifths of the IMEP.
 _MISFIRE, _PARTIAL, _NAMED = 0.2, 0.8, 8
+_COUNTED = re.compile(r"(\d+) of \d+ cycles: (.*) \(cycle (\d+)\)", re.DOTALL)  # as the core counts warnings
 _OFFSETS = ("pegging_bar", "compression_offset_bar", "pmep_bar")
 _ANGLES = ("°CA aTDC", "°CA")
 COLUMNS = (
@@ -40,7 +45,7 @@ def is_of_cycles(trace: Any) -> bool:
 
 
 def of_cycles(
-    trace: xr.Dataset,
+    parts: Iterable[xr.Dataset],
     cylinder: Cylinder,
     point: OperatingPoint,
     options: dict[str, Any],
@@ -50,35 +55,53 @@ def of_cycles(
     *,
     traces: bool = True,
 ) -> xr.Dataset:
-    """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV."""
-    angle, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
+    """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV.
+
+    A record in several parts has the same figures as in one; its traces are of one part.
+    """
     # Brake work and fuel are stated as means: they judge the mean cycle, not one that misfired.
     single = _core.engine.TraceOptions(**options | dict.fromkeys(("bmep_bar", "fuel_heat_j")))
-    raw = _core.engine.analyze_cycles(angle, pressure, cylinder, point, single, traces)
-    whole = _core.engine.TraceOptions(**options)
-    mean = _core.engine.analyze(angle, pressure.mean(axis=0), cylinder, point, whole)
+    raws: list[dict[str, Any]] = []
+    numbers: list[np.ndarray] = []
+    angle, total, spectrum, n = np.empty(0), np.empty((0, 0)), None, 0
+    for trace in parts:
+        own, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
+        angle = angle if raws else own
+        if not np.array_equal(own, angle):
+            raise DataError(f"the chunk from cycle {n + 1} on has other crank angles than the first: read it again")
+        try:
+            raws.append(_core.engine.analyze_cycles(own, pressure, cylinder, point, single, traces))
+        except DataError as error:
+            raise error.reworded(f"from cycle {n + 1} on, {error}" if n else str(error)) from None
+        numbers.append(trace[CYCLE].values if CYCLE in trace.coords else np.arange(n + 1, n + 1 + len(pressure)))
+        total = np.vstack([*total, pressure]).sum(axis=0, keepdims=True)  # one row after the other, as in one part
+        n += len(pressure)
+        if np.isfinite(raws[-1]["scalars"]["mapo_bar"]).any():
+            found = spectrum_of(own, pressure, options, point.speed_rpm, keep=traces)
+            spectrum = found if spectrum is None else found._replace(total=spectrum.total + found.total)
+    raw = raws[0]
+    mean = _core.engine.analyze(angle, total[0] / n, cylinder, point, _core.engine.TraceOptions(**options))
     columns: dict[str, tuple[Any, ...]] = {}
     if traces:
         columns = {ANGLE: (ANGLE, raw[ANGLE]), "volume_l": (ANGLE, raw["volume_l"])}
         columns |= {name: ((CYCLE, ANGLE), raw[name]) for name in COLUMNS}
-    scalars = raw["scalars"]
-    n = len(pressure)
-    figures, spectrum = ringing(
-        angle, pressure, scalars, options, speed_rpm=point.speed_rpm, bore_mm=cylinder.bore_mm,
-        threshold_bar=knock_threshold_bar, spectra=traces,
-    )  # fmt: skip
+    scalars = {name: np.concatenate([each["scalars"][name] for each in raws]) for name in raw["scalars"]}
+    figures, densities = ringing(
+        spectrum, scalars, options, bore_mm=cylinder.bore_mm, threshold_bar=knock_threshold_bar, spectra=traces
+    )
     marks = burn_marks(scalars)
     unburnt = burn_warnings(marks)
-    lines = [*raw["warnings"], *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
-    kinds = [*raw["doubts"], *unburnt, *mean["doubts"]]
+    counted = _counted(raws, n)
+    lines = [*counted.values(), *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
+    kinds = [*counted, *unburnt, *mean["doubts"]]
     return labelled_dataset(
         {
             **columns,
-            CYCLE: (CYCLE, trace[CYCLE].values if CYCLE in trace.coords else np.arange(1, n + 1)),
+            CYCLE: (CYCLE, np.concatenate(numbers)),
             **{name: (CYCLE, values) for name, values in {**scalars, **marks}.items()},
             **scatter(scalars),
             **figures,
-            **spectrum,
+            **densities,
             **{
                 f"cycle_mean_{name}": ((), v, *_label(name, "of the mean cycle")) for name, v in mean["scalars"].items()
             },
@@ -87,14 +110,27 @@ def of_cycles(
             **attrs,
             "smoothing": raw["smoothing"],
             "mass_source": raw["mass_source"],
-            "heat_window": given or ("found" if any(raw["window_found"]) else "no burn found"),
+            "heat_window": given or ("found" if any(any(each["window_found"]) for each in raws) else "no burn found"),
             "cycles": n,
             "knock_band_hz": (options["knock_low_hz"], options["knock_high_hz"]),
-            "motored": int(sum(raw["motored"])),
+            "motored": int(sum(sum(each["motored"]) for each in raws)),
             "warnings": "\n".join(lines),
             "doubts": "\n".join(kinds),
         },
     )
+
+
+def _counted(raws: list[dict[str, Any]], n: int) -> dict[str, str]:
+    """Give the warnings of all parts by their kind, counted together: how many of n cycles, and the first of them."""
+    found: dict[str, tuple[int, str, int]] = {}
+    before = 0
+    for raw in raws:
+        for kind, line in zip(raw["doubts"], raw["warnings"], strict=True):
+            count, text, first = _COUNTED.fullmatch(line).groups()  # type: ignore[union-attr]
+            known, text, at = found.get(kind, (0, text, before + int(first)))
+            found[kind] = (known + int(count), text, at)
+        before += len(raw["motored"])
+    return {kind: f"{count} of {n} cycles: {text} (cycle {at})" for kind, (count, text, at) in found.items()}
 
 
 def _label(name: str, which: str) -> tuple[str, str]:

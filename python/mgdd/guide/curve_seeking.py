@@ -22,10 +22,12 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
 
     Parameters
     ----------
-    start : float
+    start : float or mapping
         First input, in its unit; the guide's best input, ``curve.best``, where nothing speaks for another.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Name, unit, bounds and rate of the input; `ask` then gives a mapping.
     lower, upper : float
-        Bounds of the applied input, finite.
+        Bounds of the applied input, finite, where `inputs` does not say them.
     curve : Curve
         J of the guide over the input, to be maximised; it bends down at its best input, which lies in the bounds.
     prior_sd : float, optional

@@ -6,6 +6,7 @@ Angles are degrees of crank angle with firing TDC = 0 and compression negative (
 from __future__ import annotations
 
 from mgdd.io.bench_file import read
+from mgdd.io.chunks import pressure_chunks
 from mgdd.io.encoder import Encoder
 from mgdd.io.plain_csv import write_csv
 from mgdd.io.pressure import pressure_trace, read_pressure
@@ -13,6 +14,7 @@ from mgdd.io.throttle_log import read_throttle_log, throttle_log
 
 __all__ = [
     "Encoder",
+    "pressure_chunks",
     "pressure_trace",
     "read",
     "read_pressure",

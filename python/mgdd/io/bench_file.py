@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.any_table import read_any_table
+from mgdd.io.any_table import open_table
 from mgdd.io.channels import Channel, Layout, columns_shown, kept_channels, layout_of
 from mgdd.io.column_names import TIME_UNITS
 from mgdd.io.pressure import CYCLE, cycle_count, record_attrs
@@ -128,8 +128,8 @@ def read(
         offset_bar=offset_bar,
         encoder=encoder,
     )
-    table = read_any_table(path, delimiter=delimiter, decimal=decimal)
-    return bench_record(table, layout_of(table, how), channels, name=Path(path).name)
+    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+        return bench_record(table, layout_of(table, how), channels, name=Path(path).name)
 
 
 def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *, name: str) -> xr.Dataset:

@@ -113,11 +113,17 @@ def _placed(angle: NDArray[np.float64], part: NDArray[np.float64]) -> tuple[Phas
 
 
 def phase_warnings(
-    cad: NDArray[np.float64], pressure: NDArray[np.float64], *, over_time: bool, source: str
+    cad: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    *,
+    over_time: bool,
+    source: str,
+    ends: tuple[str, str] | None = None,
 ) -> list[str]:
     """Doubt cycles whose angles slip from one to the next, or one that stands apart; one line, or none.
 
-    Angles that are made of a time and one speed are refused where a cycle is more than 2 °CA off.
+    Angles that are made of a time and one speed are refused where a cycle is more than 2 °CA off. `ends` is what the
+    first and the last row are called.
     """
     found = phases(cad, pressure)
     if found is None:
@@ -127,7 +133,8 @@ def phase_warnings(
     drift, _ = found.drift_cad
     stands_apart = abs(off[odd]) > max(_JUMP_CAD, _ODD * found.stderr_cad)
     if found.drifts:
-        what = f"compression moves by {drift:+.2g} °CA from cycle 1 to cycle {len(pressure)}"
+        first, last = ends or ("cycle 1", f"cycle {len(pressure)}")
+        what = f"compression moves by {drift:+.2g} °CA from {first} to {last}"
     elif stands_apart:
         what = f"compression of cycle {odd + 1} lies {off[odd]:+.2g} °CA off the others"
     else:

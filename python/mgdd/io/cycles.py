@@ -15,10 +15,10 @@ from mgdd.signals.even_grid import wide_steps
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Cycles", "arranged", "several_cycles"]
+__all__ = ["SAME_ANGLE", "Cycles", "arranged", "several_cycles"]
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
-_SAME = 0.01
+SAME_ANGLE = 0.01
 # Share of a step by which the end of a cycle may be missed: angles of three digits in radians are rounded by as much.
 _ROUNDED = 0.3
 # Sums of steps end this much [deg] beside the angle that was meant.
@@ -98,7 +98,7 @@ def arranged(
 def several_cycles(degrees: NDArray[np.float64]) -> tuple[NDArray[np.intp], bool]:
     """Return where an angle falls back to its start, and whether it runs on over more than one cycle."""
     step, span = np.diff(degrees), float(np.ptp(degrees))
-    return np.flatnonzero(step < -0.5 * span) + 1, bool(np.all(step > 0.0)) and span > 720.0 + _SAME
+    return np.flatnonzero(step < -0.5 * span) + 1, bool(np.all(step > 0.0)) and span > 720.0 + SAME_ANGLE
 
 
 def _turned(
@@ -177,7 +177,7 @@ def _stacked(
     kept = [b for b, complete in zip(blocks, whole, strict=True) if complete]
     grid = degrees[kept[0]]
     for b in kept:
-        if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > _SAME * step:
+        if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > SAME_ANGLE * step:
             raise DataError(
                 f"{place.row(b.start)}: the cycle that starts here has other crank angles than the one at "
                 f"{place.row(kept[0].start)}: give all cycles the same angles"
@@ -232,14 +232,14 @@ def _running(
         notes.append(f"{' and '.join(parts)} of the record left out: incomplete cycles")
     same = np.all(np.diff(starts) == grid.size)
     cut = degrees[starts[0] : starts[0] + at.size].reshape(at.shape) if same else at
-    if same and np.abs(cut - at).max() <= _SAME * step:
+    if same and np.abs(cut - at).max() <= SAME_ANGLE * step:
         values = values[:, starts[0] : starts[0] + at.size].reshape(-1, *at.shape)
     else:
         at = at[at[:, -1] <= degrees[-1] + _ROUNDED * step]
         values = np.stack([np.interp(at, degrees, row) for row in values])
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
     past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
-    cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
+    cad = np.where(past > 360.0 - SAME_ANGLE * step, past - 720.0, past)
     order = np.argsort(cad, kind="stable")
     return Cycles(
         cad[order], np.ascontiguousarray(values[..., order]), rows[starts[0] : starts[1]][order], tuple(notes)

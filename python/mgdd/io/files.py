@@ -12,13 +12,14 @@ import re
 import stat
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from mgdd._arguments import shown
 from mgdd.errors import DataError, ParameterError, did_you_mean
 
-__all__ = ["decoded", "existing_file", "parsed", "read_plain_text", "write_whole", "write_whole_text"]
+__all__ = ["Stamp", "decoded", "existing_file", "parsed", "read_plain_text", "write_whole", "write_whole_text"]
 
 # Letters of more than one byte as UTF-8 has them; in older encodings they would be pairs as "Ã¤" or "Â°".
 _UTF8 = re.compile(rb"[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3}")
@@ -73,13 +74,55 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     raise FileNotFoundError(errno.ENOENT, f"no such file: {near or 'check the path'}", str(file))
 
 
+@dataclass(frozen=True)
+class Stamp:
+    """Size and time of a file that is read in parts, which must not change meanwhile.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.errors import DataError
+    >>> from mgdd.io.files import Stamp
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "log.csv"
+    ...     _ = file.write_text("0,1")
+    ...     stamp = Stamp.of(file)
+    ...     _ = file.write_text("0,1,2")
+    ...     try:
+    ...         stamp.require_same()
+    ...     except DataError as error:
+    ...         print(str(error).rpartition("/")[2])
+    log.csv: changed while it was read, from 3 to 5 bytes: read it again once it is complete
+    """
+
+    file: Path
+    size: int
+    written_ns: int
+
+    @classmethod
+    def of(cls, file: Path) -> Stamp:
+        """Look at a file."""
+        now = file.stat()
+        return cls(file, now.st_size, now.st_mtime_ns)
+
+    def require_same(self) -> None:
+        """Raise a DataError where the file is another one by now."""
+        try:
+            now = Stamp.of(self.file)
+        except OSError as error:
+            raise DataError(f"{self.file}: gone while it was read ({error.strerror}): read it again") from error
+        if now != self:
+            sizes = f", from {self.size} to {now.size} bytes" if now.size != self.size else ""
+            raise DataError(f"{self.file}: changed while it was read{sizes}: read it again once it is complete")
+
+
 def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) -> str:
     """Read a text file that `existing_file` finds and `decoded` takes."""
     file = existing_file(path)
     return decoded(file.read_bytes(), str(file), only_utf8=only_utf8)
 
 
-def decoded(raw: bytes, origin: str, *, only_utf8: bool = False) -> str:
+def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) -> str:
     """Decode a text: UTF-8, UTF-16 that begins with its mark, or Windows-1252 as older tools write it.
 
     Parameters
@@ -90,6 +133,8 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False) -> str:
         The file, for messages.
     only_utf8 : bool
         Whether its form allows no other encoding, as TOML and JSON do.
+    line : int
+        Of the file, where `raw` is a part of it that begins there.
 
     Returns
     -------
@@ -109,8 +154,8 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False) -> str:
     """
 
     def refused(error: UnicodeDecodeError, said: str) -> DataError:
-        line = raw.count(b"\n", 0, error.start) + 1
-        return DataError(f"{origin}, line {line}: {said}")
+        at = raw.count(b"\n", 0, error.start) + line
+        return DataError(f"{origin}, line {at}: {said}")
 
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         if only_utf8:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import mmap
 import struct
+from collections.abc import Iterable
 from pathlib import Path
 
 __all__ = ["check_heaps"]
@@ -15,8 +16,8 @@ _START = b"GCOL\x01\0\0\0"
 _HEAD = 16  # bytes of a heap's head, and of the head of an object in it
 
 
-def check_heaps(file: Path) -> None:
-    """Refuse heaps whose objects do not fill them.
+def check_heaps(file: Path, data_at: Iterable[tuple[int, int]] = ()) -> None:
+    """Refuse heaps whose objects do not fill them; `data_at` are places and sizes of what holds none, not looked at.
 
     Raises
     ------
@@ -24,10 +25,14 @@ def check_heaps(file: Path) -> None:
         Such a file.
     """
     with file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        at = data.find(_START)
-        while at >= 0:
-            _check_heap(data, at)
-            at = data.find(_START, at + 1)
+        start = 0
+        for begin, size in [*sorted(data_at), (len(data), 0)]:
+            end = min(begin, len(data))
+            at = data.find(_START, start, end)
+            while at >= 0:
+                _check_heap(data, at)
+                at = data.find(_START, at + 1, end)
+            start = min(max(start, begin + size), len(data))
 
 
 def _check_heap(data: mmap.mmap, start: int) -> None:

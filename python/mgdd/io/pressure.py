@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.any_table import read_any_table
+from mgdd.io.any_table import open_table
 from mgdd.io.column_names import Heading, heading
 from mgdd.io.pressure_checks import pair
 from mgdd.io.pressure_file import checked, cycles_of, odd_shape
@@ -30,6 +30,7 @@ __all__ = [
     "CYCLE",
     "as_trace",
     "cycle_count",
+    "cycles_dataset",
     "mean_cycle",
     "one_cycle",
     "pressure_trace",
@@ -216,19 +217,30 @@ def read_pressure(
         offset_bar=offset_bar,
         encoder=encoder,
     )
-    return _dataset(cycles_of(read_any_table(path, delimiter=delimiter, decimal=decimal), how), Path(path).name)
+    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+        return _dataset(cycles_of(table, how), Path(path).name)
 
 
 def _dataset(record: Record, name: str) -> xr.Dataset:
-    variables: dict[str, tuple[Any, ...]] = {ANGLE: (ANGLE, record.angle), _PRESSURE: (ANGLE, record.bar[0])}
     if len(record.bar) > 1:
-        variables |= {CYCLE: cycle_count(len(record.bar)), _PRESSURE: ((CYCLE, ANGLE), record.bar)}
+        return cycles_dataset(record, name)
+    variables = {ANGLE: (ANGLE, record.angle), _PRESSURE: (ANGLE, record.bar[0])}
     return labelled_dataset(variables, attrs=record_attrs(record, name))
 
 
-def cycle_count(count: int) -> tuple[Any, ...]:
+def cycles_dataset(record: Record, name: str, first: int = 1) -> xr.Dataset:
+    """Label the cycles of a record, counted from `first`; also a single one has the dimension."""
+    variables = {
+        ANGLE: (ANGLE, record.angle),
+        CYCLE: cycle_count(len(record.bar), first),
+        _PRESSURE: ((CYCLE, ANGLE), record.bar),
+    }
+    return labelled_dataset(variables, attrs=record_attrs(record, name))
+
+
+def cycle_count(count: int, first: int = 1) -> tuple[Any, ...]:
     """Return the coordinate of so many cycles."""
-    return CYCLE, np.arange(1, count + 1), "-", "cycle"
+    return CYCLE, np.arange(first, first + count), "-", "cycle"
 
 
 def record_attrs(record: Record, name: str) -> dict[str, str | float]:

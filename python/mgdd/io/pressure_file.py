@@ -53,7 +53,8 @@ class Pressure(NamedTuple):
 class Record(NamedTuple):
     """Angle [°CA aTDC], pressure [bar] (cycle, angle), what was cut with it (channel, cycle, angle), and notes.
 
-    `taken` and `total` are those of `Cycles`; `speed_rpm` is that of a time.
+    `taken` and `total` are those of `Cycles`, `rows` the row of each angle in the first cycle; `speed_rpm` is that of a
+    time.
     """
 
     angle: NDArray[np.float64]
@@ -62,6 +63,7 @@ class Record(NamedTuple):
     notes: list[str]
     taken: tuple[int, ...] | None
     total: int
+    rows: NDArray[np.intp]
     speed_rpm: float | None = None
 
 
@@ -75,11 +77,18 @@ def cycles_of(table: Table, how: Reading) -> Record:
     return record_of(table, angle, pressure_of(table, heads, columns, how, angle), how)
 
 
-def pressure_of(table: Table, heads: Sequence[Heading], columns: list[int], how: Reading, angle: Angle) -> Pressure:
-    """Read columns as the cycles of one cylinder, and refuse what is not a pressure, by its shape or its unit."""
+def pressure_of(
+    table: Table,
+    heads: Sequence[Heading],
+    columns: list[int],
+    how: Reading,
+    angle: Angle,
+    values: NDArray[np.float64] | None = None,
+) -> Pressure:
+    """Take columns, or `values` that were read of them, for cycles of one cylinder; refuse another shape or unit."""
     gain, notes = how.gain_bar_per_v, []
     unit, unit_of_file = _unit_of_pressure(table, heads, columns, how.pressure_unit, gain=gain is not None)
-    values = table.matrix(columns)
+    values = table.matrix(columns) if values is None else values
     if how.pressure_column is None and len(columns) > 1:
         _check_alike(table, columns, angle.degrees, values)
     for index, row in zip(columns, values, strict=True):
@@ -198,7 +207,7 @@ def checked(
     angle, bar = check_trace(degrees, one, unit=unit, source=source, rows=rows, unit_of_file=unit_of_file)
     doubts = [*level_warning(angle, values, unit), *steep_warning(angle, bar)] if level else []
     doubts += phase_warnings(angle, np.atleast_2d(bar), over_time=over_time, source=source)
-    return Record(angle, np.atleast_2d(bar), cut.values[1:], [*cut.notes, *doubts], cut.taken, cut.total)
+    return Record(angle, np.atleast_2d(bar), cut.values[1:], [*cut.notes, *doubts], cut.taken, cut.total, cut.rows)
 
 
 def _without_flagged(cut: Cycles, source: str) -> Cycles:

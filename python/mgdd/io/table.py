@@ -7,13 +7,13 @@ import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
+from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.column_names import spelled_unit
 from mgdd.io.files import existing_file, read_plain_text
 from mgdd.results.units import unit_of
@@ -27,12 +27,16 @@ __all__ = [
     "Place",
     "Table",
     "TextTable",
+    "check_text_options",
+    "content_of",
     "parse_number",
     "read_table",
+    "require_width",
     "text_table",
 ]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
+_NARROW = 4  # columns
 _ROWS = 4  # of one width, one below the other, are data
 _HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
 _RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh
@@ -104,6 +108,14 @@ class Table(ABC):
         return None
 
     @abstractmethod
+    def part(self, start: int, stop: int) -> Table:
+        """Return the table of some rows, which are read when a column of them is asked for."""
+
+    def loaded(self) -> Table:
+        """Return the table in memory, for when its file is closed."""
+        return self
+
+    @abstractmethod
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns as the rows of an array, or name the first bad cell."""
 
@@ -127,7 +139,8 @@ class Table(ABC):
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"
                 names = ", ".join(map(repr, self.header))
-                raise DataError(f"{self.source}: {what} {column!r}: the header has {names}")
+                near = did_you_mean(column, self.header) if what == "no column" else ""
+                raise DataError(f"{self.source}: {what} {column!r}: {near}{' ' if near else ''}the header has {names}")
             column = self.header.index(column)
         if isinstance(column, bool) or not 0 <= column < self.width:
             raise DataError(f"{self.source}: no column {column}: the {self.width} column(s) are numbered from 0")
@@ -174,6 +187,10 @@ class TextTable(Table):
         """Return the number of rows."""
         return len(self.texts)
 
+    def part(self, start: int, stop: int) -> TextTable:
+        """Return the table of some rows."""
+        return replace(self, texts=self.texts[start:stop], numbered=self.numbered[start:stop])
+
     @cached_property
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """Return the cells as text."""
@@ -200,16 +217,26 @@ class TextTable(Table):
         return np.stack([self._slow(index) for index in indices]) if fast is None else fast
 
     @cached_property
-    def _body(self) -> NDArray[np.float64] | None:
-        """Read all columns in one go; None where a cell is not a number."""
-        return self._parsed(None)
+    def _known(self) -> dict[int, NDArray[np.float64]]:
+        """Columns that were parsed already."""
+        return {}
 
     def _fast(self, indices: Sequence[int]) -> NDArray[np.float64] | None:
         """Return columns without looking at single cells; None where one needs the judgement of `_slow`."""
-        values = self._parsed(indices) if self._body is None else self._body[list(indices)]
-        return None if values is None or not np.isfinite(values).all() else values
+        lacking = [index for index in indices if index not in self._known]
+        if lacking:
+            # To split a line costs more than a few numbers: of a narrow table all columns are parsed in one go.
+            every = range(self.width) if self.width <= _NARROW and not self._known else lacking
+            taken, values = next(
+                ((each, found) for each in (every, lacking) if (found := self._parsed(each)) is not None), ((), ())
+            )
+            self._known.update(zip(taken, values, strict=True))
+        if any(index not in self._known for index in indices):
+            return None
+        found = np.stack([self._known[index] for index in indices])
+        return found if np.isfinite(found).all() else None
 
-    def _parsed(self, indices: Sequence[int] | None) -> NDArray[np.float64] | None:
+    def _parsed(self, indices: Sequence[int]) -> NDArray[np.float64] | None:
         texts = self.texts
         if self.mark is not None and len(self.mark) != 1:
             return None
@@ -223,7 +250,7 @@ class TextTable(Table):
             return None
 
     def _slow(self, index: int) -> NDArray[np.float64]:
-        values = np.empty(len(self.rows))
+        values = np.empty(len(self.texts))
         for position, (line, row) in enumerate(zip(self.lines, self.rows, strict=True)):
             where = f"{self.source}, line {line}, {self.called(index)}"
             if index >= len(row) or not row[index]:
@@ -246,23 +273,24 @@ def read_table(
     path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".", units_row: bool = True
 ) -> TextTable:
     """Read a text table; `delimiter` None detects it from the first row that is not a comment."""
+    check_text_options(delimiter, decimal)
+    file = existing_file(path)
+    return text_table(str(file), read_plain_text(path), delimiter=delimiter, decimal=decimal, units_row=units_row)
+
+
+def check_text_options(delimiter: str | None, decimal: str) -> None:
+    """Refuse a decimal mark that is not one, or that separates columns too."""
     if decimal not in (".", ","):
         raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
-    file = existing_file(path)
-    return text_table(str(file), read_plain_text(path), delimiter=delimiter, decimal=decimal, units_row=units_row)
 
 
 def text_table(
     source: str, text: str, *, delimiter: str | None = None, decimal: str = ".", units_row: bool = True
 ) -> TextTable:
     """Take a text for a table, as `read_table` does; messages call it by its source."""
-    content = [
-        (number, line.strip())
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    content = content_of(text)
     if not content:
         raise DataError(f"{source}: the file is empty: rows of numbers are needed")
     start = _first_row(content, delimiter, decimal) if units_row else 1  # tables of ours have one line of names
@@ -273,17 +301,31 @@ def text_table(
     if not body and units_row:
         raise DataError(f"{source}: no numeric rows below the header: rows of numbers are needed")
     width = _width(body[0][1], mark) if body else len(heads[0])
-    for number, row in body:
-        if _width(row, mark) != width:
-            cut = number == body[-1][0] and _width(row, mark) < width
-            raise DataError(
-                f"{source}, line {number}: {_width(row, mark)} cell(s) where line {body[0][0]} has {width}: "
-                f"every row needs the same columns{'; the file is cut off there: remove its last line' if cut else ''}"
-            )
+    require_width(source, body, mark, width, body[0][0] if body else 0)
     _check_commas(source, content[:start], heads, body, mark)
     header, units = _names_and_units(heads, width)
     lines, texts = zip(*body, strict=True) if body else ((), ())
     return TextTable(source, header, units, decimal, mark, texts, lines)
+
+
+def content_of(text: str, line: int = 1) -> list[tuple[int, str]]:
+    """Return the lines of a text that begins at a line: number and text, without empty ones and remarks."""
+    return [
+        (number, row.strip())
+        for number, row in enumerate(text.splitlines(), start=line)
+        if row.strip() and not row.lstrip().startswith("#")
+    ]
+
+
+def require_width(source: str, body: Sequence[tuple[int, str]], mark: str | None, width: int, first: int) -> None:
+    """Refuse a row that has not as many cells as the row of line `first`."""
+    for number, row in body:
+        if _width(row, mark) != width:
+            cut = number == body[-1][0] and _width(row, mark) < width
+            raise DataError(
+                f"{source}, line {number}: {_width(row, mark)} cell(s) where line {first} has {width}: "
+                f"every row needs the same columns{'; the file is cut off there: remove its last line' if cut else ''}"
+            )
 
 
 def _check_commas(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError, argument
-from mgdd.io.any_table import read_any_table
+from mgdd.io.any_table import open_table
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
 from mgdd.io.table import Place, Table
 from mgdd.io.throttle_checks import check_even, check_samples, check_signals
@@ -208,13 +208,13 @@ def _read(
     called: dict[str, str] = {}
     units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
-    table = read_any_table(path, delimiter=delimiter, decimal=decimal)
-    for key, column in wanted.items():
-        chosen = key if column is None and key in (table.header or ()) else column
-        if chosen is not None:
-            index = table.index(chosen)
-            units[key] = _unit_of_column(key, given.get(key), table, index)
-            columns[key], called[key] = table.numbers(index), repr(chosen)
+    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+        for key, column in wanted.items():
+            chosen = key if column is None and key in (table.header or ()) else column
+            if chosen is not None:
+                index = table.index(chosen)
+                units[key] = _unit_of_column(key, given.get(key), table, index)
+                columns[key], called[key] = table.numbers(index), repr(chosen)
     return columns, Place(table.source, table.lines, called), units
 
 

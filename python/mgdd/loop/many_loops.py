@@ -14,6 +14,7 @@ from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import limit_label, with_a_limit
+from mgdd.loop.plant_loop import require_inputs_of
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.parallel.rows import pieces
@@ -116,6 +117,9 @@ def monte_carlo(
     given = [criteria or LoopCriteria()] * len(bench_list) if not isinstance(criteria, Sequence) else list(criteria)
     if len(given) != len(bench_list):
         raise ShapeError(f"criteria has {len(given)} entries: give one for all or one per bench, {len(bench_list)}")
+    for bench in bench_list:
+        for seeker in seeker_list:
+            require_inputs_of(bench, seeker)
     goals = [own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)]
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({goal[name] for goal in goals}) > 1:

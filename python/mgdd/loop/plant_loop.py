@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-__all__ = ["LoopRun", "steer"]
+__all__ = ["LoopRun", "require_inputs_of", "steer"]
 
 _CHANGED = "operating_point_changed"
 _UNKNOWN = "not given by the plant"
@@ -96,6 +96,7 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
             f"plant = {plant!r}: must have input_names, limit_names, apply() and measure(), as "
             "EngineBench('puma_single') has"
         )
+    require_inputs_of(plant, seeker)
     if seeker.estimate.size != len(plant.input_names):
         raise ParameterError(
             f"start has {seeker.estimate.size} entries: the plant takes {len(plant.input_names)}, "
@@ -134,6 +135,15 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     return run
 
 
+def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:
+    """ParameterError where a seeker names other inputs than the plant has."""
+    named = list(getattr(seeker, "input_names", ()))
+    if named and set(named) != set(plant.input_names):
+        raise ParameterError(
+            f"inputs of the seeker are {', '.join(named)}: the plant takes {', '.join(plant.input_names)}"
+        )
+
+
 def _one_cycle(
     plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker | FeedForward | GuidedEngine, log: list[_Row]
 ) -> None:
@@ -141,8 +151,11 @@ def _one_cycle(
         seeker.at(plant.point)
     elif announcing is not None and announcing.operating_point_changes:
         seeker.restart()
-    estimate = np.array(seeker.estimate, np.float64)
-    asked = np.array(seeker.ask(), np.float64)
+    names = tuple(seeker.input_names) or plant.input_names
+    order = [names.index(name) for name in plant.input_names]  # of what the seeker has, as the plant has it
+    estimate = np.array(seeker.estimate, np.float64)[order]
+    sent = seeker.ask()
+    asked = np.array([sent[name] for name in plant.input_names] if isinstance(sent, dict) else sent, np.float64)
     plant.apply(dict(zip(plant.input_names, asked.tolist(), strict=True)))
     measured = plant.measure()
     _require_match(seeker, measured)
@@ -153,7 +166,8 @@ def _one_cycle(
     limits = [measured.limits[name] for name in seeker.limit_names]
     applied = _applied(plant.input_names, asked, measured)
     log.append(_Row(estimate, asked, applied, void, measured))
-    reading: dict[str, Any] = {"misfire": void, "applied": applied if measured.applied else None}
+    told_inputs = dict(zip(plant.input_names, applied.tolist(), strict=True)) if seeker.input_names else applied
+    reading: dict[str, Any] = {"misfire": void, "applied": told_inputs if measured.applied else None}
     if isinstance(seeker, GuidedEngine):
         reading["pressure_bar"] = measured.pressure_bar
     seeker.tell(told, limits if limits else None, **reading)

@@ -12,7 +12,7 @@ from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
 from mgdd.loop.plant import Plant
-from mgdd.loop.plant_loop import LoopRun, steer
+from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
 from mgdd.optimize.seeker_findings import findings_of
 from mgdd.results.result import Figures
 
@@ -42,8 +42,9 @@ def run_seeker(
     plant : Plant
         It advances by ``cycles``; a rig is open and stays open.
     seeker
-        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, one
-        component or as many as the plant measures, and limits that the plant measures.
+        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, in their
+        order or, where it has ``inputs``, by their names; one component or as many as the plant measures, and limits
+        that the plant measures.
     cycles : int
         How many, >= 1.
     criteria : LoopCriteria, optional
@@ -79,6 +80,7 @@ def run_seeker(
     criteria = criteria or LoopCriteria()
     if not isinstance(plant, EngineBench) or isinstance(seeker, FeedForward | GuidedEngine):
         return steer(plant, seeker, cycles, criteria)
+    require_inputs_of(plant, seeker)
     goal = criteria.to_core(plant.limit_names)
     run_loop: Any = _core.loop.run_loop  # one overload for each class of seeker
     raw, stop = or_partial(lambda: run_loop(plant, seeker, cycles, **goal))

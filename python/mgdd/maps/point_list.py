@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument, did_you_mean
-from mgdd.io.any_table import ArrayTable
+from mgdd.io.array_table import ArrayTable
 from mgdd.io.table import Table, TextTable, parse_number
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import cell_at
@@ -182,9 +182,7 @@ def _of_matrix(table: ArrayTable, name: str | None, rows: str | None, columns: s
         found = _NUMBERED.fullmatch(label)
         if found and int(found[2]) == len(groups.get(found[1], ())) + 1:
             groups.setdefault(found[1], []).append(k)
-    matrices = {
-        label: of for label, of in groups.items() if len(of) > 1 and len({len(table.columns[k]) for k in of}) == 1
-    }
+    matrices = {label: of for label, of in groups.items() if len(of) > 1 and len({table.lengths[k] for k in of}) == 1}
     if not matrices:
         return None
     vectors = [k for k in range(table.width) if not any(k in of for of in matrices.values())]
@@ -194,10 +192,10 @@ def _of_matrix(table: ArrayTable, name: str | None, rows: str | None, columns: s
             f"{table.source}: the matrices are {', '.join(matrices)}: name one with {argument('name', repr('…'))}"
         )
     own = matrices[wanted]
-    shape = (len(table.columns[own[0]]), len(own))
+    shape = (table.lengths[own[0]], len(own))
     chosen = []
     for side, size, asked in (("rows", shape[0], rows), ("columns", shape[1], columns)):
-        fit = [k for k in vectors if len(table.columns[k]) == size]
+        fit = [k for k in vectors if table.lengths[k] == size]
         index = _index(table, asked, side) if asked is not None else fit[0] if len(fit) == 1 else None
         if index is None or index not in fit:
             names = ", ".join(labels[k] for k in fit) or "none"
@@ -216,7 +214,7 @@ def _of_matrix(table: ArrayTable, name: str | None, rows: str | None, columns: s
         heading_of(labels[k], unit=table.unit(k) or "", fallback="yx"[k == chosen[1]], taken=(value.name,))
         for k in chosen
     ]
-    grid = np.array([table.columns[k] for k in own], np.float64).T
+    grid = table.matrix(own).T
     return CalibrationMap(
         {head.name: _column(table, k, gap=False) for head, k in zip(heads, chosen, strict=True)},
         grid,

@@ -31,7 +31,7 @@ np.True_
 
 from __future__ import annotations
 
-from mgdd._core.optimize import ComponentLag, Limit
+from mgdd._core.optimize import ComponentLag, Input, Limit
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
 from mgdd.optimize.fit_options import FitOptions
@@ -48,6 +48,7 @@ __all__ = [
     "FitOptions",
     "GoldenSection",
     "GradientDescent",
+    "Input",
     "IterativeLearning",
     "Limit",
     "NewtonSeeking",

@@ -19,26 +19,28 @@ class Spsa(Seeker, _core.optimize.Spsa):
 
     Parameters
     ----------
-    start : float or array_like, shape (inputs,)
+    start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
-        Bounds of the applied input, per input; infinite for none. The start must lie inside by the perturbation
-        (twice that in the second-order form).
+        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+        inside by the perturbation (twice that in the second-order form).
     form : {"first_order", "second_order", "one_measurement"}
         Two measurements per gradient; four, with the Hessian; or one, with the trend of J taken off.
     schedule : {"decreasing", "constant"}
         Decreasing gains settle; constant gains go on tracking.
-    gain : float, optional
-        a [squared unit of the input per unit of J]: without, 1/abs(J'') by `curvature` or by first readings as those
-        of `ExtremumSeeking`. Dimensionless, 3, in the second-order form. `tune` gives a better one.
+    gain : float or array_like, optional
+        a, per input [squared unit of the input per unit of J]: without, 1/abs(J'') by `curvature` or by first readings
+        as those of `ExtremumSeeking`. Dimensionless, 3, in the second-order form. `tune` gives a better one.
     stability : float
         A, iterations, >= 0; a tenth of the expected number is usual.
     gain_exponent, perturbation_exponent : float
         alpha and gamma; they must differ by more than 0.5 where gains decrease [-].
-    perturbation : float
-        c, in the unit of the input, > 0.
-    step_max : float, optional
-        Largest change of the estimate per iteration and input; 4/3 perturbation, or 1/5 of it with one
+    perturbation : float or array_like, optional
+        c, per input, in its unit, > 0; 1.5 times its scale.
+    step_max : float or array_like, optional
+        Largest change of the estimate per iteration, per input; 4/3 perturbation, or 1/5 of it with one
         measurement.
     averaging : int
         Gradients per iteration.
@@ -46,9 +48,9 @@ class Spsa(Seeker, _core.optimize.Spsa):
         Measure once more at the new estimate and refuse it where J is worse by more than 2 `noise_sd`.
     noise_sd : float
         Standard deviation of one measurement of J, for blocking.
-    initial_hessian : float, optional
-        Second order: curvature to begin with, < 0 [unit of J per squared unit of the input]; without, `curvature`, or
-        that of first readings.
+    initial_hessian : float or array_like, optional
+        Second order: diagonal of the curvature to begin with, < 0 [unit of J per squared unit of the input]; without,
+        `curvature`, or that of first readings.
     hessian_prior : float
         Second order: iterations that `initial_hessian` counts for.
     limit_amplitude : float
@@ -96,19 +98,22 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
 
     Parameters
     ----------
-    start : float or array_like, shape (inputs,)
+    start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
-        Bounds of the applied input, per input; infinite for none. The start must lie inside by `difference`.
-    step_size : float, optional
-        lambda_c, > 0 [squared unit of the input per unit of J]; 1/abs(J'') is fastest. Without, half of that by
-        `curvature` or by first readings as those of `ExtremumSeeking`.
-    difference : float
-        c, half the distance of the two measurements, in the unit of the input, > 0.
+        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+        inside by `difference`.
+    step_size : float or array_like, optional
+        lambda_c, per input, > 0 [squared unit of the input per unit of J]; 1/abs(J'') is fastest. Without, half of that
+        by `curvature` or by first readings as those of `ExtremumSeeking`.
+    difference : float or array_like, optional
+        c, half the distance of the two measurements, per input, in its unit, > 0; its scale.
     rate : float or array_like, optional
         Largest change per step, per input; without, none, or four differences where `step_size` is left out too.
-    tolerance : float
-        Converged once every entry of a step is smaller, in the unit of the input.
+    tolerance : float or array_like, optional
+        Converged once every entry of a step is smaller, per input, in its unit; a fiftieth of its scale.
     iterations : int
         Steps within which `converged_at` is looked for; the search goes on all the same.
     maximize : bool
@@ -152,18 +157,20 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
 
     Parameters
     ----------
-    start : float
+    start : float or mapping
         Estimate before the first decision.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Name, unit, bounds and scale of the input; `ask` then gives a mapping.
     lower, upper : float
-        The bracket, finite; also the bounds of the applied input.
+        The bracket, finite, where `inputs` does not say it; also the bounds of the applied input.
     noise_sd : float
         Standard deviation of one measurement of J; 0 trusts every comparison.
     significance : float
         Standard errors that decide a comparison.
     samples_max : int
         Measurements of each inner point before it counts as inconclusive.
-    tolerance : float
-        Width of the bracket at which a noise-free search ends, in the unit of the input, > 0.
+    tolerance : float, optional
+        Width of the bracket at which a noise-free search ends, in the unit of the input, > 0; a fiftieth of its scale.
     maximize : bool
         False to minimise J.
     limits : sequence of Limit, or mapping of str to float

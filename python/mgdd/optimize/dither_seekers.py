@@ -19,15 +19,18 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
 
     Parameters
     ----------
-    start : float or array_like, shape (inputs,)
+    start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
-        Bounds of the applied input, per input; infinite for none. The start must lie inside by `amplitude`.
+        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+        inside by `amplitude`.
     form : {"batch", "moving_average", "washout"}
         How the mean of J is removed: regression over one period with the estimate held, mean of the last
         period, or a first-order high-pass.
-    amplitude : float or array_like
-        Of the dither, per input, in its unit, > 0.
+    amplitude : float or array_like, optional
+        Of the dither, per input, in its unit, > 0; its scale.
     period : int
         Cycles of the window that all inputs share, >= 4.
     harmonics : sequence of int, optional
@@ -104,12 +107,15 @@ class NewtonSeeking(Seeker, _core.optimize.NewtonSeeking):
 
     Parameters
     ----------
-    start : float or array_like, shape (inputs,)
+    start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
-        Bounds of the applied input, per input; infinite for none. The start must lie inside by `amplitude`.
-    amplitude : float or array_like
-        Of the dither, per input, in its unit, > 0.
+        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+        inside by `amplitude`.
+    amplitude : float or array_like, optional
+        Of the dither, per input, in its unit, > 0; twice its scale.
     period : int
         Cycles of the window that all inputs share, >= 4.
     harmonics : sequence of int, optional
@@ -173,10 +179,12 @@ class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
     ----------
     start : float or array_like, shape (inputs,)
         First input, in its unit; one to eight inputs.
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
-        Bounds of the applied input, per input; infinite for none.
-    amplitude : float or array_like
-        Of the oscillation, per input, in its unit, > 0.
+        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none.
+    amplitude : float or array_like, optional
+        Of the oscillation, per input, in its unit, > 0; its scale.
     period : int
         Cycles of the window that all inputs share, >= 4.
     harmonics : sequence of int, optional

@@ -14,6 +14,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
 from mgdd.io.files import parsed, read_plain_text, write_whole_text
+from mgdd.optimize.inputs import unit_of_input, with_inputs
 from mgdd.optimize.optimum import limits_of
 from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
@@ -50,10 +51,12 @@ if TYPE_CHECKING:
         @property
         def component_count(self) -> int: ...
         @property
+        def input_names(self) -> list[str]: ...
+        @property
         def limit_names(self) -> list[str]: ...
         @property
         def limit_states(self) -> dict[str, str]: ...
-        def ask(self) -> NDArray[np.float64]: ...
+        def ask(self) -> Any: ...
         def tell(
             self,
             J: Any = None,  # noqa: N803
@@ -75,7 +78,9 @@ class Seeker(SeekerFindings, _CoreSeeker):
     Parameters
     ----------
     *given, **settings
-        As each kind says them; ``limits`` is a sequence of `Limit`, or a mapping of names to upper values.
+        As each kind says them; ``limits`` is a sequence of `Limit`, or a mapping of names to upper values. With
+        ``inputs``, a sequence of `Input` or a mapping of names to (lower, upper), inputs have names: `ask` gives a
+        mapping, and ``start`` and whatever is given per input may be one.
 
     Examples
     --------
@@ -87,6 +92,8 @@ class Seeker(SeekerFindings, _CoreSeeker):
     ...     Spsa(start=3.0).save(file)
     ...     Seeker.load(file)
     <Spsa cycle 0, estimate [3.]>
+    >>> seeker = Spsa(start={"soc_cad": -8.0, "egr": 0.1}, inputs={"soc_cad": (-20.0, 5.0), "egr": (0.0, 0.4)})
+    >>> seeker.tell(52.0, applied=seeker.ask())
     """
 
     kind: ClassVar[str]
@@ -96,17 +103,20 @@ class Seeker(SeekerFindings, _CoreSeeker):
         def __init__(self, *given: Any, **settings: Any) -> None:
             if isinstance(settings.get("limits"), Mapping):
                 settings["limits"] = list(limits_of(settings["limits"]))
+            if settings.get("inputs") is not None or isinstance(settings.get("start"), Mapping):
+                settings = with_inputs(settings)
             super().__init__(*given, **settings)
 
-    def run(self, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
+    def run(self, fun: Callable[[Any], Any], cycles: int) -> xr.Dataset:
         """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.
 
         Parameters
         ----------
         fun : callable
-            ``fun(input) -> J`` with the input of shape (inputs,), or ``-> (J, limits)`` where the seeker keeps
-            limits; None says that the cycle misfired. J is a number, or an array with one entry per component.
-            Exceptions of `fun` pass through and leave the seeker as before that cycle.
+            ``fun(input) -> J`` with the input of shape (inputs,), a mapping where inputs have names, or
+            ``-> (J, limits)`` where the seeker keeps limits; None says that the cycle misfired. J is a number, or an
+            array with one entry per component. Exceptions of `fun` pass through and leave the seeker as before that
+            cycle.
         cycles : int
             Calls of `fun`, >= 0.
 
@@ -153,14 +163,20 @@ class Seeker(SeekerFindings, _CoreSeeker):
     def history(self) -> xr.Dataset:
         """What was applied and measured, cycle by cycle.
 
-        Dimensions `cycle` and `input`; variables `applied` (as asked, where ``tell`` got no ``applied``) and
-        `estimate` (before the result of the cycle), both (cycle, input) in the unit of the input, `objective` (J as
-        given, components summed; NaN where the cycle misfired) and `misfire` (0 or 1). With limits also dimension
-        `limit`, and over (cycle, limit) `limits` as given and `limit_states` after the cycle (0 free, 1 active, 2
-        infeasible). Built anew on every access.
+        Dimensions `cycle` and `input`, by name where inputs have names; variables `applied` (as asked, where ``tell``
+        got no ``applied``) and `estimate` (before the result of the cycle), both (cycle, input) in the unit of the
+        input, `objective` (J as given, components summed; NaN where the cycle misfired) and `misfire` (0 or 1). With
+        limits also dimension `limit`, and over (cycle, limit) `limits` as given and `limit_states` after the cycle (0
+        free, 1 active, 2 infeasible). Built anew on every access.
         """
         columns = self._history_columns()
         names, over, unit = self.limit_names, ("cycle", "limit"), "unit of the limit"
+        inputs = self.settings["inputs"]
+        own = [unit_of_input(one) for one in inputs]
+        input_unit = own[0] if own and len(set(own)) == 1 else _INPUT_UNIT
+        which: tuple[Any, ...] = ("input", np.arange(columns["applied"].shape[1]), "-", "index of the input")
+        if inputs:
+            which = ("input", self.input_names, "-", "name of the input")
         limited: dict[str, tuple[Any, ...]] = {
             "limit": ("limit", names, "-", "limited quantity"),
             "limits": (over, columns["limits"], unit, "measured value of a limited quantity"),
@@ -169,9 +185,9 @@ class Seeker(SeekerFindings, _CoreSeeker):
         return labelled_dataset(
             {
                 "cycle": ("cycle", columns["cycle"].astype(np.int64)),
-                "input": ("input", np.arange(columns["applied"].shape[1]), "-", "index of the input"),
-                "applied": (("cycle", "input"), columns["applied"], _INPUT_UNIT, "input that the plant applied"),
-                "estimate": (("cycle", "input"), columns["estimate"], _INPUT_UNIT, "estimate of the optimum"),
+                "input": which,
+                "applied": (("cycle", "input"), columns["applied"], input_unit, "input that the plant applied"),
+                "estimate": (("cycle", "input"), columns["estimate"], input_unit, "estimate of the optimum"),
                 "objective": ("cycle", columns["objective"], _J_UNIT, "objective J"),
                 "misfire": ("cycle", columns["misfire"].astype(np.int8), "-", "misfired cycle"),
                 **(limited if names else {}),
@@ -241,7 +257,10 @@ class Seeker(SeekerFindings, _CoreSeeker):
         return rebuilt, (type(self), self.settings, self.state, columns), self.__dict__ or None
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} cycle {self.cycle}, estimate {np.array2string(self.estimate, precision=6)}>"
+        now = np.array2string(self.estimate, precision=6)
+        if names := self.input_names:
+            now = ", ".join(f"{name} {value:.6g}" for name, value in zip(names, self.estimate.tolist(), strict=True))
+        return f"<{type(self).__name__} cycle {self.cycle}, estimate {now}>"
 
     def _repr_html_(self) -> str:
         now = {"cycle": self.cycle, "estimate": self.estimate}
@@ -285,6 +304,8 @@ def _encode(value: Any) -> Any:
     if isinstance(value, _core.optimize.Limit):
         own = "name upper margin method weight scale delay_cycles lag_cycles margin_sd delay_uncertainty"
         return {"limit": {name: getattr(value, name) for name in own.split()}}
+    if isinstance(value, _core.optimize.Input):
+        return {"input": _encode(value.to_dict())}
     if isinstance(value, _core.guide.Curve):
         return {"curve": value._table}
     if isinstance(value, dict):
@@ -301,6 +322,8 @@ def _decode(item: dict[str, Any]) -> Any:
         return _core.optimize.ComponentLag(**item["component_lag"])
     if set(item) == {"limit"}:
         return _core.optimize.Limit(**item["limit"])
+    if set(item) == {"input"}:
+        return _core.optimize.Input(**item["input"])
     if set(item) == {"curve"}:
         return _core.guide.Curve._of_table(item["curve"])
     return item

@@ -76,7 +76,8 @@ def findings_of(
         out.append(Finding("failing_everywhere", (), text, "look at the plant, or start where it is known to run"))
     for side, edges in (("above", failing_above), ("below", failing_below)):
         for index in np.flatnonzero(np.isfinite(edges)):
-            name, edge = f"input[{index}]", float(edges[index])
+            inputs = settings["inputs"]
+            name, edge = inputs[index].name if inputs else f"input[{index}]", float(edges[index])
             text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
             remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
             out.append(Finding("failing_inputs", (name,), text, remedy))

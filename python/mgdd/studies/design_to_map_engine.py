@@ -191,7 +191,7 @@ def drive(cylinder: Cylinder, guide: Any, seed: int, *, learns: bool = False) ->
     bench = EngineBench(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed)
     plain = ExtremumSeeking(
         start=_START_CAD, lower=_BOUNDS_CAD[0], upper=_BOUNDS_CAD[1], form="moving_average", gain=_GAIN,
-        limits=[Limit(name, upper) for name, upper in LIMITS.items()],
+        amplitude=1.0, limits=[Limit(name, upper) for name, upper in LIMITS.items()],
     )  # fmt: skip
     seeker = FeedForward(plain, guide)
     applied, learnt = np.empty((PLACES, DWELL)), 0

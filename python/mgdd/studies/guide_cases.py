@@ -110,7 +110,7 @@ def seeker_without_clip() -> ExtremumSeeking:
     """Make extremum seeking with a moving average, no clip, start at -20 CAD: what a feed-forward leads."""
     return ExtremumSeeking(
         start=_UNGUIDED_START_CAD, lower=_WIDE_CAD[0], upper=_WIDE_CAD[1], form="moving_average", gain=_GAIN,
-        rate=math.inf,
+        amplitude=1.0, rate=math.inf,
     )  # fmt: skip
 
 

@@ -63,7 +63,8 @@ TEST(GuidedEngine, AFeedForwardOutOfTheBoundsIsWaitedForWhileTheSeekerLearns) {
   high.fuel_mg = 34.0;
   const double first = rough_model().find(low).soc_cad, other = rough_model().find(high).soc_cad;
   optimize::ExtremumSeekingSettings s;
-  s.space = {scalar_input(4.0), scalar_input(0.5 * (first + other)), scalar_input(10.0)};
+  s.space = {scalar_input(4.0), scalar_input(0.5 * (first + other)), scalar_input(10.0), {}};
+  s.dither.amplitude = scalar_input(1.0);
   optimize::ExtremumSeeking alone(s);
   const FeedForward seeker{optimize::VariantSeeker(optimize::ExtremumSeeking(s))};
   GuidedEngine guided(seeker, rough_model(), std::nullopt, low, {.keep_start = true});

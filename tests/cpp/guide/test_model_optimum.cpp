@@ -64,7 +64,7 @@ TEST(ModelOptimum, TheAscentAloneTakesFourIterationsFromMinusTwenty) {
   for (const double step_size : {18.0, 45.0}) {
     optimize::GradientDescentSettings g;
     g.space.start = optimize::scalar_input(-20.0);
-    g.step_size = step_size;
+    g.step_size = optimize::scalar_input(step_size);
     optimize::GradientDescent ascent(g);
     double widest = 0.0;
     while (ascent.converged_at() < 0 && ascent.iteration() < 60) {

@@ -101,7 +101,7 @@ double bend_of(FirstReadings& first, double slope, double curvature, double nois
     first.learn(scalar_input(asked.back()), slope * x + 0.5 * curvature * x * x + drift * k +
                                                 noise_sd * random::normal(seed, 9, static_cast<std::uint64_t>(k)));
   }
-  return first.largest_bend();
+  return first.bend().maxCoeff();
 }
 
 TEST(FirstReadings, BendIsWhatIsSeenOrWhatTheNoiseWouldHideOrWhatTheSlopeAsksFor) {
@@ -126,7 +126,7 @@ TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
   EXPECT_TRUE(flat.open());
   const FirstReadings known(scalar_input(1.0), 0.4, true, -0.7);
   EXPECT_FALSE(known.open());
-  EXPECT_EQ(known.largest_bend(), 0.7);
+  EXPECT_EQ(known.bend().maxCoeff(), 0.7);
 }
 
 // A plant that goes 0.7 of the way to one side: slope and bend are those between the inputs that it applied. What was
@@ -143,7 +143,7 @@ TEST(FirstReadings, AnUnevenPlantAndARestartLeaveTheBend) {
   first.restart();
   while (first.open())
     cycle(0.0);
-  EXPECT_NEAR(first.largest_bend(), 0.8, 1e-12);
+  EXPECT_NEAR(first.bend().maxCoeff(), 0.8, 1e-12);
 }
 
 // An input whose plant does not follow to one side shows the noise, and no slope of nothing.
@@ -172,7 +172,7 @@ TEST(FirstReadings, UnequalStepsAndARestartBendTheSame) {
   EXPECT_TRUE(first.open());
   told(1);
   EXPECT_FALSE(first.open());
-  EXPECT_NEAR(first.largest_bend(), 0.7, 1e-12);
+  EXPECT_NEAR(first.bend().maxCoeff(), 0.7, 1e-12);
 }
 
 TEST(FirstReadings, AStateThatMakesNoGainIsRefused) {

@@ -7,7 +7,7 @@ namespace {
 GradientDescentSettings from(double start, double step_size) {
   GradientDescentSettings s;
   s.space = space_at(scalar_input(start));
-  s.step_size = step_size;
+  s.step_size = scalar_input(step_size);
   return s;
 }
 
@@ -53,7 +53,7 @@ TEST(GradientDescent, TakesTwoCyclesPerInput) {
   h << -0.06, 0.02, 0.0, 0.02, -0.05, -0.01, 0.0, -0.01, -0.08;
   GradientDescentSettings s;
   s.space = space_at(inputs({4.0, -3.0, 5.0}));
-  s.step_size = 15.0;
+  s.step_size = scalar_input(15.0);
   GradientDescent seeker(s);
   for (int k = 0; k < 6; ++k)
     cycle_of(seeker, [&](const Inputs& x) { return 0.5 * x.dot(h * x); });
@@ -85,17 +85,17 @@ TEST(GradientDescent, RefusesAndAdvises) {
     change(s);
     EXPECT_THROW(GradientDescent{s}, ParameterError);
   };
-  refused([](auto& s) { s.step_size = 0.0; });
-  refused([](auto& s) { s.difference = std::nan(""); });
+  refused([](auto& s) { s.step_size = scalar_input(0.0); });
+  refused([](auto& s) { s.difference = scalar_input(std::nan("")); });
   refused([](auto& s) { s.rate = scalar_input(0.0); });
-  refused([](auto& s) { s.tolerance = -1.0; });
+  refused([](auto& s) { s.tolerance = scalar_input(-1.0); });
   refused([](auto& s) { s.iterations = 0; });
   GradientDescentSettings s = from(0.0, 40.0);
   EXPECT_TRUE(s.advice().empty());
   s.curvature = bend;
   ASSERT_EQ(s.advice().size(), 1u);
   EXPECT_NE(s.advice()[0].find("39.2"), std::string::npos) << s.advice()[0];
-  s.step_size = 39.0;
+  s.step_size = scalar_input(39.0);
   EXPECT_TRUE(s.advice().empty());
 }
 

@@ -87,7 +87,7 @@ TEST(LateLimits, EverySeekerKeepsALimitThatComesTenCyclesLate) {
     std::vector<Outcome> sum(10);
     const std::uint64_t seeds = noise > 0.0 ? 10 : 1;
     for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-      auto all = every_seeker(space_at(scalar_input(-8.0), 30.0), noise, seed, {limit});
+      auto all = every_seeker(space_at(scalar_input(-8.0), 20.0), noise, seed, {limit});
       for (std::size_t i = 0; i < all.size(); ++i) {
         const Outcome one =
             std::visit([&](auto& seeker) { return late_run(seeker, late, noise, seed); }, all[i].second);
@@ -96,7 +96,7 @@ TEST(LateLimits, EverySeekerKeepsALimitThatComesTenCyclesLate) {
         EXPECT_EQ(one.state, noise > 0.0 ? one.state : LimitState::active) << all[i].first;
       }
     }
-    const auto names = every_seeker(space_at(scalar_input(-8.0), 30.0), noise, 0, {limit});
+    const auto names = every_seeker(space_at(scalar_input(-8.0), 20.0), noise, 0, {limit});
     for (std::size_t i = 0; i < names.size(); ++i) {
       EXPECT_LE(sum[i].above, 0.01) << names[i].first << ", noise " << noise;
       EXPECT_GT(sum[i].mean, noise > 0.0 ? 0.3 : 0.9) << names[i].first << ", noise " << noise;
@@ -110,7 +110,7 @@ TEST(LateLimits, AndOneBehindALagToo) {
   limit.lag = late;
   limit.margin_sd = 2.0;
   for (const double noise : {0.0, 0.25}) {
-    for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 30.0), noise, 1, {limit})) {
+    for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 20.0), noise, 1, {limit})) {
       const Outcome out = std::visit([&](auto& seeker) { return late_run(seeker, late, noise, 3); }, any);
       EXPECT_LE(out.above, name == "golden_section" ? 0.15 : 0.02) << name << ", noise " << noise;
       EXPECT_GT(out.mean, -1.5) << name << ", noise " << noise;
@@ -126,13 +126,13 @@ TEST(LateLimits, ADelayWrongByAsManyCyclesAsItIsUncertainIsFound) {
     limit.lag.delay_cycles = stated;
     std::vector<double> above(10, 0.0);
     for (std::uint64_t seed = 0; seed < 3; ++seed) {
-      auto all = every_seeker(space_at(scalar_input(-8.0), 30.0), 0.25, seed, {limit});
+      auto all = every_seeker(space_at(scalar_input(-8.0), 20.0), 0.25, seed, {limit});
       for (std::size_t i = 0; i < all.size(); ++i) {
         const ComponentLag lag{static_cast<double>(truth), 0.0};
         above[i] += std::visit([&](auto& s) { return late_run(s, lag, 0.25, seed); }, all[i].second).above / 3.0;
       }
     }
-    const auto names = every_seeker(space_at(scalar_input(-8.0), 30.0), 0.25, 0, {limit});
+    const auto names = every_seeker(space_at(scalar_input(-8.0), 20.0), 0.25, 0, {limit});
     for (std::size_t i = 0; i < names.size(); ++i)
       EXPECT_LE(above[i], 0.03) << names[i].first << ", " << truth << " stated as " << stated;
   }
@@ -142,7 +142,7 @@ TEST(LateLimits, ADelayWrongByAsManyCyclesAsItIsUncertainIsFound) {
 TEST(LateLimits, TheEstimateWaitsForTheFirstReading) {
   Limit limit{"p", 104.0};
   limit.lag = {30.0, 0.0};
-  for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 30.0), 0.25, 1, {limit})) {
+  for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 20.0), 0.25, 1, {limit})) {
     if (name == "bounded_seeking" || name == "golden_section") continue;  // their search is their dither
     std::visit(
         [&, &who = name](auto& seeker) {
@@ -172,7 +172,7 @@ TEST(LateLimits, LimitsThatContradictEndInTheLeastExcessAndSayInfeasible) {
     Limit low{"low", -1.0, 0.0, LimitMethod::switching, 1.0, 1.0},
         high{"high", -5.0, 0.0, LimitMethod::switching, 1.0, 3.0};
     low.lag = {delay, 0.0};
-    for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 30.0), 0.0, 1, {low, high})) {
+    for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 20.0), 0.0, 1, {low, high})) {
       SCOPED_TRACE(name + ", delay " + std::to_string(delay));
       std::visit(
           [&](auto& seeker) {

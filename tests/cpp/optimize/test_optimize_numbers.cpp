@@ -45,7 +45,7 @@ TEST(OptimizeNumbers, DefaultsOfTheSeekers) {
   EXPECT_EQ(e.space.start, scalar_input(0.0));
   EXPECT_EQ(e.space.lower, scalar_input(-unlimited));
   EXPECT_EQ(e.space.upper, scalar_input(unlimited));
-  expect_dither(e.dither, 1.0);
+  expect_dither(ExtremumSeeking(e).settings().dither, 1.0);
   EXPECT_EQ(e.form, MeanRemoval::batch);
   EXPECT_EQ(e.gain.size(), 0);
   EXPECT_EQ(e.washout_pole, 0.9);
@@ -58,7 +58,7 @@ TEST(OptimizeNumbers, DefaultsOfTheSeekers) {
   EXPECT_EQ(e.limit_amplitude, 0.5);
   EXPECT_TRUE(e.maximize);
   const NewtonSeekingSettings n;
-  expect_dither(n.dither, 2.0);
+  expect_dither(NewtonSeeking(n).settings().dither, 2.0);
   EXPECT_EQ(n.time_constant_cycles, 40.0);
   EXPECT_EQ(n.hessian_rate, 0.03);
   EXPECT_EQ(n.riccati_rate, 0.02);
@@ -68,20 +68,21 @@ TEST(OptimizeNumbers, DefaultsOfTheSeekers) {
   EXPECT_EQ(n.limit_amplitude, 0.5);
   EXPECT_TRUE(n.maximize);
   const BoundedSeekingSettings b;
-  expect_dither(b.dither, 1.0);
+  expect_dither(BoundedSeeking(b).settings().dither, 1.0);
   EXPECT_FALSE(b.kappa || b.curvature);
   EXPECT_TRUE(b.maximize);
   const GradientDescentSettings g;
-  EXPECT_FALSE(g.step_size || g.curvature);
-  EXPECT_EQ(g.difference, 1.0);
-  EXPECT_EQ(g.tolerance, 0.02);
+  EXPECT_FALSE(g.curvature);
+  EXPECT_EQ(g.step_size.size(), 0);
+  EXPECT_EQ(GradientDescent(g).settings().difference, scalar_input(1.0));
+  EXPECT_EQ(GradientDescent(g).settings().tolerance, scalar_input(0.02));
   EXPECT_EQ(g.iterations, 60);
   EXPECT_TRUE(g.maximize);
   const GoldenSectionSettings s;
   EXPECT_EQ(s.noise_sd, 0.0);
   EXPECT_EQ(s.significance, 2.0);
   EXPECT_EQ(s.samples_max, 8);
-  EXPECT_EQ(s.tolerance, 0.02);
+  EXPECT_EQ(s.tolerance, 0.0);
   EXPECT_TRUE(s.maximize);
   const Limit limit;
   EXPECT_EQ(limit, (Limit{"", 0.0, 0.0, LimitMethod::switching, 1.0, 0.0}));
@@ -93,13 +94,13 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
   EXPECT_EQ(s.schedule, GainSchedule::decreasing);
   EXPECT_EQ(s.stability, 50.0);
   EXPECT_EQ(s.gain_exponent, 0.602);
-  EXPECT_EQ(s.perturbation, 1.5);
+  EXPECT_EQ(Spsa(s).settings().perturbation, scalar_input(1.5));
   EXPECT_EQ(s.perturbation_exponent, 0.101);
   EXPECT_EQ(s.averaging, 1);
   EXPECT_FALSE(s.blocking);
-  EXPECT_FALSE(s.gain || s.step_max || s.curvature);
+  EXPECT_EQ(s.gain.size() + s.step_max.size() + s.initial_hessian.size(), 0);
+  EXPECT_FALSE(s.curvature);
   EXPECT_EQ(s.noise_sd, 0.0);
-  EXPECT_FALSE(s.initial_hessian);
   EXPECT_EQ(s.hessian_prior, 20.0);
   EXPECT_EQ(s.limit_amplitude, 0.5);
   EXPECT_EQ(s.seed, 0u);
@@ -107,14 +108,14 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
   const auto made = [](SpsaForm form) {
     SpsaSettings t;
     t.form = form;
-    t.perturbation = 0.9;
+    t.perturbation = scalar_input(0.9);
     return Spsa(t).settings();
   };
-  EXPECT_FALSE(made(SpsaForm::first_order).gain || made(SpsaForm::one_measurement).gain);
-  EXPECT_EQ(made(SpsaForm::second_order).gain, 3.0);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::first_order).step_max.value_or(0.0), 1.2);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max.value_or(0.0), 1.2);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::one_measurement).step_max.value_or(0.0), 0.18);
+  EXPECT_EQ(made(SpsaForm::first_order).gain.size() + made(SpsaForm::one_measurement).gain.size(), 0);
+  EXPECT_EQ(made(SpsaForm::second_order).gain, scalar_input(3.0));
+  EXPECT_DOUBLE_EQ(made(SpsaForm::first_order).step_max[0], 1.2);
+  EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max[0], 1.2);
+  EXPECT_DOUBLE_EQ(made(SpsaForm::one_measurement).step_max[0], 0.18);
 }
 
 TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {

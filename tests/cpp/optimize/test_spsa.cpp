@@ -26,7 +26,7 @@ SpsaSettings frozen(Eigen::Index n) {
   SpsaSettings s;
   s.space = space_at(somewhere(n));
   s.schedule = GainSchedule::constant;
-  s.gain = 1e-300;
+  s.gain = scalar_input(1e-300);
   return s;
 }
 
@@ -35,7 +35,7 @@ TEST(Spsa, GradientOfAQuadraticHasNoBiasAndTakesTwoMeasurementsInAnyDimension) {
   for (Eigen::Index n = 1; n <= 5; ++n) {
     for (const double c : {0.5, 3.0}) {
       SpsaSettings s = frozen(n);
-      s.perturbation = c;
+      s.perturbation = scalar_input(c);
       s.seed = static_cast<std::uint64_t>(n);
       Spsa seeker(s);
       const InputMatrix h = bowl(n);
@@ -142,7 +142,7 @@ TEST(Spsa, ConstantGainsGoOnTracking) {
   SpsaSettings s;
   s.space = space_at(scalar_input(0.0));
   s.schedule = GainSchedule::constant;
-  s.gain = 2.0;
+  s.gain = scalar_input(2.0);
   Spsa seeker(s);
   search(seeker, quadratic, 3000);
   EXPECT_NEAR(search(seeker, [](double x) { return quadratic(x - 8.0); }, 300).back(), 8.0, 0.1);
@@ -152,8 +152,8 @@ TEST(Spsa, BlockingRefusesAStepThatMakesJWorse) {
   SpsaSettings s;
   s.space = space_at(scalar_input(5.0));
   s.schedule = GainSchedule::constant;
-  s.gain = 2.5 / std::abs(bend);  // every step overshoots: |1 - 2.5| > 1
-  s.step_max = 1e3;
+  s.gain = scalar_input(2.5 / std::abs(bend));  // every step overshoots: |1 - 2.5| > 1
+  s.step_max = scalar_input(1e3);
   Spsa free(s);
   EXPECT_GT(std::abs(search(free, quadratic, 40).back()), 100.0);
   s.blocking = true;
@@ -204,29 +204,29 @@ TEST(Spsa, RefusesAndAdvises) {
     change(s);
     EXPECT_THROW(Spsa{s}, ParameterError);
   };
-  refused([](auto& s) { s.gain = -1.0; });
-  refused([](auto& s) { s.perturbation = 0.0; });
+  refused([](auto& s) { s.gain = scalar_input(-1.0); });
+  refused([](auto& s) { s.perturbation = scalar_input(0.0); });
   refused([](auto& s) { s.stability = -1.0; });
   refused([](auto& s) { s.gain_exponent = 0.55; });
   refused([](auto& s) { s.averaging = 0; });
   refused([](auto& s) { s.noise_sd = -0.1; });
-  refused([](auto& s) { s.initial_hessian = 0.0; });
+  refused([](auto& s) { s.initial_hessian = scalar_input(0.0); });
   refused([](auto& s) { s.hessian_prior = 0.0; });
-  refused([](auto& s) { s.step_max = -1.0; });
-  refused([](auto& s) { s.step_max = 0.0; });
-  refused([](auto& s) { s.gain = 0.0; });
+  refused([](auto& s) { s.step_max = scalar_input(-1.0); });
+  refused([](auto& s) { s.step_max = scalar_input(0.0); });
+  refused([](auto& s) { s.gain = scalar_input(0.0); });
   SpsaSettings s;
   s.schedule = GainSchedule::constant;
-  s.gain = 30.0;
+  s.gain = scalar_input(30.0);
   EXPECT_TRUE(s.advice().empty());
   s.curvature = bend;
   ASSERT_EQ(s.advice().size(), 1u);
   EXPECT_NE(s.advice()[0].find("19.6"), std::string::npos) << s.advice()[0];
-  s.gain = 19.0;
+  s.gain = scalar_input(19.0);
   EXPECT_TRUE(s.advice().empty());
-  s.gain.reset();  // made of the curvature
+  s.gain.resize(0);  // made of the curvature
   EXPECT_TRUE(s.advice().empty());
-  EXPECT_DOUBLE_EQ(Spsa(s).gain().value_or(0.0), 1.0 / std::abs(bend));
+  EXPECT_DOUBLE_EQ(Spsa(s).gain()[0], 1.0 / std::abs(bend));
 }
 
 }  // namespace

@@ -24,9 +24,9 @@ Seeker seeker_of(const Tuning& t, double start, std::uint64_t seed, const Compon
     SpsaSettings s;
     s.space = space_at(scalar_input(start));
     s.schedule = GainSchedule::constant;
-    s.gain = t.gain;
-    s.perturbation = t.amplitude;
-    s.step_max = t.rate;
+    s.gain = scalar_input(t.gain);
+    s.perturbation = scalar_input(t.amplitude);
+    s.step_max = scalar_input(t.rate);
     s.seed = seed;
     return Spsa(s);
   }

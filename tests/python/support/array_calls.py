@@ -47,6 +47,7 @@ ANGLE = MODEL.simulate({"time_s": TIME, "duty": DUTY})["angle_deg"].to_numpy()
 GROUPS, SMOOTH = FirstPrincipleModel(), SmoothThrottle()
 CRANK = np.arange(-90.0, 91.0)
 BAR = 40.0 * np.exp(-((CRANK / 40.0) ** 2)) + 1.0
+WHOLE = np.random.default_rng(3).standard_normal(720)
 NOISE = np.random.default_rng(0).standard_normal(600)
 TEN = np.array(mgdd._core.identify.smooth_example)
 KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
@@ -203,6 +204,10 @@ def exchanged(row: Any) -> Any:
     return RigRecord.from_columns(["misfire", "input.duty", "value.angle_deg"], [row, row]).to_columns()[1]
 
 
+def whole_cycle(pressure: Any) -> xr.Dataset:
+    return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0).noise(pressure)
+
+
 def queued(references: Any) -> Any:
     loop = make_loop(RingTransport())
     loop.queue_references(references)
@@ -212,6 +217,7 @@ def queued(references: Any) -> Any:
 CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "engine.Indicating.__init__": (lambda a, p: list(indicating(a).cycle(p).values()), (CRANK, BAR)),
     "engine.Indicating.cycle": (lambda p: list(indicating(CRANK).cycle(p).values()), (BAR,)),
+    "engine.Indicating.noise": (lambda p: whole_cycle(p)["pressure_level_db"].to_numpy(), (WHOLE,)),
     "engine.Indicating.oscillation": (lambda p: indicating(CRANK).oscillation(p)["oscillation_bar"].to_numpy(), (BAR,)),
     "engine.Indicating.record": (lambda p: indicating(CRANK).record([p, p])["ca50_cad"].to_numpy(), (BAR,)),
     "engine.nox_at_reference_humidity": (lambda ppm: nox_at_reference_humidity(ppm, 0.01), (PPM,)),

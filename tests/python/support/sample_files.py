@@ -151,6 +151,7 @@ def _export(path: Path) -> Any:
 
 SAMPLES: dict[str, Sample] = {
     "io.read": Sample(io.read, "csv", _pressure),
+    "io.pressure_chunks": Sample(lambda path: list(io.pressure_chunks(path)), "csv", _pressure),
     "io.read_pressure": Sample(io.read_pressure, "csv", _pressure),
     "io.read_throttle_log": Sample(io.read_throttle_log, "csv", _log),
     "io.read_conditions": Sample(read_conditions, "csv", _text(CONDITIONS)),

@@ -52,7 +52,7 @@ inline auto fields_of(const CurveSeekingSettings&) {
     return FieldInfo{name, "-", above(0.0), meaning, DefaultForm::none};
   };
   return std::tuple{
-      optimize::space_fields<&S::space, DefaultForm::required>(),
+      optimize::space_fields<&S::space>(),
       field<&S::curve>("curve", "the guide's J", DefaultForm::required),
       field<&S::prior_sd>(own("prior_sd", "how far the best input may lie from the guide's")),
       field<&S::scale_sd>("scale_sd", "of the plant's curvature over the guide's"),

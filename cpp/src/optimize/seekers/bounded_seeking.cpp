@@ -13,8 +13,8 @@ namespace {
 constexpr double own_kappa = 0.051;            // times |J''| a^2: the mean approaches in ten periods
 constexpr double bounded_unseen_bend = 0.067;  // |J''| (a omega)^2 over the noise: 0.17 of |J''| a^2 at a period of 10
 
-Inputs omega_of(const DitherSettings& dither) {
-  Inputs omega(dither.amplitude.size());
+Inputs omega_of(const DitherSettings& dither, Eigen::Index inputs) {
+  Inputs omega(inputs);
   for (Eigen::Index i = 0; i < omega.size(); ++i)
     omega[i] = 2.0 * std::numbers::pi * dither.harmonics[static_cast<std::size_t>(i)] / dither.period;
   return omega;
@@ -23,6 +23,8 @@ Inputs omega_of(const DitherSettings& dither) {
 BoundedSeekingSettings checked(BoundedSeekingSettings s) {
   const Eigen::Index n = s.space.size();
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
+  s.space = resolved(std::move(s.space));
+  s.dither.amplitude = or_scaled(std::move(s.dither.amplitude), 1.0, s.space);
   validate(s.dither, n, false);
   validate(s.space, Inputs::Zero(n));
   if (s.kappa) require_positive("kappa", *s.kappa);
@@ -35,9 +37,10 @@ BoundedSeekingSettings checked(BoundedSeekingSettings s) {
 std::vector<std::string> BoundedSeekingSettings::advice() const {
   std::vector<std::string> out;
   if (!curvature || !kappa) return out;
-  for (Eigen::Index i = 0; i < dither.amplitude.size(); ++i) {
-    const double a = dither.amplitude[i];
-    const double bound = 1.0 / (a * a * omega_of(dither)[i] * std::abs(*curvature) * dither.period);  // tau = 2 periods
+  const Inputs amplitude = or_scaled(dither.amplitude, 1.0, space), omega = omega_of(dither, amplitude.size());
+  for (Eigen::Index i = 0; i < amplitude.size(); ++i) {
+    const double a = amplitude[i];
+    const double bound = 1.0 / (a * a * omega[i] * std::abs(*curvature) * dither.period);  // tau = 2 periods
     if (!(*kappa > bound)) continue;
     out.push_back("kappa = " + text(*kappa) + " is above " + text(bound) +
                   ", the bound of averaging (tau of at least 2 periods); lower kappa or the amplitude");
@@ -47,9 +50,9 @@ std::vector<std::string> BoundedSeekingSettings::advice() const {
 
 BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
     : SeekerCore(checked(std::move(settings)), [](const BoundedSeekingSettings& s) { return 2.0 * s.dither.period; }),
-      first_(settings_.dither.amplitude.cwiseProduct(omega_of(settings_.dither)), bounded_unseen_bend, !settings_.kappa,
-             settings_.curvature),
-      omega_(omega_of(settings_.dither)),
+      first_(settings_.dither.amplitude.cwiseProduct(omega_of(settings_.dither, settings_.space.size())),
+             bounded_unseen_bend, !settings_.kappa, settings_.curvature),
+      omega_(omega_of(settings_.dither, settings_.space.size())),
       metric_(InputMatrix::Identity(applied_.size(), applied_.size())),
       window_(static_cast<std::size_t>(settings_.dither.period * applied_.size()), 0.0) {
   metric_.diagonal() = settings_.dither.amplitude.cwiseAbs2().cwiseProduct(omega_);  // of the mean drift

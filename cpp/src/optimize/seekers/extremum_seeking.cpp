@@ -19,6 +19,8 @@ constexpr double dither_unseen_bend = 0.17;  // |J''| A^2 over the noise: 0.051 
 ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   const Eigen::Index n = s.space.size();
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
+  s.space = resolved(std::move(s.space));
+  s.dither.amplitude = or_scaled(std::move(s.dither.amplitude), 1.0, s.space);
   validate(s.dither, n, false);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
@@ -29,6 +31,8 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   }
   validate_entries("rate", s.rate, n, 0.0);
   validate_entries("recovery_rate", s.recovery_rate, n, 0.0);
+  s.rate = within_rates(std::move(s.rate), s.space);
+  s.recovery_rate = within_rates(std::move(s.recovery_rate), s.space);
   const auto inside = [](std::string_view name, double value, double lower, double upper) {
     if (!(value > lower && value <= upper)) {
       throw ParameterError(name, value, "must be > " + text(lower) + " and <= " + text(upper));
@@ -57,12 +61,13 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
 std::vector<std::string> ExtremumSeekingSettings::advice() const {
   std::vector<std::string> out;
   if (!curvature || *curvature == 0.0) return out;
+  const Inputs amplitude = or_scaled(dither.amplitude, 1.0, space);
   const double windows = form == MeanRemoval::batch ? 1.0 : 2.0;  // a batch at tau = M steps straight to the optimum
   for (Eigen::Index i = 0; i < gain.size(); ++i) {
-    const double bound = 2.0 / (dither.amplitude[i] * std::abs(*curvature) * windows * dither.period);
+    const double bound = 2.0 / (amplitude[i] * std::abs(*curvature) * windows * dither.period);
     if (!(gain[i] > bound * (1.0 + 1e-12))) continue;
     out.push_back("gain = " + text(gain[i]) + " is above " + text(bound) + ", the bound of averaging: with it tau = " +
-                  text(2.0 / (gain[i] * dither.amplitude[i] * std::abs(*curvature))) + " cycles is below " +
+                  text(2.0 / (gain[i] * amplitude[i] * std::abs(*curvature))) + " cycles is below " +
                   text(windows * dither.period) + (windows > 1.0 ? " (two periods)" : " (one period)") +
                   "; lower the gain or the period");
   }
@@ -139,7 +144,7 @@ bool ExtremumSeeking::remove_mean(const Reading& reading, const Inputs& applied)
 
 void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   const Inputs& a = settings_.dither.amplitude;
-  const Inputs metric = first_.open() ? a : Inputs(gain().cwiseProduct(a));  // turns the slope into a step
+  const Inputs metric = first_.open() ? Inputs(a.cwiseAbs2()) : Inputs(gain().cwiseProduct(a));  // of slopes to steps
   step = filter_.project(
       estimate_, step,
       {settings_.space, a, a * share_, rate, settings_.recovery_rate, InputMatrix(metric.asDiagonal())});

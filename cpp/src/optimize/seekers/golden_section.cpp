@@ -21,9 +21,11 @@ constexpr double widest_share = 0.2;            // of the first bracket: the ref
 constexpr double width_rate = 0.05;             // how fast the width follows what the parabola says, per triple
 constexpr double narrow_share = 0.25;           // of its width, while a limit holds the refinement back
 constexpr double least_distance = 0.1;          // of the asked one: two points nearer to each other are one
+constexpr double bracket_tolerance = 0.02;      // of the scale of its input
 constexpr std::int64_t last_draws = 2;          // in a row: the bracket is as small as the noise allows
 
 GoldenSectionSettings checked(GoldenSectionSettings s) {
+  s.space = resolved(std::move(s.space));
   if (s.space.size() != 1) {
     throw about("start",
                 ShapeError("start has " + std::to_string(s.space.size()) + " entries: golden section takes one input"));
@@ -38,6 +40,7 @@ GoldenSectionSettings checked(GoldenSectionSettings s) {
     throw ParameterError("noise_sd", s.noise_sd, "must be >= 0 and finite");
   }
   require_positive("significance", s.significance);
+  if (s.tolerance == 0.0) s.tolerance = bracket_tolerance * scale_of(s.space)[0];
   require_positive("tolerance", s.tolerance);
   if (s.samples_max < 1) throw ParameterError("samples_max", s.samples_max, "must be >= 1");
   return s;

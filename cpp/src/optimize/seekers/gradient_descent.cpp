@@ -1,6 +1,7 @@
 #include "mgdd/optimize/seekers/gradient_descent.hpp"
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
@@ -11,20 +12,25 @@ namespace {
 
 constexpr double least_difference = 0.5;     // of the difference: inputs applied nearer to each other show no slope
 constexpr double own_step = 0.5;             // step size times |J''|
+constexpr double step_tolerance = 0.02;      // in scales of the inputs
 constexpr double own_rate = 4.0;             // differences per step
 constexpr double descent_unseen_bend = 1.0;  // |J''| c^2 over the noise
 
 GradientDescentSettings checked(GradientDescentSettings s) {
   const Eigen::Index n = s.space.size();
-  if (s.step_size) require_positive("step_size", *s.step_size);
-  require_positive("difference", s.difference);
+  s.space = resolved(std::move(s.space));
+  s.step_size = for_each_input(std::move(s.step_size), n);
+  const bool own = s.step_size.size() == 0;
+  if (!own) validate_entries("step_size", s.step_size, n, 0.0, largest_reading);
+  s.difference = or_scaled(std::move(s.difference), 1.0, s.space);
+  validate_entries("difference", s.difference, n, 0.0, largest_reading);
   validate_curvature(s.curvature);
-  validate(s.space, Inputs::Constant(n, s.difference));
-  if (s.rate.size() == 0) s.rate = Inputs::Constant(n, s.step_size ? unlimited : own_rate * s.difference);
+  validate(s.space, s.difference);
+  if (s.rate.size() == 0) s.rate = own ? Inputs(own_rate * s.difference) : Inputs::Constant(n, unlimited);
   validate_entries("rate", s.rate, n, 0.0);
-  if (!(s.tolerance >= 0.0 && std::isfinite(s.tolerance))) {
-    throw ParameterError("tolerance", s.tolerance, "must be >= 0 and finite");
-  }
+  s.rate = within_rates(std::move(s.rate), s.space);
+  s.tolerance = or_scaled(std::move(s.tolerance), step_tolerance, s.space);
+  validate_entries("tolerance", s.tolerance, n, -std::numeric_limits<double>::min(), largest_reading);
   if (s.iterations < 1) throw ParameterError("iterations", s.iterations, "must be >= 1");
   return s;
 }
@@ -32,30 +38,29 @@ GradientDescentSettings checked(GradientDescentSettings s) {
 }  // namespace
 
 std::vector<std::string> GradientDescentSettings::advice() const {
-  if (!curvature || !step_size) return {};
-  const double bound = 2.0 / std::abs(*curvature);
-  if (!(*step_size >= bound)) return {};
-  return {"step_size = " + text(*step_size) + " is not below " + text(bound) +
+  if (!curvature || step_size.size() == 0) return {};
+  const double bound = 2.0 / std::abs(*curvature), largest = step_size.maxCoeff();
+  if (!(largest >= bound)) return {};
+  return {"step_size = " + text(largest) + " is not below " + text(bound) +
           " = 2/|J''|, the bound of convergence; 1/|J''| is fastest"};
 }
 
 GradientDescent::GradientDescent(GradientDescentSettings settings)
     : SeekerCore(checked(std::move(settings)),
                  [](const GradientDescentSettings& s) { return 8.0 * static_cast<double>(s.space.size()); }),
-      first_(Inputs::Constant(settings_.space.size(), settings_.difference), descent_unseen_bend, !settings_.step_size,
-             settings_.curvature),
+      first_(settings_.difference, descent_unseen_bend, settings_.step_size.size() == 0, settings_.curvature),
       gradient_(Inputs::Zero(estimate_.size())),
-      metric_(InputMatrix::Identity(estimate_.size(), estimate_.size())) {}
+      metric_(metric_of(settings_.difference)) {}
 
-std::optional<double> GradientDescent::step_size() const noexcept {
-  if (settings_.step_size || first_.open()) return settings_.step_size;
-  return own_step / first_.largest_bend();
+Inputs GradientDescent::step_size() const noexcept {
+  if (settings_.step_size.size() > 0 || first_.open()) return settings_.step_size;
+  return first_.even_steps(own_step);
 }
 
 const Inputs& GradientDescent::ask() noexcept {
   if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
   applied_ = estimate_;
-  applied_[stage_ / 2] += stage_ % 2 == 0 ? settings_.difference : -settings_.difference;
+  applied_[stage_ / 2] += (stage_ % 2 == 0 ? 1.0 : -1.0) * settings_.difference[stage_ / 2];
   return protocol_.ask(applied_);
 }
 
@@ -78,26 +83,26 @@ void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexc
     above_ = j;
     above_missed_ = missed;
   } else {
-    const double distance = 2.0 * settings_.difference + (above_missed_ - missed);  // between the applied inputs
-    const bool moved = distance > least_difference * settings_.difference;
+    const double distance = 2.0 * settings_.difference[input] + (above_missed_ - missed);  // between the applied inputs
+    const bool moved = distance > least_difference * settings_.difference[input];
     gradient_[input] = moved ? (above_ - j) / distance : 0.0;
   }
   if (++stage_ < 2 * estimate_.size()) return;
   stage_ = 0;
   clamp_.close_window();
-  const double moved = move(step_size().value_or(0.0) * gradient_);
+  const bool small = move(step_size().cwiseProduct(gradient_));
   ++iteration_;
-  if (converged_at_ < 0 && iteration_ <= settings_.iterations && moved < settings_.tolerance) {
+  if (converged_at_ < 0 && iteration_ <= settings_.iterations && small) {
     converged_at_ = iteration_;
   }
 }
 
-// Gives the largest entry of the step that the limits leave.
-double GradientDescent::move(Inputs step) noexcept {
-  const Inputs reach = Inputs::Constant(step.size(), settings_.difference);
+// True where every entry of the step that the limits leave is below its tolerance.
+bool GradientDescent::move(Inputs step) noexcept {
+  const Inputs& reach = settings_.difference;
   step = filter_.project(estimate_, step, {settings_.space, reach, reach, settings_.rate, settings_.rate, metric_});
   move_within(estimate_, step, settings_.space, reach, clamp_, Inputs::Zero(step.size()));
-  return step.cwiseAbs().maxCoeff();
+  return (step.array().abs() < settings_.tolerance.array()).all();
 }
 
 void GradientDescent::restart() noexcept {

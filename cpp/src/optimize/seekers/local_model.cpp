@@ -8,7 +8,7 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr double fewest_cycles = 4.0;  // before a slope is believed
-constexpr double ridge = 1e-12;        // share of the spread: keeps directions that were never moved at slope zero
+constexpr double ridge = 1e-12;        // share of each spread: keeps directions that were never moved at slope zero
 
 }  // namespace
 
@@ -42,7 +42,8 @@ Inputs LocalModel::slope() const noexcept {
   if (!(size > 0.0)) return Inputs::Zero(cross_.size());
   if (cross_.size() == 1) return cross_ / size;
   InputMatrix regular = spread_;
-  regular.diagonal().array() += ridge * size;
+  for (Eigen::Index i = 0; i < cross_.size(); ++i)
+    regular(i, i) = spread_(i, i) > 0.0 ? (1.0 + ridge) * spread_(i, i) : 1.0;
   return regular.llt().solve(cross_);
 }
 

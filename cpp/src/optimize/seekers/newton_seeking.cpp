@@ -10,16 +10,20 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr double newton_unseen_bend = 0.68;  // |J''| A^2 over the noise: 0.051 for an amplitude of 2 and noise of 0.3
+constexpr double own_amplitude = 2.0;        // in scales of the inputs
 constexpr double own_reach = 5.0;            // bound of |Gamma| over the first one
 
 NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   const Eigen::Index n = s.space.size();
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
+  s.space = resolved(std::move(s.space));
+  s.dither.amplitude = or_scaled(std::move(s.dither.amplitude), own_amplitude, s.space);
   validate(s.dither, n, true);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
   if (s.rate.size() == 0) s.rate = s.dither.amplitude * (3.0 / s.dither.period);
   validate_entries("rate", s.rate, n, 0.0);
+  s.rate = within_rates(std::move(s.rate), s.space);
   for (const auto& [name, value, upper] :
        {std::tuple{"time_constant_cycles", s.time_constant_cycles, 1e9},
         std::tuple{"hessian_rate", s.hessian_rate, 1.0}, std::tuple{"riccati_rate", s.riccati_rate, 1.0},

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::optimize {
 namespace {
+
+constexpr double scales_in_bounds = 40.0;  // degrees of crank angle between usual bounds of a timing
 
 std::string entry(std::string_view name, Eigen::Index i, Eigen::Index size) {
   return size == 1 ? std::string(name) : std::string(name) + "[" + std::to_string(i) + "]";
@@ -33,6 +37,85 @@ void validate_entries(std::string_view name, const Inputs& values, Eigen::Index 
                            "must be > " + text(lower) + (upper < unlimited ? " and <= " + text(upper) : std::string()));
     }
   }
+}
+
+void validate(const std::vector<Input>& inputs) {
+  if (inputs.size() > max_inputs) {
+    throw about("inputs", ShapeError("inputs has " + std::to_string(inputs.size()) + " entries: at most " +
+                                     std::to_string(max_inputs) + " inputs are possible"));
+  }
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const Input& one = inputs[i];
+    const auto refuse = [&](const char* field, double value, const std::string& why) {
+      throw ParameterError("inputs: " + one.name + " " + field, value, why);
+    };
+    if (one.name.empty()) throw about("inputs", ParameterError("inputs: a name is empty: say what is set"));
+    for (std::size_t k = 0; k < i; ++k) {
+      if (inputs[k].name == one.name) throw about("inputs", ParameterError("inputs: " + one.name + ": each name once"));
+    }
+    if (!(one.lower < one.upper)) refuse("lower", one.lower, "must be < upper = " + text(one.upper));
+    if (std::isfinite(one.lower) && std::isfinite(one.upper) && !is_reading(one.upper - one.lower)) {
+      refuse("upper", one.upper, "must be within " + text(largest_reading) + " of lower = " + text(one.lower));
+    }
+    if (!(one.scale >= 0.0 && is_reading(one.scale))) {
+      refuse("scale", one.scale, "must be > 0 and finite, or 0 for a fortieth of the bounds");
+    }
+    if (!(one.rate > 0.0)) refuse("rate", one.rate, "must be > 0");
+  }
+}
+
+SearchSpace resolved(SearchSpace space) {
+  if (space.inputs.empty()) return space;
+  validate(space.inputs);
+  const Eigen::Index n = space.size();
+  if (static_cast<Eigen::Index>(space.inputs.size()) != n) {
+    throw about("inputs", ShapeError("inputs has " + std::to_string(space.inputs.size()) + " entries: must have " +
+                                     std::to_string(n) + ", one per entry of start"));
+  }
+  for (const auto& [name, given, own] :
+       {std::tuple{"lower", &space.lower, &Input::lower}, std::tuple{"upper", &space.upper, &Input::upper}}) {
+    if (given->size() != n) *given = Inputs::Constant(n, given->size() == 1 ? (*given)[0] : 0.0);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Input& one = space.inputs[static_cast<std::size_t>(i)];
+      double& bound = (*given)[i];
+      if (std::isfinite(bound) && bound != one.*own) {
+        throw ParameterError(entry(name, i, n), bound,
+                             "must be left out, or " + text(one.*own) + " as inputs say of " + one.name);
+      }
+      bound = one.*own;
+    }
+  }
+  return space;
+}
+
+Inputs scale_of(const SearchSpace& space) noexcept {
+  Inputs scale(space.size());
+  for (Eigen::Index i = 0; i < scale.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double said = at < space.inputs.size() ? space.inputs[at].scale : 0.0;
+    const bool bounded = i < space.lower.size() && i < space.upper.size();
+    const double width = bounded ? space.upper[i] - space.lower[i] : unlimited;
+    scale[i] = said > 0.0 ? said : width > 0.0 && is_reading(width) ? width / scales_in_bounds : 1.0;
+  }
+  return scale;
+}
+
+Inputs for_each_input(Inputs values, Eigen::Index inputs) {
+  if (values.size() != 1) return values;
+  return Inputs::Constant(inputs, values[0]);
+}
+
+Inputs or_scaled(Inputs values, double factor, const SearchSpace& space) {
+  if (values.size() > 0) return for_each_input(std::move(values), space.size());
+  return factor * scale_of(space);
+}
+
+Inputs within_rates(Inputs values, const SearchSpace& space) noexcept {
+  for (std::size_t i = 0; i < space.inputs.size(); ++i) {
+    double& value = values[static_cast<Eigen::Index>(i)];
+    value = std::min(value, space.inputs[i].rate);
+  }
+  return values;
 }
 
 void validate(const SearchSpace& space, const Inputs& reach) {

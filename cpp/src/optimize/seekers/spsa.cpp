@@ -20,19 +20,27 @@ constexpr int clamp_window = 6;              // measurements, at least, before a
 constexpr double least_perturbation = 0.25;  // of the perturbation: with less applied a slope is not computed
 constexpr double perturbation_rate = 0.25;   // how fast the perturbation follows its target, per iteration
 constexpr double second_order_gain = 3.0;
+constexpr double own_perturbation = 1.5;   // in scales of the inputs
 constexpr double spsa_unseen_bend = 0.38;  // |J''| c^2 over the noise: 0.051 for a perturbation of 1.5 and noise of 0.3
 
 SpsaSettings checked(SpsaSettings s) {
   const bool second = s.form == SpsaForm::second_order;
-  if (second && !s.gain) s.gain = second_order_gain;
-  if (second && !s.initial_hessian && s.curvature && *s.curvature != 0.0) s.initial_hessian = -std::abs(*s.curvature);
-  require_positive("perturbation", s.perturbation);
-  if (!s.step_max) s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
-  if (s.gain) require_positive("gain", *s.gain);
-  if (!(*s.step_max > 0.0)) throw ParameterError("step_max", *s.step_max, "must be > 0");
-  validate_curvature(s.curvature);
   const Eigen::Index n = s.space.size();
-  validate(s.space, Inputs::Constant(n, s.perturbation * (second ? 2.0 : 1.0)));
+  s.space = resolved(std::move(s.space));
+  for (Inputs* values : {&s.gain, &s.step_max, &s.initial_hessian})
+    *values = for_each_input(std::move(*values), n);
+  if (second && s.gain.size() == 0) s.gain = Inputs::Constant(n, second_order_gain);
+  if (second && s.initial_hessian.size() == 0 && s.curvature && *s.curvature != 0.0)
+    s.initial_hessian = Inputs::Constant(n, -std::abs(*s.curvature));
+  s.perturbation = or_scaled(std::move(s.perturbation), own_perturbation, s.space);
+  validate_entries("perturbation", s.perturbation, n, 0.0, largest_reading);
+  if (s.step_max.size() == 0)
+    s.step_max = s.perturbation * (s.form == SpsaForm::one_measurement ? 1.0 / 5.0 : 4.0 / 3.0);
+  if (s.gain.size() > 0) validate_entries("gain", s.gain, n, 0.0, largest_reading);
+  validate_entries("step_max", s.step_max, n, 0.0);
+  s.step_max = within_rates(std::move(s.step_max), s.space);
+  validate_curvature(s.curvature);
+  validate(s.space, s.perturbation * (second ? 2.0 : 1.0));
   if (!(s.stability >= 0.0 && std::isfinite(s.stability))) {
     throw ParameterError("stability", s.stability, "must be >= 0 and finite");
   }
@@ -53,8 +61,11 @@ SpsaSettings checked(SpsaSettings s) {
   if (!(s.noise_sd >= 0.0 && std::isfinite(s.noise_sd))) {
     throw ParameterError("noise_sd", s.noise_sd, "must be >= 0 and finite");
   }
-  if (s.initial_hessian && !(*s.initial_hessian < 0.0 && std::isfinite(*s.initial_hessian))) {
-    throw ParameterError("initial_hessian", *s.initial_hessian, "must be < 0, as at a maximum");
+  if (s.initial_hessian.size() > 0) {
+    validate_entries("initial_hessian", s.initial_hessian, n, -unlimited);
+    for (const double value : s.initial_hessian) {
+      if (!(value < 0.0)) throw ParameterError("initial_hessian", value, "must be < 0, as at a maximum");
+    }
   }
   require_positive("hessian_prior", s.hessian_prior);
   if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {
@@ -67,9 +78,9 @@ SpsaSettings checked(SpsaSettings s) {
 
 std::vector<std::string> SpsaSettings::advice() const {
   const bool second = form == SpsaForm::second_order;
-  if (!second && !(curvature && gain)) return {};
+  if (!second && !(curvature && gain.size() > 0)) return {};
   const double bend = second ? 1.0 : std::abs(*curvature);
-  const double first = gain.value_or(second_order_gain);
+  const double first = gain.size() > 0 ? gain.maxCoeff() : second_order_gain;
   const double now = schedule == GainSchedule::constant ? first : first / std::pow(1.0 + stability, gain_exponent);
   if (!(now * bend > 1.0)) return {};
   return {"gain: the first step factor a_0 |J''| = " + text(now * bend) +
@@ -80,17 +91,19 @@ std::vector<std::string> SpsaSettings::advice() const {
 Spsa::Spsa(SpsaSettings settings)
     : SeekerCore(checked(std::move(settings)), [](const SpsaSettings&) { return 2.0 * memory; }),
       trend_(settings_.space.size(), memory),
-      first_(Inputs::Constant(settings_.space.size(), settings_.perturbation), spsa_unseen_bend,
-             settings_.form == SpsaForm::second_order ? !settings_.initial_hessian : !settings_.gain,
+      first_(settings_.perturbation, spsa_unseen_bend,
+             (settings_.form == SpsaForm::second_order ? settings_.initial_hessian : settings_.gain).size() == 0,
              settings_.curvature),
       candidate_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       sum_(gradient_),
-      hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian.value_or(0.0)),
-      hessian_sum_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
-      metric_(InputMatrix::Identity(estimate_.size(), estimate_.size())),
+      hessian_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
+      hessian_sum_(hessian_),
+      metric_(metric_of(settings_.perturbation)),
       missed_(InputMatrix::Zero(estimate_.size(), 4)),
-      measured_(4, 0.0) {}
+      measured_(4, 0.0) {
+  if (settings_.initial_hessian.size() > 0) hessian_.diagonal() = settings_.initial_hessian;
+}
 
 int Spsa::per_gradient() const noexcept {
   switch (settings_.form) {
@@ -108,18 +121,23 @@ int Spsa::measurements_per_iteration() const noexcept {
   return per_gradient() * settings_.averaging + (settings_.blocking ? 1 : 0);
 }
 
-std::optional<double> Spsa::gain() const noexcept {
-  if (settings_.gain || first_.open()) return settings_.gain;
-  return 1.0 / first_.largest_bend();
+Inputs Spsa::gain() const noexcept {
+  if (settings_.gain.size() > 0 || first_.open()) return settings_.gain;
+  return first_.even_steps(1.0);
 }
 
-double Spsa::gain_now() const noexcept {
-  const double first = gain().value_or(0.0);
+Inputs Spsa::gain_now() const noexcept {
+  Inputs first = gain();
   if (settings_.schedule == GainSchedule::constant) return first;
   return first / std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
 }
 
-double Spsa::perturbation_now() const noexcept {
+// How far an input is applied from the estimate at most.
+Inputs Spsa::widest() const noexcept {
+  return settings_.perturbation * (settings_.form == SpsaForm::second_order ? 2.0 : 1.0);
+}
+
+Inputs Spsa::perturbation_now() const noexcept {
   if (settings_.schedule == GainSchedule::constant) return share_ * settings_.perturbation;
   return share_ * settings_.perturbation /
          std::pow(static_cast<double>(iteration_) + 1.0, settings_.perturbation_exponent);
@@ -137,11 +155,11 @@ const Inputs& Spsa::ask() noexcept {
   if (stage_ == std::int64_t{per} * settings_.averaging) {
     applied_ = candidate_;
   } else {
-    const double c = perturbation_now();
+    const Inputs c = perturbation_now();
     const auto within = static_cast<int>(stage_) % per;
     for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
-      applied_[i] = estimate_[i] + (within % 2 == 0 ? c : -c) * direction(0, i);
-      if (within >= 2) applied_[i] += c * direction(1, i);
+      applied_[i] = estimate_[i] + (within % 2 == 0 ? c[i] : -c[i]) * direction(0, i);
+      if (within >= 2) applied_[i] += c[i] * direction(1, i);
     }
   }
   return protocol_.ask(applied_);
@@ -156,7 +174,7 @@ void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
   filter_.record(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);
-    if (!first_.open() && !settings_.initial_hessian) hessian_.diagonal() = -first_.bend();
+    if (!first_.open() && settings_.initial_hessian.size() == 0) hessian_.diagonal() = -first_.bend();
     return;
   }
   const int gradients_end = per_gradient() * settings_.averaging;
@@ -190,10 +208,10 @@ void Spsa::watch(const Inputs& applied) noexcept {
 }
 
 // Adds a rise of J over the perturbation `c` times the direction, less what the plant did not apply of it.
-void Spsa::add_slope(double rise, double c, const Inputs& missed) noexcept {
+void Spsa::add_slope(double rise, const Inputs& c, const Inputs& missed) noexcept {
   for (Eigen::Index i = 0; i < sum_.size(); ++i) {
-    const double distance = c * direction(0, i) + missed[i];
-    if (std::abs(distance) > least_perturbation * c) sum_[i] += rise / distance;
+    const double distance = c[i] * direction(0, i) + missed[i];
+    if (std::abs(distance) > least_perturbation * c[i]) sum_[i] += rise / distance;
   }
 }
 
@@ -201,7 +219,7 @@ void Spsa::add_slope(double rise, double c, const Inputs& missed) noexcept {
 void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   const int per = per_gradient();
   const auto within = static_cast<std::size_t>(stage_) % static_cast<std::size_t>(per);
-  const double c = perturbation_now();
+  const Inputs c = perturbation_now();
   measured_[within] = j;
   missed_.col(static_cast<Eigen::Index>(within)) = applied - applied_;
   if (settings_.form == SpsaForm::one_measurement) {
@@ -215,33 +233,36 @@ void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   if (within + 1 < static_cast<std::size_t>(per)) return;
   add_slope(measured_[0] - measured_[1], 2.0 * c, missed_.col(0) - missed_.col(1));
   const InputMatrix uneven = missed_.colwise() - missed_.col(0);  // an offset common to all four does not matter
-  if (settings_.form == SpsaForm::second_order && uneven.cwiseAbs().maxCoeff() > least_perturbation * c) {
+  const bool cut_off = (uneven.cwiseAbs().rowwise().maxCoeff().array() > least_perturbation * c.array()).any();
+  if (settings_.form == SpsaForm::second_order && cut_off) {
     hessian_sum_ += hessian_;  // perturbations that are cut off bend whatever they measure
   } else if (settings_.form == SpsaForm::second_order) {
-    const double bend = ((measured_[2] - measured_[0]) - (measured_[3] - measured_[1])) / (2.0 * c * c);
+    const double bend = ((measured_[2] - measured_[0]) - (measured_[3] - measured_[1])) / 2.0;
     for (Eigen::Index i = 0; i < sum_.size(); ++i) {
       for (Eigen::Index k = 0; k < sum_.size(); ++k) {
-        hessian_sum_(i, k) += 0.5 * bend * (direction(0, i) * direction(1, k) + direction(1, i) * direction(0, k));
+        hessian_sum_(i, k) +=
+            0.5 * bend / (c[i] * c[k]) * (direction(0, i) * direction(1, k) + direction(1, i) * direction(0, k));
       }
     }
   }
   ++draw_;
 }
 
-// -H with H shifted until it bends down in every direction, at least a fifth as much as at the start.
+// -H with H shifted until it bends down in every direction, at least a fifth as much as at the start; directions are
+// those of inputs counted in perturbations.
 InputMatrix Spsa::bent_down() noexcept {
   const double q = settings_.averaging;
   const double seen = static_cast<double>(iteration_) + settings_.hessian_prior;
   hessian_ += (hessian_sum_ / q - hessian_) / (seen + 1.0);
   hessian_sum_.setZero();
-  const double least =
-      0.2 * (settings_.initial_hessian ? std::abs(*settings_.initial_hessian) : first_.bend().minCoeff());
-  const auto n = hessian_.rows();
-  const InputMatrix floor = InputMatrix::Identity(n, n) * least;
+  const Inputs& first = settings_.initial_hessian.size() > 0 ? settings_.initial_hessian : first_.bend();
+  const Inputs squares = settings_.perturbation.cwiseAbs2();
+  const Inputs least = 0.2 * first.cwiseAbs().cwiseProduct(squares).minCoeff() * squares.cwiseInverse();
+  const InputMatrix floor = least.asDiagonal();
   InputMatrix bent = -hessian_;
-  for (double shift = least; Eigen::LLT<InputMatrix>(bent - floor).info() != Eigen::Success && shift < 1e300;
+  for (double shift = 1.0; Eigen::LLT<InputMatrix>(bent - floor).info() != Eigen::Success && shift < 1e300;
        shift *= 2.0)
-    bent.diagonal().array() += shift;
+    bent.diagonal() += shift * least;
   return bent;
 }
 
@@ -256,13 +277,12 @@ void Spsa::finish_iteration() noexcept {
     direction = bent.solve(gradient_);
     if (!settings_.limits.empty()) metric_ = bent.solve(InputMatrix::Identity(direction.size(), direction.size()));
   }
-  Inputs step = gain_now() * share_ * share_ * direction;
-  const Inputs most = Inputs::Constant(step.size(), settings_.step_max.value_or(unlimited));
-  const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
-  const Inputs widest = Inputs::Constant(step.size(), settings_.perturbation * (second ? 2.0 : 1.0));
-  step = filter_.project(estimate_, step, {settings_.space, widest, reach, most, most, metric_});
+  Inputs step = share_ * share_ * gain_now().cwiseProduct(direction);
+  const Inputs& most = settings_.step_max;
+  const Inputs reach = perturbation_now() * (second ? 2.0 : 1.0), room = widest();
+  step = filter_.project(estimate_, step, {settings_.space, room, reach, most, most, metric_});
   candidate_ = estimate_;
-  move_within(candidate_, step, settings_.space, widest, clamp_, Inputs::Zero(step.size()));
+  move_within(candidate_, step, settings_.space, room, clamp_, Inputs::Zero(step.size()));
   share_ += perturbation_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 
@@ -281,8 +301,7 @@ void Spsa::restart() noexcept {
 }
 
 void Spsa::shift_estimate(const Inputs& by) noexcept {
-  const double widest = settings_.perturbation * (settings_.form == SpsaForm::second_order ? 2.0 : 1.0);
-  const Inputs reach = Inputs::Constant(by.size(), widest);
+  const Inputs reach = widest();
   move_within(estimate_, by, settings_.space, reach);
   move_within(candidate_, by, settings_.space, reach);
 }

@@ -28,9 +28,9 @@ constexpr auto fields_of(const ComponentLag&) {
 }
 
 struct DitherSettings {
-  Inputs amplitude = scalar_input(1.0);  ///< per input, in its unit, > 0
-  int period = 10;                       ///< M, cycles of the common window, >= 4
-  std::vector<int> harmonics{1};         ///< n_i, one per input
+  Inputs amplitude{};             ///< per input, in its unit, > 0; empty: its scale, twice that in the Newton form
+  int period = 10;                ///< M, cycles of the common window, >= 4
+  std::vector<int> harmonics{1};  ///< n_i, one per input
 };
 
 template <auto place>

@@ -26,8 +26,11 @@ class FirstReadings {
   void learn(const Inputs& applied, double j) noexcept;
   /// |J''| to reckon with, per input, > 0 once nothing is open and something was wanted.
   const Inputs& bend() const noexcept { return bend_; }
-  /// Of the input that bends most; for seekers with one gain for all.
-  double largest_bend() const noexcept { return bend_.maxCoeff(); }
+  /// Step per slope that takes all inputs alike, counted in reaches: `share` over J'' for the one that bends most.
+  Inputs even_steps(double share) const noexcept {
+    const Inputs squares = reach_.cwiseAbs2();
+    return share / bend_.cwiseProduct(squares).maxCoeff() * squares;
+  }
   /// The estimate has been moved: what is not closed begins anew.
   void restart() noexcept;
   /// ParameterError for a restored state that these settings do not allow.

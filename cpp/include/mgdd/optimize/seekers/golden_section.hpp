@@ -18,18 +18,18 @@ struct GoldenSectionSettings {
   double noise_sd = 0.0;      ///< of one measurement of J; 0 = exact, every comparison is believed
   double significance = 2.0;  ///< standard errors that decide a comparison
   int samples_max = 8;        ///< measurements of each inner point before a draw
-  double tolerance = 0.02;    ///< bracket width at which an exact search ends, input unit, > 0
+  double tolerance = 0.0;     ///< bracket width at which an exact search ends, input unit; 0 = a fiftieth of its scale
   bool maximize = true;
   std::vector<Limit> limits;
 };
 inline auto fields_of(const GoldenSectionSettings&) {
   using S = GoldenSectionSettings;
   return std::tuple{
-      space_fields<&S::space, DefaultForm::required>(),
+      space_fields<&S::space>(),
       field<&S::noise_sd>("noise_sd", "of one measurement of J"),
       field<&S::significance>("significance", "standard errors that decide a comparison"),
       field<&S::samples_max>("samples_max", "measurements of each inner point"),
-      field<&S::tolerance>("tolerance", "width of the bracket at which an exact search ends"),
+      field<&S::tolerance>("tolerance", "width of the bracket at which an exact search ends", DefaultForm::none),
       field<&S::maximize>("maximize", "False to minimise J"),
       field<&S::limits>("limits", "measured quantities to keep"),
   };

@@ -17,11 +17,11 @@ namespace mgdd::optimize {
 
 struct GradientDescentSettings {
   SearchSpace space;
-  /// lambda_c, squared input unit per unit of J, > 0; none: 1/(2 |J''|) by `curvature` or first readings
-  std::optional<double> step_size{};
-  double difference = 1.0;       ///< c in input units, > 0
+  /// lambda_c, squared input unit per unit of J, per input, > 0; empty: 1/(2 |J''|) by `curvature` or first readings
+  Inputs step_size{};
+  Inputs difference{};           ///< c per input, in its unit, > 0; empty: its scale
   Inputs rate{};                 ///< largest change per step; empty: none, or 4 c with a step size of its own
-  double tolerance = 0.02;       ///< converged once every entry of a step is below it, input unit
+  Inputs tolerance{};            ///< converged once every entry of a step is below it; empty: a fiftieth of the scale
   std::int64_t iterations = 60;  ///< steps after which an unconverged search says so; it goes on all the same
   bool maximize = true;
   std::vector<Limit> limits;
@@ -33,10 +33,10 @@ inline auto fields_of(const GradientDescentSettings&) {
   using S = GradientDescentSettings;
   return std::tuple{
       space_fields<&S::space>(),
-      field<&S::step_size>("step_size", "of the step"),
-      field<&S::difference>("difference", "of the input"),
+      field<&S::step_size>("step_size", "of the step, per input"),
+      field<&S::difference>("difference", "of the two measurements to the estimate, per input"),
       field<&S::rate>("rate", "largest change per step, per input"),
-      field<&S::tolerance>("tolerance", "converged once every entry of a step is below"),
+      field<&S::tolerance>("tolerance", "converged once every entry of a step is below, per input"),
       field<&S::iterations>("iterations", "steps after which a search that has not converged says so"),
       field<&S::maximize>("maximize", "False to minimise J"),
       field<&S::limits>("limits", "measured quantities to keep"),
@@ -54,15 +54,13 @@ class GradientDescent : public SeekerCore<GradientDescentSettings> {
 
   const Inputs& gradient() const noexcept { return gradient_; }
   std::int64_t iteration() const noexcept { return iteration_; }
-  /// lambda_c in use; none while the first readings are taken.
-  std::optional<double> step_size() const noexcept;
+  /// lambda_c in use, per input; empty while the first readings are taken.
+  Inputs step_size() const noexcept;
   /// The step at which the tolerance was met first, counting that step; -1 before, and after `iterations` without.
   std::int64_t converged_at() const noexcept { return converged_at_; }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
-  void shift_estimate(const Inputs& by) noexcept {
-    move_within(estimate_, by, settings_.space, Inputs::Constant(by.size(), settings_.difference));
-  }
+  void shift_estimate(const Inputs& by) noexcept { move_within(estimate_, by, settings_.space, settings_.difference); }
 
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const {
@@ -84,7 +82,7 @@ class GradientDescent : public SeekerCore<GradientDescentSettings> {
 
  private:
   void learn(const Reading& reading, const Inputs& applied) noexcept;
-  double move(Inputs step) noexcept;
+  bool move(Inputs step) noexcept;
 
   FirstReadings first_;
   Inputs gradient_;

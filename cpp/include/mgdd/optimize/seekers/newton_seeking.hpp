@@ -19,7 +19,7 @@ namespace mgdd::optimize {
 
 struct NewtonSeekingSettings {
   SearchSpace space;
-  DitherSettings dither{.amplitude = scalar_input(2.0), .period = 10, .harmonics = {1}};
+  DitherSettings dither;
   double time_constant_cycles = 40.0;  ///< tau of the approach
   double hessian_rate = 0.03;          ///< low-pass of H per cycle
   double riccati_rate = 0.02;          ///< w_r

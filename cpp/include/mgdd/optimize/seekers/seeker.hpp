@@ -7,8 +7,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <tuple>
+#include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/record.hpp"
@@ -18,22 +20,61 @@
 
 namespace mgdd::optimize {
 
+/// What an input is called, its unit, what may be applied of it, and what counts as a step of it.
+struct Input {
+  std::string name;
+  double lower = -unlimited;
+  double upper = unlimited;
+  std::string unit{};       ///< empty: what the name says
+  double scale = 0.0;       ///< > 0: what steps are counted in, unit of the input; 0 = a fortieth of the bounds, or 1
+  double rate = unlimited;  ///< largest change of the estimate per step, > 0, unit of the input
+
+  bool operator==(const Input&) const = default;
+};
+constexpr auto fields_of(const Input&) {
+  using I = Input;
+  return std::tuple{field<&I::name>("name", "what is set", DefaultForm::required),
+                    field<&I::lower>("lower", "least applied value"),
+                    field<&I::upper>("upper", "largest applied value"),
+                    field<&I::unit>("unit", "of the input"),
+                    field<&I::scale>("scale", "what steps are counted in; 0: a fortieth of the bounds, or 1"),
+                    field<&I::rate>("rate", "largest change of the estimate per step")};
+}
+/// ParameterError or ShapeError naming the entry.
+void validate(const std::vector<Input>& inputs);
+
 /// Where to start and what may be applied, per input; infinite: not bounded on that side.
 struct SearchSpace {
   Inputs start = scalar_input(0.0);
   Inputs lower = scalar_input(-unlimited);
   Inputs upper = scalar_input(unlimited);
+  std::vector<Input> inputs{};  ///< none, or one for each, whose bounds count then
 
   Eigen::Index size() const noexcept { return start.size(); }
 };
+/// The same with the bounds of its inputs; ParameterError or ShapeError where they contradict what else was given.
+SearchSpace resolved(SearchSpace space);
+/// What steps are counted in, per input: as its input says, or a fortieth of the bounds, or 1 where there are none.
+Inputs scale_of(const SearchSpace& space) noexcept;
+/// One number for all inputs as one for each; anything else as it is.
+Inputs for_each_input(Inputs values, Eigen::Index inputs);
+/// The same, or `factor` scales where nothing is given.
+Inputs or_scaled(Inputs values, double factor, const SearchSpace& space);
+/// Squares of lengths as a metric of steps, the largest as one.
+inline InputMatrix metric_of(const Inputs& lengths) {
+  return (lengths / lengths.maxCoeff()).cwiseAbs2().asDiagonal();
+}
+/// The smaller of each entry and the rate that its input says.
+Inputs within_rates(Inputs values, const SearchSpace& space) noexcept;
 
 /// Start and bounds, first in the table of every seeker: what comes per input is counted by them.
-template <auto place, DefaultForm bounds = DefaultForm::value>
+template <auto place>
 constexpr auto space_fields() {
   using S = SearchSpace;
   return std::tuple{field<place, &S::start>("start", "first estimate, per input", DefaultForm::required),
-                    field<place, &S::lower>("lower", "least applied input, per input", bounds),
-                    field<place, &S::upper>("upper", "largest applied input, per input", bounds)};
+                    field<place, &S::lower>("lower", "least applied input, per input"),
+                    field<place, &S::upper>("upper", "largest applied input, per input"),
+                    field<place, &S::inputs>("inputs", "names, units, bounds and scales", DefaultForm::none)};
 }
 
 /// ParameterError or ShapeError naming the entry; `reach` is how far a seeker goes to either side of its estimate,

@@ -28,21 +28,21 @@ struct SpsaSettings {
   SearchSpace space;
   SpsaForm form = SpsaForm::first_order;
   GainSchedule schedule = GainSchedule::decreasing;
-  /// a, squared input unit per unit of J; none: 1/|J''| by `curvature` or first readings. Second order: dimensionless,
-  /// 3
-  std::optional<double> gain{};
+  /// a, squared input unit per unit of J, per input; empty: 1/|J''| by `curvature` or first readings. Second order:
+  /// dimensionless, 3
+  Inputs gain{};
   double stability = 50.0;               ///< A
   double gain_exponent = 0.602;          ///< alpha
-  double perturbation = 1.5;             ///< c in input units, > 0
+  Inputs perturbation{};                 ///< c per input, in its unit, > 0; empty: 1.5 scales
   double perturbation_exponent = 0.101;  ///< gamma
-  std::optional<double> step_max{};      ///< largest change per iteration and input; none: 4/3 c, one measurement c/5
+  Inputs step_max{};                     ///< largest change per iteration; empty: 4/3 c, one measurement c/5
   int averaging = 1;                     ///< gradients per iteration
   bool blocking =
       false;  ///< accept a step only if J there is not below its mean around the old estimate less 2 noise_sd
-  double noise_sd = 0.0;                    ///< of one measurement of J, for blocking
-  std::optional<double> initial_hessian{};  ///< second order: curvature to begin with, < 0; none: as for `gain`
-  double hessian_prior = 20.0;              ///< ... and how many iterations it counts for
-  double limit_amplitude = 0.5;             ///< share of c while a limit holds the estimate back
+  double noise_sd = 0.0;         ///< of one measurement of J, for blocking
+  Inputs initial_hessian{};      ///< second order: curvature to begin with, < 0; empty: as for `gain`
+  double hessian_prior = 20.0;   ///< ... and how many iterations it counts for
+  double limit_amplitude = 0.5;  ///< share of c while a limit holds the estimate back
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
@@ -56,16 +56,16 @@ inline auto fields_of(const SpsaSettings&) {
       space_fields<&S::space>(),
       field<&S::form>("form", "order of the step"),
       field<&S::schedule>("schedule", "how gain and perturbation change"),
-      field<&S::gain>("gain", "of the step"),
+      field<&S::gain>("gain", "of the step, per input"),
       field<&S::stability>("stability", "iterations that the first gains count for"),
       field<&S::gain_exponent>("gain_exponent", "decay of the gain"),
-      field<&S::perturbation>("perturbation", "of the input"),
+      field<&S::perturbation>("perturbation", "of every input"),
       field<&S::perturbation_exponent>("perturbation_exponent", "decay of the perturbation"),
-      field<&S::step_max>("step_max", "largest change per iteration and input"),
+      field<&S::step_max>("step_max", "largest change per iteration, per input"),
       field<&S::averaging>("averaging", "gradients per iteration"),
       field<&S::blocking>("blocking", "refuse steps that lose"),
       field<&S::noise_sd>("noise_sd", "of one measurement of J"),
-      field<&S::initial_hessian>("initial_hessian", "curvature to begin with"),
+      field<&S::initial_hessian>("initial_hessian", "diagonal to begin with"),
       field<&S::hessian_prior>("hessian_prior", "iterations that it counts for"),
       field<&S::limit_amplitude>("limit_amplitude", "share of the dither while a limit holds the estimate back"),
       field<&S::seed>("seed", "of the random signs"),
@@ -90,8 +90,8 @@ class Spsa : public SeekerCore<SpsaSettings> {
   const Inputs& gradient() const noexcept { return gradient_; }
   const InputMatrix& hessian() const noexcept { return hessian_; }
   std::int64_t iteration() const noexcept { return iteration_; }
-  /// a in use; none while the first readings are taken.
-  std::optional<double> gain() const noexcept;
+  /// a in use, per input; empty while the first readings are taken.
+  Inputs gain() const noexcept;
   std::int64_t blocked() const noexcept { return blocked_; }
   int measurements_per_iteration() const noexcept;
 
@@ -129,12 +129,13 @@ class Spsa : public SeekerCore<SpsaSettings> {
 
  private:
   void learn(const Reading& reading, const Inputs& applied) noexcept;
-  double gain_now() const noexcept;
-  double perturbation_now() const noexcept;
+  Inputs gain_now() const noexcept;
+  Inputs perturbation_now() const noexcept;
+  Inputs widest() const noexcept;
   int per_gradient() const noexcept;
   double direction(int kind, Eigen::Index input) const noexcept;
   void watch(const Inputs& applied) noexcept;
-  void add_slope(double rise, double c, const Inputs& missed) noexcept;
+  void add_slope(double rise, const Inputs& c, const Inputs& missed) noexcept;
   void finish_gradient(double j, const Inputs& applied) noexcept;
   void finish_iteration() noexcept;
   InputMatrix bent_down() noexcept;
@@ -143,7 +144,7 @@ class Spsa : public SeekerCore<SpsaSettings> {
   FirstReadings first_;
   Inputs candidate_, gradient_, sum_;
   InputMatrix hessian_, hessian_sum_;
-  InputMatrix metric_;            // inverse of the bend, or one
+  InputMatrix metric_;            // inverse of the bend, or squares of the perturbation
   InputMatrix missed_;            // applied less asked, per input and measurement of the gradient at work
   std::vector<double> measured_;  // of the gradient at work
   std::int64_t iteration_ = 0;    // of the gains

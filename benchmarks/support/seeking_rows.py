@@ -1,0 +1,76 @@
+"""Rows of the tables of seeking: a seeker of ours on a map as a contender, and one run of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from peers.peer_seekers import Contender, Plant, Point, like, run_to_end
+from support.seeking_maps import CountedPlant, SeekingMap
+
+from mgdd import optimize
+
+OnMap = Callable[[SeekingMap], Contender]
+Make = Callable[[SeekingMap, Point, int], optimize.Seeker]  # map, start, seed
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table."""
+
+    name: str
+    contender: OnMap
+    is_tested: bool = False  # set beside the best of the others
+    is_bayes: bool = False
+    must_arrive: bool = False
+
+
+def driven(make: Make) -> OnMap:
+    def on(field: SeekingMap) -> Contender:
+        def run(plant: Plant, start: Point, seed: int) -> None:
+            seeker = make(field, start, seed)
+            while True:
+                x = seeker.ask()
+                plant.estimate = like(start, seeker.estimate)
+                seeker.tell(plant(like(start, x)))
+
+        return run
+
+    return on
+
+
+def untouched(kind: Callable[..., optimize.Seeker], **settings: object) -> OnMap:
+    def make(field: SeekingMap, start: Point, seed: int) -> optimize.Seeker:
+        chance = {"seed": seed} if kind is optimize.Spsa else {}
+        return kind(start=start, lower=field.lower, upper=field.upper, **settings, **chance)
+
+    return driven(make)
+
+
+def tuned(method: str) -> OnMap:
+    """Given noise and curvature; the perturbation is kept inside the bounds at the start."""
+
+    def make(field: SeekingMap, start: Point, seed: int) -> optimize.Seeker:
+        room = 0.99 * float(np.min([start - field.lower, field.upper - start]))
+        found = optimize.tune(field.noise_sd, field.curvature, method=method)
+        if found.amplitude > room:
+            found = optimize.tune(field.noise_sd, field.curvature, method=method, amplitude_max=room)
+        return found.seeker(start=start, lower=field.lower, upper=field.upper, seed=seed)
+
+    return driven(make)
+
+
+def run_once(row: Row, field: SeekingMap, seed: int, *, noisy: bool = True) -> CountedPlant:
+    setting = field.setting(seed, noisy)
+    plant = CountedPlant(setting)
+    run_to_end(row.contender(field), plant, setting.start, seed)
+    return plant
+
+
+def check_agreement(rows: list[Row], field: SeekingMap) -> None:
+    """SystemExit where one that must arrive ends elsewhere without noise."""
+    for row in rows:
+        if row.must_arrive and not all(run_once(row, field, seed, noisy=False).near() for seed in (0, 1)):
+            sys.exit(f"{row.name} does not find the optimum of {field.name} without noise: nothing counted")

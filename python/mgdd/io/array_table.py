@@ -1,0 +1,186 @@
+"""Columns of a binary file, read from the disk where they are asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.io.files import Stamp
+from mgdd.io.table import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import DTypeLike, NDArray
+
+__all__ = ["ArrayTable", "Columns", "Named", "Reversed", "Samples", "columns_of", "naming_damage"]
+
+
+class Named(NamedTuple):
+    """An array of a file by name: whatever has a shape and a dtype, and gives numbers for slices."""
+
+    name: str
+    values: Any
+    unit: str = ""
+
+
+class Samples:
+    """A vector that a function reads from a first sample to one behind the last."""
+
+    def __init__(self, length: int, dtype: DTypeLike, read: Callable[[int, int], Any]) -> None:
+        self.shape, self.dtype, self._read = (length,), np.dtype(dtype), read
+
+    def __getitem__(self, index: tuple[slice]) -> Any:
+        start, stop, _ = index[0].indices(self.shape[0])
+        return self._read(start, stop)
+
+
+class Reversed:
+    """An array whose axes stand in the other order in the file, as MATLAB 7.3 writes them."""
+
+    def __init__(self, values: Any) -> None:
+        self.shape, self.dtype, self._values = values.shape[::-1], values.dtype, values
+
+    def __getitem__(self, index: tuple[Any, ...]) -> Any:
+        return np.asarray(self._values[index[::-1]]).T
+
+
+class _Column(NamedTuple):
+    """One column of an array: the axis of its samples, and what stands for the other axes."""
+
+    values: Any
+    along: int
+    across: int | None = None
+    number: int = 0
+
+    @property
+    def size(self) -> int:
+        return int(self.values.shape[self.along])
+
+    def block(self, rows: slice, count: int) -> NDArray[Any]:
+        """Read this column and those behind it, as rows."""
+        index: list[Any] = [0] * len(self.values.shape)
+        index[self.along] = rows
+        if self.across is None:
+            return np.asarray(self.values[tuple(index)])[None]
+        index[self.across] = slice(self.number, self.number + count)
+        found = np.asarray(self.values[tuple(index)])
+        return found.T if self.along < self.across else found
+
+
+Columns = list[tuple[str, str, _Column]]  # name, unit, column
+
+
+def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
+    """Give name, unit and column: a matrix column by column, along the samples of a vector, else its longer side."""
+    found = []
+    for name, values, unit in arrays:
+        axes = [k for k, size in enumerate(values.shape) if size != 1]
+        if values.dtype.kind in "fiub" and len(axes) in (1, 2) and 0 not in values.shape:
+            found.append((name, unit, values, axes))
+    lengths = {values.shape[axes[0]] for _, _, values, axes in found if len(axes) == 1} if along is None else {along}
+    columns: Columns = []
+    for name, unit, values, axes in found:
+        if len(axes) == 1:
+            columns.append((name, unit, _Column(values, axes[0])))
+            continue
+        rows, width = (values.shape[k] for k in axes)
+        turned = rows not in lengths and (width in lengths or width > rows)
+        down, across = axes[::-1] if turned else axes
+        for k in range(values.shape[across]):
+            columns.append((f"{name} {k + 1}".strip(), unit, _Column(values, down, across, k)))
+    return columns
+
+
+@dataclass(frozen=True)
+class ArrayTable(Table):
+    """Columns of a binary file; those of several rasters differ in length, also where few `window` rows are read."""
+
+    columns: tuple[_Column, ...]
+    stamp: Stamp | None = None
+    window: tuple[int, int | None] = (0, None)
+
+    @property
+    def width(self) -> int:
+        """Return the number of columns."""
+        return len(self.columns)
+
+    @property
+    def height(self) -> int:
+        """Return the number of rows of the first column in the window."""
+        return self._rows_of(self.columns[0])
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Return the number of rows that each column has in the file."""
+        return tuple(column.size for column in self.columns)
+
+    def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
+        """Return columns of one length as the rows of an array."""
+        columns = [self.columns[index] for index in indices]
+        if len({column.size for column in columns}) > 1:
+            sizes = ", ".join(f"{self.called(index)} has {self.columns[index].size}" for index in indices)
+            raise DataError(f"{self.source}: columns of different rasters, {sizes}: name columns of one")
+        out = np.empty((len(columns), self._rows_of(columns[0]) if columns else 0))
+        # Columns that stand side by side are read in one go: a file is read by rows.
+        runs = itertools.groupby(enumerate(columns), lambda each: (id(each[1].values), each[1].number - each[0]))
+        for _, run in runs:
+            (at, first), *others = run
+            count = 1 + len(others)
+            with self._reading():
+                place = out[at : at + count]
+                place[:] = _complete(first.block(slice(*self.window), count), place.shape)
+        return out
+
+    def part(self, start: int, stop: int) -> ArrayTable:
+        """Return the table of some rows, counted in the file; nothing is read."""
+        return replace(self, window=(start, stop))
+
+    def loaded(self) -> ArrayTable:
+        """Return the table with all of its arrays in memory."""
+        with self._reading():
+            held = {
+                id(each): _complete(np.asarray(each[(slice(None),) * len(each.shape)]), each.shape)
+                for each in {id(column.values): column.values for column in self.columns}.values()
+            }
+        columns = tuple(each._replace(values=held[id(each.values)]) for each in self.columns)
+        return replace(self, columns=columns, stamp=None)
+
+    def _rows_of(self, column: _Column) -> int:
+        return len(range(*slice(*self.window).indices(column.size)))
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[None]:
+        if self.stamp is None:
+            yield
+            return
+        self.stamp.require_same()
+        with naming_damage(self.stamp.file):
+            yield
+        self.stamp.require_same()
+
+
+def _complete(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Refuse fewer numbers than the head of a file told, which NumPy would repeat or leave out."""
+    if values.shape != shape:
+        raise ValueError(f"{values.shape} numbers where {shape} are said to be")
+    return values
+
+
+@contextlib.contextmanager
+def naming_damage(file: Path) -> Iterator[None]:
+    """Turn what a library raises of a file into a DataError that names it."""
+    try:
+        yield
+    except (ImportError, DataError):
+        raise
+    except Exception as error:  # of another library: any class
+        text = f"{type(error).__name__} {error}".strip()
+        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error

@@ -1,0 +1,81 @@
+"""Inputs by name: how they may be given, and what their units are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mgdd._core.optimize import Input
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.results.units import unit_of
+
+__all__ = ["inputs_of", "named_values", "unit_of_input", "with_inputs"]
+
+
+def inputs_of(inputs: Any) -> tuple[Input, ...]:
+    """Read inputs in either form: `Input` objects, or bounds by name.
+
+    Parameters
+    ----------
+    inputs : mapping of str to (float, float), or sequence of Input, optional
+        None for none.
+
+    Returns
+    -------
+    tuple of Input
+        In the order given.
+
+    Raises
+    ------
+    ParameterError
+        Neither of the two, a name twice, or bounds that are not two numbers with something between them.
+    """
+    if inputs is None:
+        return ()
+    if isinstance(inputs, Mapping):
+        out = list[Input]()
+        for name, bounds in inputs.items():
+            if isinstance(bounds, Input):
+                if bounds.name != name:
+                    raise ParameterError(f"inputs: {name!r} is called {bounds.name!r} in its Input: name it alike")
+                out.append(bounds)
+                continue
+            numbers = tuple(bounds) if isinstance(bounds, Sequence) and not isinstance(bounds, str) else ()
+            if len(numbers) != 2 or any(isinstance(n, bool) or not isinstance(n, int | float) for n in numbers):
+                raise ParameterError(f"inputs: {name} = {bounds!r}: must be (lower, upper), two numbers, or an Input")
+            out.append(Input(str(name), float(numbers[0]), float(numbers[1])))
+        return tuple(out)
+    if isinstance(inputs, Sequence) and all(isinstance(one, Input) for one in inputs):
+        names = [one.name for one in inputs]
+        if len(set(names)) < len(names):
+            raise ParameterError(f"inputs: {', '.join(names)}: each name once")
+        return tuple(inputs)
+    raise ParameterError(
+        f"inputs = {inputs!r}: must map names to bounds, for example {{'soc_cad': (-20.0, 5.0)}}, or be Input objects"
+    )
+
+
+def named_values(argument: str, values: Any, inputs: Sequence[Input]) -> Any:
+    """Put numbers by name into the order of the inputs; anything that is no mapping stays as it is."""
+    if not isinstance(values, Mapping):
+        return values
+    names = [one.name for one in inputs]
+    if not names:
+        raise ParameterError(f"{argument} = {dict(values)!r}: names need `inputs`, which say what they are")
+    if set(values) != set(names):
+        raise ShapeError(
+            f"{argument} has {', '.join(map(str, values))}: must have one number for each of {', '.join(names)}"
+        )
+    return [values[name] for name in names]
+
+
+def with_inputs(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Give the settings of a seeker with inputs as `Input` objects, and with numbers in their order."""
+    inputs = inputs_of(settings.get("inputs"))
+    own = {name: named_values(name, value, inputs) for name, value in settings.items() if name != "inputs"}
+    return {**own, "inputs": list(inputs)}
+
+
+def unit_of_input(given: Input) -> str:
+    """Return the unit of an input: its own, else what its name says."""
+    return given.unit or unit_of(given.name)

@@ -1,0 +1,389 @@
+"""Chunks of cycles: together they are the whole file bit for bit, in any format and form, within bounded memory."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mgdd.cli.main import main
+from mgdd.engine import Indicating, analyze, simulate
+from mgdd.errors import DataError, ParameterError
+from mgdd.io import pressure_chunks, pressure_trace, read_pressure
+from mgdd.io.any_table import read_any_table
+from mgdd.results.labels import ANGLE, check_labels
+from table_files import WITHOUT_UNITS, WRITERS
+
+# asammdf closes twice what it could not open.
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+STEP, COUNT = 2.0, 31
+CAD = np.arange(-360.0, 360.0, STEP)
+
+
+@pytest.fixture(autouse=True)
+def few_rows_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short file is read whole: let these be long ones."""
+    monkeypatch.setattr("mgdd.io.chunks._ROWS", 1000)
+    monkeypatch.setattr("mgdd.io.text_rows._BLOCK", 5000)
+
+
+def cycles_at(degrees: np.ndarray, tdc: float, count: int = COUNT) -> np.ndarray:
+    """Cycles of unlike height and noise over angles as in a file, whose firing TDC is given."""
+    rng = np.random.default_rng(7)
+    cad = (degrees - tdc + 360.0) % 720.0 - 360.0
+    height = 40.0 + 5.0 * rng.random((count, 1))
+    return 1.2 + height * np.exp(-(((cad - 8.0) / 35.0) ** 2)) + 0.05 * rng.random((count, degrees.size))
+
+
+def stacked(degrees: np.ndarray, tdc: float) -> dict[str, np.ndarray]:
+    return {"angle": np.tile(degrees, COUNT), "pcyl": cycles_at(degrees, tdc).ravel()}
+
+
+def require_whole(file: Path, cycles: int, **options: Any) -> list[xr.Dataset]:
+    whole = read_pressure(file, **options)
+    parts = list(pressure_chunks(file, cycles=cycles, **options))
+    for part in parts:
+        check_labels(part)
+        assert part["pressure_bar"].dims == ("cycle", ANGLE)
+        assert part.attrs["file"] == file.name
+        assert part[ANGLE].identical(whole[ANGLE])
+    assert [part.sizes["cycle"] for part in parts[:-1]] == [cycles] * (len(parts) - 1)
+    together = np.concatenate([part["pressure_bar"] for part in parts])
+    np.testing.assert_array_equal(together, whole["pressure_bar"])
+    np.testing.assert_array_equal(np.concatenate([part["cycle"] for part in parts]), whole["cycle"])
+    return parts
+
+
+def write_npy(file: Path, names: dict[str, np.ndarray], _: dict[str, str]) -> None:
+    with file.open("wb") as stream:
+        np.save(stream, np.column_stack(list(names.values())))
+
+
+def write_text(file: Path, names: dict[str, np.ndarray], units: dict[str, str]) -> None:
+    rows = [",".join(map(repr, row)) for row in np.column_stack(list(names.values())).tolist()]
+    heads = [",".join(names), ",".join(units.get(name, "-") for name in names)]
+    file.write_text("\n".join(["# bench 4", *heads, *rows]))
+
+
+FORMS: dict[str, Callable[..., None]] = {**WRITERS, "npy": write_npy, "text": write_text}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_chunks_of_every_format_are_the_whole_file(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "record"
+    FORMS[form](file, stacked(CAD, 0.0), {"angle": "deg", "pcyl": "bar"})
+    columns = (0, 1) if form == "npy" else ("angle", "pcyl")
+    unit = {"pressure_unit": "bar"} if form in WITHOUT_UNITS else {}
+    parts = require_whole(file, 7, angle_column=columns[0], pressure_column=columns[1], **unit)
+    assert len(parts) == 5
+    assert not any(part.attrs["warnings"] for part in parts)
+
+
+ZERO = np.arange(0.0, 720.0, STEP)
+
+
+@pytest.mark.parametrize("form", ["hdf5", "mat73", "parquet", "npz", "text"])
+@pytest.mark.parametrize("joined", [False, True])
+def test_a_column_per_cycle(form: str, joined: bool, tmp_path: Path) -> None:
+    """Joined ones begin at firing TDC: each column has the burn of the cycle that the column before compressed."""
+    file, angle = tmp_path / "record", ZERO if joined else CAD
+    names = {"angle": angle, **{f"p {k + 1}": row for k, row in enumerate(cycles_at(angle, 0.0))}}
+    if form in ("hdf5", "mat73", "npz"):
+        names = {"angle": angle, "p": cycles_at(angle, 0.0).T}
+    FORMS[form](file, names, {})
+    parts = require_whole(file, 12, **({"firing_tdc_deg": 0} if joined else {}))
+    assert sum(part.sizes["cycle"] for part in parts) == COUNT - joined
+
+
+ON = STEP * np.arange(COUNT * CAD.size)
+AT_CAD, AT_0, AT_300, AT_360 = (
+    cycles_at(grid, tdc).ravel() for grid, tdc in ((CAD, 0.0), (ZERO, 0.0), (ZERO, 300.0), (ZERO, 360.0))
+)
+CASES: dict[str, tuple[np.ndarray, np.ndarray, dict[str, Any], int]] = {
+    "incomplete ends": (np.tile(CAD, COUNT)[33:-77], AT_CAD[33:-77], {}, COUNT - 2),
+    "0 to 720": (np.tile(ZERO, COUNT), AT_360, {"firing_tdc_deg": 360}, COUNT),
+    "0 to 720, seam within": (np.tile(ZERO, COUNT), AT_300, {"firing_tdc_deg": 300}, COUNT),
+    "joined": (np.tile(ZERO, COUNT), AT_0, {"firing_tdc_deg": 0}, COUNT - 1),
+    "joined, cut": (np.tile(ZERO, COUNT)[30:-40], AT_0[30:-40], {"firing_tdc_deg": 0}, COUNT - 3),
+    "runs on": (ON, AT_360, {"firing_tdc_deg": 360}, COUNT),
+    "runs on, in mid burn": (ON, AT_0, {"firing_tdc_deg": 0}, COUNT - 1),
+    "before TDC": (np.tile(-CAD, COUNT), AT_CAD, {"before_tdc": True}, COUNT),
+    "offset": (np.tile(CAD, COUNT), AT_CAD, {"tdc_offset_cad": 0.3}, COUNT),
+    "radians": (np.tile(np.deg2rad(CAD), COUNT), AT_CAD, {"angle_unit": "rad"}, COUNT),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("cycles", [1, 9, 400])
+def test_chunks_of_every_form_are_the_whole_record(case: str, cycles: int, tmp_path: Path) -> None:
+    degrees, pressure, options, count = CASES[case]
+    np.save(tmp_path / "r.npy", np.column_stack([degrees, pressure]))
+    parts = require_whole(tmp_path / "r.npy", cycles, **options)
+    assert sum(part.sizes["cycle"] for part in parts) == count
+    said = [part.attrs["warnings"] for part in parts]
+    assert not any(said[1:-1])
+    lost = len(degrees) - count * CAD.size
+    noted = [int(line.split()[0]) for line in "\n".join(said).splitlines() if "left out: incomplete" in line]
+    assert sum(noted) == lost
+
+
+def test_samples_by_their_step_and_volts(tmp_path: Path) -> None:
+    np.save(tmp_path / "r.npy", cycles_at(ZERO, 360.0).ravel()[:, None] / 20.0)
+    volts = {"angle_step_deg": STEP, "firing_tdc_deg": 360, "gain_bar_per_v": 20.0, "offset_bar": 0.25}
+    assert len(require_whole(tmp_path / "r.npy", 10, **volts)) == 4
+
+
+def test_steps_that_do_not_divide_a_cycle_are_read_whole(tmp_path: Path) -> None:
+    degrees = 0.7 * np.arange(20 * 1030)
+    np.save(tmp_path / "r.npy", np.column_stack([degrees, cycles_at(degrees, 360.0, 1).ravel()]))
+    assert "interpolated" in require_whole(tmp_path / "r.npy", 6, firing_tdc_deg=360)[0].attrs["warnings"]
+
+
+def test_groups_of_rows_of_parquet(tmp_path: Path) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(arrow.table(stacked(CAD, 0.0)), tmp_path / "r.parquet", row_group_size=1234)
+    np.testing.assert_array_equal(read_pressure(tmp_path / "r.parquet")["pressure_bar"], cycles_at(CAD, 0.0))
+    assert len(require_whole(tmp_path / "r.parquet", 2)) == 16
+
+
+def test_one_cycle_is_a_chunk_of_one(tmp_path: Path) -> None:
+    write_text(tmp_path / "one.csv", {"angle": CAD, "p": cycles_at(CAD, 0.0, 1)[0]}, {})
+    (part,) = pressure_chunks(tmp_path / "one.csv")
+    check_labels(part)
+    assert part["pressure_bar"].dims == ("cycle", ANGLE)
+    np.testing.assert_array_equal(part["pressure_bar"][0], read_pressure(tmp_path / "one.csv")["pressure_bar"])
+
+
+# --- only what is asked for ---------------------------------------------------------------------------------
+@pytest.mark.parametrize("form", ["hdf5", "npz", "parquet"])
+def test_a_column_that_is_not_asked_for_is_not_read(form: str, tmp_path: Path) -> None:
+    """Another column is damaged, and its format would notice."""
+    file, names = tmp_path / "record", {**stacked(CAD, 0.0), "other": np.full(CAD.size * COUNT, 12345.678)}
+    if form == "hdf5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(file, "w") as content:
+            for name, values in names.items():
+                content.create_dataset(name, data=values, chunks=(1000,), fletcher32=True)
+    elif form == "parquet":
+        arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+        parquet.write_table(
+            arrow.table(names), file, compression="none", use_dictionary=False, write_page_checksum=True
+        )
+    else:
+        FORMS[form](file, names, {})
+    raw, mark = file.read_bytes(), np.float64(12345.678).tobytes()
+    file.write_bytes(raw.replace(mark * 200, mark[::-1] * 200, 1))
+    assert raw != file.read_bytes()
+    named = {"angle_column": "angle", "pressure_column": "pcyl"}
+    if form == "parquet":  # its library does not compare the sums that it writes
+        assert read_pressure(file, **named).sizes["cycle"] == COUNT
+        return
+    np.testing.assert_array_equal(read_pressure(file, **named)["pressure_bar"], cycles_at(CAD, 0.0))
+    assert len(list(pressure_chunks(file, cycles=10, **named))) == 4
+    with pytest.raises(DataError, match="cannot be read"):
+        read_pressure(file, angle_column="angle", pressure_column="other")
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_table_in_memory_needs_its_file_no_more(form: str, tmp_path: Path) -> None:
+    WRITERS[form](tmp_path / "r", stacked(CAD, 0.0), {})
+    table = read_any_table(tmp_path / "r")
+    (tmp_path / "r").unlink()
+    np.testing.assert_allclose(table.numbers(table.index("pcyl")), cycles_at(CAD, 0.0).ravel(), rtol=1e-12)
+
+
+# --- what is refused ----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("cycles", [0, -3, 2.0, True, "all"])
+def test_cycles_that_are_no_count(cycles: Any) -> None:
+    with pytest.raises(ParameterError, match=r"cycles = .*: must be a whole number >= 1"):
+        pressure_chunks("nothing.csv", cycles=cycles)
+
+
+def test_an_option_that_is_not_known_is_refused_at_once() -> None:
+    with pytest.raises(TypeError, match="pressure_colum'"):
+        pressure_chunks("nothing.csv", pressure_colum="p")
+
+
+@pytest.mark.parametrize("form", ["text", "hdf5"])
+def test_a_cycle_that_lost_samples_is_named_and_the_cycles_before_stay_good(form: str, tmp_path: Path) -> None:
+    file, names, at = tmp_path / "r", stacked(CAD, 0.0), 22 * CAD.size + 100
+    FORMS[form](file, {name: np.delete(values, slice(at, at + 3)) for name, values in names.items()}, {})
+    chunks = pressure_chunks(file, cycles=10)
+    good = list(itertools.islice(chunks, 2))
+    np.testing.assert_array_equal(np.concatenate([each["pressure_bar"] for each in good]), cycles_at(CAD, 0.0)[:20])
+    where = f"line {at + 4}" if form == "text" else f"sample {at} of the file"
+    with pytest.raises(DataError, match=f"{file} from cycle 21 on, {where}: the crank angle is {CAD[103]:g}, and"):
+        next(chunks)
+    assert next(chunks, None) is None
+
+
+def test_a_text_whose_last_row_is_cut(tmp_path: Path) -> None:
+    file = tmp_path / "r.csv"
+    write_text(file, stacked(CAD, 0.0), {})
+    text = file.read_text()
+    file.write_text(text[: text.rindex(",")])
+    chunks = pressure_chunks(file, cycles=10)
+    assert [each["cycle"].values[-1] for each in itertools.islice(chunks, 2)] == [10, 20]
+    last = text.count("\n") + 1
+    with pytest.raises(DataError, match=rf"line {last}: 1 cell\(s\) where line 4 has 2.*the file is cut off there"):
+        next(chunks)
+
+
+def test_a_letter_that_is_damaged_far_down(tmp_path: Path) -> None:
+    file = tmp_path / "r.csv"
+    write_text(file, stacked(CAD, 0.0), {})
+    rows = file.read_bytes().split(b"\n")
+    rows[5000] = "1 °".encode()[:-1] + b",2 \xc3\xa4"
+    file.write_bytes(b"\n".join(rows))
+    chunks = pressure_chunks(file, cycles=4)
+    next(chunks)
+    with pytest.raises(DataError, match="line 5001: damaged UTF-8"):
+        list(chunks)
+
+
+@pytest.mark.parametrize("form", ["text", "hdf5", "npy", "parquet", "tdms", "mdf", "netcdf3"])
+def test_a_file_that_changes_between_chunks(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "record"
+    FORMS[form](file, stacked(CAD, 0.0), {"angle": "deg"})
+    columns = (0, 1) if form == "npy" else ("angle", "pcyl")
+    chunks = pressure_chunks(file, cycles=10, angle_column=columns[0], pressure_column=columns[1])
+    first = next(chunks)
+    with file.open("ab") as stream:
+        stream.write(b"\n1,2")
+    with pytest.raises(DataError, match=r"record: changed while it was read, from \d+ to \d+ bytes: read it again"):
+        next(chunks)
+    np.testing.assert_array_equal(first["pressure_bar"], cycles_at(CAD, 0.0)[:10])
+
+
+def test_an_angle_that_slips_from_chunk_to_chunk_is_doubted(tmp_path: Path) -> None:
+    slip = np.repeat(np.linspace(0.0, 1.0, COUNT), CAD.size)
+    degrees = np.tile(CAD, COUNT)
+    np.save(tmp_path / "r.npy", np.column_stack([degrees, 1.2 + 40.0 * np.exp(-(((degrees - slip) / 35.0) ** 2))]))
+    parts = list(pressure_chunks(tmp_path / "r.npy", cycles=4))
+    assert not parts[0].attrs["warnings"]
+    assert "from the first chunk to cycles 29 to 31" in parts[-1].attrs["warnings"]
+
+
+# --- figures ------------------------------------------------------------------------------------------------
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    """Fired cycles with two that do not burn, and one whose level is off."""
+    fuel = [0.0 if k in (4, 25) else 20.0 + 0.3 * (k % 7) for k in range(COUNT)]
+    runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0) for mg in fuel]
+    pressure = np.array([run["pressure_bar"] for run in runs])
+    pressure[20] += 0.6
+    names = {"angle": np.tile(runs[0][ANGLE], COUNT), "p": pressure.ravel()}
+    write_text(tmp_path / "bench.csv", names, {})
+    return tmp_path / "bench.csv"
+
+
+def test_figures_of_chunks_are_those_of_the_whole(record: Path) -> None:
+    options: dict[str, Any] = {"traces": False, "gamma": 1.2, "fuel_mg": 40.0, "quiet": True}
+    whole = analyze(read_pressure(record), "puma_single", **options)
+    parts = analyze(pressure_chunks(record, cycles=8), "puma_single", **options)
+    xr.testing.assert_identical(parts, whole)
+    assert np.flatnonzero(whole["misfire"]).tolist() == [4, 25]
+    assert "1 of 31 cycles: polytropic exponent" in whole.attrs["warnings"]
+    assert "(cycle 21)" in whole.attrs["warnings"]
+
+
+def test_the_spectrum_of_chunks_is_that_of_the_whole() -> None:
+    """The second chunk alone rings."""
+    run = simulate("puma_single", {"fuel_mg": 20.0}, soc_cad=-5.0, step_cad=0.2)
+    ms = np.maximum(run[ANGLE].to_numpy() - 4.0, 0.0) / 9.0
+    wave = np.exp(-ms) * np.sin(2.0 * np.pi * 6.5 * ms)
+    loud = np.array([0.0, 0.0, 0.0, 1.0, 2.0])[:, None]
+    whole = pressure_trace(run[ANGLE], run["pressure_bar"].to_numpy() + loud * wave).assign_attrs(speed_rpm=1500.0)
+    options: dict[str, Any] = {"traces": False, "quiet": True, "knock_threshold_bar": 0.5}
+    figures = [
+        analyze(each, "puma_single", **options)
+        for each in (whole, iter([whole.isel(cycle=slice(0, 3)), whole.isel(cycle=slice(3, None))]))
+    ]
+    assert float(figures[0]["ringing_frequency_khz"]) == pytest.approx(6.5, rel=0.01)
+    assert float(figures[0]["knock_share_percent"]) == 40.0
+    xr.testing.assert_allclose(figures[1], figures[0], rtol=1e-12)
+
+
+def test_chunks_give_no_traces(record: Path) -> None:
+    with pytest.raises(ParameterError, match=r"traces = True: .*pass traces=False"):
+        analyze(pressure_chunks(record), "puma_single")
+    with pytest.raises(DataError, match="no chunk: each must be pressure_bar"):
+        analyze(iter([]), "puma_single", traces=False)
+    other = [next(pressure_chunks(record, cycles=4)).isel({ANGLE: slice(k, None)}) for k in (0, 1)]
+    with pytest.raises(DataError, match="the chunk from cycle 5 on has other crank angles"):
+        analyze(iter(other), "puma_single", traces=False)
+
+
+def test_a_cycle_that_is_refused_is_counted_from_the_first_chunk_on(record: Path) -> None:
+    chunks = list(pressure_chunks(record, cycles=8))
+    chunks[2]["pressure_bar"][3, 40] = np.nan
+    with pytest.raises(DataError, match=r"from cycle 17 on, .*cycle 4"):
+        analyze(iter(chunks), "puma_single", traces=False)
+
+
+def test_indicating_takes_chunk_after_chunk(record: Path) -> None:
+    whole = read_pressure(record)
+    indicating = Indicating(whole[ANGLE], "puma_single", speed_rpm=1500.0)
+    parts = [indicating.record(each["pressure_bar"])["imep_net_bar"] for each in pressure_chunks(record, cycles=8)]
+    np.testing.assert_array_equal(np.concatenate(parts), indicating.record(whole["pressure_bar"])["imep_net_bar"])
+
+
+def test_the_command_reads_in_chunks(record: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    command = ["engine", "analyze", str(record), "--preset", "puma_single", "--json"]
+    assert main(command) == 0
+    whole = capsys.readouterr().out
+    assert main([*command, "--chunk-cycles", "8", "-o", str(tmp_path / "cycles.csv")]) == 0
+    assert capsys.readouterr().out == whole
+    assert len((tmp_path / "cycles.csv").read_text().splitlines()) == 1 + COUNT
+    assert main([*command, "--chunk-cycles", "8", "--tdc"]) == 2
+    assert "--chunk-cycles and --tdc, which needs the whole record, contradict each other" in capsys.readouterr().out
+    assert main([*command, "--chunk-cycles", "0"]) == 2
+    assert "--chunk-cycles = 0: must be >= 1" in capsys.readouterr().out
+
+
+# --- memory -------------------------------------------------------------------------------------------------
+LIMITED = """
+import resource, sys
+import numpy, scipy.signal, xarray
+from mgdd.engine import analyze, simulate
+from mgdd.errors import DataError
+from mgdd.io import pressure_chunks, pressure_trace, read_pressure
+from mgdd.io.any_table import read_any_table
+simulate("puma_single", {"speed_rpm": 1500.0})
+small, file = sys.argv[1:]
+options = dict(traces=False, quiet=True)
+analyze(pressure_chunks(small, cycles=10), "puma_single", **options)
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+limit = 1024 * int(status["VmSize"].split()[0]) + 50_000_000
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+print(int(analyze(pressure_chunks(file, cycles=10), "puma_single", **options).attrs["cycles"]))
+try:
+    read_pressure(file)
+except MemoryError:
+    print("too large")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_record_that_memory_does_not_hold_becomes_figures(tmp_path: Path) -> None:
+    cad = np.arange(-360.0, 360.0, 0.4)
+    body = "".join(f"{a!r},{p!r}\n" for a, p in zip(cad.tolist(), cycles_at(cad, 0.0, 1)[0].tolist(), strict=True))
+    for name, count in (("small.csv", 40), ("large.csv", 250)):
+        with (tmp_path / name).open("w") as stream:
+            stream.write("angle,p\n")
+            stream.writelines(itertools.repeat(body, count))
+    files = [str(tmp_path / name) for name in ("small.csv", "large.csv")]
+    threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, *files], capture_output=True, text=True, env={**os.environ, **threads}
+    )
+    assert done.stdout.split("\n")[:2] == ["250", "too large"], done.stderr
