@@ -138,6 +138,8 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
     told, pitch = np.isfinite(degrees), 360.0 / teeth
     angle, time = degrees[told], time_s[told]
     at = np.arange(angle[0] + pitch, angle[-1] - pitch, pitch / _PER_PITCH)
+    if not at.size:
+        return []
     before, here, behind = (np.interp(at + side, angle, time) for side in (-pitch, 0.0, pitch))
     late = pitch * (2.0 * here - before - behind) / (behind - before)
     turn = teeth * _PER_PITCH
