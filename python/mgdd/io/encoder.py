@@ -145,10 +145,8 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
     turn = teeth * _PER_PITCH
     if late.size >= 3 * turn:
         late -= np.resize(np.median(late[: late.size // turn * turn].reshape(-1, turn), axis=0), late.size)
-    usual, sample = (
-        float(np.median(np.abs(late))),
-        float(np.median(np.diff(angle))),
-    )  # a pulse begins between two samples
+    usual = float(np.median(np.abs(late)))
+    sample = float(np.median(np.diff(angle)))  # within it a pulse may begin anywhere
     bad = np.flatnonzero(np.abs(late) > max(_DISPLACED_DEG, _ODD * usual, 2.0 * sample))
     parts = np.split(bad, np.flatnonzero(np.diff(bad) > 2 * _PER_PITCH) + 1) if bad.size else []
     return [(float(at[part[0]]) - pitch, float(at[part[-1]]) + pitch) for part in parts]
