@@ -3,11 +3,11 @@
 
     python tools/fuzz_readers.py csv --seconds 600 --seed 1
 
-Each case is a file that the library of its format writes (`fuzz_files.py`). It is read, and every value compared with
-what was written; then damaged copies are read. A whole file must give its values or an `mgdd.errors.Error`, a damaged
-one a result or such an error. Anything else is a finding, and its file is kept below build/fuzz: another value or
-exception, the end of the process, more than ten seconds or 2 GB, a file that reading changed. ``--cases 17 18`` runs
-these again, in this process. Ends with 1 where something was found.
+Each case is a file that the library of its format writes (`fuzz_*.py` among the support of the tests). It is read, and
+every value compared with what was written; then damaged copies are read. A whole file must give its values or an
+`mgdd.errors.Error`, a damaged one a result or such an error. Anything else is a finding, and its file is kept below
+build/fuzz: another value or exception, the end of the process, more than ten seconds or 2 GB, a file that reading
+changed. ``--cases 17 18`` runs these again, in this process. Ends with 1 where something was found.
 """
 
 from __future__ import annotations
@@ -238,10 +238,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         if asked.cases is not None:
             warnings.simplefilter("ignore")
-            for number in asked.cases:
-                for step in run(asked.format, asked.seed, number, Path(folder), None):
-                    print(*step[:3], step.outcome)
-            return 0
+            steps = [
+                step for number in asked.cases for step in run(asked.format, asked.seed, number, Path(folder), None)
+            ]
+            print(*(" ".join(map(str, step)) for step in steps), sep="\n")
+            return int(any(step.outcome.startswith("FOUND") for step in steps))
         fuzz, start = Fuzz(asked.format, asked.seed, Path(folder), kept), time.monotonic()
         fuzz.until(start + asked.seconds)
     for key, count in fuzz.found.most_common():

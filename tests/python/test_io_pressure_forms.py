@@ -410,6 +410,8 @@ def test_a_level_that_no_intake_has_is_doubted_by_unit(write: Write) -> None:
         ("p_intake_kPa", None, "kPa", "other"),
         ("sample", "-", None, "counter"),
         ("x", None, None, None),
+        ("run.v_1", "Nm", None, "other"),
+        ("p_bar.1", None, "bar", "pressure"),
     ],
 )
 def test_what_a_heading_says(name: str, row: str | None, unit: str | None, quantity: str | None) -> None:

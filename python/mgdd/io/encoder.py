@@ -138,12 +138,16 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
     told, pitch = np.isfinite(degrees), 360.0 / teeth
     angle, time = degrees[told], time_s[told]
     at = np.arange(angle[0] + pitch, angle[-1] - pitch, pitch / _PER_PITCH)
+    if not at.size:
+        return []
     before, here, behind = (np.interp(at + side, angle, time) for side in (-pitch, 0.0, pitch))
     late = pitch * (2.0 * here - before - behind) / (behind - before)
     turn = teeth * _PER_PITCH
     if late.size >= 3 * turn:
         late -= np.resize(np.median(late[: late.size // turn * turn].reshape(-1, turn), axis=0), late.size)
-    bad = np.flatnonzero(np.abs(late) > max(_DISPLACED_DEG, _ODD * float(np.median(np.abs(late)))))
+    usual = float(np.median(np.abs(late)))
+    sample = float(np.median(np.diff(angle)))  # within it a pulse may begin anywhere
+    bad = np.flatnonzero(np.abs(late) > max(_DISPLACED_DEG, _ODD * usual, 2.0 * sample))
     parts = np.split(bad, np.flatnonzero(np.diff(bad) > 2 * _PER_PITCH) + 1) if bad.size else []
     return [(float(at[part[0]]) - pitch, float(at[part[-1]]) + pitch) for part in parts]
 

@@ -126,7 +126,8 @@ def encoder(rng: Random, path: Path) -> Case:
         if chance(np.random.default_rng(len(time)), 0.5):
             same = read_pressure(file, **how)["pressure_bar"]
             assert np.array_equal(same, made["pressure_bar"])
-        most = WRONG_CAD * (2.0 if "missing" in made.attrs["warnings"] else 1.0)  # in a hole the speed is not known
+        most = max(WRONG_CAD, 2.5 * pitch / per_tooth)  # an edge is told by no more than its samples
+        most *= 2.0 if "missing" in made.attrs["warnings"] else 1.0  # in a hole the speed is not known
         assert np.abs(off).max() <= most, (
             f"{np.abs(off).max():.3f} CAD off: {teeth}-{missing} told {told}, index {has_index}, {faults} faults, "
             f"{per_tooth} samples a tooth, {made.attrs['warnings']!r}"
