@@ -13,7 +13,9 @@ import pytest
 
 from mgdd.errors import DataError
 from mgdd.io import read_pressure, read_throttle_log
-from mgdd.io.any_table import read_any_table
+from mgdd.io.any_table import open_parts, read_any_table
+from mgdd.io.array_table import ArrayTable, Named, Samples, columns_of
+from mgdd.io.files import Stamp
 from mgdd.io.matlab_tags import check_tags
 from table_files import WITHOUT_UNITS, WRITERS
 
@@ -88,6 +90,18 @@ def test_a_damaged_length_of_tdms_takes_no_memory(tmp_path: Path) -> None:
     tracemalloc.start()
     with pytest.raises(DataError, match=r"cannot be read"):
         read_any_table(tmp_path / "a.tdms")
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
+
+
+def test_a_damaged_length_of_netcdf_takes_no_memory(tmp_path: Path) -> None:
+    WRITERS["netcdf3"](tmp_path / "a.nc", LOG, {})
+    whole = (tmp_path / "a.nc").read_bytes()
+    at = whole.index(b"\0\0\0\4duty")
+    (tmp_path / "a.nc").write_bytes(whole[:at] + b"\x7f\xff\xff\xff" + whole[at + 4 :])
+    tracemalloc.start()
+    with pytest.raises(DataError, match=r"cannot be read"):
+        read_any_table(tmp_path / "a.nc")
     assert tracemalloc.get_traced_memory()[1] < 1e8
     tracemalloc.stop()
 
@@ -247,6 +261,22 @@ def test_a_bad_row_is_never_taken_for_a_preamble(text: str, message: str, tmp_pa
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize("row", ["70,25  55,5 -1,0", '"-0,35"  "+0,5"', "5 833,0", "0,0 17 81,5 2,0"])
+def test_decimal_commas_between_blanks_are_no_separators(row: str, tmp_path: Path) -> None:
+    """The first and the last column would be numbers, of half a cell."""
+    (tmp_path / "t.csv").write_text(f"{row}\n" * 3)
+    with pytest.raises(DataError, match=r"line 1: commas between numbers that blanks separate: pass decimal=','"):
+        read_any_table(tmp_path / "t.csv")
+    first = float(row.split()[0].strip('"').replace(",", "."))
+    assert read_any_table(tmp_path / "t.csv", decimal=",").numbers(0).tolist() == [first] * 3
+
+
+@pytest.mark.parametrize("row", ["1, 2, 3", "1 2 3,5.5", "2026-11-28 01:02:03,4", "1,7 b,3"])
+def test_blanks_beside_commas_are_no_matter(row: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"a,b,c\n{row}\n" if row.count(",") == 2 else f"a,b\n{row}\n")
+    assert read_any_table(tmp_path / "t.csv").mark == ","
+
+
 @pytest.mark.parametrize("compressed", [False, True])
 def test_a_damaged_matlab_file_never_ends_the_process(compressed: bool, tmp_path: Path) -> None:
     """SciPy's reader writes past its arrays where the sizes in a file contradict each other."""
@@ -312,6 +342,18 @@ def test_a_damaged_heap_of_hdf5_is_refused(tmp_path: Path) -> None:
             read_any_table(file)
 
 
+@pytest.mark.parametrize("how", [{}, {"chunks": (5,)}])
+def test_numbers_of_hdf5_that_look_like_a_damaged_heap_are_numbers(how: dict[str, Any], tmp_path: Path) -> None:
+    """What data sets hold is passed over, and so a record larger than memory is not read to find its heaps."""
+    h5py = pytest.importorskip("h5py")
+    false = np.frombuffer(b"GCOL\x01\0\0\0" + (4096).to_bytes(8, "little") + bytes(64), np.int64)
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        content.create_dataset("a", data=false, **how).attrs["units"] = "bar"
+    table = read_any_table(tmp_path / "a.h5")
+    assert table.units == ("bar",)
+    np.testing.assert_array_equal(table.numbers(0), false.astype(float))
+
+
 def test_a_unit_of_hdf5_that_is_no_text_is_not_read(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as content:
@@ -334,6 +376,42 @@ def test_blocks_of_mdf_in_a_circle_are_refused(tmp_path: Path) -> None:
         file.write_bytes(whole[:at] + (at - 24).to_bytes(8, "little") + whole[at + 8 :])
         with pytest.raises(DataError, match="its blocks name each other in a circle"):
             read_any_table(file)
+
+
+def test_many_parts_of_mdf_are_no_circle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each part of a compressed block is read where the one before was."""
+    asammdf = pytest.importorskip("asammdf")
+    monkeypatch.setattr("mgdd.io.watched_file._CIRCLES", 50)
+    with asammdf.MDF(version="4.10") as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a", compression=2))
+    with open_parts(file) as part:
+        found = [part(k, k + 1).numbers(1) for k in range(len(TIME))]
+    np.testing.assert_array_equal(np.concatenate(found), LOG["duty"])
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_what_stands_in_no_record_of_mdf_is_the_same_in_parts(version: str, tmp_path: Path) -> None:
+    """A group without times, times that are counted, and a channel that is: asammdf counts them in each part anew."""
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version=version) as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a"))
+        master, duty = (channel.address for channel in content.groups[0].channels)
+    raw = file.read_bytes()
+    # The type of the times (none, counted) and of the channel, with the row that is counted then.
+    damage = [(master + 24, b"\0", 0), (master + 188, bytes(4), 0)]
+    if version >= "4":
+        damage = [(master + 88, b"\0", 0), (master + 88, b"\3", 0), (duty + 88, b"\6", 1)]
+    for at, part_of_head, row in damage:
+        end = at + len(part_of_head)
+        assert raw[at:end] != part_of_head
+        file.write_bytes(raw[:at] + part_of_head + raw[end:])
+        table = read_any_table(file)
+        assert np.diff(table.numbers(row)[:3]).tolist() == [1.0, 1.0]
+        with open_parts(file) as part:
+            for k in range(table.width):
+                np.testing.assert_array_equal(part(7, 12).numbers(k), table.numbers(k)[7:12])
 
 
 def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:
@@ -369,6 +447,16 @@ def test_an_unfinalised_bus_log_of_a_vehicle() -> None:
     rpm = 0.125 * (low + 256.0 * high)
     assert (int(speed.sum()), rpm.min(), rpm.max()) == (12719, 646.5, 653.75)
     assert rpm.mean() == pytest.approx(650.05, abs=0.005)
+
+
+def test_fewer_numbers_than_a_file_told_are_refused(tmp_path: Path) -> None:
+    """NumPy would repeat one number in all rows."""
+    (tmp_path / "a").touch()
+    columns = columns_of([Named("v", Samples(5, float, lambda *_: np.ones(1)))])
+    table = ArrayTable("a", ("v",), None, (columns[0][2],), Stamp.of(tmp_path / "a"))
+    for read in (table.loaded, lambda: table.numbers(0)):
+        with pytest.raises(DataError, match=r"numbers where \((1, )?5,?\) are said to be"):
+            read()
 
 
 def test_a_misspelt_column_is_told_the_near_one(tmp_path: Path) -> None:

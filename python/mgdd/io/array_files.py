@@ -16,6 +16,7 @@ from mgdd.io.array_table import Columns, Named, Reversed, columns_of
 from mgdd.io.extras import import_extra
 from mgdd.io.hdf5_heaps import check_heaps
 from mgdd.io.matlab_tags import check_tags
+from mgdd.io.watched_file import WatchedFile
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -90,7 +91,11 @@ def _places_of(item: Any) -> list[tuple[int, int]]:
 def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the variables of a netCDF 3 file until the stack closes it."""
     import xarray as xr
+    from scipy.io import netcdf_file
 
+    # First so: by its path SciPy makes room for whatever length stands in the head.
+    with file.open("rb") as stream, netcdf_file(WatchedFile(stream), mmap=True):
+        pass
     dataset = stack.enter_context(xr.open_dataset(file, engine="scipy"))
     found = []
     for name in sorted(dataset.variables, key=lambda each: each != ANGLE):  # the angle first, as in a text

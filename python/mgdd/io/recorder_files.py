@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import shutil
 import tempfile
 import warnings
@@ -16,61 +15,19 @@ import numpy as np
 
 from mgdd.io.array_table import Columns, Named, Samples, columns_of
 from mgdd.io.extras import import_extra
+from mgdd.io.watched_file import WatchedFile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["of_mdf", "of_tdms"]
 
-_CIRCLES = 10_000  # that a reader may go; what many channels share is read as often
-_LONG = 1 << 16  # bytes, from which on what is left of the file is looked at
-
-
-class _Watched(io.BufferedIOBase):
-    """A file that gives what there is where a length is damaged, and notices who reads in a circle."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-        self.forget()
-
-    def forget(self) -> None:
-        """Begin to watch anew: who reads part after part is at one place as often as there are parts."""
-        self._count, self._mark, self._met = 0, -1, 0
-
-    def seek(self, offset: int, whence: int = 0, /) -> int:
-        return self._stream.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._stream.tell()
-
-    def readinto(self, buffer: Any, /) -> int:
-        found: int = self._stream.readinto(buffer)  # type: ignore[attr-defined]
-        return found
-
-    def write(self, data: Any, /) -> int:
-        return self._stream.write(data)
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        at, self._count = self.tell(), self._count + 1
-        if at == self._mark:
-            self._met += 1
-            if self._met > _CIRCLES:
-                raise ValueError(f"its blocks name each other in a circle, the one at byte {at} among them")
-        if self._count.bit_count() == 1:  # a power of two: within the circle in the end (Brent 1980)
-            self._mark, self._met = at, 0
-        if size is None or size < 0:
-            return self._stream.read()
-        if size > _LONG:
-            size = min(size, max(self.seek(0, io.SEEK_END) - at, 0))
-            self.seek(at)
-        return self._stream.read(size)
-
 
 def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of a TDMS file until the stack closes it."""
     nptdms = import_extra("nptdms", "formats", "a TDMS file")
     # Not by its path: an index beside it may be of another record.
-    content = stack.enter_context(nptdms.TdmsFile.open(_Watched(stack.enter_context(file.open("rb")))))
+    content = stack.enter_context(nptdms.TdmsFile.open(WatchedFile(stack.enter_context(file.open("rb")))))
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
@@ -102,21 +59,25 @@ def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of an MDF file, each group with its time, until the stack closes it."""
     asammdf = import_extra("asammdf", "mdf", "an MDF file")
     found: list[Named] = []
-    stream = _Watched(_finished(file, stack))
+    stream = WatchedFile(_finished(file, stack))
     content = stack.enter_context(asammdf.MDF(stream))  # not by its path: in large blocks it believes every size then
     for number, group in enumerate(content.groups):
         own = _channels(content, number)
         count = group.channel_group.cycles_nr
         if not own or not count:
             continue
-        master = partial(_records, stream, content.get_master, number)
+        master = _master(content, number, stream)
         if not _has_time(found, count, master):
             found.append(Named(f"time {number}" if found else "time", Samples(count, np.float64, master), "s"))
         for k in own:
-            read = partial(_records, stream, partial(_samples, content, number), k)
-            first, channel = read(0, 1), group.channels[k]
+            channel, get = group.channels[k], partial(_samples, content, number)
+            read = (
+                partial(_part_of, partial(get, k)) if _virtual(content, channel) else partial(_records, stream, get, k)
+            )
+            first = read(0, 1)
             if first.ndim == 1:
-                found.append(Named(channel.name, Samples(count, first.dtype, read), _unit_of(content, number, k)))
+                unit = str(content.get_channel_unit(group=number, index=k))
+                found.append(Named(channel.name, Samples(count, first.dtype, read), unit))
             else:
                 whole = content.select([(None, number, k)])[0]
                 found.append(Named(whole.name, whole.samples, whole.unit))
@@ -133,6 +94,18 @@ def _finished(file: Path, stack: contextlib.ExitStack) -> IO[bytes]:
     return copy
 
 
+def _master(content: Any, number: int, stream: WatchedFile) -> Callable[[int, int], NDArray[Any]]:
+    at = content.masters_db.get(number)
+    if at is None or _virtual(content, content.groups[number].channels[at]):
+        return partial(_part_of, partial(content.get_master, number))
+    return partial(_records, stream, content.get_master, number)
+
+
+def _virtual(content: Any, channel: Any) -> bool:
+    """Whether a channel stands in no record; asammdf counts it from wherever a part begins."""
+    return bool(channel.channel_type in (3, 6) if content.version >= "4" else not channel.bit_count)
+
+
 def _has_time(found: list[Named], count: int, master: Callable[[int, int], NDArray[Any]]) -> bool:
     """Whether a column of seconds holds these times already."""
     times = [each.values for each in found if each.unit == "s" and each.values.shape == (count,)]
@@ -145,13 +118,9 @@ def _samples(content: Any, group: int, index: int, **part: int) -> NDArray[Any]:
     return found
 
 
-def _records(stream: _Watched, read: Callable[..., NDArray[Any]], index: int, start: int, stop: int) -> NDArray[Any]:
+def _records(stream: WatchedFile, read: Callable[..., NDArray[Any]], index: int, start: int, stop: int) -> NDArray[Any]:
     stream.forget()
     return read(index, record_offset=start, record_count=stop - start)
-
-
-def _unit_of(content: Any, group: int, index: int) -> str:
-    return str(content.get(group=group, index=index, record_count=1).unit)
 
 
 def _channels(content: Any, number: int) -> list[int]:
@@ -165,7 +134,7 @@ def _channels(content: Any, number: int) -> list[int]:
     if rows * size > held:
         raise ValueError(f"{rows} records of {size} bytes in a group of {held}")
     for k, channel in enumerate(group.channels):
-        if not old and channel.channel_type in (3, 6):  # virtual ones stand in no record
+        if _virtual(content, channel):
             first = bits = 0
         elif old:
             first, bits = channel.start_offset // 8 + channel.additional_byte_offset, channel.bit_count

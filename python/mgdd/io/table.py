@@ -335,8 +335,18 @@ def _check_commas(
     body: Sequence[tuple[int, str]],
     mark: str | None,
 ) -> None:
-    """Refuse commas that separate cells and are decimal marks as well: twice as many cells as names."""
-    if mark != "," or not heads or not body or len(heads[-1]) < 2:
+    """Refuse commas that are decimal marks: blanks separate the cells, or there are twice as many cells as names."""
+    if mark != "," or not body:
+        return
+    line, row = body[0]
+    split = [cell.replace('"', " ").split() for cell in row.split(mark)]
+    blanks = any(len(cell) > 1 for cell in split) and all(len(cell) > 1 for cell in split[1:-1])
+    if blanks and "." not in row and all(parse_number(part) is not None for cell in split for part in cell):
+        raise DataError(
+            f"{source}, line {line}: commas between numbers that blanks separate: pass "
+            f"{argument('decimal', repr(','))} if the comma is a decimal mark"
+        )
+    if not heads or len(heads[-1]) < 2:
         return
     names, cells = len(heads[-1]), _cells(body[0][1], mark)
     if len(cells) == 2 * names and all(cell.isdecimal() for cell in cells[1::2]):

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mgdd.io import read, read_pressure
-from mgdd.io.any_table import read_any_table
+from mgdd.errors import DataError
+from mgdd.io import chunks, pressure_chunks, read, read_pressure, text_rows
+from mgdd.io.any_table import open_parts, read_any_table
 from mgdd.io.pressure_checks import PRESSURE_UNITS, to_bar
 
 __all__ = [
@@ -114,7 +117,7 @@ def bench(rng: Random, *, written: Callable[[Any], Any] = np.asarray, matrix: bo
     """Draw a record of pressure over angle: cycles in columns, below each other or running on; `written` rounds."""
     step, form = pick(rng, [0.5, 1.0, 2.0, 0.75]), pick(rng, ["short", "whole", "720", "below", "on"])
     cad = np.arange(-180.0, 180.0, step) if form == "short" else np.arange(-360.0, 360.0, step)
-    cycles = int(rng.integers(2, 4)) if form in ("below", "on") else int(rng.integers(1, 5)) if matrix else 1
+    cycles = pick(rng, [2, 3, 7]) if form in ("below", "on") else int(rng.integers(1, 5)) if matrix else 1
     unit = pick(rng, PRESSURE_UNITS)
     one = 1.0 / float(to_bar(np.float64(1.0), unit))
     raw = written(cylinder_bar(rng, cad, cycles) * one)
@@ -151,8 +154,41 @@ def require_table(content: Content, path: Path) -> None:
             assert got.shape == wanted.shape, (name, got.shape, wanted.shape)
             near = np.allclose(got, wanted, rtol=content.tolerance, atol=0.0, equal_nan=True)
             assert near, (name, got[:5], wanted[:5])
+            require_parts(content, path, at, got)
             if content.has_units:
                 assert (found.unit(at) or "") == each.unit.strip("[]() "), (name, found.unit(at), each.unit)
+
+
+@contextlib.contextmanager
+def short_parts() -> Iterator[None]:
+    """Read short files in parts too."""
+    kept = chunks._ROWS, chunks._CYCLES, text_rows._BLOCK
+    chunks._ROWS, chunks._CYCLES, text_rows._BLOCK = 500, 2, 4000
+    try:
+        yield
+    finally:
+        chunks._ROWS, chunks._CYCLES, text_rows._BLOCK = kept
+
+
+def require_parts(content: Content, path: Path, at: int, whole: Any) -> None:
+    """Compare a column that is read in parts with the whole one."""
+    edges = [0, whole.size // 3, whole.size // 3 + 1, whole.size]
+    with short_parts(), open_parts(path, **content.text) as part:
+        found = [part(*each).numbers(at) for each in itertools.pairwise(edges)]
+    assert np.array_equal(np.concatenate(found), whole, equal_nan=True), ("parts", at)
+
+
+def require_chunks(path: Path, whole: Any, **how: Any) -> None:
+    """Compare a record that is read in chunks of cycles with the whole one."""
+    bar = np.atleast_2d(whole["pressure_bar"])
+    try:
+        with short_parts():
+            found = [each["pressure_bar"] for each in pressure_chunks(path, cycles=2, **how)]
+    except DataError as error:
+        if "is read whole" in str(error):  # its angles are not quite the same from cycle to cycle
+            return
+        raise AssertionError(("chunks", str(error))) from error
+    assert np.array_equal(np.concatenate(found), bar), ("chunks", [each.shape for each in found], bar.shape)
 
 
 def require_bench(content: Content, path: Path) -> None:
@@ -164,6 +200,8 @@ def require_bench(content: Content, path: Path) -> None:
         how |= {"pressure_unit": unit, "angle_unit": "rad" if content.beside["angle"] == "rad" else "deg"}
     reader = read if sum(path.read_bytes()[-9:]) % 2 else read_pressure
     made = reader(path, **how, **content.text)
+    if reader is read_pressure:
+        require_chunks(path, made, **how, **content.text)
     wanted = to_bar(np.asarray(raw, np.float64), unit)
     if "pressure_bar" not in made and "pressure_column" not in how:
         return  # of several columns that may be cylinders
@@ -186,7 +224,7 @@ def read_all(content: Content, path: Path) -> None:
     """Read a damaged file by all readers; the first refusal ends it."""
     found = read_any_table(path, **content.text)
     for at in range(found.width):
-        found.numbers(at)
+        require_parts(content, path, at, found.numbers(at))
     if content.angle is not None:
         read(path, **content.how, **content.text)
 
