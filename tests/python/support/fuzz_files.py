@@ -152,7 +152,8 @@ def require_table(content: Content, path: Path) -> None:
             near = np.allclose(got, wanted, rtol=content.tolerance, atol=0.0, equal_nan=True)
             assert near, (name, got[:5], wanted[:5])
             if content.has_units:
-                assert (found.unit(at) or "") == each.unit.strip("[]() "), (name, found.unit(at), each.unit)
+                said, unit = ((text or "").strip("[]() -") for text in (found.unit(at), each.unit))
+                assert said == unit, (name, said, unit)
 
 
 def require_bench(content: Content, path: Path) -> None:
