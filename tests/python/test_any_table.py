@@ -141,7 +141,7 @@ def test_a_struct_of_matlab_has_fields(tmp_path: Path) -> None:
     assert set(read_any_table(tmp_path / "s.mat").header or ()) == {"bench.angle", "bench.p"}
 
 
-@pytest.mark.parametrize("above", [[], [["Operator", "Öz"]]])
+@pytest.mark.parametrize("above", [[], [["Operator", "Öz"]], [["Operator", "Öz"], ["Run", 17]]])
 def test_a_sheet_may_be_indented_below_remarks(above: list[list[Any]], tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()

@@ -116,6 +116,7 @@ DOUBTFUL = {
     "unit unknown in a row": ([FULL, ONE], "CAD,p\ndeg,dyn", "says 'dyn' for the pressure: convert it to one of bar"),
     "may be a unit": ([FULL, ONE], "CAD,p (dyn/cm2)", "'dyn/cm2' in the header may be a unit, .*pass pressure_unit="),
     "a unit behind a blank": ([FULL, ONE], "CAD,pressure t/m2", "'t/m2' in the header may be a unit"),
+    "x first": ([RUN[:1440], FULL, ONE], "X_Value,angle,p", "first one, and 'angle' is an angle: pass angle_column="),
     "angle in gon": ([FULL, ONE], "CAD [gon],p", "is in 'gon', which is not known: convert it, or pass angle_unit="),
     "two units": ([FULL, ONE, ONE], "CAD,p1,p2\ndeg,bar,kPa", "pressures in bar, kPa"),
     "volts": ([FULL, ONE], "CAD,U [V]", "says V for the pressure: pass gain_bar_per_v= and offset_bar="),

@@ -18,7 +18,7 @@ from mgdd.io.array_table import ArrayTable, Columns, naming_damage
 from mgdd.io.extras import import_extra
 from mgdd.io.files import Stamp, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
-from mgdd.io.table import Table, parse_number, read_table, text_table
+from mgdd.io.table import Table, parse_number, read_table, spells_units, text_table
 from mgdd.io.text_rows import TextRows
 
 if TYPE_CHECKING:
@@ -175,7 +175,10 @@ def _sheet_text(file: Path) -> tuple[str, str]:
 
 
 def _filled(row: list[str], holds_numbers: list[bool]) -> list[str]:
-    """Mark empty cells: a tab at an end of the line would be lost."""
+    """Mark empty cells, as a tab at an end of the line would be lost; not those beside a remark, which is short."""
+    cells = [cell for cell in row if cell]
+    if 2 * len(cells) <= len(holds_numbers) and parse_number(cells[0]) is None and not spells_units(cells):
+        return cells
     data = any(parse_number(cell) is not None for cell in row)
     return [cell or ("nan" if data and number else "-") for cell, number in zip(row, holds_numbers, strict=False)]
 

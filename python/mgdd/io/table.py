@@ -32,6 +32,7 @@ __all__ = [
     "parse_number",
     "read_table",
     "require_width",
+    "spells_units",
     "text_table",
 ]
 
@@ -390,17 +391,18 @@ def _names_and_units(
     whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
     wide = [cells for cells in whole if len(cells) == width or (len(cells) > width and cells[0] == "X_Value")]
     aligned = [cells[len(cells) - width :] for cells in wide]
-    if len(aligned) == 2 and aligned[0].count("-") > aligned[1].count("-") and not _spells_units(aligned[1]):
+    if len(aligned) == 2 and aligned[0].count("-") > aligned[1].count("-") and not spells_units(aligned[1]):
         return aligned[1], None  # below a remark of a sheet, made as wide
     if len(heads) <= 2 and (len(aligned) == len(heads) or len(heads) == 1):
         return next(iter(aligned), None), heads[1] if len(heads) == 2 else None
-    rows = [at for at, cells in enumerate(aligned) if at and _spells_units(cells)]
+    rows = [at for at, cells in enumerate(aligned) if at and spells_units(cells)]
     if rows:
         return aligned[rows[-1] - 1], aligned[rows[-1]]
     return (aligned[-1] if aligned else None), None
 
 
-def _spells_units(cells: Sequence[str]) -> bool:
+def spells_units(cells: Sequence[str]) -> bool:
+    """Return whether a row holds units, and nothing else that is not empty."""
     texts = [cell.strip("[](){} ") for cell in cells]
     known = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
     bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]

@@ -156,7 +156,8 @@ def require_table(content: Content, path: Path) -> None:
             assert near, (name, got[:5], wanted[:5])
             require_parts(content, path, at, got)
             if content.has_units:
-                assert (found.unit(at) or "") == each.unit.strip("[]() "), (name, found.unit(at), each.unit)
+                said, unit = ((text or "").strip("[]() -") for text in (found.unit(at), each.unit))
+                assert said == unit, (name, said, unit)
 
 
 @contextlib.contextmanager
