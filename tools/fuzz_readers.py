@@ -3,11 +3,11 @@
 
     python tools/fuzz_readers.py csv --seconds 600 --seed 1
 
-Each case is a file that the library of its format writes (`fuzz_*.py` among the support of the tests). It is read, and
-every value compared with what was written; then damaged copies are read. A whole file must give its values or an
-`mgdd.errors.Error`, a damaged one a result or such an error. Anything else is a finding, and its file is kept below
-build/fuzz: another value or exception, the end of the process, more than ten seconds or 2 GB, a file that reading
-changed. ``--cases 17 18`` runs these again, in this process. Ends with 1 where something was found.
+Each case is a file that the library of its format writes (`fuzz_*.py` among the support of the tests). It is read,
+whole and in parts, and every value compared with what was written; then damaged copies are read. A whole file must give
+its values or an `mgdd.errors.Error`, a damaged one a result or such an error. Anything else is a finding, and its file
+is kept below build/fuzz: another value or exception, the end of the process, more than ten seconds or 2 GB, a file that
+reading changed. ``--cases 17 18`` runs these again, in this process. Ends with 1 where something was found.
 """
 
 from __future__ import annotations
