@@ -237,6 +237,10 @@ def mdf(rng: Random, path: Path) -> Case:
                 conversion = {"a": 0.25, "b": -3.0}
                 content.columns[at] = each._replace(values=0.25 * values - 3.0)
             signals.append(asammdf.Signal(values, time, name=each.name, unit=each.unit, conversion=conversion))
+        if version[0] == "4" and chance(rng, 0.3):
+            texts = np.array([f"text {k % 7}" * (1 + k % 3) for k in range(time.size)], "S")
+            signals.append(asammdf.Signal(texts, time, name="text", encoding="utf-8"))
+            signals.append(asammdf.Signal(rng.integers(0, 255, (time.size, 8), np.uint8), time, name="bytes"))
         file.append(signals, common_timebase=True)
         if chance(rng, 0.4):
             rows = len(time) + 7
