@@ -354,6 +354,15 @@ def test_numbers_of_hdf5_that_look_like_a_damaged_heap_are_numbers(how: dict[str
     np.testing.assert_array_equal(table.numbers(0), false.astype(float))
 
 
+def test_two_data_sets_of_hdf5_may_come_to_one_name(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        content["a/b"], content["a.b"] = np.arange(3.0), np.arange(3.0) + 7.0
+    table = read_any_table(tmp_path / "a.h5")
+    assert table.header == ("a.b", "a.b")
+    assert sorted(table.matrix([0, 1])[:, 0].tolist()) == [0.0, 7.0]
+
+
 def test_a_unit_of_hdf5_that_is_no_text_is_not_read(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as content:

@@ -51,18 +51,20 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
     h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
     content = stack.enter_context(h5py.File(file, "r"))
     matlab = any("MATLAB_class" in item.attrs for item in content.values())
-    found: dict[str, Any] = {}
+    found: list[tuple[str, Any]] = []
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.shape is not None and item.dtype.kind in "fiub" and name[0] != "#":
-            found[name.replace("/", ".")] = item
+            found.append((name.replace("/", "."), item))
 
     content.visititems(visit)
-    kinds = {name: _kinds_of_units(h5py, item) for name, item in found.items()}
-    if any(kind.is_variable_str() for own in kinds.values() for kind in own.values()):
-        check_heaps(file, itertools.chain.from_iterable(map(_places_of, found.values())))
-    units = {name: next(filter(None, (_text(found[name].attrs[key]) for key in kinds[name])), "") for name in found}
-    return columns_of(Named(name, Reversed(item) if matlab else item, units[name]) for name, item in found.items())
+    kinds = [_kinds_of_units(h5py, item) for _, item in found]
+    if any(kind.is_variable_str() for own in kinds for kind in own.values()):
+        check_heaps(file, itertools.chain.from_iterable(_places_of(item) for _, item in found))
+    return columns_of(
+        Named(name, Reversed(item) if matlab else item, next(filter(None, (_text(item.attrs[key]) for key in own)), ""))
+        for (name, item), own in zip(found, kinds, strict=True)
+    )
 
 
 def _kinds_of_units(h5py: Any, item: Any) -> dict[str, Any]:
