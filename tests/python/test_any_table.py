@@ -354,6 +354,18 @@ def test_numbers_of_hdf5_that_look_like_a_damaged_heap_are_numbers(how: dict[str
     np.testing.assert_array_equal(table.numbers(0), false.astype(float))
 
 
+def test_a_data_set_of_hdf5_without_all_of_its_bytes_is_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        content["a"] = np.arange(333.0)
+        place = content["a"].id.get_offset().to_bytes(8, "little") + (8 * 333).to_bytes(8, "little")
+    whole = (tmp_path / "a.h5").read_bytes()
+    assert whole.count(place) == 1
+    (tmp_path / "a.h5").write_bytes(whole.replace(place, place[:8] + (1031).to_bytes(8, "little")))
+    with pytest.raises(DataError, match="data set 'a' has 1031 of 2664 bytes"):
+        read_any_table(tmp_path / "a.h5")
+
+
 def test_two_data_sets_of_hdf5_may_come_to_one_name(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as content:
