@@ -50,7 +50,7 @@ class WatchedFile(io.BufferedIOBase):
             self._met += 1
             if self._met > _CIRCLES:
                 raise ValueError(f"its blocks name each other in a circle, the one at byte {at} among them")
-        if self._count.bit_count() == 1:  # a power of two: within the circle in the end (Brent 1980)
+        if self._count.bit_count() == 1:  # a power of two: within the circle in the end, as Brent finds cycles
             self._mark, self._met = at, 0
         if size is None or size < 0:
             return self._stream.read()
