@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,9 @@ import pytest
 
 from mgdd.errors import DataError
 from mgdd.io import read_pressure, read_throttle_log
-from mgdd.io.any_table import read_any_table
+from mgdd.io.any_table import open_parts, read_any_table
+from mgdd.io.array_table import ArrayTable, Named, Samples, columns_of
+from mgdd.io.files import Stamp
 from mgdd.io.matlab_tags import check_tags
 from table_files import WITHOUT_UNITS, WRITERS
 
@@ -57,6 +61,51 @@ def test_a_waveform_of_tdms_gets_its_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.numbers(0), TIME, rtol=1e-12)
 
 
+def test_a_channel_called_time_keeps_its_name_beside_a_waveform(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    timed = nptdms.ChannelObject("g", "duty", LOG["duty"], properties={"wf_increment": 0.001, "wf_start_offset": 0.0})
+    with nptdms.TdmsWriter(str(tmp_path / "w.tdms")) as writer:
+        writer.write_segment([timed, nptdms.ChannelObject("g", "time", np.arange(3.0))])
+    table = read_any_table(tmp_path / "w.tdms")
+    assert table.header == ("time (duty)", "duty", "time")
+    assert table.numbers(table.index("time")).tolist() == [0.0, 1.0, 2.0]
+
+
+def test_an_index_of_tdms_that_is_of_another_record_changes_nothing(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    for name, values in (("b.tdms", np.arange(9.0)), ("a.tdms", np.arange(7, dtype="i4"))):
+        with nptdms.TdmsWriter(str(tmp_path / name), index_file=True) as writer:
+            writer.write_segment([nptdms.ChannelObject("g", "v", values)])
+    (tmp_path / "b.tdms_index").replace(tmp_path / "a.tdms_index")
+    assert read_any_table(tmp_path / "a.tdms").numbers(0).tolist() == list(range(7))
+
+
+def test_a_damaged_length_of_tdms_takes_no_memory(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("g", "duty", LOG["duty"], properties={"note": "warm"})])
+    whole = (tmp_path / "a.tdms").read_bytes()
+    at = whole.index(b"\4\0\0\0note")
+    (tmp_path / "a.tdms").write_bytes(whole[:at] + b"\xff\xff\xff\x7f" + whole[at + 4 :])
+    tracemalloc.start()
+    with pytest.raises(DataError, match=r"cannot be read"):
+        read_any_table(tmp_path / "a.tdms")
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
+
+
+def test_a_damaged_length_of_netcdf_takes_no_memory(tmp_path: Path) -> None:
+    WRITERS["netcdf3"](tmp_path / "a.nc", LOG, {})
+    whole = (tmp_path / "a.nc").read_bytes()
+    at = whole.index(b"\0\0\0\4duty")
+    (tmp_path / "a.nc").write_bytes(whole[:at] + b"\x7f\xff\xff\xff" + whole[at + 4 :])
+    tracemalloc.start()
+    with pytest.raises(DataError, match=r"cannot be read"):
+        read_any_table(tmp_path / "a.nc")
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
+
+
 def test_rasters_of_mdf_keep_their_own_times(tmp_path: Path) -> None:
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(version="4.10") as content:
@@ -76,11 +125,36 @@ def test_an_array_of_numpy_has_columns_by_number(tmp_path: Path) -> None:
     np.testing.assert_array_equal(trace["pressure_bar"], CYCLES)
 
 
+def test_decimals_and_empty_truths_of_parquet_are_numbers(tmp_path: Path) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    held = {"d": arrow.array([Decimal("1.25"), None]), "b": arrow.array([None, True]), "n": arrow.array(["a", "b"])}
+    parquet.write_table(arrow.table(held), tmp_path / "a.parquet")
+    table = read_any_table(tmp_path / "a.parquet")
+    assert table.header == ("d", "b")
+    np.testing.assert_array_equal(table.matrix([0, 1]), [[1.25, np.nan], [np.nan, 1.0]])
+
+
 def test_a_struct_of_matlab_has_fields(tmp_path: Path) -> None:
     from scipy.io import savemat
 
     savemat(tmp_path / "s.mat", {"bench": {"angle": ANGLE, "p": CYCLES[0], "note": "warm"}})
     assert set(read_any_table(tmp_path / "s.mat").header or ()) == {"bench.angle", "bench.p"}
+
+
+@pytest.mark.parametrize("above", [[], [["Operator", "Öz"]], [["Operator", "Öz"], ["Run", 17]]])
+def test_a_sheet_may_be_indented_below_remarks(above: list[list[Any]], tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    rows = [[None, "angle", "p", "note"], *([None, a, a + 0.5, None] for a in range(5))]
+    for row in (*above, *rows):
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    table = read_any_table(tmp_path / "a.xlsx")
+    assert [table.numbers(table.index(name)).tolist() for name in ("angle", "p")] == [
+        [*range(5)],
+        [0.5, 1.5, 2.5, 3.5, 4.5],
+    ]
+    assert table.numeric(range(table.width)) == [1, 2]
 
 
 # --- what is refused ---------------------------------------------------------------------------------------
@@ -146,6 +220,7 @@ X_Value\tduty\tangle_deg\tComment
         ("Operator;Smith\nEngine;V8\nangle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
         ("speed = 1500\nload = 40 %\nangle;p\ndeg;bar\n", ("angle", "p"), ("deg", "bar")),
         ("Date;2018-01-01;3\nRun;17\n\nangle;p\n", ("angle", "p"), None),
+        ("Test 4\nangle;fuel\ndeg;g/kWh\n", ("angle", "fuel"), ("deg", "g/kWh")),
     ],
 )
 def test_what_stands_above_the_rows(above: str, header: Any, units: Any, tmp_path: Path) -> None:
@@ -163,9 +238,17 @@ def test_labview_text(tmp_path: Path) -> None:
     assert table.matrix([0, 2]).tolist() == [[0.0, 0.001, 0.002, 0.003], [20.0, 20.5, 21.0, 21.5]]
 
 
+def test_labview_text_with_commas(tmp_path: Path) -> None:
+    (tmp_path / "t.lvm").write_text(LABVIEW.replace("Header***\t\t", "Header***\t\t\t").replace("\t", ","))
+    table = read_any_table(tmp_path / "t.lvm")
+    assert table.header == ("X_Value", "duty", "angle_deg")
+    assert table.matrix([0, 2]).tolist() == [[0.0, 0.001, 0.002, 0.003], [20.0, 20.5, 21.0, 21.5]]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (";1.5;2\n;2;3\n;3;4\n;4;5\nend;a;b\n;5;6\n", "line 5, column 1: 'a' is not a number"),
         ("angle;p\n1;2;3\n2;3\n3;4\n4;5\n", "line 3: 2 cell(s) where line 2 has 3"),
         ("angle;p\n1;2\n2;x\n3;4\n4;5\n", "line 3, column 'p': 'x' is not a number"),
         ("angle;p\nP1;20;35\nP2;3.5\nP3;4.5\nP4;5.5\n", "line 3: 2 cell(s) where line 2 has 3"),
@@ -176,6 +259,22 @@ def test_a_bad_row_is_never_taken_for_a_preamble(text: str, message: str, tmp_pa
     with pytest.raises(DataError) as error:
         read_any_table(tmp_path / "t.csv").numbers(1)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize("row", ["70,25  55,5 -1,0", '"-0,35"  "+0,5"', "5 833,0", "0,0 17 81,5 2,0"])
+def test_decimal_commas_between_blanks_are_no_separators(row: str, tmp_path: Path) -> None:
+    """The first and the last column would be numbers, of half a cell."""
+    (tmp_path / "t.csv").write_text(f"{row}\n" * 3)
+    with pytest.raises(DataError, match=r"line 1: commas between numbers that blanks separate: pass decimal=','"):
+        read_any_table(tmp_path / "t.csv")
+    first = float(row.split()[0].strip('"').replace(",", "."))
+    assert read_any_table(tmp_path / "t.csv", decimal=",").numbers(0).tolist() == [first] * 3
+
+
+@pytest.mark.parametrize("row", ["1, 2, 3", "1 2 3,5.5", "2026-11-28 01:02:03,4", "1,7 b,3"])
+def test_blanks_beside_commas_are_no_matter(row: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"a,b,c\n{row}\n" if row.count(",") == 2 else f"a,b\n{row}\n")
+    assert read_any_table(tmp_path / "t.csv").mark == ","
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -207,6 +306,133 @@ def test_a_damaged_matlab_file_never_ends_the_process(compressed: bool, tmp_path
         file.write_bytes(whole[:at] + b"\x10\xc3" + whole[at + 2 :])
         with pytest.raises(DataError, match=r"4 bytes of type 49936 in a text of shape \(1, 4\)"):
             read_any_table(file)
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_a_damaged_mdf_file_never_ends_the_process(version: str, tmp_path: Path) -> None:
+    """In its C code asammdf believes the sizes in a file: of a channel within its record, of a large block."""
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version=version) as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a"))
+        channel = content.groups[0].channels[1]
+        at = channel.address + (186 if version < "4" else 92)  # bytes, or bits, from the start of a record
+        assert read_any_table(file).header == ("time", "duty")
+    whole = bytearray(file.read_bytes())
+    whole[at : at + 2] = b"\xf0\xff"
+    file.write_bytes(whole)
+    with pytest.raises(
+        DataError, match=r"cannot be read \(ValueError channel 'duty' ends at byte \d+ of a record of 16"
+    ):
+        read_any_table(file)
+
+
+def test_a_damaged_heap_of_hdf5_is_refused(tmp_path: Path) -> None:
+    """On an object without bytes the library would stay for ever; on one that is too long it reads what is behind."""
+    file = tmp_path / "a.h5"
+    WRITERS["hdf5"](file, LOG, {"duty": "-", "angle_deg": "deg"})
+    assert read_any_table(file).units is not None
+    whole = file.read_bytes()
+    heap = whole.index(b"GCOL")
+    for size in (0, 1 << 40):
+        file.write_bytes(whole[: heap + 16] + bytes(8) + size.to_bytes(8, "little") + whole[heap + 32 :])
+        with pytest.raises(
+            DataError, match=rf"the heap at byte {heap} has an object of {size} bytes where 4080 are left"
+        ):
+            read_any_table(file)
+
+
+@pytest.mark.parametrize("how", [{}, {"chunks": (5,)}])
+def test_numbers_of_hdf5_that_look_like_a_damaged_heap_are_numbers(how: dict[str, Any], tmp_path: Path) -> None:
+    """What data sets hold is passed over, and so a record larger than memory is not read to find its heaps."""
+    h5py = pytest.importorskip("h5py")
+    false = np.frombuffer(b"GCOL\x01\0\0\0" + (4096).to_bytes(8, "little") + bytes(64), np.int64)
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        content.create_dataset("a", data=false, **how).attrs["units"] = "bar"
+    table = read_any_table(tmp_path / "a.h5")
+    assert table.units == ("bar",)
+    np.testing.assert_array_equal(table.numbers(0), false.astype(float))
+
+
+def test_a_data_set_of_hdf5_without_all_of_its_bytes_is_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        content["a"] = np.arange(333.0)
+        place = content["a"].id.get_offset().to_bytes(8, "little") + (8 * 333).to_bytes(8, "little")
+    whole = (tmp_path / "a.h5").read_bytes()
+    assert whole.count(place) == 1
+    (tmp_path / "a.h5").write_bytes(whole.replace(place, place[:8] + (1031).to_bytes(8, "little")))
+    with pytest.raises(DataError, match="data set 'a' has 1031 of 2664 bytes"):
+        read_any_table(tmp_path / "a.h5")
+
+
+def test_two_data_sets_of_hdf5_may_come_to_one_name(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        content["a/b"], content["a.b"] = np.arange(3.0), np.arange(3.0) + 7.0
+    table = read_any_table(tmp_path / "a.h5")
+    assert table.header == ("a.b", "a.b")
+    assert sorted(table.matrix([0, 1])[:, 0].tolist()) == [0.0, 7.0]
+
+
+def test_a_unit_of_hdf5_that_is_no_text_is_not_read(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        for name, unit in {"a": "bar", "b": np.bytes_("bar"), "c": np.array(["bar"], dtype=object), "d": 7.0}.items():
+            content[name] = np.arange(3.0)
+            content[name].attrs["units"] = unit
+        content["e"] = np.arange(3.0)
+        content["e"].attrs.create("units", [np.arange(2), np.arange(3)], dtype=h5py.vlen_dtype("i4"))
+    assert read_any_table(tmp_path / "a.h5").units == ("bar", "bar", "bar", "", "")
+
+
+def test_blocks_of_mdf_in_a_circle_are_refused(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a"))
+        group, channels = content.groups[0].data_group.address, content.groups[0].channel_group.address
+    whole = file.read_bytes()
+    for at in (group + 24, channels + 24):  # where the next one stands: each is its own
+        file.write_bytes(whole[:at] + (at - 24).to_bytes(8, "little") + whole[at + 8 :])
+        with pytest.raises(DataError, match="its blocks name each other in a circle"):
+            read_any_table(file)
+
+
+def test_many_parts_of_mdf_are_no_circle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each part of a compressed block is read where the one before was."""
+    asammdf = pytest.importorskip("asammdf")
+    monkeypatch.setattr("mgdd.io.watched_file._CIRCLES", 50)
+    with asammdf.MDF(version="4.10") as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a", compression=2))
+    with open_parts(file) as part:
+        found = [part(k, k + 1).numbers(1) for k in range(len(TIME))]
+    np.testing.assert_array_equal(np.concatenate(found), LOG["duty"])
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_what_stands_in_no_record_of_mdf_is_the_same_in_parts(version: str, tmp_path: Path) -> None:
+    """A group without times, times that are counted, and a channel that is: asammdf counts them in each part anew."""
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version=version) as content:
+        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
+        file = Path(content.save(tmp_path / "a"))
+        master, duty = (channel.address for channel in content.groups[0].channels)
+    raw = file.read_bytes()
+    # The type of the times (none, counted) and of the channel, with the row that is counted then.
+    damage = [(master + 24, b"\0", 0), (master + 188, bytes(4), 0)]
+    if version >= "4":
+        damage = [(master + 88, b"\0", 0), (master + 88, b"\3", 0), (duty + 88, b"\6", 1)]
+    for at, part_of_head, row in damage:
+        end = at + len(part_of_head)
+        assert raw[at:end] != part_of_head
+        file.write_bytes(raw[:at] + part_of_head + raw[end:])
+        table = read_any_table(file)
+        assert np.diff(table.numbers(row)[:3]).tolist() == [1.0, 1.0]
+        with open_parts(file) as part:
+            for k in range(table.width):
+                np.testing.assert_array_equal(part(7, 12).numbers(k), table.numbers(k)[7:12])
 
 
 def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:
@@ -242,6 +468,16 @@ def test_an_unfinalised_bus_log_of_a_vehicle() -> None:
     rpm = 0.125 * (low + 256.0 * high)
     assert (int(speed.sum()), rpm.min(), rpm.max()) == (12719, 646.5, 653.75)
     assert rpm.mean() == pytest.approx(650.05, abs=0.005)
+
+
+def test_fewer_numbers_than_a_file_told_are_refused(tmp_path: Path) -> None:
+    """NumPy would repeat one number in all rows."""
+    (tmp_path / "a").touch()
+    columns = columns_of([Named("v", Samples(5, float, lambda *_: np.ones(1)))])
+    table = ArrayTable("a", ("v",), None, (columns[0][2],), Stamp.of(tmp_path / "a"))
+    for read in (table.loaded, lambda: table.numbers(0)):
+        with pytest.raises(DataError, match=r"numbers where \((1, )?5,?\) are said to be"):
+            read()
 
 
 def test_a_misspelt_column_is_told_the_near_one(tmp_path: Path) -> None:

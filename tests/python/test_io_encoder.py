@@ -121,6 +121,36 @@ def test_a_miscounted_turn_costs_its_cycle_only(bench, tmp_path: Path) -> None:
     assert np.abs(less["pressure_bar"].to_numpy() - kept).max() < 0.01 * kept.max()
 
 
+@pytest.mark.parametrize(("edge", "late_deg"), [(1224.0, 0.9), (1224.0, 1.8), (1224.0, -1.8)])
+def test_a_displaced_edge_costs_its_cycle_only(bench, tmp_path: Path, edge: float, late_deg: float) -> None:
+    """A dropout begins before an edge and ends behind it, or a spike ends in it: no edge is missing, one is wrong."""
+    low, high = sorted((edge, edge + late_deg))
+    frame = bench.assign(crank=bench["crank"].mask(bench["behind"].between(low, high), 0.2 if late_deg > 0.0 else 4.8))
+    columns = ("time [s]", "crank", "pcyl [bar]")
+    whole = read_pressure(saved(bench, tmp_path, *columns), encoder=WHEEL, firing_tdc_deg=TDC_DEG)
+    less = read_pressure(saved(frame, tmp_path, *columns), encoder=WHEEL, firing_tdc_deg=TDC_DEG)
+    assert "cycle 2 of 6 left out: the encoder's edges are miscounted or displaced" in less.attrs["warnings"]
+    kept = whole["pressure_bar"].to_numpy()[[0, 2, 3, 4, 5]]
+    assert np.abs(less["pressure_bar"].to_numpy() - kept).max() < 0.01 * kept.max()
+
+
+def test_a_displaced_edge_in_the_compression_of_a_short_record_says_nothing_of_its_period(
+    bench, tmp_path: Path
+) -> None:
+    frame = bench[bench["behind"] < 2300.0]
+    frame = frame.assign(crank=frame["crank"].mask(frame["behind"].between(1872.0, 1874.4), 0.2))
+    path = saved(frame, tmp_path, "time [s]", "crank", "pcyl [bar]")
+    trace = read_pressure(path, encoder=WHEEL, firing_tdc_deg=TDC_DEG)
+    assert "cycle 3 of 3 left out: the encoder's edges" in trace.attrs["warnings"]
+
+
+def test_a_bent_tooth_costs_no_cycle(bench, tmp_path: Path) -> None:
+    bent = (bench["behind"] % 360.0).between(144.0, 144.9)
+    frame = bench.assign(crank=bench["crank"].mask(bent, 0.2))
+    path = saved(frame, tmp_path, "time [s]", "crank", "pcyl [bar]")
+    assert read_pressure(path, encoder=WHEEL, firing_tdc_deg=TDC_DEG).sizes["cycle"] == 6
+
+
 def test_lost_and_extra_edges_are_counted_aloud(bench, tmp_path: Path) -> None:
     behind = bench["behind"]
     lost, spike = behind.between(1500.0 - 0.1, 1504.0), behind.between(2002.2, 2002.6)

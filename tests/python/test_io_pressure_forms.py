@@ -116,6 +116,7 @@ DOUBTFUL = {
     "unit unknown in a row": ([FULL, ONE], "CAD,p\ndeg,dyn", "says 'dyn' for the pressure: convert it to one of bar"),
     "may be a unit": ([FULL, ONE], "CAD,p (dyn/cm2)", "'dyn/cm2' in the header may be a unit, .*pass pressure_unit="),
     "a unit behind a blank": ([FULL, ONE], "CAD,pressure t/m2", "'t/m2' in the header may be a unit"),
+    "x first": ([RUN[:1440], FULL, ONE], "X_Value,angle,p", "first one, and 'angle' is an angle: pass angle_column="),
     "angle in gon": ([FULL, ONE], "CAD [gon],p", "is in 'gon', which is not known: convert it, or pass angle_unit="),
     "two units": ([FULL, ONE, ONE], "CAD,p1,p2\ndeg,bar,kPa", "pressures in bar, kPa"),
     "volts": ([FULL, ONE], "CAD,U [V]", "says V for the pressure: pass gain_bar_per_v= and offset_bar="),
@@ -167,6 +168,15 @@ def test_cycles_below_each_other_that_do_not_match(write: Write) -> None:
     twice = write([np.tile(FULL, 2), CYCLES[:2].ravel(), CYCLES[:2].ravel()], "angle,p1,p2")
     with pytest.raises(DataError, match="several pressure columns, and several cycles below each other"):
         read_pressure(twice)
+
+
+@pytest.mark.parametrize("step", [0.25, 0.5, 1.5])
+def test_angles_that_run_on_in_radians_of_three_digits_lose_no_cycle(write: Write, step: float) -> None:
+    angle = np.arange(0.0, 3600.0, step)
+    path = write([np.round(np.deg2rad(angle), 3), np.interp(angle, RUN, CYCLES.ravel())], "angle [rad],p [bar]")
+    trace = read_pressure(path, firing_tdc_deg=360.0)
+    wanted = np.interp(angle, RUN, CYCLES.ravel()).reshape(5, -1)
+    np.testing.assert_allclose(trace["pressure_bar"], wanted, atol=0.05 * wanted.max() * step)
 
 
 @pytest.mark.parametrize("form", ["running", "stacked", "columns"])
@@ -401,6 +411,8 @@ def test_a_level_that_no_intake_has_is_doubted_by_unit(write: Write) -> None:
         ("p_intake_kPa", None, "kPa", "other"),
         ("sample", "-", None, "counter"),
         ("x", None, None, None),
+        ("run.v_1", "Nm", None, "other"),
+        ("p_bar.1", None, "bar", "pressure"),
     ],
 )
 def test_what_a_heading_says(name: str, row: str | None, unit: str | None, quantity: str | None) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import re
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -15,6 +17,9 @@ import numpy as np
 import pytest
 
 from file_mutants import judged, mutant_of_bytes, mutant_of_text
+from fuzz_binary import BINARY
+from fuzz_files import TEXT
+from fuzz_others import OTHERS
 from map_cases import timing_table
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
@@ -245,3 +250,16 @@ def test_a_mutant_of_any_file_is_refused_with_an_error_of_mgdd(name: str, tmp_pa
 @pytest.mark.parametrize("name", SAMPLES)
 def test_many_mutants_of_any_file_are_refused_with_an_error_of_mgdd(name: str, tmp_path: Path) -> None:
     assert survey_any(name, tmp_path, 100 if name in SLOW else 1500, 10_000)["refused"] > 0
+
+
+# --- random files -------------------------------------------------------------------------------------------
+TOOL = Path(__file__).parents[2] / "tools/fuzz_readers.py"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", [*TEXT, *BINARY, *OTHERS])
+def test_random_files_of_a_format_are_read_as_written_and_refused_where_damaged(form: str) -> None:
+    command = [sys.executable, str(TOOL), form, "--seed", "1", "--cases", *map(str, range(8))]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "whole read" in ended.stdout

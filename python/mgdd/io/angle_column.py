@@ -155,6 +155,8 @@ def _choose_angle(
         if head.quantity == "time" and others and column is None:
             raise DataError(f"{called} is a time, and {others[0]!r} an angle: {hint}")
         return index, head.unit
+    if column is None and head.quantity is None and others:
+        raise DataError(f"{called} is the first one, and {others[0]!r} is an angle: {hint}")
     if unit is not None:
         return index, unit
     step = argument("angle_step_deg", "")

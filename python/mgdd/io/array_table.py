@@ -135,7 +135,8 @@ class ArrayTable(Table):
             (at, first), *others = run
             count = 1 + len(others)
             with self._reading():
-                out[at : at + count] = first.block(slice(*self.window), count)
+                place = out[at : at + count]
+                place[:] = _complete(first.block(slice(*self.window), count), place.shape)
         return out
 
     def part(self, start: int, stop: int) -> ArrayTable:
@@ -146,7 +147,7 @@ class ArrayTable(Table):
         """Return the table with all of its arrays in memory."""
         with self._reading():
             held = {
-                id(each): np.asarray(each[(slice(None),) * len(each.shape)])
+                id(each): _complete(np.asarray(each[(slice(None),) * len(each.shape)]), each.shape)
                 for each in {id(column.values): column.values for column in self.columns}.values()
             }
         columns = tuple(each._replace(values=held[id(each.values)]) for each in self.columns)
@@ -164,6 +165,13 @@ class ArrayTable(Table):
         with naming_damage(self.stamp.file):
             yield
         self.stamp.require_same()
+
+
+def _complete(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Refuse fewer numbers than the head of a file told, which NumPy would repeat or leave out."""
+    if values.shape != shape:
+        raise ValueError(f"{values.shape} numbers where {shape} are said to be")
+    return values
 
 
 @contextlib.contextmanager

@@ -175,7 +175,8 @@ def _unit_word(name: str) -> str | None:
             return str(text)
     if (ratio := _ratio(name)) and _known(ratio):
         return ratio
-    words = [word for word in re.split(r"[\s_/,;.\-]+", name.strip()) if word and not word.isdecimal()]
+    own = [part for part in name.split(".") if not part.strip().isdecimal()]  # behind those of its structs and groups
+    words = [word for word in re.split(r"[\s_/,;\-]+", own[-1].strip() if own else "") if word and not word.isdecimal()]
     if not words or (len(words[-1]) == 1 and (len(words) == 1 or (words[-1] != "V" and words[0].lower() == "p"))):
         return None  # a lone letter is a name, and p_a is a cylinder rather than an ampere
     return words[-1] if _known(words[-1]) is not None else None

@@ -19,6 +19,8 @@ __all__ = ["SAME_ANGLE", "Cycles", "arranged", "several_cycles"]
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
 SAME_ANGLE = 0.01
+# Share of a step by which the end of a cycle may be missed: angles of three digits in radians are rounded by as much.
+_ROUNDED = 0.3
 # Sums of steps end this much [deg] beside the angle that was meant.
 _ROUNDING = 1e-6
 
@@ -44,10 +46,12 @@ def arranged(
     firing_tdc_deg: float | None,
     before_tdc: bool,
     place: Place,
+    counts_turns: bool = False,
 ) -> Cycles:
     """Turn angles as in the file [deg] to °CA aTDC and cut channels (channel, column, sample) into complete cycles.
 
-    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle.
+    The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle, unless
+    the angle `counts_turns` by a mark of the shaft.
 
     Raises
     ------
@@ -86,7 +90,7 @@ def arranged(
         values, runs_on = values[..., keep].reshape(len(values), 1, -1), True
     if runs_on:
         _check_tdc(degrees, firing_tdc_deg, place)
-        cut = _running(degrees, values[:, 0], rows, float(firing_tdc_deg or 0.0), place)
+        cut = _running(degrees, values[:, 0], rows, float(firing_tdc_deg or 0.0), place, counts_turns)
         return cut._replace(notes=notes + cut.notes)
     return _turned(degrees, values, rows, firing_tdc_deg, place)._replace(notes=notes)
 
@@ -191,6 +195,7 @@ def _running(
     rows: NDArray[np.intp],
     firing_tdc_deg: float,
     place: Place,
+    counts_turns: bool,
 ) -> Cycles:
     """Cut angles that run on into cycles of 720 degrees, at the start of the record or at gas-exchange TDC."""
     wide, step = wide_steps(degrees)
@@ -200,7 +205,7 @@ def _running(
             f"{place.row(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual "
             f"step is {step:g}; fill it or cut the record there"
         )
-    found = repetition(degrees, values[0], firing_tdc_deg)
+    found = None if counts_turns else repetition(degrees, values[0], firing_tdc_deg)
     if found is not None and found.differs:
         factor = CYCLE_DEG / found.degrees
         raise DataError(
@@ -211,13 +216,13 @@ def _running(
     first = float(degrees[0])
     if _splits_a_burn(degrees, firing_tdc_deg):
         first += (-360.0 - _seam(first, firing_tdc_deg)) % 720.0
-    count = int((degrees[-1] + step * (1.0 + SAME_ANGLE) - first) // 720.0)
+    count = int((degrees[-1] + step * (1.0 + _ROUNDED) - first) // 720.0)
     if count < 1:
         raise DataError(
             f"{place.source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
             f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
         )
-    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - SAME_ANGLE * step)
+    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _ROUNDED * step)
     head, tail = int(starts[0]), degrees.size - int(starts[-1])
     grid = degrees[starts[0] : starts[1]]
     at = grid + 720.0 * np.arange(count)[:, None]
@@ -230,7 +235,7 @@ def _running(
     if same and np.abs(cut - at).max() <= SAME_ANGLE * step:
         values = values[:, starts[0] : starts[0] + at.size].reshape(-1, *at.shape)
     else:
-        at = at[at[:, -1] <= degrees[-1] + SAME_ANGLE * step]
+        at = at[at[:, -1] <= degrees[-1] + _ROUNDED * step]
         values = np.stack([np.interp(at, degrees, row) for row in values])
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
     past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)

@@ -26,6 +26,8 @@ __all__ = ["Encoder", "Turning", "on_even_angles", "turning_of"]
 _STEPS_DEG = (0.01, 0.02, 0.025, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 # Mean pressure around the two places of TDC: the firing one has more, by at least this share of the whole range.
 _AROUND_DEG, _CLEARLY = 15.0, 0.15
+# An edge is displaced by at least so many degrees, and by so many times what is usual; looked for at parts of a pitch.
+_DISPLACED_DEG, _ODD, _PER_PITCH = 0.3, 8.0, 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +92,8 @@ class Encoder:
             ``crank_angle_deg(time_s)``, running on, 0 at a mark: the first edge behind the gap, the edge of the index,
             or the first edge; NaN before the first and behind the last turn that can be told. ``speed_rpm(turn)`` from
             mark to mark, ``mark_s(turn)``; ``lost``, ``extra`` (edges) and ``lost_marks`` are counts, ``slipped_deg``
-            (stretch, end) are turns whose count is wrong: the angle is right at their ends only.
+            (stretch, end) are turns whose count is wrong, and the neighbourhoods of edges that come early or late: the
+            angle is right at their ends only.
 
         Raises
         ------
@@ -107,12 +110,12 @@ class Encoder:
             {
                 "time_s": ("time_s", np.asarray(time_s, dtype=np.float64)),
                 "turn": ("turn", np.arange(1, speed.size + 1), "-", "turn"),
-                "slip": ("slip", np.arange(1, len(slipped) + 1), "-", "stretch of turns with a wrong count"),
+                "slip": ("slip", np.arange(1, len(slipped) + 1), "-", "stretch of miscounted or displaced edges"),
                 "end": ("end", np.array(["from", "to"]), "-", "end of a stretch"),
                 "crank_angle_deg": ("time_s", found["angle_deg"], "deg", "crank angle from a mark on"),
                 "mark_s": ("turn", marks[:-1], "s", "time of the mark that begins a turn"),
                 "speed_rpm": ("turn", speed, "rpm", "engine speed"),
-                "slipped_deg": (("slip", "end"), slipped, "deg", "turns with a wrong count"),
+                "slipped_deg": (("slip", "end"), slipped, "deg", "miscounted or displaced edges"),
                 **{name: ((), found[name], "-", name.replace("_", " ")) for name in ("lost", "extra", "lost_marks")},
             }
         )
@@ -120,9 +123,33 @@ class Encoder:
 
 def _found(encoder: Encoder, time_s: ArrayLike, signal: ArrayLike, index: ArrayLike | None) -> dict[str, Any]:
     e = encoder
-    return _core.encoder_angle(
+    found: dict[str, Any] = _core.encoder_angle(
         time_s, signal, index, teeth=e.teeth, missing_teeth=e.missing_teeth, falling=e.falling, level=e.level
     )
+    displaced = _displaced(np.asarray(found["angle_deg"]), np.asarray(time_s, np.float64), e.teeth)
+    return {**found, "slipped_deg": sorted([*found["slipped_deg"], *displaced])}
+
+
+def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth: int) -> list[tuple[float, float]]:
+    """Give the stretches of a pitch before and behind an edge that comes early or late, as where a dropout cuts it.
+
+    What a place of the wheel has in every turn, as a bent tooth, is left to it.
+    """
+    told, pitch = np.isfinite(degrees), 360.0 / teeth
+    angle, time = degrees[told], time_s[told]
+    at = np.arange(angle[0] + pitch, angle[-1] - pitch, pitch / _PER_PITCH)
+    if not at.size:
+        return []
+    before, here, behind = (np.interp(at + side, angle, time) for side in (-pitch, 0.0, pitch))
+    late = pitch * (2.0 * here - before - behind) / (behind - before)
+    turn = teeth * _PER_PITCH
+    if late.size >= 3 * turn:
+        late -= np.resize(np.median(late[: late.size // turn * turn].reshape(-1, turn), axis=0), late.size)
+    usual = float(np.median(np.abs(late)))
+    sample = float(np.median(np.diff(angle)))  # within it a pulse may begin anywhere
+    bad = np.flatnonzero(np.abs(late) > max(_DISPLACED_DEG, _ODD * usual, 2.0 * sample))
+    parts = np.split(bad, np.flatnonzero(np.diff(bad) > 2 * _PER_PITCH) + 1) if bad.size else []
+    return [(float(at[part[0]]) - pitch, float(at[part[-1]]) + pitch) for part in parts]
 
 
 class Turning(NamedTuple):
@@ -133,6 +160,7 @@ class Turning(NamedTuple):
     speed_rpm: float | None
     slipped_deg: list[tuple[float, float]]
     notes: list[str]
+    has_mark: bool
 
 
 def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: int | str | None) -> Turning:
@@ -161,11 +189,12 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
     ):
         if count:
             notes.append(f"{table.called(column)}: {count} {what.format('s' if count > 1 else '')}")
-    if not encoder.missing_teeth and index is None:
+    has_mark = encoder.missing_teeth > 0 or index is not None
+    if not has_mark:
         notes.append(f"{table.called(column)} has no mark of the turn: that no edge is missing is taken for granted")
     speed = 60.0 * (len(marks) - 1) / float(marks[-1] - marks[0]) if clock is not None and len(marks) > 1 else None
     used = tuple(i for i in (column, index, clock) if i is not None)
-    return Turning(found["angle_deg"], used, speed, found["slipped_deg"], notes)
+    return Turning(found["angle_deg"], used, speed, found["slipped_deg"], notes, has_mark)
 
 
 def _time(table: Table, heads: Sequence[Heading], size: int, column: int) -> int | None:

@@ -168,7 +168,7 @@ def read_pressure(
         For a record over time beside the signal of an encoder or a toothed wheel: its column, its teeth, its mark.
         `firing_tdc_deg` is the angle of TDC behind that mark then, in either turn: the firing one is the one with the
         higher pressure. The samples are taken at even angles by a cubic, every `angle_step_deg`, or at about as many
-        as there are; cycles with miscounted edges are left out. ``attrs["speed_rpm"]`` is the mean speed.
+        as there are; cycles with miscounted or displaced edges are left out. ``attrs["speed_rpm"]`` is the mean speed.
     delimiter : str, optional
         Column separator; None detects it.
     decimal : {".", ","}

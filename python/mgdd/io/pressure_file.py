@@ -153,6 +153,7 @@ def record_of(
         source=source or table.source,
         rows=rows,
         flagged=flagged,
+        counts_turns=angle.turning is not None and angle.turning.has_mark,
         level=pressure.level,
         unit_of_file=pressure.unit_of_file,
         over_time=over_time,
@@ -176,6 +177,7 @@ def checked(
     unit_of_file: bool = False,
     over_time: bool = False,
     flagged: bool = False,
+    counts_turns: bool = False,
 ) -> Record:
     """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in.
 
@@ -188,7 +190,14 @@ def checked(
         check_span(degrees, angle_unit, source, several=firing_tdc_deg is not None)
         place = Place(source, rows)
         together = cut.values if along is None else np.concatenate([cut.values, along])
-        cut = arranged(degrees, together, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place)
+        cut = arranged(
+            degrees,
+            together,
+            firing_tdc_deg=firing_tdc_deg,
+            before_tdc=before_tdc,
+            place=place,
+            counts_turns=counts_turns,
+        )
         if flagged:
             cut = _without_flagged(cut, source)
         _check_turns(cut.degrees, cut.values[0], source)
@@ -205,15 +214,14 @@ def _without_flagged(cut: Cycles, source: str) -> Cycles:
     values, bad = cut.values[:-1], cut.values[-1].max(axis=1) > 0.0
     if bad.all():
         raise DataError(
-            f"{source}: in each of the {bad.size} cycle(s) the encoder's edges are miscounted: set the level of its "
-            "edges, or record it again"
+            f"{source}: in each of the {bad.size} cycle(s) the encoder's edges are miscounted or displaced: set the "
+            "level of its edges, or record it again"
         )
     if not bad.any():
         return cut._replace(values=values)
     numbers = ", ".join(str(k + 1) for k in np.flatnonzero(bad)[:8])
-    note = (
-        f"cycle {numbers}{', ...' if bad.sum() > 8 else ''} of {bad.size} left out: the encoder's edges are miscounted"
-    )
+    which = f"cycle {numbers}{', ...' if bad.sum() > 8 else ''} of {bad.size}"
+    note = f"{which} left out: the encoder's edges are miscounted or displaced"
     taken = tuple(int(k) for k in np.flatnonzero(~bad))
     return cut._replace(values=values[:, ~bad], notes=(*cut.notes, note), taken=taken, total=bad.size)
 

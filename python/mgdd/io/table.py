@@ -32,12 +32,15 @@ __all__ = [
     "parse_number",
     "read_table",
     "require_width",
+    "spells_units",
     "text_table",
 ]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _NARROW = 4  # columns
 _ROWS = 4  # of one width, one below the other, are data
+_HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
+_RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh
 _COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
 
 
@@ -333,8 +336,18 @@ def _check_commas(
     body: Sequence[tuple[int, str]],
     mark: str | None,
 ) -> None:
-    """Refuse commas that separate cells and are decimal marks as well: twice as many cells as names."""
-    if mark != "," or not heads or not body or len(heads[-1]) < 2:
+    """Refuse commas that are decimal marks: blanks separate the cells, or there are twice as many cells as names."""
+    if mark != "," or not body:
+        return
+    line, row = body[0]
+    split = [cell.replace('"', " ").split() for cell in row.split(mark)]
+    blanks = any(len(cell) > 1 for cell in split) and all(len(cell) > 1 for cell in split[1:-1])
+    if blanks and "." not in row and all(parse_number(part) is not None for cell in split for part in cell):
+        raise DataError(
+            f"{source}, line {line}: commas between numbers that blanks separate: pass "
+            f"{argument('decimal', repr(','))} if the comma is a decimal mark"
+        )
+    if not heads or len(heads[-1]) < 2:
         return
     names, cells = len(heads[-1]), _cells(body[0][1], mark)
     if len(cells) == 2 * names and all(cell.isdecimal() for cell in cells[1::2]):
@@ -346,23 +359,29 @@ def _check_commas(
 
 def _first_row(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> int:
     """Return where the rows of numbers begin: names, units, remarks and the lines of a preamble stand above them."""
+
+    def mark_of(text: str) -> str | None:
+        return delimiter if delimiter is not None else _detect(text, decimal)
+
+    last_head: int | None = None
     for at, (_, text) in enumerate(content):
-        mark = delimiter if delimiter is not None else _detect(text, decimal)
-        cells, below = _cells(text, mark), content[at + 1 : at + _ROWS]
+        mark = mark_of(text)
+        cells = _cells(text, mark)
         if _is_head(cells):
             continue
-        if _like_number(cells[0]) or not _has_head(content[at + 1 :], delimiter, decimal):
+        if _like_number(cells[0]) or (not cells[0] and all(_like_number(cell) for cell in cells if cell)):
             return at  # one of another width is refused by its line
+        if last_head is None:
+            later = ((k, content[k][1]) for k in range(len(content) - 1, at, -1))
+            last_head = next((k for k, row in later if _is_head(_cells(row, mark_of(row)))), at)
+        if at >= last_head:
+            return at
         above = _cells(content[at - 1][1], mark) if at else ()
         named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
-        if named and all(_width(row, mark) == len(cells) for _, row in below):
+        below = [_cells(row, mark) for _, row in content[at + 1 : at + _ROWS]]
+        if named and all(len(one) == len(cells) and one[0] != _HEADER_ENDS for one in below):
             return at
     return len(content)
-
-
-def _has_head(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> bool:
-    marks = ((text, delimiter if delimiter is not None else _detect(text, decimal)) for _, text in content)
-    return any(_is_head(_cells(text, mark)) for text, mark in marks)
 
 
 def _names_and_units(
@@ -370,24 +389,28 @@ def _names_and_units(
 ) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None]:
     """Choose the lines above the rows that name the columns and their units; the others are remarks."""
     whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
-    aligned = [cells[len(cells) - width :] for cells in whole if len(cells) == width or cells[0] == "X_Value"]
+    wide = [cells for cells in whole if len(cells) == width or (len(cells) > width and cells[0] == "X_Value")]
+    aligned = [cells[len(cells) - width :] for cells in wide]
+    if len(aligned) == 2 and aligned[0].count("-") > aligned[1].count("-") and not spells_units(aligned[1]):
+        return aligned[1], None  # below a remark of a sheet, made as wide
     if len(heads) <= 2 and (len(aligned) == len(heads) or len(heads) == 1):
         return next(iter(aligned), None), heads[1] if len(heads) == 2 else None
-    rows = [at for at, cells in enumerate(aligned) if at and _spells_units(cells)]
+    rows = [at for at, cells in enumerate(aligned) if at and spells_units(cells)]
     if rows:
         return aligned[rows[-1] - 1], aligned[rows[-1]]
     return (aligned[-1] if aligned else None), None
 
 
-def _spells_units(cells: Sequence[str]) -> bool:
+def spells_units(cells: Sequence[str]) -> bool:
+    """Return whether a row holds units, and nothing else that is not empty."""
     texts = [cell.strip("[](){} ") for cell in cells]
-    known = [spelled_unit(text) is not None for text in texts if text]
+    known = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
     bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
     return (bool(known) and all(known)) or (bool(bracketed) and all(bracketed))
 
 
 def _cells(text: str, mark: str | None) -> tuple[str, ...]:
-    return tuple(cell.strip().strip('"') for cell in text.split(mark))
+    return tuple(cell.strip().strip('"').strip() for cell in text.split(mark))
 
 
 def _width(text: str, mark: str | None) -> int:

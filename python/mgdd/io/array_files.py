@@ -1,0 +1,184 @@
+"""Readers of files of arrays: MATLAB, HDF5, netCDF, NumPy, Parquet."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.io.array_table import Columns, Named, Reversed, columns_of
+from mgdd.io.extras import import_extra
+from mgdd.io.hdf5_heaps import check_heaps
+from mgdd.io.matlab_tags import check_tags
+from mgdd.io.watched_file import WatchedFile
+from mgdd.results.labels import ANGLE
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["of_hdf5", "of_matlab", "of_netcdf", "of_numpy", "of_parquet"]
+
+
+def of_matlab(file: Path, _: contextlib.ExitStack) -> Columns:
+    """Read the variables of MATLAB 4 to 7, whole."""
+    from scipy.io import loadmat
+
+    check_tags(file.read_bytes(), str(file))
+    try:
+        content = loadmat(file, squeeze_me=True, struct_as_record=False)
+    except Exception as error:
+        raise DataError(f"{file}: not a MATLAB file: {error}: save it with save(..., '-v7') or as CSV") from error
+    return columns_of(
+        column for name, value in content.items() if not name.startswith("__") for column in _of_struct(name, value)
+    )
+
+
+def _of_struct(name: str, value: Any) -> Iterator[Named]:
+    for field in getattr(value, "_fieldnames", ()):
+        yield from _of_struct(f"{name}.{field}", getattr(value, field))
+    if isinstance(value, np.ndarray):
+        yield Named(name, value)
+
+
+def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
+    """Open the data sets of an HDF5 file, as MATLAB 7.3 and netCDF 4 write one too, until the stack closes it."""
+    h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
+    content = stack.enter_context(h5py.File(file, "r"))
+    matlab = any("MATLAB_class" in item.attrs for item in content.values())
+    found: list[tuple[str, Any]] = []
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.shape is not None and item.dtype.kind in "fiub" and name[0] != "#":
+            found.append((name.replace("/", "."), item))
+
+    content.visititems(visit)
+    for name, item in found:
+        needed, held = item.size * item.id.get_type().get_size(), item.id.get_storage_size()
+        if item.id.get_offset() is not None and held < needed:  # the library would give whatever is in memory
+            raise ValueError(f"data set {name!r} has {held} of {needed} bytes")
+    kinds = [_kinds_of_units(h5py, item) for _, item in found]
+    if any(kind.is_variable_str() for own in kinds for kind in own.values()):
+        check_heaps(file, itertools.chain.from_iterable(_places_of(item) for _, item in found))
+    return columns_of(
+        Named(name, Reversed(item) if matlab else item, next(filter(None, (_text(item.attrs[key]) for key in own)), ""))
+        for (name, item), own in zip(found, kinds, strict=True)
+    )
+
+
+def _kinds_of_units(h5py: Any, item: Any) -> dict[str, Any]:
+    """Give the types of units that are texts; one that is damaged to a list of numbers would end the process."""
+    kinds = {key: item.attrs.get_id(key).get_type() for key in ("units", "unit") if key in item.attrs}
+    return {key: kind for key, kind in kinds.items() if isinstance(kind, h5py.h5t.TypeStringID)}
+
+
+def _text(value: Any) -> str:
+    if not np.size(value) or getattr(value, "shape", ()) is None:  # as netCDF 4 writes an empty text
+        return ""
+    text = np.ravel(value)[0]
+    return text.decode() if isinstance(text, bytes) else str(text)
+
+
+def _places_of(item: Any) -> list[tuple[int, int]]:
+    """Say where in the file the numbers of a data set stand: first bytes, and how many."""
+    found: list[tuple[int, int]] = []
+    if item.chunks:
+        item.id.chunk_iter(lambda chunk: found.append((chunk.byte_offset, chunk.size)))
+    elif (start := item.id.get_offset()) is not None:
+        found.append((start, item.id.get_storage_size()))
+    return found
+
+
+def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:
+    """Open the variables of a netCDF 3 file until the stack closes it."""
+    import xarray as xr
+    from scipy.io import netcdf_file
+
+    # First so: by its path SciPy makes room for whatever length stands in the head.
+    with file.open("rb") as stream, netcdf_file(WatchedFile(stream), mmap=True):
+        pass
+    dataset = stack.enter_context(xr.open_dataset(file, engine="scipy"))
+    found = []
+    for name in sorted(dataset.variables, key=lambda each: each != ANGLE):  # the angle first, as in a text
+        variable = dataset[name].variable
+        turned = variable.dims[-1:] == (ANGLE,)
+        found.append(Named(str(name), Reversed(variable) if turned else variable, str(variable.attrs.get("units", ""))))
+    return columns_of(found, along=dataset.sizes.get(ANGLE))
+
+
+def of_numpy(file: Path, stack: contextlib.ExitStack) -> Columns:
+    """Open the arrays of an NPY or NPZ file until the stack closes it."""
+    content = np.load(file, mmap_mode="r", allow_pickle=False)
+    if isinstance(content, np.ndarray):
+        named = content.dtype.names
+        return columns_of([Named(name, content[name]) for name in named] if named else [Named("", content)])
+    stack.enter_context(content)
+    members = (name.removesuffix(".npy") for name in content.zip.namelist() if name.endswith(".npy"))
+    return columns_of(Named(name, _Member(content, name)) for name in members)
+
+
+class _Member:
+    """An array of an NPZ file, which holds it compressed: read whole, once, where any of it is asked for."""
+
+    def __init__(self, archive: Any, name: str) -> None:
+        self._archive, self._name = archive, name
+        with archive.zip.open(f"{name}.npy") as stream:
+            form = np.lib.format
+            read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
+            header = read.get(form.read_magic(stream))  # another version holds records, no columns
+            found: tuple[Any, bool, Any] = header(stream) if header else ((), False, np.dtype(object))
+            self.shape, _, self.dtype = found
+
+    @cached_property
+    def _values(self) -> NDArray[Any]:
+        values: NDArray[Any] = self._archive[self._name]
+        return values
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._values[index]
+
+
+def of_parquet(file: Path, stack: contextlib.ExitStack) -> Columns:
+    """Open the columns of a Parquet file until the stack closes it."""
+    parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
+    content = stack.enter_context(parquet.ParquetFile(file))
+    found = []
+    for field in content.schema_arrow:
+        notes = field.metadata or {}
+        unit = (notes.get(b"units") or notes.get(b"unit") or b"").decode()
+        found.append(Named(field.name, _ArrowColumn(content, field), unit))
+    return columns_of(found)
+
+
+class _ArrowColumn:
+    """A column of a Parquet file, read by groups of rows; the last one is kept for rows that follow."""
+
+    def __init__(self, content: Any, field: Any) -> None:
+        self._content, self._name = content, field.name
+        meta = content.metadata
+        self._ends = np.cumsum([meta.row_group(k).num_rows for k in range(meta.num_row_groups)], dtype=np.int64)
+        self.shape = (meta.num_rows,)
+        self._cast = str(field.type).startswith(("decimal", "bool"))  # else objects, where cells are empty
+        try:
+            self.dtype = np.dtype(float if self._cast else field.type.to_pandas_dtype())
+        except (NotImplementedError, TypeError):
+            self.dtype = np.dtype(object)
+        self._kept: tuple[int, NDArray[Any]] = (-1, np.empty(0))
+
+    def __getitem__(self, index: tuple[slice]) -> NDArray[Any]:
+        start, stop, _ = index[0].indices(self.shape[0])
+        first, last = (int(np.searchsorted(self._ends, at, side="right")) for at in (start, max(stop - 1, start)))
+        begin = int(self._ends[first - 1]) if first else 0
+        parts = [self._group(k) for k in range(first, min(last + 1, self._ends.size))]
+        return np.concatenate(parts)[start - begin : stop - begin]
+
+    def _group(self, number: int) -> NDArray[Any]:
+        if self._kept[0] != number:
+            found = self._content.read_row_group(number, columns=[self._name])[self._name]
+            self._kept = number, (found.cast("double") if self._cast else found).to_numpy()
+        return self._kept[1]

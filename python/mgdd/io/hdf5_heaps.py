@@ -1,0 +1,49 @@
+"""A check of the heaps of an HDF5 file, where its texts stand: on damaged ones the library would stay for ever.
+
+The layout stands in "HDF5 File Format Specification" by The HDF Group, version 3.0, III.E.
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+
+__all__ = ["check_heaps"]
+
+_START = b"GCOL\x01\0\0\0"
+_HEAD = 16  # bytes of a heap's head, and of the head of an object in it
+
+
+def check_heaps(file: Path, data_at: Iterable[tuple[int, int]] = ()) -> None:
+    """Refuse heaps whose objects do not fill them; `data_at` are places and sizes of what holds none, not looked at.
+
+    Raises
+    ------
+    ValueError
+        Such a file.
+    """
+    with file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        start = 0
+        for begin, size in [*sorted(data_at), (len(data), 0)]:
+            end = min(begin, len(data))
+            at = data.find(_START, start, end)
+            while at >= 0:
+                _check_heap(data, at)
+                at = data.find(_START, at + 1, end)
+            start = min(max(start, begin + size), len(data))
+
+
+def _check_heap(data: mmap.mmap, start: int) -> None:
+    if start + _HEAD > len(data):
+        return
+    end = start + struct.unpack_from("<Q", data, start + 8)[0]
+    at = start + _HEAD
+    while at + _HEAD <= min(end, len(data)):
+        index, size = struct.unpack_from("<H6xQ", data, at)
+        # Object 0 is what is free, with its head; the others have bytes of their own behind it, filled up to eight.
+        needed = size if index == 0 else _HEAD + (size + 7) // 8 * 8
+        if not _HEAD <= needed <= end - at:
+            raise ValueError(f"the heap at byte {start} has an object of {size} bytes where {end - at} are left")
+        at += needed

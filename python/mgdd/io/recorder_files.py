@@ -1,0 +1,149 @@
+"""Readers of files of recorders: TDMS of National Instruments, MDF of ASAM."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import tempfile
+import warnings
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.io.array_table import Columns, Named, Samples, columns_of
+from mgdd.io.extras import import_extra
+from mgdd.io.watched_file import WatchedFile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["of_mdf", "of_tdms"]
+
+
+def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
+    """Open the channels of a TDMS file until the stack closes it."""
+    nptdms = import_extra("nptdms", "formats", "a TDMS file")
+    # Not by its path: an index beside it may be of another record.
+    content = stack.enter_context(nptdms.TdmsFile.open(WatchedFile(stack.enter_context(file.open("rb")))))
+    if content.file_status.incomplete_final_segment:
+        warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
+    channels = [channel for group in content.groups() for channel in group.channels()]
+    found: list[Named] = []
+    for channel in channels:
+        count = len(channel)
+        alone = sum(other.name == channel.name for other in channels) == 1
+        name = channel.name if alone else f"{channel.group_name}.{channel.name}"
+        timed = "wf_increment" in channel.properties and count
+        if timed and not any(each.values.shape == (count,) and each.unit == "s" for each in found):
+            time = Samples(count, np.float64, partial(_part_of, channel.time_track))
+            plain = not found and all(other.name != "time" for other in channels)
+            found.append(Named("time" if plain else f"time ({name})", time, "s"))
+        unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
+        found.append(Named(name, Samples(count, channel.dtype, partial(_sliced, channel)), str(unit)))
+    return columns_of(found)
+
+
+def _part_of(whole: Callable[[], NDArray[Any]], start: int, stop: int) -> NDArray[Any]:
+    return whole()[start:stop]
+
+
+def _sliced(values: Any, start: int, stop: int) -> NDArray[Any]:
+    found: NDArray[Any] = values[start:stop]
+    return found
+
+
+def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
+    """Open the channels of an MDF file, each group with its time, until the stack closes it."""
+    asammdf = import_extra("asammdf", "mdf", "an MDF file")
+    found: list[Named] = []
+    stream = WatchedFile(_finished(file, stack))
+    content = stack.enter_context(asammdf.MDF(stream))  # not by its path: in large blocks it believes every size then
+    for number, group in enumerate(content.groups):
+        own = _channels(content, number)
+        count = group.channel_group.cycles_nr
+        if not own or not count:
+            continue
+        master = _master(content, number, stream)
+        if not _has_time(found, count, master):
+            found.append(Named(f"time {number}" if found else "time", Samples(count, np.float64, master), "s"))
+        for k in own:
+            channel, get = group.channels[k], partial(_samples, content, number)
+            read = (
+                partial(_part_of, partial(get, k)) if _virtual(content, channel) else partial(_records, stream, get, k)
+            )
+            first = read(0, 1)
+            if first.ndim == 1:
+                unit = str(content.get_channel_unit(group=number, index=k))
+                found.append(Named(channel.name, Samples(count, first.dtype, read), unit))
+            else:
+                whole = content.select([(None, number, k)])[0]
+                found.append(Named(whole.name, whole.samples, whole.unit))
+    return columns_of(found)
+
+
+def _finished(file: Path, stack: contextlib.ExitStack) -> IO[bytes]:
+    """Open a file; of one that its recorder did not finish a copy, in which asammdf does so."""
+    stream = stack.enter_context(file.open("rb"))
+    if stream.peek(1).startswith(b"MDF "):
+        return stream
+    copy = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
+    shutil.copyfileobj(stream, copy)
+    return copy
+
+
+def _master(content: Any, number: int, stream: WatchedFile) -> Callable[[int, int], NDArray[Any]]:
+    at = content.masters_db.get(number)
+    if at is None or _virtual(content, content.groups[number].channels[at]):
+        return partial(_part_of, partial(content.get_master, number))
+    return partial(_records, stream, content.get_master, number)
+
+
+def _virtual(content: Any, channel: Any) -> bool:
+    """Whether a channel stands in no record; asammdf counts it from wherever a part begins."""
+    return bool(channel.channel_type in (3, 6) if content.version >= "4" else not channel.bit_count)
+
+
+def _has_time(found: list[Named], count: int, master: Callable[[int, int], NDArray[Any]]) -> bool:
+    """Whether a column of seconds holds these times already."""
+    times = [each.values for each in found if each.unit == "s" and each.values.shape == (count,)]
+    return bool(times) and any(np.array_equal(each[(slice(None),)], master(0, count)) for each in times)
+
+
+def _samples(content: Any, group: int, index: int, **part: int) -> NDArray[Any]:
+    values, _ = content.get(group=group, index=index, samples_only=True, ignore_invalidation_bits=True, **part)
+    found: NDArray[Any] = values
+    return found
+
+
+def _records(stream: WatchedFile, read: Callable[..., NDArray[Any]], index: int, start: int, stop: int) -> NDArray[Any]:
+    stream.forget()
+    return read(index, record_offset=start, record_count=stop - start)
+
+
+def _channels(content: Any, number: int) -> list[int]:
+    """Give the channels of a group that hold numbers; one that is not within its record is refused.
+
+    On such a channel asammdf ends the process. Numbers of the types stand in "MDF" by ASAM, versions 3.3 and 4.2.
+    """
+    master, group, out = content.masters_db.get(number), content.groups[number], []
+    size, old = int(group.channel_group.samples_byte_nr), content.version < "4"
+    rows, held = group.channel_group.cycles_nr, sum(block.original_size for block in group.get_data_blocks())
+    if rows * size > held:
+        raise ValueError(f"{rows} records of {size} bytes in a group of {held}")
+    for k, channel in enumerate(group.channels):
+        if _virtual(content, channel):
+            first = bits = 0
+        elif old:
+            first, bits = channel.start_offset // 8 + channel.additional_byte_offset, channel.bit_count
+        else:
+            first, bits = channel.byte_offset, channel.bit_offset + channel.bit_count
+        end = first + (bits + 7) // 8
+        if end > size:
+            raise ValueError(f"channel {channel.name!r} ends at byte {end} of a record of {size}")
+        numeric = channel.data_type != 7 if old else channel.data_type in (*range(6), 10)  # or the bytes of a bus
+        if k != master and numeric and not group.channel_dependencies[k]:
+            out.append(k)
+    return out
