@@ -332,6 +332,13 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
   return best;
 }
 
+void GaussianProcessSeeking::reseed(std::uint64_t seed) noexcept {
+  settings_.seed = seed;
+  j_.reseed(seed);
+  for (ProcessModel& model : limited_)
+    model.reseed(seed);
+}
+
 LimitState GaussianProcessSeeking::limit_state(std::size_t i) const noexcept {
   if (unsafe_[0] >= 10.0 && room_[i] < 0.0) return LimitState::infeasible;
   return expected_sd_ > 0.0 && room_[i] < active_room ? LimitState::active : LimitState::free;

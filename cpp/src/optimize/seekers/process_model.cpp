@@ -146,15 +146,17 @@ void ProcessModel::record(const Inputs& z, double value, const Inputs& about) no
   values_[at] = value;
   ages_[at] = 0.0;
   ++told_;
+  factored_ = false;
 }
 
 void ProcessModel::age(double cycles) noexcept {
   ages_.head(count_).array() += cycles;
+  factored_ = false;
 }
 
 void ProcessModel::forget() noexcept {
   count_ = told_ = 0;
-  begun_ = false;
+  begun_ = factored_ = false;
   points_.setZero();
   values_.setZero();
   ages_.setZero();
@@ -260,6 +262,15 @@ void ProcessModel::factor() noexcept {
   cholesky(factor_, count_);
   solve_lower(factor_, count_, weights_.data());
   solve_upper(factor_, count_, weights_.data());
+  factored_ = true;
+}
+
+// After a restart in another process, or readings since the last fit.
+void ProcessModel::refresh() noexcept {
+  if (factored_) return;
+  level_ = values_.head(count_).mean();
+  now_ = scales_of(numbers_);
+  factor();
 }
 
 void ProcessModel::fit(const Inputs& about) noexcept {
@@ -271,8 +282,8 @@ void ProcessModel::fit(const Inputs& about) noexcept {
     try_numbers(told_ < first_readings ? first_trials : told_ < more_readings ? more_trials : late_trials);
     if (told_ == enough + settling_readings) settled_bend_ = numbers_[0];
   }
-  now_ = scales_of(numbers_);
-  factor();
+  factored_ = false;
+  refresh();
 }
 
 void ProcessModel::predict(const InputTable& at, int points) noexcept {
@@ -282,6 +293,7 @@ void ProcessModel::predict(const InputTable& at, int points) noexcept {
 }
 
 void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
+  refresh();
   for (int p = 0; p < points; ++p) {
     asked_.row(p) = at.row(p).head(settings_.inputs);
     double* const own = &kernels_(p, 0);

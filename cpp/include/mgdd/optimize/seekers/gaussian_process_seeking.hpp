@@ -64,7 +64,7 @@ class GaussianProcessSeeking {
   void restart() noexcept;
   /// Moves the estimate, within the bounds, and the next input with it; what was learnt stays.
   void shift_estimate(const Inputs& by) noexcept;
-  void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
+  void reseed(std::uint64_t seed) noexcept;
 
   const Inputs& estimate() const noexcept { return estimate_; }
   double noise_sd() const noexcept { return j_.noise_sd(); }

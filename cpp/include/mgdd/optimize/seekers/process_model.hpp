@@ -49,6 +49,7 @@ class ProcessModel {
   /// Every reading so far counts as if it were this much older.
   void age(double cycles) noexcept;
   void forget() noexcept;
+  void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
 
   template <class Self, class V>
   static void visit(Self& self, V& v, const std::string& name) {
@@ -77,6 +78,7 @@ class ProcessModel {
   void begin_numbers() noexcept;
   void try_numbers(int trials) noexcept;
   void factor() noexcept;
+  void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
   bool noise_known() const noexcept { return settings_.noise_sd.has_value(); }
 
@@ -87,7 +89,8 @@ class ProcessModel {
   Eigen::VectorXd values_, ages_;
   Numbers numbers_;
   std::optional<double> settled_bend_{};  // logarithm, as the first readings gave it
-  // Made anew by every fit and prediction.
+  // Made anew of the above where readings or numbers have changed.
+  bool factored_ = false;
   double level_ = 0.0;
   InputTable factor_, small_;  // lower triangles
   Eigen::VectorXd weights_, small_rest_, distance_, mean_;
