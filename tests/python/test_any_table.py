@@ -312,6 +312,17 @@ def test_a_damaged_heap_of_hdf5_is_refused(tmp_path: Path) -> None:
             read_any_table(file)
 
 
+def test_a_tree_of_hdf5_in_a_circle_is_refused(tmp_path: Path) -> None:
+    """The library would walk its nodes for ever."""
+    file = tmp_path / "a.h5"
+    WRITERS["hdf5"](file, LOG, {})
+    whole = file.read_bytes()
+    node = whole.index(b"TREE")
+    file.write_bytes(whole[: node + 16] + node.to_bytes(8, "little") + whole[node + 24 :])
+    with pytest.raises(DataError, match=rf"in a circle, the one at byte {node} among them"):
+        read_any_table(file)
+
+
 def test_a_unit_of_hdf5_that_is_no_text_is_not_read(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as content:
