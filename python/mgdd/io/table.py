@@ -294,7 +294,13 @@ def _check_commas(
     body: Sequence[tuple[int, str]],
     mark: str | None,
 ) -> None:
-    """Refuse commas that separate cells and are decimal marks as well: twice as many cells as names."""
+    """Refuse commas that are decimal marks beside blanks, or separate cells as well: twice as many cells as names."""
+    inner = _cells(body[0][1], mark)[1:-1] if mark == "," and body else ()
+    if inner and all(re.fullmatch(r"\d+\s+[+-]?\d+", cell) for cell in inner):
+        raise DataError(
+            f"{source}, line {body[0][0]}: {inner[0]!r} between two commas: they are decimal marks and blanks separate "
+            f"the columns: pass {argument('decimal', repr(','))}"
+        )
     if mark != "," or not heads or not body or len(heads[-1]) < 2:
         return
     names, cells = len(heads[-1]), _cells(body[0][1], mark)
