@@ -296,7 +296,7 @@ def _check_commas(
 ) -> None:
     """Refuse commas that are decimal marks beside blanks, or separate cells as well: twice as many cells as names."""
     inner = _cells(body[0][1], mark)[1:-1] if mark == "," and body else ()
-    if inner and all(re.fullmatch(r"\d+\s+[+-]?\d+", cell) for cell in inner):
+    if inner and all(re.fullmatch(r"\d+(e[+-]?\d+)?\s+[+-]?\d+", cell, re.IGNORECASE) for cell in inner):
         raise DataError(
             f"{source}, line {body[0][0]}: {inner[0]!r} between two commas: they are decimal marks and blanks separate "
             f"the columns: pass {argument('decimal', repr(','))}"
