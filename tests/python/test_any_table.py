@@ -246,7 +246,7 @@ def test_labview_text_with_commas(tmp_path: Path) -> None:
         ("angle;p\n1;2;3\n2;3\n3;4\n4;5\n", "line 3: 2 cell(s) where line 2 has 3"),
         (
             "angle p\n1,5 2,25\n2,5 -3,5\n",
-            "line 2: '5 2' between two commas: they are decimal marks and blanks",
+            "line 2: '5 2' between commas: they are decimal marks and blanks",
         ),
         ("angle;p\n1;2\n2;x\n3;4\n4;5\n", "line 3, column 'p': 'x' is not a number"),
         ("angle;p\nP1;20;35\nP2;3.5\nP3;4.5\nP4;5.5\n", "line 3: 2 cell(s) where line 2 has 3"),

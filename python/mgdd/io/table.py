@@ -295,10 +295,11 @@ def _check_commas(
     mark: str | None,
 ) -> None:
     """Refuse commas that are decimal marks beside blanks, or separate cells as well: twice as many cells as names."""
-    inner = _cells(body[0][1], mark)[1:-1] if mark == "," and body else ()
-    if inner and all(re.fullmatch(r"\d+(e[+-]?\d+)?\s+[+-]?\d+", cell, re.IGNORECASE) for cell in inner):
+    first = body[0][1] if mark == "," and body else "."
+    whole = [cell for cell in first.split(",") if len(cell.split()) > 1]
+    if whole and re.fullmatch(r'[\d\s",eE+-]+', first):
         raise DataError(
-            f"{source}, line {body[0][0]}: {inner[0]!r} between two commas: they are decimal marks and blanks separate "
+            f"{source}, line {body[0][0]}: {whole[0]!r} between commas: they are decimal marks and blanks separate "
             f"the columns: pass {argument('decimal', repr(','))}"
         )
     if mark != "," or not heads or not body or len(heads[-1]) < 2:
