@@ -143,6 +143,8 @@ def run(form: str, seed: int, number: int, folder: Path, say: Connection | None,
         if say is not None:
             say.send(step)
         steps.append(step._replace(outcome=judged(case, path, whole=copy == 0)))
+        if steps[-1].outcome.startswith("FOUND"):
+            path.with_name(f"found {case.name}").write_bytes(raw)  # the next copy takes the place of this one
         if say is not None:
             say.send(steps[-1])
     return steps
@@ -220,10 +222,14 @@ class Fuzz:
             self.found[key] += 1
             if self.found[key] <= 2:
                 print(f"case {step.case}, copy {step.copy}, {step.what}: {outcome[:1500]}", flush=True)
-                file = self.folder / step.what.partition(",")[0]
+                name = step.what.partition(",")[0]
+                file = self.folder / f"found {name}"
+                file = file if file.exists() else self.folder / name
                 if word == "FOUND" and file.exists():
-                    name = f"{self.form}_{self.seed}_{step.case}_{step.copy}_{file.name}"
-                    (self.kept / name).write_bytes(file.read_bytes())
+                    (self.kept / f"{self.form}_{self.seed}_{step.case}_{step.copy}_{name}").write_bytes(
+                        file.read_bytes()
+                    )
+                    (self.folder / f"found {name}").unlink(missing_ok=True)
 
 
 def main() -> int:

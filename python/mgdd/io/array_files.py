@@ -14,7 +14,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.array_table import Columns, Named, Reversed, columns_of
 from mgdd.io.extras import import_extra
-from mgdd.io.hdf5_heaps import check_heaps
+from mgdd.io.hdf5_heaps import check_heaps, check_trees
 from mgdd.io.matlab_tags import check_tags
 from mgdd.io.watched_file import WatchedFile
 from mgdd.results.labels import ANGLE
@@ -49,6 +49,7 @@ def _of_struct(name: str, value: Any) -> Iterator[Named]:
 def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the data sets of an HDF5 file, as MATLAB 7.3 and netCDF 4 write one too, until the stack closes it."""
     h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
+    check_trees(file)
     content = stack.enter_context(h5py.File(file, "r"))
     matlab = any("MATLAB_class" in item.attrs for item in content.values())
     found: list[tuple[str, Any]] = []

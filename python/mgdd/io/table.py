@@ -336,18 +336,15 @@ def _check_commas(
     body: Sequence[tuple[int, str]],
     mark: str | None,
 ) -> None:
-    """Refuse commas that are decimal marks: blanks separate the cells, or there are twice as many cells as names."""
-    if mark != "," or not body:
-        return
-    line, row = body[0]
-    split = [cell.replace('"', " ").split() for cell in row.split(mark)]
-    blanks = any(len(cell) > 1 for cell in split) and all(len(cell) > 1 for cell in split[1:-1])
-    if blanks and "." not in row and all(parse_number(part) is not None for cell in split for part in cell):
+    """Refuse commas that are decimal marks beside blanks, or separate cells as well: twice as many cells as names."""
+    first = body[0][1] if mark == "," and body else "."
+    whole = [cell for cell in first.split(",") if len(cell.split()) > 1]
+    if whole and re.fullmatch(r'[\d\s",eE+-]+', first):
         raise DataError(
-            f"{source}, line {line}: commas between numbers that blanks separate: pass "
-            f"{argument('decimal', repr(','))} if the comma is a decimal mark"
+            f"{source}, line {body[0][0]}: {whole[0]!r} between commas: they are decimal marks and blanks separate "
+            f"the columns: pass {argument('decimal', repr(','))}"
         )
-    if not heads or len(heads[-1]) < 2:
+    if mark != "," or not heads or not body or len(heads[-1]) < 2:
         return
     names, cells = len(heads[-1]), _cells(body[0][1], mark)
     if len(cells) == 2 * names and all(cell.isdecimal() for cell in cells[1::2]):
