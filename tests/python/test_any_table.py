@@ -277,9 +277,7 @@ def test_a_bad_row_is_never_taken_for_a_preamble(text: str, message: str, tmp_pa
 def test_decimal_commas_between_blanks_are_no_separators(row: str, tmp_path: Path) -> None:
     """The first and the last column would be numbers, of half a cell."""
     (tmp_path / "t.csv").write_text(f"{row}\n" * 3)
-    with pytest.raises(
-        DataError, match=r"line 1: .* are decimal marks and blanks separate the columns: pass decimal=','"
-    ):
+    with pytest.raises(DataError, match=r"line 1: .* are decimal marks and blanks separate .*: pass decimal=','"):
         read_any_table(tmp_path / "t.csv")
     first = float(row.split()[0].strip('"').replace(",", "."))
     assert read_any_table(tmp_path / "t.csv", decimal=",").numbers(0).tolist() == [first] * 3
