@@ -35,7 +35,6 @@ S make(int inputs, bool with_limits) {
   s.space.upper = Inputs::Constant(inputs, 20.0);
   s.limits = limits(with_limits);
   if constexpr (requires { s.dither; }) {
-    s.dither.amplitude = Inputs::Constant(inputs, s.dither.amplitude[0]);
     if (inputs == 3) {
       s.dither.period = 40;
       s.dither.harmonics = {4, 5, 7};
@@ -89,6 +88,6 @@ bool add(const std::string& name, int most_inputs = 3) {
 [[maybe_unused]] const bool registered =
     add<ExtremumSeeking>("extremum_seeking") && add<NewtonSeeking>("newton_seeking") &&
     add<BoundedSeeking>("bounded_seeking") && add<Spsa>("spsa") && add<GradientDescent>("gradient_descent") &&
-    add<GoldenSection>("golden_section", 1);
+    add<GoldenSection>("golden_section", 1) && add<GaussianProcessSeeking>("gaussian_process");
 
 }  // namespace

@@ -117,7 +117,7 @@ int main() {
   plant("plant_lugre", Friction::lugre, Backlash::hysteresis);
   mgdd::optimize::SpsaSettings spsa;
   spsa.space = space();
-  spsa.gain = 0.5;
+  spsa.gain = mgdd::optimize::scalar_input(0.5);
   seek("spsa", mgdd::optimize::Spsa(spsa));
   mgdd::optimize::ExtremumSeekingSettings seeking;
   seeking.space = mgdd::optimize::SearchSpace{mgdd::optimize::scalar_input(-3.0), mgdd::optimize::scalar_input(-20.0),
