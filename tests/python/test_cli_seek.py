@@ -17,6 +17,7 @@ import pytest
 from mgdd.cli import main
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+from mgdd.loop.timing_search import TimingSearch
 from mgdd.optimize import ExtremumSeeking
 
 METHODS = ("extremum_seeking", "newton", "bounded", "spsa", "golden")
@@ -238,7 +239,12 @@ def test_bounds_by_name_are_those_of_lower_and_upper(capsys: pytest.CaptureFixtu
         (["--start-cad", "11", "--method", "golden"], ["--start-cad", "9"], "must be in [-30, 10]", 2),
         (["--start-cad", "nan"], ["--start-cad", "-8"], "--start-cad nan", 2),
         (["--lower-cad", "-61"], ["--lower-cad", "-60"], "--lower-cad -61: must be in [-60, 20]", 2),
-        (["--upper-cad", "-25"], ["--upper-cad", "-5"], "--start-cad -20: must be in [-29, -26]", 2),
+        (
+            ["--upper-cad", "-25", "--start-cad", "-20"],
+            ["--upper-cad", "-25"],
+            "--start-cad -20: must be in [-29, -26]",
+            2,
+        ),
         (["--upper-cad", "-30"], ["--upper-cad", "0"], "--lower-cad -30: must be below --upper-cad -30", 2),
         (["--input", "soc_cad=-61:5"], ["--input", "soc_cad=-60:5"], "--lower-cad -61: must be in [-60, 20]", 2),
         (["--input", "soc_cad=5:-25"], ["--input", "soc-cad=-25:5"], "LOW and HIGH must be finite and LOW < HIGH", 2),
@@ -322,3 +328,9 @@ def test_ctrl_c_leaves_the_cycles_so_far(tmp_path: Path) -> None:
     if result["cycles"] >= 1000:
         assert abs(result["final_cad"] - result["optimum_cad"]) < 4.0
     assert f"interrupted: {result['cycles']} of 2000000 cycles are kept".encode() in err
+
+
+@pytest.mark.parametrize(("bounds", "start"), [((-20.0, 5.0), -19.0), ((-12.0, 9.0), -11.0), ((-50.0, -24.0), -25.0)])
+def test_a_start_that_is_left_out_lies_within_the_bounds(bounds: tuple[float, float], start: float) -> None:
+    search = TimingSearch(bench=EngineBench(seed=1), lower_cad=bounds[0], upper_cad=bounds[1], cycles=20)
+    assert search.run().start_cad == start  # as near to -20 as the dither of 1 leaves

@@ -19,7 +19,7 @@ from mgdd.loop.plant_loop import LoopRun
 from mgdd.loop.seek import run_seeker
 from mgdd.loop.seek_guides import CURVES, Guidance, guidance_of, guided_seeker, late_loss, with_start
 from mgdd.loop.seek_limits import COV, COV_CYCLES, choose_start, doubts_of
-from mgdd.loop.seek_task import Task, default_cycles, make_seeker
+from mgdd.loop.seek_task import Task, amplitude_of, default_cycles, make_seeker
 from mgdd.optimize.optimum import Optimum
 
 __all__ = ["TimingSearch", "TimingSearchRun"]
@@ -44,8 +44,8 @@ class TimingSearch:
     form : {"batch", "moving_average", "washout"}, optional
         Of extremum_seeking; batch if left out.
     start_cad : float, optional
-        First SOC [°CA aTDC]; -20 if left out, with a guide its best timing, with limits a start whose noise-free values
-        stay below them.
+        First SOC [°CA aTDC]; -20 if left out, or what of the bounds is nearest to it, with a guide its best timing,
+        with limits a start whose noise-free values stay below them.
     lower_cad : float
         Earliest SOC [°CA aTDC].
     upper_cad : float
@@ -212,6 +212,9 @@ class TimingSearch:
         reason = "default" if self.start_cad is None else "as given"
         if self.start_cad is None and guided is not None:
             task, reason = with_start(task, guided)
+        elif self.start_cad is None:
+            reach = amplitude_of(task)
+            task = replace(task, start_cad=max(min(_START_CAD, bounds[1] - reach), bounds[0] + reach))
         if self.start_cad is None and self.limits:
             start, reason = choose_start(task, wanted=reason)
             task = replace(task, start_cad=start)
