@@ -145,6 +145,10 @@ def test_a_column_per_cycle_is_one_channel(write: Write) -> None:
     assert bench["lift"].dims == (ANGLE,)
     assert bench["torque"].attrs["source"] == "columns 'torque_1 [Nm]' to 'torque_5 [Nm]', one per cycle"
     two = [f"cyl{c}_cycle{k + 1} [bar]" for c in (1, 2) for k in range(5)]
+    # As many as the cycles, but not numbered as they are: five thermocouples.
+    header = [name.replace("torque_", "t_wall_1") for name in header]
+    bench = read(write([FULL, *cycles, *torque, 0.1 * FULL], "CAD," + ",".join(header)))
+    np.testing.assert_array_equal(bench["t_wall_13"], torque[2])
     bench = read(write([FULL, *cycles, *SECOND.reshape(5, 1440)], "CAD," + ",".join(two)))
     np.testing.assert_array_equal(bench["pressure_2_bar"], SECOND.reshape(5, 1440))
     assert bench["pressure_2_bar"].attrs["source"].endswith("'cyl2_cycle5 [bar]', one per cycle")

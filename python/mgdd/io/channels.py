@@ -78,8 +78,7 @@ def layout_of(table: Table, how: Reading) -> Layout:
     groups = _pressures(table, heads, how, angle, fast)
     taken = {i for group in groups for i in group}
     channels = _named_pressures(table, heads, groups)
-    count = len(groups[0])
-    for group in _series(table, heads, [i for i in fast if i not in taken], count):
+    for group in _series(table, heads, [i for i in fast if i not in taken], groups[0]):
         channels.append(_channel(table, heads, group, "fast", channels))
     for i in numeric:
         if i in fast or i in angle.columns or i in times or _numbers_cycles(table, heads[i], i):
@@ -193,10 +192,17 @@ def _grouped(table: Table, heads: Sequence[Heading], columns: Sequence[int]) -> 
     return [tuple(group) for group in groups.values()]
 
 
-def _series(table: Table, heads: Sequence[Heading], columns: Sequence[int], count: int) -> list[tuple[int, ...]]:
-    """Put columns of one name together that are as many as the cycles of the pressure."""
+def _series(
+    table: Table, heads: Sequence[Heading], columns: Sequence[int], pressure: Sequence[int]
+) -> list[tuple[int, ...]]:
+    """Put columns of one name together that are numbered as the cycles of the pressure."""
     groups = _grouped(table, heads, columns) if table.header is not None else [(i,) for i in columns]
-    return sorted(part for group in groups for part in ([group] if len(group) == count else [(i,) for i in group]))
+
+    def numbers(group: Sequence[int]) -> list[str | None]:
+        return [last_number(heads[i].name) for i in group]
+
+    wanted = numbers(pressure)
+    return sorted(part for group in groups for part in ([group] if numbers(group) == wanted else [(i,) for i in group]))
 
 
 def _named_pressures(table: Table, heads: Sequence[Heading], groups: Sequence[tuple[int, ...]]) -> list[Channel]:

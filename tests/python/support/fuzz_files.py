@@ -312,7 +312,8 @@ def text(rng: Random, _: Path) -> Case:
     encoding = pick(rng, ["utf-8", "utf-8", "utf-8-sig", "utf-16", "cp1252"])
     whole = end.join(lines) + end * int(rng.integers(0, 3))
     name = pick(rng, ["a.csv", "a.txt", "a.asc", "a", "a.dat", "a b.CSV"])
-    if decimal == "," and len(cells) > 1 and chance(rng, 0.1):
+    # "0, 1," told with a point is a table of commas.
+    if decimal == "," and len(cells) > 1 and form != "{:.0f}." and chance(rng, 0.1):
         content.text["decimal"] = "."  # told wrong
     return case_of(content, whole.encode(encoding), name, encoding, read_text)
 
