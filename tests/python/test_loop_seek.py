@@ -200,7 +200,7 @@ def test_steady_map_is_quiet_and_labelled() -> None:
         (lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 0), "cycles = 0: must be >= 1"),
         (
             lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)]), 5),
-            r"limits of the seeker \[p_max_bar\] and of the bench \[\] differ",
+            r"limits of the seeker \['p_max_bar'\] are not all measured by the plant, which has \[\]",
         ),
         (
             lambda: run_seeker(

@@ -17,7 +17,7 @@ from mgdd.loop.many_loops import monte_carlo
 from mgdd.loop.many_tracks import track_many
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
-from mgdd.loop.seek import run_seeker
+from mgdd.loop.seek import run_seeker, seek
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
@@ -37,6 +37,7 @@ __all__ = [
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",
+    "seek",
     "simulate_drive",
     "track",
     "track_many",

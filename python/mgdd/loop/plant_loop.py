@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -126,13 +128,31 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     except KeyboardInterrupt:
         interrupted = True
         del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
-    dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
-    dataset.attrs |= {"interrupted": int(interrupted), **criteria.attributes(tuple(plant.limit_names), uppers)}
-    summary = Figures(summarize_cycles(dataset, criteria))
-    run = LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
+    except Exception as error:
+        del log[seeker.cycle - first :]
+        with contextlib.suppress(AttributeError):  # of a class with slots
+            error.partial = _run_of(plant, seeker, log, first, criteria, uppers)  # type: ignore[attr-defined]
+        raise
+    run = _run_of(plant, seeker, log, first, criteria, uppers, interrupted=interrupted)
     if interrupted:
         raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
     return run
+
+
+def _run_of(
+    plant: Plant,
+    seeker: Seeker | FeedForward | GuidedEngine,
+    log: list[_Row],
+    first: int,
+    criteria: LoopCriteria,
+    uppers: Sequence[float],
+    *,
+    interrupted: bool = False,
+) -> LoopRun:
+    dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
+    dataset.attrs |= {"interrupted": int(interrupted), **criteria.attributes(tuple(plant.limit_names), uppers)}
+    summary = Figures(summarize_cycles(dataset, criteria))
+    return LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
 
 
 def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:

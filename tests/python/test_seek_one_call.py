@@ -1,0 +1,335 @@
+"""One call of `seek`: which seeker it takes, what it returns, what it doubts, and what it refuses."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.errors import DataError, Error, Interrupted, ParameterError, ShapeError
+from mgdd.guide import Curve
+from mgdd.loop import EngineBench, Measurement, run_seeker, seek
+from mgdd.loop.seek_choice import MANY_CYCLES
+from mgdd.loop.seek_result import SeekResult
+from mgdd.optimize import GaussianProcessSeeking, Input
+
+TWO = {"soc_cad": (-25.0, 15.0), "egr": (0.0, 0.4)}
+ONE = {"soc_cad": (-25.0, 15.0)}
+BEST = {"soc_cad": -4.0, "egr": 0.15}
+
+
+def engine(noise: float = 0.3, seed: int = 1, best: dict[str, float] = BEST) -> Callable[[dict[str, float]], float]:
+    """Efficiency with a coupling of its inputs; what it does not take is held at its best."""
+    rng = np.random.default_rng(seed)
+
+    def measured(x: dict[str, float]) -> float:
+        timing, egr = x["soc_cad"] - best["soc_cad"], x.get("egr", best["egr"]) - best["egr"]
+        return 56.0 - 0.03 * timing**2 - 300.0 * egr**2 - 1.5 * timing * egr + noise * rng.standard_normal()
+
+    return measured
+
+
+def limited(x: dict[str, float]) -> tuple[float, dict[str, float]]:
+    return engine(0.0)(x), {"p_max_bar": 100.0 - 2.0 * x["soc_cad"] - 20.0 * x.get("egr", 0.15)}
+
+
+def codes(found: SeekResult) -> list[str]:
+    return [finding.code for finding in found.findings]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "settings", "kind", "said"),
+    [
+        (ONE, {}, "CurveSeeking", "a parabola serves as the guide"),
+        (ONE, {"guide": Curve.parabola(curvature=-0.05, best=2.0, reach=60.0)}, "CurveSeeking", "curve of a guide"),
+        (ONE, {"delay_cycles": 3}, "CurveSeeking", "one input"),
+        (TWO, {}, "GaussianProcessSeeking", "2 inputs"),
+        (TWO, {"lag_cycles": 2.0}, "GaussianProcessSeeking", "2 inputs"),
+        (TWO, {"cycles": MANY_CYCLES}, "Spsa", "10000 cycles of 2 inputs"),
+        (ONE, {"cycles": MANY_CYCLES}, "CurveSeeking", "one input"),
+    ],
+)
+def test_the_choice_and_its_reason(inputs: Any, settings: dict[str, Any], kind: str, said: str) -> None:
+    found = seek(engine(), inputs, **{"cycles": 60, **settings})
+    assert found.seeker.kind == kind
+    assert said in found.reason
+    assert found.summary().startswith(f"{kind}: {found.reason}")
+
+
+def test_a_limit_or_a_delay_keeps_a_long_run_from_spsa() -> None:
+    from mgdd.loop.seek_choice import chosen
+    from mgdd.optimize import Limit
+
+    two = [Input(name, *bounds) for name, bounds in TWO.items()]
+    plain: dict[str, Any] = {
+        "cycles": MANY_CYCLES, "limits": [], "noise_sd": None, "delay_cycles": 0.0, "lag_cycles": 0.0, "guide": None,
+        "maximize": True, "seed": 0,
+    }  # fmt: skip
+    assert chosen(two, None, **plain).seeker.kind == "Spsa"
+    for one in ({"cycles": MANY_CYCLES - 1}, {"limits": [Limit("p", 1.0)]}, {"delay_cycles": 1.0}, {"lag_cycles": 1.0}):
+        assert chosen(two, None, **{**plain, **one}).seeker.kind == "GaussianProcessSeeking"
+
+
+@pytest.mark.parametrize("inputs", [ONE, TWO])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_it_finds_the_best_inputs_and_says_how_well(inputs: Any, sign: float) -> None:
+    start = {"soc_cad": 6.0, "egr": 0.28}
+    start = {name: start[name] for name in inputs}
+    covered = []
+    for seed in range(6):
+        measured = engine(seed=seed)
+        found = seek(lambda x, f=measured: sign * f(x), inputs, start=start, cycles=150, maximize=sign > 0.0, seed=seed)
+        exact = engine(0.0)
+        assert exact(BEST) - exact(found.inputs) < 0.15
+        assert found.start == start
+        assert found.gain == pytest.approx(exact(BEST) - exact(start), abs=1.5)
+        assert found.gain_sd == pytest.approx(0.3, rel=0.4)
+        covered.append(abs(sign * found.value - exact(found.inputs)) < 4.0 * found.value_sd)
+        assert found.run.dataset.sizes["cycle"] == 150
+    assert sum(covered) >= 5
+
+
+def test_the_same_seed_gives_the_same_run_and_it_goes_on() -> None:
+    first, again = (seek(engine(), TWO, cycles=40, seed=5) for _ in range(2))
+    assert first.inputs == again.inputs
+    more = run_seeker(EngineBench(seed=2), seek(EngineBench(seed=2), ONE, cycles=30).seeker, 20)
+    assert more.dataset["cycle"].to_numpy()[0] == 0  # of the bench, a new one
+    assert more.dataset.sizes["cycle"] == 20
+
+
+def test_a_bench_is_a_plant_and_limits_are_kept() -> None:
+    bench = EngineBench(seed=4, limits=["dp_max_bar_per_cad", "p_max_bar"])
+    found = seek(bench, {"soc_cad": (-25.0, 10.0)}, start=2.0, limits={"p_max_bar": 95.0}, cycles=300)
+    assert bench.cycle == 300
+    best = bench.find_optimum({"p_max_bar": 95.0})
+    assert found.inputs["soc_cad"] == pytest.approx(best["soc_cad"], abs=1.0)
+    assert list(found.limits) == ["p_max_bar"]
+    assert 91.0 < found.limits["p_max_bar"] < 96.0
+    assert "limit_broken" not in codes(found)
+
+
+def test_a_late_sensor_is_compensated() -> None:
+    best, late = {"soc_cad": -6.0, "egr": 0.1}, 6
+    path: list[dict[str, float]] = []
+    exact = engine(0.1, best=best)
+
+    def behind(x: dict[str, float]) -> float:
+        path.append(x)
+        return exact(path[max(len(path) - 1 - late, 0)])
+
+    found = seek(behind, TWO, start={"soc_cad": 6.0, "egr": 0.28}, cycles=200, delay_cycles=late)
+    assert engine(0.0, best=best)(best) - engine(0.0, best=best)(found.inputs) < 0.2
+    assert "no_gain" not in codes(found)
+
+
+def test_limits_of_a_function_by_name() -> None:
+    found = seek(limited, TWO, start={"soc_cad": 8.0, "egr": 0.3}, limits={"p_max_bar": 101.0}, cycles=150)
+    at = limited(found.inputs)[1]["p_max_bar"]
+    assert at < 101.5
+    assert found.limits["p_max_bar"] == pytest.approx(at, abs=0.5)
+    tried = -np.linspace(4.0, -15.0, 2000)
+    held = [x for x in tried if 100.0 - 2.0 * x - 20.0 * 0.15 <= 101.0]
+    assert found.inputs["soc_cad"] == pytest.approx(min(held), abs=1.5)
+
+
+class Drifting:
+    """An engine whose best timing becomes later from cycle to cycle."""
+
+    def __init__(self, rate: float) -> None:
+        self.rate, self.cycles = rate, 0
+
+    def __call__(self, x: dict[str, float]) -> float:
+        self.cycles += 1
+        return engine(0.1, seed=self.cycles, best={"soc_cad": -15.0 + self.rate * self.cycles, "egr": 0.15})(x)
+
+
+@pytest.mark.parametrize(
+    ("code", "settings", "plant"),
+    [
+        ("few_cycles", {"cycles": 12}, engine()),
+        ("not_settled", {"cycles": 100}, Drifting(0.25)),
+        ("at_bound", {"cycles": 80}, engine(best={"soc_cad": -40.0, "egr": 0.15})),
+        ("no_gain", {"cycles": 60, "start": BEST}, engine()),
+        ("no_reading", {"cycles": 20}, lambda _: None),
+        ("failing_everywhere", {"cycles": 20}, lambda _: None),
+        ("unexplained", {"cycles": 100}, Drifting(0.25)),
+        ("start_above_limit", {"cycles": 40, "limits": {"p_max_bar": 80.0}}, limited),
+        ("limit_broken", {"cycles": 40, "limits": {"p_max_bar": 50.0}}, limited),
+    ],
+)
+def test_a_doubtful_result_is_doubted_aloud(code: str, settings: dict[str, Any], plant: Any) -> None:
+    found = seek(plant, TWO, **settings)
+    assert code in codes(found)
+    doubted = next(finding for finding in found.findings if finding.code == code)
+    assert str(doubted) in found.to_dict()["findings"][codes(found).index(code)]["text"] + "; " + doubted.remedy
+    assert doubted.text[:30] in found._repr_html_()
+    assert doubted.text in found.dataset.attrs["findings"]
+
+
+def test_a_good_result_is_not_doubted() -> None:
+    doubted = [seek(engine(seed=s), TWO, start={"soc_cad": 8.0, "egr": 0.3}, seed=s).findings for s in range(8)]
+    assert sum(not each for each in doubted) >= 7
+
+
+def test_a_curve_that_does_not_fit_is_doubted() -> None:
+    guide = Curve.parabola(curvature=-0.05, best=2.0, reach=60.0)
+    assert "untrusted_guide" in codes(seek(lambda x: 3.0 * math.sin(x["soc_cad"]), ONE, guide=guide))
+    assert "handed_over" in codes(seek(lambda _: 0.0, ONE, guide=guide))
+    path: list[float] = []
+
+    def late(x: dict[str, float]) -> float:
+        path.append(x["soc_cad"])
+        return engine(0.05)({"soc_cad": path[max(len(path) - 5, 0)]})
+
+    assert "delay" in codes(seek(late, ONE, guide=guide, delay_cycles=2))
+
+
+def test_a_result_is_pickled_tabulated_and_plain() -> None:
+    found = seek(limited, TWO, start={"soc_cad": 8.0, "egr": 0.3}, limits={"p_max_bar": 101.0}, cycles=50)
+    again = pickle.loads(pickle.dumps(found))
+    assert again.to_dict() == found.to_dict()
+    data = found.dataset
+    assert data["best"].sel(input="egr") == found.inputs["egr"]
+    assert data["limits_at_best"].sel(limit="p_max_bar") == found.limits["p_max_bar"]
+    assert data.attrs["seeker"] == "GaussianProcessSeeking"
+    assert found.to_dict()["cycles"] == 50
+
+
+class Rig:
+    """A plant of two inputs that counts its cycles."""
+
+    input_names, limit_names = ("soc_cad", "egr"), ("p_max_bar",)
+
+    def __init__(self, fails_at: int = 10**9) -> None:
+        self.cycles, self.fails_at = 0, fails_at
+
+    def apply(self, inputs: dict[str, float]) -> None:
+        self.inputs = inputs
+
+    def measure(self) -> Measurement:
+        if self.cycles == self.fails_at:
+            raise OSError("the bus is gone")
+        self.cycles += 1
+        j, limits = limited(self.inputs)
+        return Measurement(components=(j,), limits=limits)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "settings", "error", "message"),
+    [
+        ({}, {}, ParameterError, "inputs: none given"),
+        ({"soc_cad": (-25.0, 15.0)}, {}, ParameterError, "inputs = soc_cad: the plant takes soc_cad, egr"),
+        ({"soc": (-25.0, 15.0), "egr": (0, 1)}, {}, ParameterError, "inputs = soc, egr: the plant takes soc_cad, egr"),
+        ({"soc_cad": (-25.0, math.inf), "egr": (0, 1)}, {}, ParameterError, "soc_cad = .*inf.*: give finite bounds"),
+        ([Input("soc_cad"), Input("egr")], {}, ParameterError, "soc_cad = .*: give finite bounds"),
+        ({"soc_cad": 3.0, "egr": (0, 1)}, {}, ParameterError, r"soc_cad = 3.0: must be \(lower, upper\)"),
+        (
+            TWO,
+            {"start": {"soc_cad": -30.0, "egr": 0.1}},
+            ParameterError,
+            r"soc_cad = -30: must be in \[-25, 15\]",
+        ),
+        (TWO, {"start": {"soc_cad": -3.0}}, ShapeError, "start has soc_cad: must have one number for each"),
+        (TWO, {"start": [1.0]}, ShapeError, "start has 1 entries"),
+        (TWO, {"start": [1.0, math.nan]}, ParameterError, "start: egr = nan"),
+        (TWO, {"limits": {"p_max": 95.0}}, ParameterError, "'p_max' is not measured.*did you mean 'p_max_bar'"),
+        (TWO, {"limits": {"p_max_bar": math.nan}}, ParameterError, "p_max_bar = nan: must be a finite number"),
+        (TWO, {"cycles": 2}, ParameterError, "cycles = 2: must be >= 3, one reading"),
+        (TWO, {"cycles": 9, "delay_cycles": 8}, ParameterError, "cycles = 9: must be >= 11"),
+        (TWO, {"cycles": 20.0}, ParameterError, "cycles = 20: must be a whole number"),
+        (TWO, {"noise_sd": 0.0}, ParameterError, "noise_sd"),
+        (TWO, {"guide": Curve.parabola(curvature=-1.0, best=0.0, reach=9.0)}, ParameterError, "a Curve has one input"),
+    ],
+)
+def test_a_refused_call_moves_nothing(inputs: Any, settings: dict[str, Any], error: type, message: str) -> None:
+    rig = Rig()
+    with pytest.raises(error, match=message):
+        seek(rig, inputs, **settings)
+    assert rig.cycles == 0
+
+
+def test_more_than_eight_inputs_and_no_plant_are_refused() -> None:
+    with pytest.raises(Error, match="at most 8 inputs"):
+        seek(lambda _: 0.0, {f"x{i}": (0.0, 1.0) for i in range(9)})
+    with pytest.raises(ParameterError, match="must be a Plant, or a function"):
+        seek(3.0, TWO)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (math.nan, "J = nan at soc_cad = .*, egr = .*: must be a finite number; return J"),
+        ("56", "J = '56' at"),
+        ([56.0], "J = .56.0. at"),
+        ((56.0, 3.0), "limits = 3.0 at"),
+        ((56.0, {"other": 1.0}), "limits = other at .*: must name p_max_bar"),
+        (56.0, "limits = none at .*: must name p_max_bar"),
+        ((56.0, {"p_max_bar": math.inf}), "p_max_bar = inf at"),
+    ],
+)
+def test_a_wrong_answer_keeps_what_was_found(answer: Any, message: str) -> None:
+    calls = 0
+
+    def plant(x: dict[str, float]) -> Any:
+        nonlocal calls
+        calls += 1
+        return answer if calls == 26 else limited(x)
+
+    with pytest.raises(DataError, match=message) as info:
+        seek(plant, TWO, limits={"p_max_bar": 120.0})
+    part = info.value.partial  # type: ignore[attr-defined]
+    assert isinstance(part, SeekResult)
+    assert part.run.dataset.sizes["cycle"] == part.seeker.cycle == 25
+
+
+def test_an_error_of_the_plant_passes_through_with_what_was_found() -> None:
+    rig = Rig(fails_at=31)
+    with pytest.raises(OSError, match="the bus is gone") as info:
+        seek(rig, TWO)
+    part = info.value.partial  # type: ignore[attr-defined]
+    assert part.run.dataset.sizes["cycle"] == 31
+    whole = seek(Rig(), TWO, cycles=31)
+    assert part.inputs == whole.inputs
+    rig.fails_at = 10**9
+    assert run_seeker(rig, part.seeker, 9).dataset["cycle"].to_numpy().tolist() == list(range(31, 40))
+
+
+def test_ctrl_c_keeps_what_was_found() -> None:
+    calls = 0
+
+    def stopped(x: dict[str, float]) -> float:
+        nonlocal calls
+        calls += 1
+        if calls == 20:
+            raise KeyboardInterrupt
+        return engine(0.0)(x)
+
+    with pytest.raises(Interrupted) as info:
+        seek(stopped, TWO)
+    assert isinstance(info.value.partial, SeekResult)
+    assert info.value.partial.interrupted
+    assert "interrupted" in codes(info.value.partial)
+
+
+def test_an_error_in_the_first_cycle_has_an_empty_part() -> None:
+    with pytest.raises(OSError, match="bus") as info:
+        seek(Rig(fails_at=0), TWO)
+    part = info.value.partial  # type: ignore[attr-defined]
+    assert part.run.dataset.sizes["cycle"] == 0
+    assert "no_reading" in codes(part)
+    assert part.summary()
+
+
+def test_it_is_the_seeker_of_that_name_and_nothing_else() -> None:
+    start = {"soc_cad": 6.0, "egr": 0.3}
+    found = seek(Rig(), TWO, start=start, cycles=40, noise_sd=0.2, seed=3)
+    own = GaussianProcessSeeking(inputs=TWO, start=start, noise_sd=0.2, seed=3)
+    run = run_seeker(Rig(), own, 40)
+    np.testing.assert_array_equal(found.run.dataset["applied"], run.dataset["applied"])
+    copied = copy.deepcopy(found)
+    assert copied.inputs == found.inputs
