@@ -24,7 +24,7 @@ from mgdd.engine import Indicating, analyze, find_optimum, ignition_delay, simul
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
-from mgdd.loop import EngineBench, SurrogatePlant, run_seeker, seek, tune_controller
+from mgdd.loop import EngineBench, SurrogatePlant, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.plot.convergence import convergence
@@ -100,6 +100,9 @@ def record(folder: Path) -> Any:
 MADE: dict[str, Callable[[Path], Any]] = {
     "LoopRun": lambda _: run(),
     "SeekResult": lambda _: seek(EngineBench(seed=1), {"soc_cad": (-25.0, 10.0)}, cycles=40),
+    "FrontResult": lambda _: seek_front(
+        EngineBench(seed=1), {"soc_cad": (-15.0, 5.0)}, {"efficiency_gross": "max", "nox_soft_ppm": "min"}, cycles=60
+    ),
     "Fit": lambda _: throttle_fit(),
     "CylinderFit": lambda _: cylinder_fit(),
     "ResponseFit": lambda _: response(),

@@ -18,6 +18,7 @@ from mgdd.loop.many_tracks import track_many
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import run_seeker, seek
+from mgdd.loop.seek_front import seek_front
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
@@ -38,6 +39,7 @@ __all__ = [
     "monte_carlo",
     "run_seeker",
     "seek",
+    "seek_front",
     "simulate_drive",
     "track",
     "track_many",

@@ -26,6 +26,8 @@ class FunctionPlant:
         Names of the inputs.
     limits : sequence of str
         Names of the limits that it has to give.
+    values : sequence of str
+        Names of quantities that it gives instead of J, in one mapping together with the limits.
 
     Examples
     --------
@@ -36,8 +38,15 @@ class FunctionPlant:
     53.0
     """
 
-    def __init__(self, function: Callable[[Any], Any], inputs: Sequence[str], limits: Sequence[str] = ()) -> None:
-        self._function = function
+    def __init__(
+        self,
+        function: Callable[[Any], Any],
+        inputs: Sequence[str],
+        limits: Sequence[str] = (),
+        *,
+        values: Sequence[str] = (),
+    ) -> None:
+        self._function, self._values = function, tuple(values)
         self.input_names, self.limit_names = tuple(inputs), tuple(limits)
         self._applied = dict[str, float]()
 
@@ -50,6 +59,8 @@ class FunctionPlant:
         answer = self._function(dict(self._applied))
         if answer is None:
             return Measurement(components=(math.nan,), limits=dict.fromkeys(self.limit_names, math.nan), misfire=True)
+        if self._values:
+            return self._named(answer)
         j, limits = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, {})
         number = self._number("J", j)
         if not isinstance(limits, Mapping) or set(self.limit_names) - set(limits):
@@ -61,6 +72,13 @@ class FunctionPlant:
             components=(number,),
             limits={name: self._number(name, limits[name]) for name in self.limit_names},
         )
+
+    def _named(self, answer: Any) -> Measurement:
+        wanted = (*self._values, *self.limit_names)
+        if not isinstance(answer, Mapping) or set(wanted) - set(answer):
+            raise DataError(f"function gave {answer!r}{self._where()}: must map {', '.join(wanted)} to numbers")
+        numbers = {name: self._number(name, answer[name]) for name in wanted}
+        return Measurement(values=numbers, limits={name: numbers[name] for name in self.limit_names})
 
     def _number(self, name: str, value: Any) -> float:
         number = getattr(value, "item", lambda: value)() if getattr(value, "ndim", 1) == 0 else value

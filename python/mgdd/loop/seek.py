@@ -29,7 +29,7 @@ from mgdd.results.result import Figures
 if TYPE_CHECKING:
     from mgdd.optimize import Input, Limit
 
-__all__ = ["LoopRun", "run_seeker", "seek"]
+__all__ = ["LoopRun", "require_measured", "run_seeker", "seek", "seek_inputs", "started"]
 
 
 def run_seeker(
@@ -187,23 +187,18 @@ def seek(
     >>> round(found.inputs["soc_cad"]), round(found.inputs["egr"], 2), found.findings
     (-4, 0.15, ())
     """
-    given = inputs_of(inputs)
-    if not given:
-        raise ParameterError("inputs: none given; give bounds by name, for example {'soc_cad': (-20.0, 5.0)}")
+    given = seek_inputs(inputs)
     names, wanted = [one.name for one in given], limits_of(limits)
-    for one in given:
-        if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
-            raise ParameterError(f"inputs: {one.name} = ({one.lower:g}, {one.upper:g}): give finite bounds")
     if isinstance(cycles, bool) or not isinstance(cycles, int):
         raise ParameterError.of("cycles", cycles, "a whole number")
     if isinstance(plant, Plant):
-        _require_measured(plant, names, [limit.name for limit in wanted])
+        require_measured(plant, names, [limit.name for limit in wanted])
     elif callable(plant):
         plant = FunctionPlant(plant, names, [limit.name for limit in wanted])
     else:
         raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
     choice = chosen(
-        given, _started(start, given), cycles=cycles, limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
+        given, started(start, given), cycles=cycles, limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
         lag_cycles=lag_cycles, guide=guide, maximize=maximize, seed=seed,
     )  # fmt: skip
     if cycles < choice.first_cycles:
@@ -223,7 +218,18 @@ def seek(
         raise
 
 
-def _started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
+def seek_inputs(inputs: Any) -> tuple[Input, ...]:
+    """Read the inputs of a search; ParameterError for none, and for bounds that are not finite."""
+    given = inputs_of(inputs)
+    if not given:
+        raise ParameterError("inputs: none given; give bounds by name, for example {'soc_cad': (-20.0, 5.0)}")
+    for one in given:
+        if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
+            raise ParameterError(f"inputs: {one.name} = ({one.lower:g}, {one.upper:g}): give finite bounds")
+    return given
+
+
+def started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
     """Give the start by name; ParameterError where it lies outside of the bounds."""
     if start is None:
         return None
@@ -239,7 +245,7 @@ def _started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def _require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
+def require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
     """ParameterError where a plant has other inputs, or does not measure a limit."""
     if set(names) != set(plant.input_names):
         raise ParameterError(f"inputs = {', '.join(names)}: the plant takes {', '.join(plant.input_names)}")
