@@ -75,6 +75,7 @@ def rows_for(field: SeekingMap) -> list[Row]:
             Row(f"tuned: {method.replace('_', ' ')}", tuned(method), must_arrive=True)
             for method in ("batch", "moving_average", "spsa")
         ),
+        Row("Gaussian process seeking", untouched(optimize.GaussianProcessSeeking)),
         Row("golden section, noise given", driven(golden), must_arrive=True),
         *found,
     ]

@@ -106,6 +106,21 @@ def test_a_front_of_the_bench_is_that_of_its_steady_map() -> None:
     assert np.max(np.abs(predicted - exact) / np.ptp(exact, axis=0)) < 0.06
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_front_bent_inwards_is_found_between_its_ends(seed: int) -> None:
+    """No weighted sum is best there: the seekers stay at the ends, and the models say what lies between."""
+    rng = np.random.default_rng(seed)
+
+    def plant(x: dict[str, float]) -> dict[str, float]:
+        first, second = x["share"], (1.0 - x["share"]) ** 3
+        return dict(zip(("first", "second"), (rng.normal([first, second], 0.02)).tolist(), strict=True))
+
+    front = seek_front(plant, {"share": (0.0, 1.0)}, {"first": "max", "second": "max"}, cycles=100, seed=seed)
+    at = front.dataset["inputs"].to_numpy()[:, 0]
+    assert np.abs(front.dataset["objectives"].sel(objective="second") - (1.0 - at) ** 3).max() < 0.06
+    assert np.sum((at > 0.1) & (at < 0.9)) >= 8
+
+
 def test_minimising_what_is_negated_is_the_same_search() -> None:
     plain = engine(seed=4)
     one = seek_front(plain, TWO, WAYS, cycles=60)
