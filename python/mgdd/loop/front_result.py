@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-__all__ = ["FrontResult", "front_of", "undominated"]
+__all__ = ["FrontResult", "fit_of", "front_of", "undominated"]
 
 _DEGREES, _MOST_TERMS = (2, 3, 4), 40
 _SLACK = 1.05  # of the left-out error: a higher degree has to be better by more
@@ -125,8 +125,8 @@ def front_of(
     known = ~void[late:]
     caused = applied[: len(applied) - late][known]
     columns = dict(zip(names, caused.T, strict=True))
-    fits = {name: _fit(columns, measured[late:][known][:, k]) for k, name in enumerate(wanted)}
-    fits |= {limit.name: _fit(columns, measured_limits[late:][known][:, k]) for k, limit in enumerate(limits)}
+    fits = {name: fit_of(columns, measured[late:][known][:, k]) for k, name in enumerate(wanted)}
+    fits |= {limit.name: fit_of(columns, measured_limits[late:][known][:, k]) for k, limit in enumerate(limits)}
     models = {name: fit.model for name, fit in fits.items()}
     at, kept = _front_inputs(models, signs, limits, caused, seed)
     at = at[_spaced(_signed(models, signs, at), points)]
@@ -167,7 +167,7 @@ def front_of(
     return FrontResult(dataset=dataset, models=models, findings=tuple(findings))
 
 
-def _fit(columns: Mapping[str, Numbers], values: Numbers) -> ResponseFit:
+def fit_of(columns: Mapping[str, Numbers], values: Numbers) -> ResponseFit:
     """Fit the polynomial of the lowest degree that predicts left-out readings about as well as any."""
     inputs = len(columns)
     found: list[tuple[float, ResponseFit]] = []
