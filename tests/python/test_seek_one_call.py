@@ -325,6 +325,14 @@ def test_an_error_in_the_first_cycle_has_an_empty_part() -> None:
     assert part.summary()
 
 
+def test_one_reading_is_what_is_known_of_j() -> None:
+    with pytest.raises(OSError, match="bus") as info:
+        seek(Rig(fails_at=1), TWO)
+    part = info.value.partial  # type: ignore[attr-defined]
+    assert part.value == limited({"soc_cad": -5.0, "egr": 0.2})[0]
+    assert math.isnan(part.value_sd)
+
+
 def test_it_is_the_seeker_of_that_name_and_nothing_else() -> None:
     start = {"soc_cad": 6.0, "egr": 0.3}
     found = seek(Rig(), TWO, start=start, cycles=40, noise_sd=0.2, seed=3)

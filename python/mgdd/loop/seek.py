@@ -189,7 +189,7 @@ def seek(
     """
     given = seek_inputs(inputs)
     names, wanted = [one.name for one in given], limits_of(limits)
-    if isinstance(cycles, bool) or not isinstance(cycles, int):
+    if isinstance(cycles, bool) or not isinstance(cycles, int | np.integer):
         raise ParameterError.of("cycles", cycles, "a whole number")
     if isinstance(plant, Plant):
         require_measured(plant, names, [limit.name for limit in wanted])

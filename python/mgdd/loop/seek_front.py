@@ -118,7 +118,7 @@ def seek_front(
         ("points", points, 2, math.inf),
         ("cycles", cycles, least, math.inf),
     ):
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
             upper = f" and <= {high}" if math.isfinite(high) else ""
             raise ParameterError.of(name, value, f"a whole number >= {low}{upper}")
     if isinstance(plant, Plant):

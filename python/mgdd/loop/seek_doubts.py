@@ -1,0 +1,160 @@
+"""The readings of a search, and what in them speaks against its result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mgdd.results.finding import Finding
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from mgdd.loop.plant_loop import LoopRun
+    from mgdd.optimize import Input, Limit, Seeker
+
+__all__ = ["Mean", "Readings", "doubts_about"]
+
+_NEAREST = 10  # readings that say what J and limits are at the estimate
+_PER_INPUT = 10  # cycles; the estimate is near after 7 to 10 in the median, docs/benchmarks.md
+_MOVES, _EDGE = 0.1, 0.01  # shares of the bounds
+_SURE = 2.0  # standard deviations
+_TRUSTED = 0.5
+_PER_DOUBT = 200  # cycles; maps that stand still make a seeker doubt once in them in 15 of 100 runs, never twice
+
+
+class Mean(NamedTuple):
+    """A mean with its standard deviation."""
+
+    value: float
+    sd: float
+
+
+class Readings:
+    """The cycles of a run whose reading counts."""
+
+    def __init__(self, data: xr.Dataset, seeker: Seeker) -> None:
+        self._data, self._seeker = data, seeker
+        names = list(seeker.input_names)
+        one = "estimate_cad" in data
+        self.estimates = _per_input(data, "estimate_cad" if one else "estimate", names)
+        self.applied = _per_input(data, "soc_applied_cad" if one else "applied", names)
+        bounds = np.array([(each.lower, each.upper) for each in seeker.settings["inputs"]])
+        self.width = bounds[:, 1] - bounds[:, 0]
+        self.counts = ~data["void" if "void" in data else "misfire"].to_numpy().astype(bool)
+        self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
+
+    def limit(self, name: str) -> NDArray[np.float64]:
+        """Give the readings of a limit, NaN where the cycle does not count."""
+        if "limits" not in self._data:
+            return np.full(self.j.size, math.nan)
+        values = self._data["limits"].sel(limit=name).to_numpy()
+        return np.where(self.counts, values, math.nan)
+
+    def near_estimate(self, values: NDArray[np.float64], late_cycles: float) -> Mean:
+        """Average the readings whose inputs were nearest to the last estimate."""
+        late = round(late_cycles)
+        read, caused = values[late:], self.applied[: max(values.size - late, 0)]
+        known = np.isfinite(read)
+        away = np.linalg.norm((caused - self._seeker.estimate) / self.width, axis=1)[known]
+        return _mean(read[known][np.argsort(away, kind="stable")[:_NEAREST]])
+
+    def gain(self, late_cycles: float) -> Mean:
+        """Compare the mean of the last quarter with the first reading."""
+        first = self.j[math.ceil(late_cycles) :]
+        first, last = first[np.isfinite(first)], self.j[self.j.size - max(self.j.size // 4, 1) :]
+        last = last[np.isfinite(last)]
+        if first.size < 2 or not last.size:
+            return Mean(math.nan, math.nan)
+        noise = float(getattr(self._seeker, "noise_sd", math.nan))
+        if not math.isfinite(noise):
+            noise = float(np.std(last))
+        return Mean(float(last.mean() - first[0]), noise * math.sqrt(1.0 + 1.0 / last.size))
+
+
+def _per_input(data: xr.Dataset, name: str, names: Sequence[str]) -> NDArray[np.float64]:
+    values = data[name]
+    table: NDArray[np.float64] = (
+        values.sel(input=list(names)).to_numpy() if "input" in values.dims else values.to_numpy()[:, None]
+    )
+    return table
+
+
+def _mean(values: NDArray[np.float64]) -> Mean:
+    if not values.size:
+        return Mean(math.nan, math.nan)
+    sd = float(np.std(values, ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
+    return Mean(float(values.mean()), sd)
+
+
+def doubts_about(
+    seeker: Seeker, run: LoopRun, readings: Readings, gain: Mean, kept: Mapping[str, Mean], *, guided: bool
+) -> list[Finding]:
+    """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
+    inputs, limits = seeker.settings["inputs"], seeker.settings["limits"]
+    return [
+        *_about_run(run, readings, inputs, gain),
+        *_about_limits(readings, limits, kept),
+        *_about_seeker(seeker, guided, readings.j.size, seen=gain.value > _SURE * gain.sd),
+    ]
+
+
+def _about_run(run: LoopRun, readings: Readings, inputs: Sequence[Input], gain: Mean) -> Iterator[Finding]:
+    cycles = readings.j.size
+    if run.interrupted:
+        yield Finding("interrupted", (), f"interrupted after {cycles} cycles", "run_seeker goes on with .seeker")
+    if not readings.counts.any():
+        yield Finding("no_reading", (), "no cycle gave a reading of J", "look at the plant, or start where it runs")
+        return
+    if cycles < _PER_INPUT * len(inputs):
+        remedy = f"take {_PER_INPUT * len(inputs)} cycles at least"
+        yield Finding("few_cycles", (), f"{cycles} cycles of {len(inputs)} inputs are few", remedy)
+    late = readings.estimates[cycles - max(cycles // 4, 1) :]
+    moves = np.ptp(late, axis=0) / readings.width
+    for one, move in zip(inputs, moves, strict=True):
+        if move > _MOVES:
+            text = f"the estimate of {one.name} moved by {move:.0%} of its bounds over the last {len(late)} cycles"
+            yield Finding("not_settled", (one.name,), text, "take more cycles; J may be flat along it")
+    for one, value, width in zip(inputs, late[-1], readings.width, strict=True):
+        if min(value - one.lower, one.upper - value) <= _EDGE * width:
+            side = "lower" if value - one.lower <= _EDGE * width else "upper"
+            text = f"the best {one.name} lies at its {side} bound, {getattr(one, side):.6g}"
+            yield Finding("at_bound", (one.name,), text, "widen it where the plant allows that")
+    if gain.value <= _SURE * gain.sd:
+        text = f"J is better than at the start by {gain.value:.3g} ± {gain.sd:.2g}, which the noise may be"
+        yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
+
+
+def _about_limits(readings: Readings, limits: Sequence[Limit], kept: Mapping[str, Mean]) -> Iterator[Finding]:
+    for limit in limits:
+        values = readings.limit(limit.name)
+        values = values[np.isfinite(values)]
+        mean = kept[limit.name]
+        if values.size and values[0] > limit.upper:
+            text = f"the first reading of {limit.name}, {values[0]:.6g}, is above its limit, {limit.upper:.6g}"
+            yield Finding("start_above_limit", (limit.name,), text, "start where it holds")
+        if mean.value - _SURE * mean.sd > limit.upper:
+            text = f"{limit.name} is {mean.value:.6g} at the best inputs, above its limit, {limit.upper:.6g}"
+            yield Finding("limit_broken", (limit.name,), text, "widen the bounds: none of the inputs tried holds it")
+
+
+def _about_seeker(seeker: Seeker, guided: bool, cycles: int, *, seen: bool) -> Iterator[Finding]:
+    doubts = int(getattr(seeker, "doubts", 0))
+    if doubts > 1 + cycles // _PER_DOUBT:
+        text = f"readings were not explained by earlier ones, {doubts} times: J drifts or jumps"
+        yield Finding("unexplained", (), text, "look at what else changes; the newest readings count")
+    if getattr(seeker, "handed_over", False):
+        which = "of the guide" if guided else "of a parabola"
+        text = f"the shape {which} did not explain the readings, and extremum seeking took over"
+        yield Finding("handed_over", (), text, "take more cycles" + ("" if guided else ", or give a guide"))
+    elif guided and getattr(seeker, "trust", 1.0) < _TRUSTED:
+        text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"  # type: ignore[attr-defined]
+        yield Finding("untrusted_guide", (), text, "look at its shape")
+    told, taken = seeker.settings.get("delay_cycles"), getattr(seeker, "delay_cycles", None)
+    if seen and taken is not None and told is not None and taken != told:
+        text = f"the readings fit a delay of {taken:g} cycles, not {told:g} as stated"
+        yield Finding("delay", (), text, "mend delay_cycles")
