@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "mgdd/optimize/seekers/tuner.hpp"
 #include "optimize/seeker_binding.hpp"
@@ -72,6 +73,49 @@ void bind_golden_section(py::module_& m) {
   bind_seeking(cls);
 }
 
+std::vector<std::vector<double>> axes_from(const py::sequence& given) {
+  std::vector<std::vector<double>> axes;
+  for (const py::handle& axis : given)
+    axes.push_back(to_column(axis.cast<InputArray>(), "axes[" + std::to_string(axes.size()) + "]"));
+  return axes;
+}
+
+void bind_surface(py::module_& m) {
+  py::class_<Surface>(m, "Surface", "Behind guide= of mgdd.optimize.GaussianProcessSeeking: a table over a grid.")
+      .def(py::init([](const py::sequence& axes, const InputArray& values) {
+             return Surface(axes_from(axes), {values.data(), values.data() + values.size()});
+           }),
+           py::arg("axes"), py::arg("values"))
+      .def(
+          "__call__",
+          [](const Surface& s, const InputArray& at) {
+            const auto n = static_cast<Eigen::Index>(s.axes().size());
+            if (at.size() != n) throw ShapeError("at has " + std::to_string(at.size()) + " entries: one per axis");
+            return s(Inputs(Eigen::Map<const Eigen::VectorXd>(at.data(), n)));
+          },
+          py::arg("at"), "Value at one point; the edge holds outside of the grid.")
+      .def_property_readonly("axes", &Surface::axes, "Of the grid, one per input.")
+      .def_property_readonly(
+          "values",
+          [](const Surface& s) {
+            std::vector<py::ssize_t> shape;
+            for (const auto& axis : s.axes())
+              shape.push_back(static_cast<py::ssize_t>(axis.size()));
+            return py::array_t<double>(shape, s.values().data());
+          },
+          "At its nodes, shape of the axes.")
+      .def("__eq__",
+           [](const Surface& s, const py::object& other) {
+             return py::isinstance<Surface>(other) && s == other.cast<const Surface&>();
+           })
+      .def(py::pickle([](const Surface& s) { return py::make_tuple(1, s.axes(), s.values()); },
+                      [](const py::tuple& state) {
+                        require_pickle_version(state);
+                        return Surface(state[1].cast<std::vector<std::vector<double>>>(),
+                                       state[2].cast<std::vector<double>>());
+                      }));
+}
+
 void bind_gaussian_process(py::module_& m) {
   using B = BoundSeeker<GaussianProcessSeeking>;
   py::class_<B> cls(m, "GaussianProcessSeeking", "By Gaussian processes; see mgdd.optimize.GaussianProcessSeeking.");
@@ -87,7 +131,31 @@ void bind_gaussian_process(py::module_& m) {
           "Standard deviation of that expectation, without the noise of a reading.")
       .def_property_readonly(
           "doubts", [](const B& b) { return b.use()->seeker().doubts(); },
-          "How often the readings were not what the process expects, and what was known was aged.");
+          "How often the readings were not what the process expects, and what was known was aged.")
+      .def_property_readonly(
+          "guide_factor",
+          [](const B& b) {
+            const auto r = b.use();
+            py::list out;
+            const auto& guides = b.constant().settings().guide;
+            for (std::size_t i = 0; i < guides.size(); ++i) {
+              if (guides[i].empty()) out.append(py::none());
+              if (!guides[i].empty()) out.append(r->seeker().guide_factor(i));
+            }
+            return out;
+          },
+          "What the guide of each component is multiplied by, as learnt: about 1 where it is right, towards 0 where it "
+          "says nothing.")
+      .def_property_readonly(
+          "delay_cycles",
+          [](const B& b) {
+            const auto r = b.use();
+            py::list out;
+            for (std::size_t i = 0; i < r->component_count(); ++i)
+              out.append(r->seeker().delay_cycles(i));
+            return out;
+          },
+          "Cycles between input and reading of each component that explain the readings best.");
   bind_seeking(cls);
 }
 
@@ -140,6 +208,7 @@ void bind_direct_seekers(py::module_& m) {
   bind_spsa(m);
   bind_gradient_descent(m);
   bind_golden_section(m);
+  bind_surface(m);
   bind_gaussian_process(m);
   bind_tuner(m);
 }

@@ -1,6 +1,7 @@
 // Settings of a seeker as keywords of its class, from the table of its record.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,6 +27,24 @@ struct Written<optimize::Inputs> {
   static void put(optimize::Inputs& values, const py::object& given, const FieldInfo& info, std::size_t inputs) {
     values.resize(0);
     if (!given.is_none()) values = inputs_from(given, info.name, static_cast<Eigen::Index>(inputs));
+  }
+};
+
+/// Surfaces, None for those that are not there.
+template <>
+struct Written<std::vector<optimize::Surface>> {
+  using Argument = std::vector<std::optional<optimize::Surface>>;
+
+  static py::object get(const std::vector<optimize::Surface>& surfaces) {
+    py::list out;
+    for (const optimize::Surface& one : surfaces)
+      out.append(one.empty() ? py::object(py::none()) : py::cast(one));
+    return surfaces.empty() ? py::object(py::none()) : py::object(out);
+  }
+  static void put(std::vector<optimize::Surface>& surfaces, Argument given, const FieldInfo&, std::size_t) {
+    surfaces.clear();
+    for (auto& one : given)
+      surfaces.push_back(one ? std::move(*one) : optimize::Surface{});
   }
 };
 

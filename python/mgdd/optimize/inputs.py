@@ -72,7 +72,10 @@ def with_inputs(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Give the settings of a seeker with inputs as `Input` objects, and with numbers in their order."""
     inputs = inputs_of(settings.get("inputs"))
     names = [one.name for one in inputs]
-    own = {name: named_values(name, value, names) for name, value in settings.items() if name != "inputs"}
+    own = {
+        name: value if name == "limit_guides" else named_values(name, value, names)  # those go by names of limits
+        for name, value in settings.items()
+    }
     return {**own, "inputs": list(inputs)}
 
 

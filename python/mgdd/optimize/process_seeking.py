@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from mgdd import _core
+from mgdd.optimize.guide_surface import with_guides
 from mgdd.optimize.seeker import Seeker
 
 __all__ = ["GaussianProcessSeeking"]
@@ -18,6 +19,10 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     input, is worth most over `horizon` cycles. Nothing is asked farther from the start than half as far again as what
     has been. Level, slopes and bends of J have a prior that takes its scale from the readings, so any unit of J and of
     the inputs does. All arguments are keywords.
+
+    With a `guide`, a model too rough to design with, the readings to the side are left out: what it says is the mean of
+    the process, times a factor and moved by a distance per input, both learnt beside what it misses. A guide in another
+    unit than J does, and one that says nothing is left behind. Without it the plain search runs on.
 
     Parameters
     ----------
@@ -41,7 +46,19 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         With which every limit holds at every input asked for, in [0.5, 1), as far as the processes know [-].
     delay_cycles, lag_cycles : float
         Transport delay and time constant between the plant and J [cycles]; behind a lag an input is held for two time
-        constants. The delay is taken as told.
+        constants. Readings that are on their way are counted on.
+    components : sequence of ComponentLag, optional
+        Delay and lag of each component of J, for example efficiency at once and NOx behind its analyser; `tell` then
+        takes one number per component, each with a process of its own.
+    delay_uncertainty : int
+        Cycles by which a delay may be shorter or longer than told, at most 20; ``delay_cycles`` says which one the
+        readings show. A delay and lag of 0 are taken as told.
+    guide : callable, fitted response or DataArray, optional
+        What a model says of J over one to five inputs: a callable of what `ask` gives, asked on a grid between the
+        bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates per input. A
+        sequence gives one per component.
+    limit_guides : mapping of str to guides, or sequence, optional
+        The same of limits. With those of all limits the readings to the side are left out there too.
     seed : int
         Of the inputs that are compared: the same seed gives the same run.
     maximize : bool
@@ -52,9 +69,10 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     Raises
     ------
     mgdd.errors.ParameterError
-        A value outside its domain, an infinite bound, or bounds that exclude the start.
+        A value outside its domain, an infinite bound, bounds that exclude the start, or a guide that fails or is not
+        finite somewhere between them.
     mgdd.errors.ShapeError
-        Entries that are not one per input.
+        Entries that are not one per input, or a guide of more than five inputs.
 
     Notes
     -----
@@ -75,6 +93,16 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     >>> history = seeker.run(lambda x: -0.03 * (x["soc_cad"] + 4) ** 2 - 300 * (x["egr"] - 0.15) ** 2, 20)
     >>> bool(abs(seeker.estimate[0] + 4.0) < 1.0 and abs(seeker.estimate[1] - 0.15) < 0.02)
     True
+    >>> seeker = GaussianProcessSeeking(
+    ...     start={"soc_cad": -16.0, "egr": 0.3}, inputs={"soc_cad": (-25.0, 15.0), "egr": (0.0, 0.4)},
+    ...     guide=lambda x: -0.04 * x["soc_cad"] ** 2 - 250 * (x["egr"] - 0.2) ** 2,
+    ... )
+    >>> history = seeker.run(lambda x: -0.03 * (x["soc_cad"] + 4) ** 2 - 300 * (x["egr"] - 0.15) ** 2, 8)
+    >>> bool(abs(seeker.estimate[0] + 4.0) < 1.0 and abs(seeker.estimate[1] - 0.15) < 0.02)
+    True
     """
 
     kind: ClassVar[str] = "GaussianProcessSeeking"
+
+    def _prepared(self, settings: dict[str, Any]) -> dict[str, Any]:
+        return with_guides(settings)

@@ -105,7 +105,11 @@ class Seeker(SeekerFindings, _CoreSeeker):
                 settings["limits"] = list(limits_of(settings["limits"]))
             if settings.get("inputs") is not None or isinstance(settings.get("start"), Mapping):
                 settings = with_inputs(settings)
-            super().__init__(*given, **settings)
+            super().__init__(*given, **self._prepared(settings))
+
+    def _prepared(self, settings: dict[str, Any]) -> dict[str, Any]:
+        """Give settings as the class of the core takes them."""
+        return settings
 
     def run(self, fun: Callable[[Any], Any], cycles: int) -> xr.Dataset:
         """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.
@@ -308,6 +312,8 @@ def _encode(value: Any) -> Any:
         return {"input": _encode(value.to_dict())}
     if isinstance(value, _core.guide.Curve):
         return {"curve": value._table}
+    if isinstance(value, _core.optimize.Surface):
+        return {"surface": [value.axes, value.values.ravel().tolist()]}
     if isinstance(value, dict):
         return {name: _encode(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -326,4 +332,6 @@ def _decode(item: dict[str, Any]) -> Any:
         return _core.optimize.Input(**item["input"])
     if set(item) == {"curve"}:
         return _core.guide.Curve._of_table(item["curve"])
+    if set(item) == {"surface"}:
+        return _core.optimize.Surface(*item["surface"])
     return item

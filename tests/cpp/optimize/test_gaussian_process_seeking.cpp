@@ -126,6 +126,27 @@ TEST(GaussianProcessSeeking, TakesReadingsThatComeLateToTheirInputs) {
   EXPECT_LT(lost(seeker.estimate()), 0.1);
 }
 
+// What is on its way is counted on: nothing is tried twelve times before its first reading comes.
+TEST(GaussianProcessSeeking, WaitsForWhatIsOnItsWay) {
+  double asked_far = 0.0;
+  constexpr int seeds = 10;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    auto s = two_inputs(seed);
+    s.components = {{20.0, 0.0}};
+    s.delay_uncertainty = 0;
+    GaussianProcessSeeking seeker(s);
+    std::vector<double> on_their_way(20, -lost(s.space.start));
+    for (int k = 0; k < 200; ++k) {
+      on_their_way.push_back(-lost(seeker.ask()) + noise(seed, k));
+      asked_far += lost(seeker.ask()) / (200 * seeds);
+      const double j[] = {on_their_way[static_cast<std::size_t>(k)]};
+      seeker.tell({j, {}});
+    }
+    EXPECT_LT(lost(seeker.estimate()), 0.2) << seed;
+  }
+  EXPECT_LT(asked_far, 3.2);  // the start itself loses 9.6
+}
+
 // y += (1 - exp(-1/3)) (x - y): an input is held for 1 + 6 cycles, and several readings stand between two choices.
 TEST(GaussianProcessSeeking, HoldsItsInputsBehindALag) {
   auto s = two_inputs(4);
@@ -239,6 +260,13 @@ TEST(GaussianProcessSeeking, RefusesByName) {
   refused([](auto& s) { s.limit_probability = 1.0; }, "limit_probability");
   refused([](auto& s) { s.sensor.delay_cycles = -1.0; }, "delay_cycles");
   refused([](auto& s) { s.space.start[1] = 0.5; }, "start");
+  refused([](auto& s) { s.delay_uncertainty = 21; }, "delay_uncertainty");
+  refused(
+      [](auto& s) {
+        s.sensor.delay_cycles = 2.0;
+        s.components = {{3.0, 0.0}};
+      },
+      "delay_cycles");
 }
 
 }  // namespace

@@ -1,8 +1,12 @@
 #include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/random.hpp"
@@ -13,18 +17,39 @@ namespace {
 
 constexpr int far_candidates = 8, near_candidates = 48;
 constexpr int candidates = 1 + far_candidates + near_candidates;
+constexpr int most_on_their_way = 8;  // inputs whose readings have not come, that are counted on
 constexpr double cloud_nearest = 0.011, cloud_farthest = 0.3;  // of the near ones, as a share of the bounds
 constexpr int search_rounds = 6, search_points = 12;
 constexpr double search_width = 0.08, search_shrinks = 0.45;
-constexpr double growth = 1.5;                     // of what has been explored
+constexpr double growth = 0.4;                     // beyond what has been explored, in widths of that
+constexpr double guided_reach = 0.2;               // beyond it at least where there is a guide, in ranges
 constexpr double planned_readings[] = {1, 4, 16};  // that the worth of an input is reckoned with
+constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
 constexpr double surprise_rate = 0.1, most_surprise = 3.0;
 constexpr std::int64_t calm_cycles = 10;  // after a doubt
 constexpr double doubt_age = 3.0;         // memories: what was known counts a twentieth then
 constexpr double lags_held = 2.0;
 constexpr double active_room = 0.05;   // scales of a limit
-constexpr double limit_memory = 20.0;  // cycles of the planes that tell the delays of limits from one another
+constexpr double plane_memory = 20.0;  // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
+
+// None, or one of each; a guide says something of every input, and not the same everywhere.
+void require_guides(const std::string& name, const std::vector<Surface>& guides, std::size_t count,
+                    const std::string& whose, Eigen::Index inputs) {
+  if (!guides.empty() && guides.size() != count) {
+    throw about(name, ShapeError(name + " has " + std::to_string(guides.size()) + " entries: must have one per " +
+                                 whose + ", " + std::to_string(count)));
+  }
+  for (const Surface& guide : guides) {
+    if (guide.empty()) continue;
+    if (guide.axes().size() != static_cast<std::size_t>(inputs)) {
+      throw about(name, ShapeError(name + " is over " + std::to_string(guide.axes().size()) +
+                                   " inputs: must be over the " + std::to_string(inputs) + " that are sought"));
+    }
+    const auto [least, most] = std::minmax_element(guide.values().begin(), guide.values().end());
+    if (*least == *most) throw ParameterError(name, *least, "must not say the same everywhere: leave it out");
+  }
+}
 
 GaussianProcessSeekingSettings checked(GaussianProcessSeekingSettings s) {
   const Eigen::Index n = s.space.size();
@@ -41,7 +66,7 @@ GaussianProcessSeekingSettings checked(GaussianProcessSeekingSettings s) {
   if (s.noise_sd) require_positive("noise_sd", *s.noise_sd);
   require_in(Domain{0.0, 1e6}, "horizon", s.horizon);
   require_in(Domain{10.0, 1e9}, "memory_cycles", s.memory_cycles);
-  require_in(Domain{10.0, 200.0}, "kept", s.kept);
+  require_in(Domain{10.0, most_kept}, "kept", s.kept);
   require_in(Domain{1e-3, 0.5}, "first_step", s.first_step);
   require_in(Domain{0.5, 0.9999}, "limit_probability", s.limit_probability);
   validate(s.sensor, "");
@@ -49,25 +74,59 @@ GaussianProcessSeekingSettings checked(GaussianProcessSeekingSettings s) {
   for (Limit& limit : s.limits) {
     if (limit.scale == 0.0) limit.scale = limit.upper != 0.0 ? std::abs(limit.upper) : 1.0;
   }
+  if (s.components.empty())
+    s.components.push_back(s.sensor);
+  else if (s.sensor != ComponentLag{}) {
+    throw ParameterError("delay_cycles", s.sensor.delay_cycles, "must be left out where components say their own");
+  }
+  validate(s.components);
+  require_in(Domain{0.0, 20.0}, "delay_uncertainty", s.delay_uncertainty);
+  require_guides("guide", s.guide, s.components.size(), "component of J", n);
+  require_guides("limit_guides", s.limit_guides, s.limits.size(), "limit", n);
   return s;
 }
 
+// Of the components, then of the limits.
 std::vector<UncertainLag> lags_with_j(const GaussianProcessSeekingSettings& s) {
-  std::vector<UncertainLag> out{{s.sensor, 0, limit_memory}};
-  const std::vector<UncertainLag> limits = lags_of(s.limits, limit_memory);
+  std::vector<UncertainLag> out;
+  for (const ComponentLag& lag : s.components)
+    out.push_back({lag, lag == ComponentLag{} ? 0 : s.delay_uncertainty, plane_memory});
+  const std::vector<UncertainLag> limits = lags_of(s.limits, plane_memory);
   out.insert(out.end(), limits.begin(), limits.end());
   return out;
 }
 
-ProcessModel::Settings process_settings(const GaussianProcessSeekingSettings& s, bool bends_down) {
+ProcessModel::Settings process_settings(const GaussianProcessSeekingSettings& s) {
   ProcessModel::Settings out;
   out.inputs = s.space.size();
   out.kept = s.kept;
-  out.most_points = candidates;
+  out.most_points = candidates + most_on_their_way;
   out.memory = s.memory_cycles;
-  out.bends_down = bends_down;
-  if (bends_down) out.noise_sd = s.noise_sd;
   out.seed = s.seed;
+  out.guide = {{}, s.space.lower, s.space.upper, 1.0};
+  return out;
+}
+
+std::vector<ProcessModel> component_processes(const GaussianProcessSeekingSettings& s) {
+  std::vector<ProcessModel> out;
+  for (std::size_t i = 0; i < s.components.size(); ++i) {
+    ProcessModel::Settings own = process_settings(s);
+    if (s.components.size() == 1) own.noise_sd = s.noise_sd;
+    if (!s.guide.empty()) own.guide.surface = s.guide[i];
+    own.guide.sign = s.maximize ? 1.0 : -1.0;
+    out.emplace_back(own);
+  }
+  return out;
+}
+
+std::vector<ProcessModel> limit_processes(const GaussianProcessSeekingSettings& s) {
+  std::vector<ProcessModel> out;
+  for (std::size_t i = 0; i < s.limits.size(); ++i) {
+    ProcessModel::Settings own = process_settings(s);
+    own.bends_down = false;
+    if (!s.limit_guides.empty()) own.guide.surface = s.limit_guides[i];
+    out.emplace_back(own);
+  }
   return out;
 }
 
@@ -79,21 +138,28 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       hold_(1),
       protocol_(settings_.space.size()),
       causes_(lags_with_j(settings_), settings_.space.size()),
-      j_(process_settings(settings_, true)),
-      limited_(settings_.limits.size(), ProcessModel(process_settings(settings_, false))),
+      j_(component_processes(settings_)),
+      limited_(limit_processes(settings_)),
       estimate_(settings_.space.start),
       applied_(estimate_),
       middle_(scaled(estimate_)),
+      lowest_(middle_),
+      highest_(middle_),
+      surprise_(j_.size(), 1.0),
       room_(settings_.limits.size(), 0.0),
       unsafe_(settings_.limits.empty() ? 0 : 1, 0.0),
-      candidates_(InputTable::Zero(candidates, settings_.space.size())),
+      candidates_(InputTable::Zero(candidates + most_on_their_way, settings_.space.size())),
       covariance_(candidates, candidates),
+      own_(candidates + most_on_their_way, candidates + most_on_their_way),
+      means_(Eigen::VectorXd::Zero(candidates)),
       worth_mean_(candidates, 0.0),
-      effect_(candidates, 0.0),
+      effect_(candidates + most_on_their_way, 0.0),
       breaks_(candidates, 0.0),
       over_(candidates, 0.0),
       order_(candidates, 0) {
-  double longest = settings_.sensor.lag_cycles;
+  double longest = 0.0;
+  for (const ComponentLag& component : settings_.components)
+    longest = std::max(longest, component.lag_cycles);
   for (const Limit& limit : settings_.limits)
     longest = std::max(longest, limit.lag.lag_cycles);
   hold_ += static_cast<std::int64_t>(std::ceil(lags_held * longest));
@@ -110,9 +176,9 @@ Inputs GaussianProcessSeeking::unscaled(const Inputs& z) const noexcept {
 
 // Within the bounds, what may be explored by now, and what is not known to fail.
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
-  const double far = growth * explored_;
+  const double wide = growth * (highest_ - lowest_).maxCoeff(), far = guided() ? std::max(wide, guided_reach) : wide;
   for (Eigen::Index i = 0; i < z.size(); ++i)
-    z[i] = std::clamp(z[i], std::max(0.0, middle_[i] - far), std::min(1.0, middle_[i] + far));
+    z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));
   return scaled(protocol_.failures.keep(unscaled(z)));
 }
 
@@ -122,7 +188,7 @@ double GaussianProcessSeeking::draw(std::uint64_t stream, int index) const noexc
 }
 
 TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, 1, limit_count(), applied_.size());
+  const TellStatus status = protocol_.check(reading, j_.size(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   if (status == TellStatus::accepted) {
@@ -138,56 +204,136 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
 
 void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
   causes_.record(applied);
-  explored_ = std::max(explored_, (scaled(applied) - middle_).cwiseAbs().maxCoeff());
   const Inputs about = scaled(estimate_);
-  const double value = objective_of(reading, settings_.maximize);
-  if (causes_.known(0)) {
-    const Inputs z = scaled(causes_.of(0, applied));
-    watch_surprise(value, z);
-    j_.record(z, value, about);
+  for (std::size_t i = 0; i < j_.size(); ++i) {
+    const double value = settings_.maximize ? reading.components[i] : -reading.components[i];
+    if (causes_.judge(i, applied, value)) doubt();
+    if (!causes_.known(i)) continue;
+    const Inputs z = scaled(causes_.of(i, applied));
+    watch_surprise(i, value, z);
+    j_[i].record(z, value, about);
   }
+  const std::size_t all = j_.size();
   for (std::size_t i = 0; i < limited_.size(); ++i) {
-    causes_.judge(i + 1, applied, reading.limits[i]);
-    if (causes_.known(i + 1)) limited_[i].record(scaled(causes_.of(i + 1, applied)), reading.limits[i], about);
+    causes_.judge(all + i, applied, reading.limits[i]);
+    if (causes_.known(all + i)) limited_[i].record(scaled(causes_.of(all + i, applied)), reading.limits[i], about);
   }
+  // Only what has been read widens what may be asked.
+  const std::size_t slowest = causes_.slowest();
+  if (causes_.known(slowest)) explore(scaled(causes_.of(slowest, applied)));
+}
+
+void GaussianProcessSeeking::explore(const Inputs& z) noexcept {
+  lowest_ = lowest_.cwiseMin(z);
+  highest_ = highest_.cwiseMax(z);
 }
 
 // Readings that the process does not explain: what was known before is aged.
-void GaussianProcessSeeking::watch_surprise(double value, const Inputs& z) noexcept {
-  ++since_doubt_;
-  if (j_.count() < 3 * static_cast<int>(z.size()) + 3) return;
+void GaussianProcessSeeking::watch_surprise(std::size_t component, double value, const Inputs& z) noexcept {
+  ProcessModel& model = j_[component];
+  if (component == 0) ++since_doubt_;
+  if (model.count() < 3 * static_cast<int>(z.size()) + 3) return;
   candidates_.row(0) = z.transpose();
-  j_.predict(candidates_, 1);
-  const double noise = std::max(j_.noise_sd(), least_noise * std::abs(value));
-  const double variance = std::max(j_.covariance(0, 0), 0.0) + noise * noise;
-  const double off = value - j_.mean(0);
-  surprise_ += surprise_rate * (std::min(off * off / std::max(variance, 1e-300), 100.0) - surprise_);
-  if (since_doubt_ < calm_cycles || surprise_ < most_surprise) return;
-  j_.age(doubt_age * settings_.memory_cycles);
-  surprise_ = 1.0;
+  model.predict(candidates_, 1);
+  const double noise = std::max(model.noise_sd(), least_noise * std::abs(value));
+  const double variance = std::max(model.covariance(0, 0), 0.0) + noise * noise;
+  const double off = value - model.mean(0);
+  double& surprise = surprise_[component];
+  surprise += surprise_rate * (std::min(off * off / std::max(variance, 1e-300), 100.0) - surprise);
+  if (since_doubt_ >= calm_cycles && surprise >= most_surprise) doubt();
+}
+
+void GaussianProcessSeeking::doubt() noexcept {
+  for (ProcessModel& model : j_)
+    model.age(doubt_age * settings_.memory_cycles);
+  std::fill(surprise_.begin(), surprise_.end(), 1.0);
   since_doubt_ = 0;
   ++doubts_;
 }
 
 void GaussianProcessSeeking::choose() noexcept {
   const Eigen::Index n = estimate_.size();
-  const bool read = j_.count() >= n + 1 && std::all_of(limited_.begin(), limited_.end(),
-                                                       [&](const ProcessModel& m) { return m.count() >= n + 1; });
-  if (star_ < n || !read) return choose_first();
+  const auto enough = [](const ProcessModel& m) { return m.count() >= m.fewest(); };
+  const bool read = std::all_of(j_.begin(), j_.end(), enough) && std::all_of(limited_.begin(), limited_.end(), enough);
+  if (!read || (star_ < n && !guided())) return choose_first();
   const Inputs about = scaled(estimate_);
-  j_.fit(about);
-  for (ProcessModel& model : limited_)
-    model.fit(about);
+  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
+    for (ProcessModel& model : *models)
+      model.fit(about);
+  }
   const Inputs best = best_of_mean(about);
   estimate_ = unscaled(best);
   draw_candidates(best);
   judge_safety(candidates);
-  j_.predict(candidates_, candidates);
-  expected_ = (settings_.maximize ? 1.0 : -1.0) * j_.mean(0);
-  expected_sd_ = std::sqrt(std::max(j_.covariance(0, 0), 0.0));
+  means_.setZero();
+  covariance_.setZero();
+  double variance = 0.0;
+  for (std::size_t i = 0; i < j_.size(); ++i) {
+    take_in(i, candidates);
+    variance += std::max(j_[i].covariance(0, 0), 0.0);
+  }
+  expected_ = (settings_.maximize ? 1.0 : -1.0) * means_[0];
+  expected_sd_ = std::sqrt(variance);
   for (std::size_t i = 0; i < limited_.size(); ++i)
     room_[i] = -excess(i, 0) / settings_.limits[i].scale;
   send(candidates_.row(most_worth(candidates)).transpose());
+}
+
+// Adds a component's means and covariances at the candidates, these as they will be once what is on its way is read.
+void GaussianProcessSeeking::take_in(std::size_t component, int points) noexcept {
+  ProcessModel& model = j_[component];
+  std::array<int, most_on_their_way> times{};
+  int more = 0;
+  for (std::int64_t back = 0; back < causes_.on_their_way(component); ++back) {
+    const Inputs z = scaled(causes_.applied_before(back));
+    int at = 0;
+    while (at < more && candidates_.row(points + at).transpose() != z)
+      ++at;
+    if (at == most_on_their_way) continue;
+    if (at == more) candidates_.row(points + more++) = z.transpose();
+    ++times[static_cast<std::size_t>(at)];
+  }
+  const int all = points + more;
+  model.predict(candidates_, all);
+  for (int a = 0; a < all; ++a) {
+    if (a < points) means_[a] += model.mean(a);
+    for (int b = 0; b <= a; ++b)
+      own_(a, b) = own_(b, a) = model.covariance(a, b);
+  }
+  const double noise = model.noise_sd();
+  for (int k = 0; k < more; ++k) {
+    const int at = points + k;
+    const double variance = own_(at, at) + noise * noise / times[static_cast<std::size_t>(k)];
+    if (!(variance > 0.0)) continue;
+    for (int a = 0; a < all; ++a)
+      effect_[static_cast<std::size_t>(a)] = own_(a, at) / std::sqrt(variance);
+    const Eigen::Map<const Eigen::VectorXd> effect(effect_.data(), all);
+    for (int b = 0; b < all; ++b)
+      own_.col(b).head(all) -= effect[b] * effect;
+  }
+  covariance_.topLeftCorner(points, points) += own_.topLeftCorner(points, points);
+}
+
+double GaussianProcessSeeking::mean(int point) const noexcept {
+  double sum = 0.0;
+  for (const ProcessModel& model : j_)
+    sum += model.mean(point);
+  return sum;
+}
+
+double GaussianProcessSeeking::noise_sd() const noexcept {
+  double squares = 0.0;
+  for (const ProcessModel& model : j_)
+    squares += model.noise_sd() * model.noise_sd();
+  return std::sqrt(squares);
+}
+
+// Whether guides say enough to leave the readings to the side out.
+bool GaussianProcessSeeking::guided() const noexcept {
+  const auto empty = [](const Surface& s) { return s.empty(); };
+  return !settings_.guide.empty() && std::none_of(settings_.guide.begin(), settings_.guide.end(), empty) &&
+         settings_.limit_guides.size() == settings_.limits.size() &&
+         std::none_of(settings_.limit_guides.begin(), settings_.limit_guides.end(), empty);
 }
 
 // The start, then one input to the side of it per cycle, towards the middle of the bounds; in turns until all is read.
@@ -198,7 +344,6 @@ void GaussianProcessSeeking::choose_first() noexcept {
   Inputs z = middle_;
   const double step = settings_.first_step * (limited_.empty() ? 1.0 : 0.5);
   if (side >= 0) z[side] += z[side] < 0.5 ? step : -step;
-  explored_ = std::max(explored_, step);
   send(scaled(protocol_.failures.keep(unscaled(z))));
 }
 
@@ -250,20 +395,21 @@ Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
       candidates_.row(p) = reachable(z).transpose();
     }
     judge_safety(search_points + 1);
-    j_.predict_means(candidates_, search_points + 1);
+    for (ProcessModel& model : j_)
+      model.predict_means(candidates_, search_points + 1);
     const auto better = [&](double over, double mean) {
       if (over > 0.0 || best_over > 0.0) return over < best_over;
       return mean > best_mean;
     };
     if (first) {
       best_over = over_[0];
-      best_mean = j_.mean(0);
+      best_mean = mean(0);
       first = false;
     }
     for (int p = 1; p <= search_points; ++p) {
-      if (!better(over_[static_cast<std::size_t>(p)], j_.mean(p))) continue;
+      if (!better(over_[static_cast<std::size_t>(p)], mean(p))) continue;
       best_over = over_[static_cast<std::size_t>(p)];
-      best_mean = j_.mean(p);
+      best_mean = mean(p);
       best = candidates_.row(p).transpose();
     }
   }
@@ -304,12 +450,9 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
     return static_cast<int>(std::min_element(over_.begin(), over_.begin() + points) - over_.begin());
   }
   const std::vector<int>& kept = order_;
-  for (int a = 0; a < safe; ++a) {
-    worth_mean_[at(a)] = j_.mean(kept[at(a)]);
-    for (int b = 0; b <= a; ++b)
-      covariance_(a, b) = covariance_(b, a) = j_.covariance(kept[at(a)], kept[at(b)]);
-  }
-  const double noise = std::max(j_.noise_sd(), least_noise * std::abs(worth_mean_[0]));
+  for (int a = 0; a < safe; ++a)
+    worth_mean_[at(a)] = means_[kept[at(a)]];
+  const double noise = std::max(noise_sd(), least_noise * std::abs(worth_mean_[0]));
   const std::span<const double> means(worth_mean_.data(), at(safe));
   const std::span<double> effects(effect_.data(), at(safe));
   double most = 0.0;
@@ -317,10 +460,17 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
   std::array<int, candidates> scratch{};
   for (int a = 0; a < safe; ++a) {
     double taught = 0.0;
+    const auto [least, steepest] = std::ranges::minmax_element(
+        kept.begin(), kept.begin() + safe, {}, [&](int b) { return covariance_(b, kept[at(a)]); });
+    const double range = covariance_(*steepest, kept[at(a)]) - covariance_(*least, kept[at(a)]);
     for (const double readings : planned_readings) {
-      const double sd = std::sqrt(std::max(covariance_(a, a), 0.0) + noise * noise / readings);
+      const double sd = std::sqrt(std::max(covariance_(kept[at(a)], kept[at(a)]), 0.0) + noise * noise / readings);
+      if (!(sd > 0.0)) continue;
+      // The largest of lines through one point rises by their range of slopes times E max(Z, 0) at most.
+      const double at_most = rise_of_normal * range / (sd * readings);
+      if (at_most <= taught || (best >= 0 && means[at(a)] + settings_.horizon * at_most <= most)) continue;
       for (int b = 0; b < safe; ++b)
-        effects[at(b)] = sd > 0.0 ? covariance_(b, a) / sd : 0.0;
+        effects[at(b)] = covariance_(kept[at(b)], kept[at(a)]) / sd;
       const double gain = knowledge_gradient(means, effects, {scratch.data(), at(safe)}, {breaks_.data(), at(safe)});
       taught = std::max(taught, gain / readings);
     }
@@ -334,7 +484,8 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
 
 void GaussianProcessSeeking::reseed(std::uint64_t seed) noexcept {
   settings_.seed = seed;
-  j_.reseed(seed);
+  for (ProcessModel& model : j_)
+    model.reseed(seed);
   for (ProcessModel& model : limited_)
     model.reseed(seed);
 }
@@ -347,13 +498,13 @@ LimitState GaussianProcessSeeking::limit_state(std::size_t i) const noexcept {
 void GaussianProcessSeeking::restart() noexcept {
   protocol_.failures.forget();
   causes_.forget();
-  j_.forget();
-  for (ProcessModel& model : limited_)
-    model.forget();
-  middle_ = scaled(estimate_);
-  explored_ = 0.0;
+  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
+    for (ProcessModel& model : *models)
+      model.forget();
+  }
+  middle_ = lowest_ = highest_ = scaled(estimate_);
   star_ = held_ = since_doubt_ = 0;
-  surprise_ = 1.0;
+  std::fill(surprise_.begin(), surprise_.end(), 1.0);
   expected_ = expected_sd_ = 0.0;
   std::fill(room_.begin(), room_.end(), 0.0);
   std::fill(unsafe_.begin(), unsafe_.end(), 0.0);
@@ -364,6 +515,7 @@ void GaussianProcessSeeking::shift_estimate(const Inputs& by) noexcept {
   move_within(estimate_, by, settings_.space, Inputs::Zero(by.size()));
   if (!protocol_.asked) move_within(applied_, by, settings_.space, Inputs::Zero(by.size()));
   middle_ = scaled(estimate_);
+  explore(middle_);
 }
 
 }  // namespace mgdd::optimize

@@ -10,13 +10,15 @@
 namespace mgdd::optimize {
 namespace {
 
-// Priors, in bends: J = level - bend/2 |z - 1/2|^2 + slopes (sd 0.4) + bends (0.6) + couplings (0.5) + the rest.
-constexpr double level_sd = 3.0, slope_sd = 0.4, bend_sd = 0.6, coupling_sd = 0.5;
+// Priors of logarithms.
 constexpr double noise_prior = -5.3, noise_prior_sd = 1.5;
 constexpr double rest_prior = -4.5, rest_prior_sd = 1.5;
 constexpr double length_prior = -0.7, length_prior_sd = 0.7;
 constexpr double settled_sd = 0.4;  // of the bend, once the first readings have shown it
 constexpr double bend_search_sd = 1.5;
+constexpr double guided_bend_prior = -1.0, guided_bend_prior_sd = 0.7;  // of the bend over that of J as a whole
+constexpr double factor_width = 0.5;                                    // of what the guide counts by: heavy tails
+constexpr double useless_factor = -6.0;
 constexpr int settling_readings = 30;
 constexpr int evidence_readings = 60;
 constexpr double crowd = 0.75;  // share of the readings, those nearest to the estimate, of which the oldest goes
@@ -71,10 +73,16 @@ double log_prior(double value, double middle, double sd) noexcept {
 
 ProcessModel::ProcessModel(const Settings& settings)
     : settings_(settings),
-      points_(InputTable::Zero(settings.kept, settings.inputs)),
+      kernel_(settings.inputs, settings.bends_down, settings.guide),
+      points_(InputTable::Zero(settings.kept, kernel_.width())),
       values_(Eigen::VectorXd::Zero(settings.kept)),
       ages_(values_),
-      numbers_(Numbers::Zero(3 + settings.inputs)),
+      numbers_(Numbers::Zero(3 + settings.inputs + (kernel_.guided() ? 1 : 0))),
+      columns_(InputTable::Zero(kernel_.width(), settings.kept)),
+      quadratic_(settings.kept, settings.kept),
+      guide_(quadratic_),
+      matern_(quadratic_),
+      table_lengths_(Inputs::Zero(settings.inputs)),
       factor_(settings.kept, settings.kept),
       small_(evidence_readings, evidence_readings),
       weights_(values_),
@@ -84,46 +92,55 @@ ProcessModel::ProcessModel(const Settings& settings)
       order_(static_cast<std::size_t>(settings.kept), 0),
       chosen_(evidence_readings, 0),
       kernels_(settings.most_points, settings.kept),
-      asked_(InputTable::Zero(settings.most_points, settings.inputs)),
-      now_{1.0, 0.0, 0.0, Inputs::Ones(settings.inputs)} {}
+      asked_(InputTable::Zero(settings.most_points, kernel_.width())) {
+  now_.inverse_length = Inputs::Ones(settings.inputs);
+}
 
 double ProcessModel::noise_sd() const noexcept {
   return settings_.noise_sd.value_or(std::exp(numbers_[0] + numbers_[1]));
 }
 
 ProcessModel::Scales ProcessModel::scales_of(const Numbers& numbers) const noexcept {
-  const double bend = std::exp(numbers[0]);
-  Scales out{bend * bend, settings_.noise_sd.value_or(bend * std::exp(numbers[1])), std::exp(numbers[2]),
-             Inputs(settings_.inputs)};
-  out.noise *= out.noise;
-  out.rest *= out.rest;
-  for (Eigen::Index i = 0; i < settings_.inputs; ++i)
-    out.inverse_length[i] = std::exp(-numbers[3 + i]);
+  Scales out;
+  out.bend = std::exp(numbers[0]);
+  out.guide = kernel_.guided() ? std::exp(numbers[numbers.size() - 1]) : 0.0;
+  const double noise = settings_.noise_sd.value_or(out.bend * std::exp(numbers[1])), rest = std::exp(numbers[2]);
+  out.noise_variance = noise * noise;
+  out.rest = rest * rest;
+  out.inverse_length = (-numbers.segment(3, settings_.inputs)).array().exp().matrix();
   return out;
 }
 
-double ProcessModel::prior_mean(const double* z, const Scales& s) const noexcept {
-  if (!settings_.bends_down) return 0.0;
-  double sum = 0.0;
-  for (Eigen::Index i = 0; i < settings_.inputs; ++i)
-    sum += (z[i] - 0.5) * (z[i] - 0.5);
-  return -0.5 * std::sqrt(s.squared_bend) * sum;
+void ProcessModel::tabulate(std::int64_t reading) noexcept {
+  columns_.col(reading) = points_.row(reading).transpose();
+  for (std::int64_t other = 0; other < count_; ++other) {
+    const std::int64_t i = std::max(reading, other), j = std::min(reading, other);
+    const ProcessKernel::Fixed f = kernel_.fixed(&points_(i, 0), &points_(j, 0));
+    quadratic_(i, j) = f.quadratic;
+    guide_(i, j) = f.guide;
+    matern_(i, j) = kernel_.matern(&points_(i, 0), &points_(j, 0), table_lengths_);
+  }
 }
 
-double ProcessModel::kernel(const double* a, const double* b, const Scales& s) const noexcept {
-  double slopes = 0.0, bends = 0.0, couplings = 0.0, squares = 0.0;
-  for (Eigen::Index i = 0; i < settings_.inputs; ++i) {
-    const double both = (a[i] - 0.5) * (b[i] - 0.5);
-    couplings += slopes * both;  // of every pair once
-    slopes += both;
-    bends += 0.25 * both * both;
-    const double off = (a[i] - b[i]) * s.inverse_length[i];
-    squares += off * off;
+void ProcessModel::tabulate_lengths() noexcept {
+  for (std::int64_t i = 0; i < count_; ++i) {
+    for (std::int64_t j = 0; j <= i; ++j)
+      matern_(i, j) = kernel_.matern(&points_(i, 0), &points_(j, 0), table_lengths_);
   }
-  const double r = std::sqrt(5.0 * squares);
-  const double matern = (1.0 + r + r * r / 3.0) * std::exp(-r);
-  return s.squared_bend * (level_sd * level_sd + slope_sd * slope_sd * slopes + bend_sd * bend_sd * bends +
-                           coupling_sd * coupling_sd * couplings + s.rest * matern);
+}
+
+// Tables of all readings at the lengths in use.
+void ProcessModel::know_tables() noexcept {
+  const Inputs lengths = scales_of(numbers_).inverse_length;
+  if (!tables_known_) {
+    table_lengths_ = lengths;
+    for (std::int64_t i = 0; i < count_; ++i)
+      tabulate(i);
+    tables_known_ = true;
+  } else if (lengths != table_lengths_) {
+    table_lengths_ = lengths;
+    tabulate_lengths();
+  }
 }
 
 // Of the readings nearest to `about` the oldest one.
@@ -142,10 +159,11 @@ int ProcessModel::crowded_reading(const Inputs& about) noexcept {
 void ProcessModel::record(const Inputs& z, double value, const Inputs& about) noexcept {
   const int at = count_ < settings_.kept ? static_cast<int>(count_++) : crowded_reading(about);
   ages_.head(count_).array() += 1.0;
-  points_.row(at) = z.transpose();
+  kernel_.describe(z, &points_(at, 0));
   values_[at] = value;
   ages_[at] = 0.0;
   ++told_;
+  if (tables_known_) tabulate(at);
   factored_ = false;
 }
 
@@ -156,7 +174,7 @@ void ProcessModel::age(double cycles) noexcept {
 
 void ProcessModel::forget() noexcept {
   count_ = told_ = 0;
-  begun_ = factored_ = false;
+  begun_ = factored_ = tables_known_ = false;
   points_.setZero();
   values_.setZero();
   ages_.setZero();
@@ -179,16 +197,20 @@ void ProcessModel::choose_readings(const Inputs& about) noexcept {
   std::copy(begin, begin + most, chosen_.begin());
 }
 
-// Logarithm of the likelihood of the chosen readings times the priors.
-double ProcessModel::evidence(const Numbers& numbers) noexcept {
+// Logarithm of the likelihood of the chosen readings times the priors; the lengths may be those of the tables.
+double ProcessModel::evidence(const Numbers& numbers, bool same_lengths) noexcept {
   const Scales s = scales_of(numbers);
   const auto n = std::min<std::int64_t>(count_, evidence_readings);
   for (std::int64_t a = 0; a < n; ++a) {
-    const int i = chosen_[static_cast<std::size_t>(a)];
-    small_rest_[a] = values_[i] - level_ - prior_mean(&points_(i, 0), s);
-    for (std::int64_t b = 0; b <= a; ++b)
-      small_(a, b) = kernel(&points_(i, 0), &points_(chosen_[static_cast<std::size_t>(b)], 0), s);
-    small_(a, a) += s.noise * std::exp(ages_[i] / settings_.memory) + jitter * s.squared_bend;
+    const int one = chosen_[static_cast<std::size_t>(a)];
+    small_rest_[a] = values_[one] - level_ - kernel_.mean(&points_(one, 0), s);
+    for (std::int64_t b = 0; b <= a; ++b) {
+      const int other = chosen_[static_cast<std::size_t>(b)], i = std::max(one, other), j = std::min(one, other);
+      const double matern =
+          same_lengths ? matern_(i, j) : kernel_.matern(&points_(i, 0), &points_(j, 0), s.inverse_length);
+      small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s);
+    }
+    small_(a, a) += s.noise_variance * std::exp(ages_[one] / settings_.memory) + jitter * s.bend * s.bend;
   }
   cholesky(small_, n);
   solve_lower(small_, n, small_rest_.data());
@@ -196,14 +218,37 @@ double ProcessModel::evidence(const Numbers& numbers) noexcept {
   for (std::int64_t a = 0; a < n; ++a) {
     // A faded reading counts as a power of its likelihood; without this term it would speak for less noise.
     const double faded = 1.0 - std::exp(-ages_[chosen_[static_cast<std::size_t>(a)]] / settings_.memory);
-    out += 0.5 * faded * std::log(s.noise) - std::log(small_(a, a));
+    out += 0.5 * faded * std::log(s.noise_variance) - std::log(small_(a, a));
   }
-  const double noise = noise_known() ? std::log(*settings_.noise_sd) - numbers[0] : numbers[1];
-  out += log_prior(noise, noise_prior, noise_prior_sd) + log_prior(numbers[2], rest_prior, rest_prior_sd);
+  out += log_priors(numbers, s);
+  return std::isfinite(out) ? out : -std::numeric_limits<double>::infinity();
+}
+
+double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const noexcept {
+  const double whole = std::log(kernel_.whole_bend(s));
+  double out = log_prior(0.5 * std::log(s.noise_variance) - whole, noise_prior, noise_prior_sd) +
+               log_prior(numbers[2], rest_prior, rest_prior_sd);
   for (Eigen::Index i = 0; i < settings_.inputs; ++i)
     out += log_prior(numbers[3 + i], length_prior, length_prior_sd);
+  if (kernel_.guided()) {
+    const double factor = numbers[numbers.size() - 1] / factor_width;
+    out += log_prior(numbers[0] - whole, guided_bend_prior, guided_bend_prior_sd) - std::log1p(factor * factor);
+  }
   if (settled_bend_) out += log_prior(numbers[0], *settled_bend_, settled_sd);
-  return std::isfinite(out) ? out : -std::numeric_limits<double>::infinity();
+  return out;
+}
+
+// Logarithm of the factor by which the guide fits the readings best, 0 where they do not say.
+double ProcessModel::guide_in_readings() const noexcept {
+  double middle = 0.0, both = 0.0, squares = 0.0;
+  for (std::int64_t i = 0; i < count_; ++i)
+    middle += kernel_.guide_at(&points_(i, 0)) / static_cast<double>(count_);
+  for (std::int64_t i = 0; i < count_; ++i) {
+    const double off = kernel_.guide_at(&points_(i, 0)) - middle;
+    both += off * values_[i];
+    squares += off * off;
+  }
+  return both > 0.0 && squares > 0.0 ? std::log(both / squares) : 0.0;
 }
 
 // The bend that the spread of the readings suggests.
@@ -213,18 +258,38 @@ void ProcessModel::begin_numbers() noexcept {
   double farthest = 1e-6;
   for (std::int64_t i = 0; i < count_; ++i)
     for (std::int64_t j = 0; j < i; ++j)
-      farthest = std::max(farthest, (points_.row(i) - points_.row(j)).norm());
+      farthest = std::max(farthest, (points_.row(i) - points_.row(j)).head(settings_.inputs).norm());
   const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), 1e-300});
   numbers_[0] = std::log(rise / (0.3 * farthest));
   numbers_[1] = noise_prior;
   numbers_[2] = rest_prior;
-  numbers_.tail(settings_.inputs).setConstant(length_prior);
+  numbers_.segment(3, settings_.inputs).setConstant(length_prior);
+  if (kernel_.guided()) {
+    numbers_[numbers_.size() - 1] = 0.0;
+    numbers_[0] = std::log(kernel_.guide_bend()) + guided_bend_prior;
+    numbers_[1] = noise_prior - guided_bend_prior;
+  }
   begun_ = true;
 }
 
+// Numbers drawn from the priors: the evidence has more than one top.
+ProcessModel::Numbers ProcessModel::anew(std::uint64_t trial) const noexcept {
+  const auto normal = [&](std::uint64_t stream) { return random::normal(settings_.seed, stream, trial); };
+  Numbers out = numbers_;
+  out[0] += bend_search_sd * normal(101);
+  out[1] = noise_prior + noise_prior_sd * normal(102);
+  out[2] = rest_prior + rest_prior_sd * normal(103);
+  out.segment(3, settings_.inputs).setConstant(length_prior);
+  if (kernel_.guided()) {
+    const double fitted[] = {guide_in_readings(), 0.0, useless_factor};
+    out[out.size() - 1] = fitted[trial / 4 % 3] + factor_width * normal(104);
+  }
+  return out;
+}
+
 void ProcessModel::try_numbers(int trials) noexcept {
-  const Eigen::Index sizes = 3 + settings_.inputs;
-  double best = evidence(numbers_);
+  const Eigen::Index sizes = numbers_.size();
+  double best = evidence(numbers_, true);
   for (std::int64_t t = told_ * trials; t < (told_ + 1) * trials; ++t) {
     const Eigen::Index which = t % sizes;
     const std::int64_t round = t / sizes;
@@ -232,32 +297,29 @@ void ProcessModel::try_numbers(int trials) noexcept {
     const double width = round % 2 == 0 ? coarse_step : fine_step;
     const double step = width * random::normal(settings_.seed, 100, static_cast<std::uint64_t>(t));
     Numbers trial = numbers_;
-    if (told_ < more_readings && t % 4 == 3) {  // anew from the priors: the evidence has more than one top
-      const auto normal = [&](std::uint64_t stream) {
-        return random::normal(settings_.seed, stream, static_cast<std::uint64_t>(t));
-      };
-      trial[0] += bend_search_sd * normal(101);
-      trial[1] = noise_prior + noise_prior_sd * normal(102);
-      trial[2] = rest_prior + rest_prior_sd * normal(103);
-      trial.tail(settings_.inputs).setConstant(length_prior);
+    const bool jumps = told_ < more_readings && t % 4 == 3;
+    if (jumps) {
+      trial = anew(static_cast<std::uint64_t>(t));
     } else {
       trial[which] += step;
       if (which == 0 && round % 3 == 0) trial[1] -= step;  // the noise stays
     }
-    if (trial.tail(sizes - 1).minCoeff() < lowest_log || trial.tail(sizes - 1).maxCoeff() > highest_log) continue;
-    const double found = evidence(trial);
+    const auto bounded = trial.segment(1, 2 + settings_.inputs);
+    if (bounded.minCoeff() < lowest_log || bounded.maxCoeff() > highest_log) continue;
+    const double found = evidence(trial, !jumps && (which < 3 || which == 3 + settings_.inputs));
     if (found <= best) continue;
     best = found;
     numbers_ = trial;
+    know_tables();
   }
 }
 
 void ProcessModel::factor() noexcept {
   for (std::int64_t i = 0; i < count_; ++i) {
-    weights_[i] = values_[i] - level_ - prior_mean(&points_(i, 0), now_);
+    weights_[i] = values_[i] - level_ - kernel_.mean(&points_(i, 0), now_);
     for (std::int64_t j = 0; j <= i; ++j)
-      factor_(i, j) = kernel(&points_(i, 0), &points_(j, 0), now_);
-    factor_(i, i) += now_.noise * std::exp(ages_[i] / settings_.memory) + jitter * now_.squared_bend;
+      factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_);
+    factor_(i, i) += now_.noise_variance * std::exp(ages_[i] / settings_.memory) + jitter * now_.bend * now_.bend;
   }
   cholesky(factor_, count_);
   solve_lower(factor_, count_, weights_.data());
@@ -270,13 +332,15 @@ void ProcessModel::refresh() noexcept {
   if (factored_) return;
   level_ = values_.head(count_).mean();
   now_ = scales_of(numbers_);
+  know_tables();
   factor();
 }
 
 void ProcessModel::fit(const Inputs& about) noexcept {
   level_ = values_.head(count_).mean();
-  const auto enough = settings_.inputs + 1;
+  const auto enough = kernel_.guided() ? 2 : settings_.inputs + 1;
   if (!begun_ || told_ <= enough) begin_numbers();
+  know_tables();
   choose_readings(about);
   if (told_ >= enough) {
     try_numbers(told_ < first_readings ? first_trials : told_ < more_readings ? more_trials : late_trials);
@@ -288,23 +352,23 @@ void ProcessModel::fit(const Inputs& about) noexcept {
 
 void ProcessModel::predict(const InputTable& at, int points) noexcept {
   predict_means(at, points);
-  for (int p = 0; p < points; ++p)
-    solve_lower(factor_, count_, &kernels_(p, 0));
+  factor_.topLeftCorner(count_, count_)
+      .triangularView<Eigen::Lower>()
+      .solveInPlace(kernels_.topLeftCorner(points, count_).transpose());
 }
 
 void ProcessModel::predict_means(const InputTable& at, int points) noexcept {
   refresh();
   for (int p = 0; p < points; ++p) {
-    asked_.row(p) = at.row(p).head(settings_.inputs);
+    kernel_.describe(at.row(p).head(settings_.inputs).transpose(), &asked_(p, 0));
     double* const own = &kernels_(p, 0);
-    for (std::int64_t i = 0; i < count_; ++i)
-      own[i] = kernel(&points_(i, 0), &asked_(p, 0), now_);
-    mean_[p] = level_ + prior_mean(&asked_(p, 0), now_) + dot(own, weights_.data(), count_);
+    kernel_.covariances(&asked_(p, 0), columns_, count_, now_, own);
+    mean_[p] = level_ + kernel_.mean(&asked_(p, 0), now_) + dot(own, weights_.data(), count_);
   }
 }
 
 double ProcessModel::covariance(int i, int j) const noexcept {
-  return kernel(&asked_(i, 0), &asked_(j, 0), now_) - dot(&kernels_(i, 0), &kernels_(j, 0), count_);
+  return kernel_.covariance(&asked_(i, 0), &asked_(j, 0), now_) - dot(&kernels_(i, 0), &kernels_(j, 0), count_);
 }
 
 double knowledge_gradient(std::span<const double> mean, std::span<const double> effect, std::span<int> order,

@@ -1,10 +1,11 @@
 // Seeking with a Gaussian process of J, and one of every limited quantity (Rasmussen and Williams 2006). After a
 // reading at the start and one to the side per input, the next input is the one that is worth most: its J, plus what a
 // few readings there would teach about the best input (knowledge gradient, Frazier, Powell and Dayanik 2009), used for
-// `horizon` cycles. Nothing is asked farther from the start than half as far again as what has been, nor where a limit
-// holds with less than the stated probability: the safe set grows from the start (Sui et al. 2015). Readings fade; ones
-// that the process cannot explain age all that was known. ask and tell are noexcept and allocation-free; all randomness
-// is a function of (seed, cycle).
+// `horizon` cycles. With a guide the readings to the side are left out: what a rough model says of J is the mean of the
+// process, whose factor, place and error are learnt. Nothing is asked farther from the start than half as far again as
+// what has been, nor where a limit holds with less than the stated probability: the safe set grows from the start (Sui
+// et al. 2015). Readings fade; ones that the process cannot explain age all that was known. ask and tell are noexcept
+// and allocation-free; all randomness is a function of (seed, cycle).
 #pragma once
 
 #include <cstdint>
@@ -23,17 +24,21 @@
 namespace mgdd::optimize {
 
 struct GaussianProcessSeekingSettings {
-  SearchSpace space;                 ///< finite bounds
-  std::optional<double> noise_sd{};  ///< of one reading of J, > 0; none: learnt
-  double horizon = 60.0;             ///< cycles for which what is learnt pays
-  double memory_cycles = 143.0;      ///< readings fade with this time constant
-  int kept = 100;                    ///< readings at most, 10 to 200
-  double first_step = 0.1;           ///< of the first readings to the side, as a share of the bounds
-  double limit_probability = 0.95;   ///< with which a limit holds at every input asked for
-  ComponentLag sensor{};             ///< between the plant and J
+  SearchSpace space;                       ///< finite bounds
+  std::optional<double> noise_sd{};        ///< of one reading of J, > 0; none: learnt
+  double horizon = 60.0;                   ///< cycles for which what is learnt pays
+  double memory_cycles = 143.0;            ///< readings fade with this time constant
+  int kept = 100;                          ///< readings at most, 10 to 200
+  double first_step = 0.1;                 ///< of the first readings to the side, as a share of the bounds
+  double limit_probability = 0.95;         ///< with which a limit holds at every input asked for
+  ComponentLag sensor{};                   ///< between the plant and J, where it has one component
+  std::vector<ComponentLag> components{};  ///< the same of every component of J; empty: J is one
+  int delay_uncertainty = 4;               ///< cycles by which a delay may be shorter or longer: it is learnt
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
+  std::vector<Surface> guide{};         ///< what a model says of every component of J, or none at all
+  std::vector<Surface> limit_guides{};  ///< the same of every limit
 };
 inline auto fields_of(const GaussianProcessSeekingSettings&) {
   using S = GaussianProcessSeekingSettings;
@@ -47,9 +52,13 @@ inline auto fields_of(const GaussianProcessSeekingSettings&) {
       field<&S::limit_probability>("limit_probability", "with which a limit holds at every input asked for"),
       field<&S::sensor, &ComponentLag::delay_cycles>("delay_cycles", "between the plant and J"),
       field<&S::sensor, &ComponentLag::lag_cycles>("lag_cycles", "the same"),
+      field<&S::components>("components", "delay and lag of each component of J", DefaultForm::none),
+      field<&S::delay_uncertainty>("delay_uncertainty", "cycles by which a delay may be shorter or longer"),
       field<&S::seed>("seed", "of the inputs that are compared"),
       field<&S::maximize>("maximize", "False to minimise J"),
       field<&S::limits>("limits", "measured quantities to keep"),
+      field<&S::guide>("guide", "what a model says of J", DefaultForm::none),
+      field<&S::limit_guides>("limit_guides", "the same of every limit", DefaultForm::none),
   };
 }
 
@@ -67,18 +76,22 @@ class GaussianProcessSeeking {
   void reseed(std::uint64_t seed) noexcept;
 
   const Inputs& estimate() const noexcept { return estimate_; }
-  double noise_sd() const noexcept { return j_.noise_sd(); }
+  double noise_sd() const noexcept;
   /// What a reading of J at the estimate is expected to be, and its standard deviation without noise.
   double expected() const noexcept { return expected_; }
   double expected_sd() const noexcept { return expected_sd_; }
   std::int64_t doubts() const noexcept { return doubts_; }
+  /// What the guide is multiplied by, as learnt: about 1 where it is right, towards 0 where it says nothing.
+  double guide_factor(std::size_t component = 0) const noexcept { return j_[component].guide_factor(); }
+  /// Whole cycles between input and reading of a component that explain the readings best.
+  double delay_cycles(std::size_t component = 0) const noexcept { return causes_.delay_cycles(component); }
   const GaussianProcessSeekingSettings& settings() const noexcept { return settings_; }
   const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const Protocol& protocol() const noexcept { return protocol_; }
-  std::size_t component_count() const noexcept { return 1; }
+  std::size_t component_count() const noexcept { return j_.size(); }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
   LimitState limit_state(std::size_t i) const noexcept;
-  double limit_delay(std::size_t i) const noexcept { return causes_.delay_cycles(i + 1); }
+  double limit_delay(std::size_t i) const noexcept { return causes_.delay_cycles(j_.size() + i); }
 
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const {
@@ -92,7 +105,8 @@ class GaussianProcessSeeking {
     v("estimate", self.estimate_);
     v("applied", self.applied_);
     v("middle", self.middle_);
-    v("explored", self.explored_);
+    v("lowest", self.lowest_);
+    v("highest", self.highest_);
     v("star", self.star_, 1 + self.estimate_.size());
     v("held", self.held_);
     v("expected", self.expected_);
@@ -103,7 +117,8 @@ class GaussianProcessSeeking {
     v("limit_room", self.room_);
     v("limit_unsafe", self.unsafe_);
     CausingInputs::visit(self.causes_, v, "cause");
-    ProcessModel::visit(self.j_, v, "j");
+    for (std::size_t i = 0; i < self.j_.size(); ++i)
+      ProcessModel::visit(self.j_[i], v, i == 0 ? "j" : "j" + std::to_string(i));
     for (std::size_t i = 0; i < self.limited_.size(); ++i)
       ProcessModel::visit(self.limited_[i], v, "limit" + std::to_string(i));
   }
@@ -114,36 +129,42 @@ class GaussianProcessSeeking {
   Inputs reachable(Inputs z) const noexcept;
   double draw(std::uint64_t stream, int index) const noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
-  void watch_surprise(double value, const Inputs& z) noexcept;
+  void watch_surprise(std::size_t component, double value, const Inputs& z) noexcept;
+  void doubt() noexcept;
+  void take_in(std::size_t component, int points) noexcept;
+  double mean(int point) const noexcept;
   void choose() noexcept;
   void choose_first() noexcept;
+  bool guided() const noexcept;
   void draw_candidates(const Inputs& about) noexcept;
   void judge_safety(int points) noexcept;
   double excess(std::size_t i, int point) noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;
+  void explore(const Inputs& z) noexcept;
   void send(const Inputs& z) noexcept;
 
   GaussianProcessSeekingSettings settings_;
   double quantile_;
   std::int64_t hold_;  // cycles for which an input is asked behind a lag
   Protocol protocol_;
-  CausingInputs causes_;  // of J, then of the limits
-  ProcessModel j_;
+  CausingInputs causes_;         // of J, then of the limits
+  std::vector<ProcessModel> j_;  // of its components
   std::vector<ProcessModel> limited_;
   Inputs estimate_, applied_;
-  Inputs middle_;          // of what may be explored: the start, scaled
-  double explored_ = 0.0;  // largest distance from there of an entry that was asked
-  std::int64_t star_ = 0;  // first readings asked for
+  Inputs middle_;            // the start, scaled
+  Inputs lowest_, highest_;  // of each input that was asked, scaled
+  std::int64_t star_ = 0;    // first readings asked for
   std::int64_t held_ = 0;
   double expected_ = 0.0, expected_sd_ = 0.0;
-  double surprise_ = 1.0;  // running mean of the squared normalised innovation
+  std::vector<double> surprise_;  // running means of squared normalised innovations, of the components
   std::int64_t since_doubt_ = 0, doubts_ = 0;
   std::vector<double> room_;    // of every limit at the estimate, in its scale
   std::vector<double> unsafe_;  // cycles in a row in which no input was safe
   // Scratch.
   InputTable candidates_;
-  Eigen::MatrixXd covariance_;
+  Eigen::MatrixXd covariance_, own_;
+  Eigen::VectorXd means_;
   std::vector<double> worth_mean_, effect_, breaks_, over_;
   std::vector<int> order_;
 };

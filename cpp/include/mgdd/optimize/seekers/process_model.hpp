@@ -1,21 +1,21 @@
-// A Gaussian process of one measured quantity over the inputs (Rasmussen and Williams 2006, ch. 2 and 5), for seekers:
-// level, slope and bends with a prior that grows with one number, the bend, and a Matern 5/2 term for what they miss, a
-// length scale per input. The variance of a reading grows with its age by exp(age/memory). Bend, noise, size and
-// lengths of the rest go to where the evidence of the readings, with priors, is largest, a few trials per reading.
-// Inputs are counted in their ranges, 0 to 1. noexcept and allocation-free after construction.
+// A Gaussian process of one measured quantity over the inputs (Rasmussen and Williams 2006, ch. 2 and 5), for seekers,
+// with the covariance of `ProcessKernel`. The variance of a reading grows with its age by exp(age/memory). Bend, noise,
+// size and lengths of the rest, and what the guide counts by, go to where the evidence of the readings, with priors, is
+// largest, a few trials per reading. Inputs are counted in their ranges, 0 to 1. noexcept and allocation-free after
+// construction.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
-#include "mgdd/optimize/seekers/inputs.hpp"
+#include "mgdd/optimize/seekers/process_kernel.hpp"
 
 namespace mgdd::optimize {
-
-using InputTable = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // a row per point
 
 class ProcessModel {
  public:
@@ -27,6 +27,7 @@ class ProcessModel {
     bool bends_down = true;            ///< whether a maximum is expected, as of J
     std::optional<double> noise_sd{};  ///< of a reading, > 0; none: learnt
     std::uint64_t seed = 0;
+    ProcessGuide guide{};
   };
   explicit ProcessModel(const Settings& settings);
 
@@ -35,7 +36,7 @@ class ProcessModel {
 
   /// Takes a reading at `z`; where all places are taken, the oldest of those near `about` makes room.
   void record(const Inputs& z, double value, const Inputs& about) noexcept;
-  /// Looks for better numbers of the process and makes predictions possible; 2 readings at least.
+  /// Looks for better numbers of the process and makes predictions possible; 2 readings at least, 1 with a guide.
   void fit(const Inputs& about) noexcept;
 
   /// Mean of the quantity at the first `points` rows of `at`.
@@ -50,6 +51,10 @@ class ProcessModel {
   void age(double cycles) noexcept;
   void forget() noexcept;
   void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
+  /// What the guide counts by, in its own unit; 0 without one.
+  double guide_factor() const noexcept { return kernel_.guided() ? std::exp(numbers_[numbers_.size() - 1]) : 0.0; }
+  /// Readings from which on predictions are possible.
+  int fewest() const noexcept { return kernel_.guided() ? 1 : static_cast<int>(settings_.inputs) + 1; }
 
   template <class Self, class V>
   static void visit(Self& self, V& v, const std::string& name) {
@@ -61,38 +66,44 @@ class ProcessModel {
     v(name + "_ages", self.ages_);
     v(name + "_numbers", self.numbers_);
     v(name + "_settled_bend", self.settled_bend_);
+    if constexpr (!std::is_const_v<Self>) self.tables_known_ = self.factored_ = false;
   }
 
  private:
-  // Logarithms: bend, noise over bend, size of the rest over bend, lengths.
-  using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3 + max_inputs, 1>;
-  struct Scales {
-    double squared_bend, noise, rest;
-    Inputs inverse_length;
-  };
+  // Logarithms: bend, noise over bend, size of the rest over bend, lengths; what the guide counts by.
+  using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4 + max_inputs, 1>;
+  using Scales = ProcessKernel::Scales;
   Scales scales_of(const Numbers& numbers) const noexcept;
-  double prior_mean(const double* z, const Scales& s) const noexcept;
-  double kernel(const double* a, const double* b, const Scales& s) const noexcept;
   void choose_readings(const Inputs& about) noexcept;
-  double evidence(const Numbers& numbers) noexcept;
+  double evidence(const Numbers& numbers, bool same_lengths) noexcept;
+  double log_priors(const Numbers& numbers, const Scales& s) const noexcept;
   void begin_numbers() noexcept;
   void try_numbers(int trials) noexcept;
+  Numbers anew(std::uint64_t trial) const noexcept;
+  double guide_in_readings() const noexcept;
+  void tabulate(std::int64_t reading) noexcept;
+  void tabulate_lengths() noexcept;
+  void know_tables() noexcept;
   void factor() noexcept;
   void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
   bool noise_known() const noexcept { return settings_.noise_sd.has_value(); }
 
   Settings settings_;
+  ProcessKernel kernel_;
   std::int64_t count_ = 0, told_ = 0;
   bool begun_ = false;  // the numbers have been made of readings
-  InputTable points_;
+  InputTable points_;   // as the kernel describes them
   Eigen::VectorXd values_, ages_;
   Numbers numbers_;
   std::optional<double> settled_bend_{};  // logarithm, as the first readings gave it
   // Made anew of the above where readings or numbers have changed.
-  bool factored_ = false;
+  bool factored_ = false, tables_known_ = false;
   double level_ = 0.0;
-  InputTable factor_, small_;  // lower triangles
+  InputTable columns_;                     // `points_`, a column per point
+  InputTable quadratic_, guide_, matern_;  // lower triangles, of all readings
+  Inputs table_lengths_;                   // inverse ones that the last table is of
+  InputTable factor_, small_;              // lower triangles
   Eigen::VectorXd weights_, small_rest_, distance_, mean_;
   std::vector<int> order_, chosen_;
   InputTable kernels_;  // a row per point: of the readings, solved with the factor

@@ -1,0 +1,234 @@
+// A rough model as the mean of a Gaussian process: its table, and what it is worth to the seeker.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/state.hpp"
+#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+using Model = std::function<double(double, double)>;  // of timing and EGR
+
+Surface table(const Model& model, double from = -25.0, double to = 15.0) {
+  std::vector<std::vector<double>> axes(2);
+  std::vector<double> values;
+  for (int i = 0; i < 17; ++i)
+    axes[0].push_back(from + (to - from) * i / 16.0);
+  for (int k = 0; k < 13; ++k)
+    axes[1].push_back(0.4 * k / 12.0);
+  for (const double soc : axes[0]) {
+    for (const double egr : axes[1])
+      values.push_back(model(soc, egr));
+  }
+  return {axes, values};
+}
+
+GaussianProcessSeekingSettings settings_of(std::uint64_t seed, const Model& guide) {
+  GaussianProcessSeekingSettings s;
+  s.space.inputs = {{.name = "soc_cad", .lower = -25.0, .upper = 15.0}, {.name = "egr", .lower = 0.0, .upper = 0.4}};
+  s.space.start = Inputs(2);
+  s.space.start << 4.0, 0.31;
+  s.seed = seed;
+  if (guide) s.guide = {table(guide)};
+  return s;
+}
+
+double lost(const Inputs& x) {
+  const double a = x[0] + 4.0, b = 100.0 * (x[1] - 0.2);
+  return 0.03 * (a * a + b * b + 1.2 * a * b);
+}
+
+// Off by a fifth of each range, in a level and a unit of its own, and too steep.
+double off_by_a_fifth(double soc, double egr) {
+  const double a = soc + 12.0, b = 100.0 * (egr - 0.28);
+  return 900.0 - 0.04 * (a * a + b * b + b * a);
+}
+
+struct Outcome {
+  double arrived, lost;
+};
+Outcome run(GaussianProcessSeekingSettings s, int cycles = 60) {
+  GaussianProcessSeeking seeker(s);
+  Outcome out{static_cast<double>(cycles), 0.0};
+  for (int k = 0; k < cycles; ++k) {
+    if (out.arrived == cycles && lost(seeker.estimate()) < 0.06) out.arrived = k;
+    const double own = lost(seeker.ask());
+    out.lost += own;
+    const double j[] = {(s.maximize ? 1.0 : -1.0) *
+                        (50.0 - own + 0.3 * random::normal(s.seed, 9, static_cast<std::uint64_t>(k)))};
+    seeker.tell({j, {}});
+  }
+  return out;
+}
+
+double median_arrival(const std::function<GaussianProcessSeekingSettings(std::uint64_t)>& settings, int seeds = 20) {
+  std::vector<double> arrivals;
+  for (int seed = 0; seed < seeds; ++seed)
+    arrivals.push_back(run(settings(static_cast<std::uint64_t>(seed))).arrived);
+  std::sort(arrivals.begin(), arrivals.end());
+  return arrivals[arrivals.size() / 2];
+}
+
+TEST(Surface, ReadsACubicAndItsSlopesBetweenItsNodes) {
+  const Surface s = table([](double a, double b) { return 1.0 + 0.1 * a * a * a * b - 3.0 * a * b * b + 7.0 * b; });
+  Inputs at(2), slopes(2);
+  at << -3.3, 0.17;
+  EXPECT_NEAR(s.read(at, slopes), 1.0 + 0.1 * -35.937 * 0.17 + 9.9 * 0.0289 + 1.19, 1e-10);
+  EXPECT_NEAR(slopes[0], 0.3 * 10.89 * 0.17 - 3.0 * 0.0289, 1e-10);
+  EXPECT_NEAR(slopes[1], 0.1 * -35.937 + 6.0 * 3.3 * 0.17 + 7.0, 1e-9);
+}
+
+TEST(Surface, ItsEdgeHoldsBeyondIt) {
+  const Surface s = table([](double a, double b) { return a + 100.0 * b; }, -20.0, 10.0);
+  Inputs at(2), slopes(2);
+  at << -24.0, 0.1;
+  EXPECT_NEAR(s.read(at, slopes), -10.0, 1e-10);
+  EXPECT_EQ(slopes[0], 0.0);
+  EXPECT_NEAR(slopes[1], 100.0, 1e-9);
+}
+
+TEST(Surface, RefusesByName) {
+  using Axes = std::vector<std::vector<double>>;
+  EXPECT_THROW((Surface(Axes{}, {})), ShapeError);
+  EXPECT_THROW((Surface(Axes(6, {0.0, 1.0}), std::vector<double>(64))), ShapeError);
+  EXPECT_THROW((Surface(Axes{{0.0, 1.0}}, {1.0, 2.0, 3.0})), ShapeError);
+  EXPECT_THROW((Surface(Axes{{1.0, 0.0}}, {1.0, 2.0})), ParameterError);
+  EXPECT_THROW((Surface(Axes{{0.0, 1.0}}, {1.0, std::nan("")})), ParameterError);
+}
+
+TEST(GuidedProcess, AGuideThatIsOffByAFifthHalvesTheReadings) {
+  const double plain = median_arrival([](std::uint64_t seed) { return settings_of(seed, nullptr); });
+  const double guided = median_arrival([](std::uint64_t seed) { return settings_of(seed, off_by_a_fifth); });
+  EXPECT_LE(guided, 6.0);
+  EXPECT_LT(guided, plain);
+}
+
+TEST(GuidedProcess, AnotherUnitOfTheGuideIsLearnt) {
+  const Model large = [](double soc, double egr) { return 300.0 * off_by_a_fifth(soc, egr); };
+  EXPECT_LE(median_arrival([&](std::uint64_t seed) { return settings_of(seed, large); }), 9.0);
+}
+
+TEST(GuidedProcess, AGuideThatSaysNothingIsLeftBehind) {
+  const Model useless = [](double soc, double egr) { return 2.0 * std::sin(0.35 * soc) + 2.0 * std::cos(35.0 * egr); };
+  EXPECT_LE(median_arrival([&](std::uint64_t seed) { return settings_of(seed, useless); }), 14.0);
+  GaussianProcessSeeking seeker(settings_of(1, useless));
+  for (int k = 0; k < 60; ++k) {
+    const double j[] = {50.0 - lost(seeker.ask()) + 0.3 * random::normal(1, 9, static_cast<std::uint64_t>(k))};
+    seeker.tell({j, {}});
+  }
+  EXPECT_LT(seeker.guide_factor(), 0.2);
+}
+
+// A guide says J itself, also where less is better.
+TEST(GuidedProcess, MinimisingIsMaximisingTheNegative) {
+  auto down = settings_of(3, [](double soc, double egr) { return -off_by_a_fifth(soc, egr); });
+  down.maximize = false;
+  EXPECT_EQ(run(settings_of(3, off_by_a_fifth)).lost, run(down).lost);
+}
+
+// p_max = 100 + 2 soc + 60 egr, of which the guide knows the shape but not the level.
+TEST(GuidedProcess, GuidesOfLimitsKeepThemFromTheFirstStepOn) {
+  double above = 0.0, late = 0.0;
+  constexpr int seeds = 10, cycles = 40;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    auto s = settings_of(seed, off_by_a_fifth);
+    s.space.start << -18.0, 0.3;
+    s.limits = {{.name = "p_max_bar", .upper = 110.0}};
+    s.limit_guides = {table([](double soc, double egr) { return 150.0 + 2.2 * soc + 50.0 * egr; })};
+    GaussianProcessSeeking seeker(s);
+    for (int k = 0; k < cycles; ++k) {
+      const Inputs x = seeker.ask();
+      const double p = 100.0 + 2.0 * x[0] + 60.0 * x[1];
+      const auto at = static_cast<std::uint64_t>(k);
+      const double j[] = {-lost(x) + 0.3 * random::normal(seed, 9, at)}, limits[] = {p + random::normal(seed, 8, at)};
+      seeker.tell({j, limits});
+      above += p > 110.0 ? 1.0 / (seeds * cycles) : 0.0;
+    }
+    late += lost(seeker.estimate()) / seeds;
+  }
+  EXPECT_LE(above, 0.02);
+  EXPECT_LT(late, 1.0);  // the limit cuts the best input off
+}
+
+// Efficiency at once, NOx behind an analyser that is told three cycles short: each by its own guide and its own delay.
+TEST(GuidedProcess, ComponentsHaveTheirOwnGuidesAndDelays) {
+  const auto efficiency = [](double soc, double egr) {
+    return 45.0 - 0.03 * (soc + 9.0) * (soc + 9.0) - 60.0 * (egr - 0.1) * (egr - 0.1);
+  };
+  const auto nox = [](double soc, double egr) { return -6.0 * std::exp(-0.04 * (soc + 9.0) - 4.0 * egr); };
+  double best = -1e9, late = 0.0;
+  for (double soc = -25.0; soc <= 15.0; soc += 0.25) {
+    for (double egr = 0.0; egr <= 0.4; egr += 0.005)
+      best = std::max(best, efficiency(soc, egr) + nox(soc, egr));
+  }
+  constexpr int seeds = 10, cycles = 120;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    auto s = settings_of(seed, nullptr);
+    s.components = {{}, {12.0, 0.0}};
+    s.guide = {table([&](double soc, double egr) { return 0.8 * efficiency(soc - 3.0, egr); }),
+               table([&](double soc, double egr) { return 1.5 * nox(soc, egr + 0.05); })};
+    GaussianProcessSeeking seeker(s);
+    std::vector<double> on_the_way(15, nox(4.0, 0.31));
+    for (int k = 0; k < cycles; ++k) {
+      const Inputs x = seeker.ask();
+      const auto at = static_cast<std::uint64_t>(k);
+      on_the_way.push_back(nox(x[0], x[1]));
+      const double j[] = {efficiency(x[0], x[1]) + 0.2 * random::normal(seed, 9, at),
+                          on_the_way[at] + 0.05 * random::normal(seed, 8, at)};
+      ASSERT_EQ(seeker.tell({j, {}}), TellStatus::accepted);
+    }
+    late += (best - efficiency(seeker.estimate()[0], seeker.estimate()[1]) -
+             nox(seeker.estimate()[0], seeker.estimate()[1])) /
+            seeds;
+  }
+  EXPECT_LT(late, 0.1);
+}
+
+TEST(GuidedProcess, GoesOnBitForBitInASeekerThatHasRunAndAllocatesNothing) {
+  auto s = settings_of(5, off_by_a_fifth);
+  s.kept = 12;
+  GaussianProcessSeeking seeker(s), again(s);
+  const auto cycle = [](GaussianProcessSeeking& one, int k) {
+    const double j[] = {-lost(one.ask()) + random::normal(5, 9, static_cast<std::uint64_t>(k))};
+    one.tell({j, {}});
+  };
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 30; ++k)
+    cycle(seeker, k);
+  EXPECT_EQ(counter.count(), 0u);
+  for (int k = 100; k < 120; ++k)
+    cycle(again, k);
+  restore_state(again, save_state(seeker));
+  for (int k = 30; k < 45; ++k) {
+    cycle(seeker, k);
+    cycle(again, k);
+    ASSERT_EQ(save_state(seeker), save_state(again)) << k;
+  }
+}
+
+TEST(GuidedProcess, RefusesByName) {
+  const auto refused = [](auto change, const std::string& field) {
+    auto s = settings_of(0, off_by_a_fifth);
+    change(s);
+    try {
+      const GaussianProcessSeeking made(s);
+      ADD_FAILURE() << field;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+    }
+  };
+  refused([](auto& s) { s.guide = {Surface({{0.0, 1.0}}, {1.0, 2.0})}; }, "guide is over 1");
+  refused([](auto& s) { s.guide = {table([](double, double) { return 3.0; })}; }, "guide");
+  refused([](auto& s) { s.guide.push_back(s.guide[0]); }, "guide has 2");
+  refused([](auto& s) { s.limit_guides = s.guide; }, "limit_guides");
+}
+
+}  // namespace
+}  // namespace mgdd::optimize
