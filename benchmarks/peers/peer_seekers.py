@@ -79,6 +79,41 @@ def scaled(contender: Contender, lower: Point, upper: Point, width: float) -> Co
     return run
 
 
+class HeldPlant:
+    """A plant at which every input is held for some cycles, and on until there is a reading, unless one is made up."""
+
+    def __init__(self, plant: Plant, cycles: int, instead: float | None) -> None:
+        self._plant, self._cycles, self._instead = plant, cycles, instead
+
+    @property
+    def estimate(self) -> Point:
+        """Best input so far."""
+        return self._plant.estimate
+
+    @estimate.setter
+    def estimate(self, x: Point) -> None:
+        self._plant.estimate = x
+
+    def __call__(self, x: Point) -> float:
+        """Return the last reading at x, or raise FinishedError."""
+        for _ in range(self._cycles):
+            j = self._plant(x)
+        while math.isnan(j):
+            if self._instead is not None:
+                return self._instead
+            j = self._plant(x)
+        return j
+
+
+def held(contender: Contender, cycles: int = 1, instead: float | None = None) -> Contender:
+    """Let a contender that knows neither delays nor missing readings wait, or read `instead` where there is none."""
+
+    def run(plant: Plant, start: Point, seed: int) -> None:
+        contender(HeldPlant(plant, cycles, instead), start, seed)
+
+    return run
+
+
 class NullPlant:
     """Returns zero until it has been asked often enough."""
 

@@ -14,6 +14,7 @@ from mgdd.guide import Curve, ModelOptimum
 from mgdd.loop import EngineBench
 
 CYCLES, EARLY, NEAR = 300, 40, 1.0
+STATED_FROM, STATED_SDS = 20, 1.44  # cycle; half width of an interval of 85 %
 WIDTH, AWAY = 40.0, 12.0
 NOISE, CURVATURE = 0.3, -0.06
 ENGINE_BOUNDS, ENGINE_STARTS = (-30.0, 10.0), (-20.0, 0.0)
@@ -28,8 +29,9 @@ class Setting:
 
     start: Point
     near: Callable[[Point], bool]
-    read: Readings
+    read: Readings  # NaN where there is no reading
     lost: Readings  # J below that of the best input, without noise
+    top: Callable[[], float] = lambda: 0.0  # J of the best input
 
 
 def within(best: float) -> Callable[[Point], bool]:
@@ -52,11 +54,16 @@ class SeekingMap:
 
 
 class CountedPlant:
-    """Adds up J lost by what is applied, knows when the estimate arrived, and ends the run after 300 cycles."""
+    """Adds up J lost by what is applied, knows when the estimate arrived, and ends the run after 300 cycles.
+
+    Whoever states J at its estimate with a standard deviation sets `stated`; from cycle 20 on it is judged.
+    """
 
     def __init__(self, setting: Setting) -> None:
         self.estimate, self.cycles, self.lost, self.lost_early = setting.start, 0, 0.0, 0.0
         self.arrived = math.inf
+        self.stated: tuple[float, float] | None = None
+        self.judged = self.covered = 0
         self._setting = setting
 
     def __call__(self, x: Point) -> float:
@@ -65,6 +72,10 @@ class CountedPlant:
             self.arrived = self.cycles
         if self.cycles >= CYCLES:
             raise FinishedError
+        if self.stated is not None and self.cycles >= STATED_FROM and self.stated[1] > 0.0:
+            expected, sd = self.stated
+            self.judged += 1
+            self.covered += abs(self._setting.top() - self.lost_by_estimate() - expected) <= STATED_SDS * sd
         self.cycles += 1
         self.lost += self._setting.lost(x)
         if self.cycles == EARLY:
@@ -115,6 +126,7 @@ def engine() -> SeekingMap:
             within(best),
             lambda x: bench.step(x)["j"],
             lambda x: float(true.max() - np.interp(x, timings, true)),
+            lambda: float(true.max()),
         )
 
     heats = {"wall heat +30 %": 0.65, "adiabatic": 0.0, "twice the wall heat": 1.0}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,14 +28,21 @@ class Row:
     must_arrive: bool = False
 
 
-def driven(make: Make) -> OnMap:
+def driven(make: Make, *, asks_again: bool = False) -> OnMap:
+    """Where nothing is read it is told of a misfire, or its input is applied again until something is."""
+
     def on(field: SeekingMap) -> Contender:
         def run(plant: Plant, start: Point, seed: int) -> None:
             seeker = make(field, start, seed)
             while True:
                 x = seeker.ask()
                 plant.estimate = like(start, seeker.estimate)
-                seeker.tell(plant(like(start, x)))
+                if isinstance(seeker, optimize.GaussianProcessSeeking):
+                    plant.stated = (seeker.expected, seeker.expected_sd)
+                j = plant(like(start, x))
+                while asks_again and math.isnan(j):
+                    j = plant(like(start, x))
+                seeker.tell(j, misfire=math.isnan(j))
 
         return run
 

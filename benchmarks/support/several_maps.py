@@ -17,6 +17,10 @@ THREE = np.array([[1.0, 0.5, -0.25], [0.5, 1.0, 0.35], [-0.25, 0.35, 1.0]])  # c
 Drop = Callable[[np.ndarray], float]  # of the distances from the best input, each in a fortieth of its bounds
 
 
+def coupled(d: np.ndarray) -> float:
+    return -0.03 * float(d[0] ** 2 + d[1] ** 2 + 1.2 * d[0] * d[1])
+
+
 def turned(drop: Callable[[float, float], float]) -> Drop:
     """Let a formula be one of axes that no input is along."""
     cos, sin = math.cos(TURN), math.sin(TURN)
@@ -52,7 +56,7 @@ def several(name: str, inputs: int, drop: Drop) -> SeekingMap:
 
 def several_maps() -> list[SeekingMap]:
     return [
-        several("coupled", 2, lambda d: -0.03 * float(d[0] ** 2 + d[1] ** 2 + 1.2 * d[0] * d[1])),
+        several("coupled", 2, coupled),
         several("skewed", 2, turned(lambda u, v: -6.0 * (math.exp(0.1 * u) - 1.0 - 0.1 * u) - 0.03 * v * v)),
         several("ridge", 2, turned(lambda u, v: -0.03 * u * u - 0.002 * v * v)),
         several("three", 3, lambda d: -0.03 * float(d @ THREE @ d)),

@@ -10,7 +10,8 @@ import pytest
 from mgdd import datasets
 from mgdd.datasets.files import path
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.loop import SurrogatePlant
+from mgdd.loop import SurrogatePlant, run_seeker
+from mgdd.optimize import GaussianProcessSeeking, Limit
 from mgdd.results.labels import check_labels
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
@@ -253,6 +254,8 @@ def test_wrong_records_are_refused():
         (lambda s: s.find_optimum({}), "must name at least one signal"),
         (lambda s: SurrogatePlant(s, block_cycles=0), "block_cycles = 0: must be >= 1"),
         (lambda s: SurrogatePlant(s, outside="no"), "outside = 'no'"),
+        (lambda s: SurrogatePlant(s, "leverage_share"), "objective: 'leverage_share' is not a signal"),
+        (lambda s: SurrogatePlant(s, at={"p2m_us": 9e3}, outside="clamp"), "at = .*: no command can be clamped"),
     ],
 )
 def test_a_wrong_question_is_refused(known, call, message):
@@ -317,6 +320,26 @@ def test_a_refused_command_or_state_changes_nothing(known):
         engine.state = {**saved, "row": 10**7}
     assert engine.state == saved
     assert SurrogatePlant(known).step(30.0)["supported"] is False
+
+
+def test_a_clamped_command_goes_as_far_as_the_support_reaches(known):
+    names, support = known.inputs, known.support
+    medians = np.array([known.medians[name] for name in names])
+    plant = SurrogatePlant(known, limits=["leverage_share"], inputs=names, outside="clamp", residuals=False)
+    rng = np.random.default_rng(4)
+    for wanted in rng.uniform(support.lower - 0.3 * (support.upper - support.lower), support.upper, (60, 4)):
+        plant.apply(dict(zip(names, wanted.tolist(), strict=True)))
+        measured = plant.measure()
+        applied = np.array([measured.applied[name] for name in names])
+        assert known.evaluate(applied[None])[1][0]
+        share = support.leverage(applied[None])[0] / support.leverage_limit
+        assert measured.limits["leverage_share"] == measured.noise_free_limits["leverage_share"] == share
+        if known.evaluate(wanted[None])[1][0]:
+            np.testing.assert_array_equal(applied, wanted)
+        else:
+            shares = (applied - medians) / (wanted - medians)
+            np.testing.assert_allclose(shares, shares[0], rtol=1e-9)
+            assert not known.evaluate((applied + 1e-6 * (wanted - medians))[None])[1][0]
 
 
 def test_a_stretch_longer_than_the_records_is_refused(known):
@@ -435,6 +458,26 @@ def test_the_virtual_engine_scatters_like_the_log(measured):
         drawn.append([noisy[name] - clean[name] for name in measured.signals])
     spread = np.array(drawn).std(axis=0) / [signal.residual_sd for signal in measured.signals.values()]
     assert ((spread > 0.7) & (spread < 1.3)).all()
+
+
+def test_a_search_that_keeps_the_leverage_stays_inside_the_records(measured):
+    names, support = measured.inputs, measured.support
+    bounds = dict(zip(names, zip(support.lower, support.upper, strict=True), strict=True))
+    asked_outside = []
+    for seed in range(4):
+        for keeps in (True, False):
+            limits = [Limit("leverage_share", 1.0)] if keeps else []
+            plant = SurrogatePlant(measured, limits=limits, inputs=names, outside="clamp", seed=seed)
+            seeker = GaussianProcessSeeking(start=measured.medians, inputs=bounds, limits=limits, seed=seed)
+            run = run_seeker(plant, seeker, 60)
+            assert run.dataset["supported"].to_numpy().all()
+            assert measured.evaluate(run.dataset["applied"].to_numpy())[1].all()
+            inside = measured.evaluate(run.dataset["asked"].to_numpy())[1]
+            asked_outside.append((keeps, 1.0 - inside.mean()))
+            imep = measured.evaluate(run.dataset["applied"].to_numpy()[-10:])[0][:, 0].mean()
+            assert imep > 8.0, "the medians give 7.0 bar, the best input 9.5"
+    shares = np.array([[share for keeps, share in asked_outside if keeps is kept] for kept in (True, False)])
+    assert shares[0].mean() < 0.1 < 0.3 < shares[1].mean()
 
 
 def test_commands_of_the_records_hold_for_1_to_30_cycles() -> None:

@@ -13,6 +13,7 @@ from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.optimize.optimum import limit_names_of
 from mgdd.results.describe import described
+from mgdd.surrogate.points import farthest_inside
 from mgdd.surrogate.signal_model import decay_of
 from mgdd.surrogate.surrogate import EngineSurrogate
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["SurrogatePlant"]
+
+_LEVERAGE = "leverage_share"
 
 
 class SurrogatePlant:
@@ -37,7 +40,8 @@ class SurrogatePlant:
     objective : str or mapping of str to float
         A signal, or the weight of each signal; every weighted signal is one component of J.
     limits : sequence of str, or limits by name or as Limit
-        Signals to report as limits.
+        Signals to report as limits, and ``leverage_share``: the leverage of the inputs, as a share of the highest in
+        the support. It is known exactly, and a seeker that keeps it at 1 stays where the surfaces are known.
     inputs : sequence of str
         Which inputs of the surrogate are steered, ``soi_cad`` first; the others keep the values of `at`.
     at : mapping of str to float, optional
@@ -50,13 +54,14 @@ class SurrogatePlant:
         Whether to add them; without, readings are those of the surfaces.
     block_cycles : int
         Length of a stretch [cycles]; at its end the next begins, with a jump in slow residuals.
-    outside : {"flag", "raise"}
-        What to do with a command outside the support.
+    outside : {"flag", "raise", "clamp"}
+        What to do with a command outside the support; clamped, it is applied as far from the medians as the support
+        reaches, and `Measurement.applied` says so.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        A value outside its domain, an unknown signal or input.
+        A value outside its domain, an unknown signal or input; medians outside the support, with ``outside="clamp"``.
     mgdd.errors.DataError
         No stretch of that length without a gap in the residuals.
 
@@ -89,27 +94,29 @@ class SurrogatePlant:
         block_cycles: int = 100,
         outside: str = "flag",
     ) -> None:
-        if outside not in ("flag", "raise"):
-            raise ParameterError.of("outside", outside, "'flag' or 'raise'")
+        if outside not in ("flag", "raise", "clamp"):
+            raise ParameterError.of("outside", outside, "'flag', 'raise' or 'clamp'")
         if block_cycles < 1:
             raise ParameterError.of("block_cycles", block_cycles, ">= 1")
         self._weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         if not self._weights:
             raise ParameterError("objective = {}: must name at least one signal")
-        for what, names in (("objective", self._weights), ("limits", limit_names_of(limits))):
-            for name in names:
-                if name not in surrogate.signals:
-                    raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {list(surrogate.signals)}")
+        self._limits, self._inputs, signals = tuple(limit_names_of(limits)), tuple(inputs), list(surrogate.signals)
+        for what, names in (("objective", self._weights), ("limits", [n for n in self._limits if n != _LEVERAGE])):
+            if unknown := [name for name in names if name not in signals]:
+                raise ParameterError(f"{what}: {unknown[0]!r} is not a signal: must be one of {signals}")
         known = tuple(surrogate.support.inputs)
         if tuple(inputs)[:1] != ("soi_cad",) or len(set(inputs)) < len(inputs) or not set(inputs) <= set(known):
             raise ParameterError(
                 f"inputs = {list(inputs)}: must begin with soi_cad and be among {list(known)}, once each"
             )
-        self._limits, self._inputs = tuple(limit_names_of(limits)), tuple(inputs)
         self._applied: tuple[float, ...] | None = None
         self.surrogate = surrogate
         self._at = dict(at or {})
         self._outside = outside
+        self._inside = self._point(surrogate.medians["soi_cad"])
+        if outside == "clamp" and not self._steady(self._inside)[1]:
+            raise ParameterError(f"at = {self._at}: no command can be clamped, the medians of the others are outside")
         self._names = tuple(surrogate.signals)
         models = list(surrogate.signals.values())
         first = min(model.lag_cycles for model in models)
@@ -119,7 +126,7 @@ class SurrogatePlant:
         self._block = block_cycles
         self._starts = _starts(surrogate.residuals, block_cycles) if residuals else None
         self._generator = np.random.default_rng(seed)
-        steady, _ = self._steady(surrogate.medians["soi_cad"] if start_soi_cad is None else start_soi_cad)
+        steady, _ = self._steady(self._point(surrogate.medians["soi_cad"] if start_soi_cad is None else start_soi_cad))
         self._history = np.tile(steady, (int(self._delays.max()) + 1, 1))
         self._sensor = steady.copy()
         self._row = self._left = self._cycles = 0
@@ -169,11 +176,15 @@ class SurrogatePlant:
             raise RigError("measure() before apply(): apply the inputs first")
         soi, *others = self._applied
         reading = self.step(soi, dict(zip(self._inputs[1:], others, strict=True)))
+        support, point = self.surrogate.support, self._point_applied
+        applied = dict(zip(support.inputs, point.tolist(), strict=True)) if self._outside == "clamp" else {}
+        known = {**reading, _LEVERAGE: float(support.leverage(point[None])[0]) / support.leverage_limit}
         return Measurement(
             components=tuple(weight * float(reading[name]) for name, weight in self._weights.items()),
-            limits={name: float(reading[name]) for name in self._limits},
+            limits={name: float(known[name]) for name in self._limits},
             values={name: float(value) for name, value in reading.items()},
-            noise_free_limits={name: self._noise_free[name] for name in self._limits},
+            noise_free_limits={name: self._noise_free.get(name, known[name]) for name in self._limits},
+            applied={name: value for name, value in applied.items() if name in self._inputs},
         )
 
     def step(self, soi_cad: float, at: Mapping[str, float] | None = None) -> dict[str, float | bool]:
@@ -197,9 +208,14 @@ class SurrogatePlant:
         mgdd.errors.ParameterError
             A command that is not finite, or outside the support with ``outside="raise"``; the plant has not moved.
         """
-        steady, supported = self._steady(soi_cad, at)
+        point = self._point(soi_cad, at)
+        steady, supported = self._steady(point)
         if not supported and self._outside == "raise":
             raise ParameterError(f"soi_cad = {soi_cad:g}: outside the support of the records; stay inside")
+        if not supported and self._outside == "clamp":
+            point = farthest_inside(self._inside, point, lambda at: self._steady(at)[1])
+            steady, supported = self._steady(point)
+        self._point_applied = point
         self._history = np.vstack([steady, self._history[:-1]])
         arriving = self._history[self._delays, np.arange(self._delays.size)]
         self._sensor = self._decays * self._sensor + (1.0 - self._decays) * arriving
@@ -244,10 +260,12 @@ class SurrogatePlant:
         self._history, self._sensor, self._generator = history, sensor, generator
         self._row, self._left, self._cycles = row, left, int(saved["cycles"])
 
-    def _steady(self, soi_cad: float, at: Mapping[str, float] | None = None) -> tuple[NDArray[np.float64], bool]:
-        values, supported = self.surrogate.evaluate(
-            self.surrogate.points(np.array([float(soi_cad)]), {**self._at, **(at or {})})
-        )
+    def _point(self, soi_cad: float, at: Mapping[str, float] | None = None) -> NDArray[np.float64]:
+        point: NDArray[np.float64] = self.surrogate.points(np.array([float(soi_cad)]), {**self._at, **(at or {})})[0]
+        return point
+
+    def _steady(self, point: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
+        values, supported = self.surrogate.evaluate(point[None])
         return values[0], bool(supported[0])
 
     def _residual(self) -> NDArray[np.float64]:
