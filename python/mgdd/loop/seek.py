@@ -34,8 +34,9 @@ def run_seeker(
     Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is reported as such. A new operating
     point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
     the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
-    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` the loop
-    runs in the core without the GIL; one ask and tell at a time from Python gives the same trajectory, bit for bit.
+    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` of
+    one input the loop runs in the core without the GIL; one ask and tell at a time from Python gives the same
+    trajectory, bit for bit.
 
     Parameters
     ----------
@@ -78,7 +79,8 @@ def run_seeker(
     True
     """
     criteria = criteria or LoopCriteria()
-    if not isinstance(plant, EngineBench) or isinstance(seeker, FeedForward | GuidedEngine):
+    several = len(getattr(plant, "input_names", ())) > 1
+    if several or not isinstance(plant, EngineBench) or isinstance(seeker, FeedForward | GuidedEngine):
         return steer(plant, seeker, cycles, criteria)
     require_inputs_of(plant, seeker)
     goal = criteria.to_core(plant.limit_names)
