@@ -127,6 +127,7 @@ def test_seekers_of_named_inputs_run_on_it_in_any_order() -> None:
         run = run_seeker(EngineBench(inputs=THREE, limits=["p_max_bar"], seed=1), seeker, 30)
         assert list(run.dataset["input"].values) == THREE
         np.testing.assert_array_equal(run.dataset["applied"].sel(input="egr"), run.dataset["egr"])
+        np.testing.assert_array_equal(run.dataset["estimate"][0], [start[name] for name in THREE])
         ends.append(dict(zip(seeker.input_names, seeker.estimate, strict=True)))
     assert ends[0].keys() == ends[1].keys()
 
@@ -212,7 +213,9 @@ def test_the_command_seeks_several_inputs(capsys: pytest.CaptureFixture[str], tm
     assert out["start"].keys() == out["final"].keys() == best.inputs.keys()
     assert out["limit_figures"]["limit_nox_true_ppm"] == 700.0
     assert -0.01 < out["j_lost_at_final"] < 3.0
-    seek(capsys, *SOUGHT, "--cycles", "3", "-o", file)
+    text = seek(capsys, *SOUGHT, *limits, "--cycles", "3", "-o", file)
+    assert "egr: start 0." in text
+    assert "nox_true_ppm as measured: worst " in text
     with open(file) as table:  # noqa: PTH123
         assert "estimate_egr" in table.readline()
 

@@ -18,6 +18,7 @@ from mgdd.cli.seek_inputs import seek_inputs
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, ParameterError, hinted
 from mgdd.loop import EngineBench
+from mgdd.loop.limit_figures import FIGURES
 from mgdd.loop.seek_limits import COV, SCATTER, limit_report
 from mgdd.loop.timing_search import TimingSearch, TimingSearchRun
 from mgdd.optimize.optimum import Optimum
@@ -172,7 +173,15 @@ def _seek_several(
     for name in bench.input_names:
         for kind in ("estimate", "asked"):
             table[f"{kind}_{name}"] = run.dataset[kind].sel(input=name, drop=True)
-    emit(args, payload, text=[lines(to_jsonable(payload))], traces=table)
+    text = [
+        f"{name}: start {payload['start'][name]:.4g}, estimate {payload['final'][name]:.4g}, "
+        f"optimum {payload['optimum'][name]:.4g}"
+        for name in bench.input_names
+    ]
+    for name in limits:
+        own = {figure: payload["limit_figures"].get(f"{figure}_{name}") for figure in FIGURES}
+        text.append(f"{name} as measured: {_kept(own, int(payload['limit_figures']['judged_from']))}")
+    emit(args, payload, text=[lines(to_jsonable(payload)), *text], traces=table)
     if args.figure:
         from mgdd import plot
 

@@ -79,7 +79,7 @@ class EngineBench(_core.loop.EngineBench):
 
     >>> bench = EngineBench(inputs=["soc_cad", "egr", "intake_pressure_kpa"], soc_scatter_cad=0.0)
     >>> [round(bench.step({"soc_cad": -6.0, "egr": egr})["nox_true_ppm"]) for egr in (0.0, 0.3)]
-    [1548, 951]
+    [1545, 763]
     """
 
     def __init__(
