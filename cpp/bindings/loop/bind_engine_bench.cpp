@@ -1,5 +1,6 @@
 // Binds loop/engine_bench.hpp: the virtual engine bench and the dynamics of its sensors.
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -35,16 +36,41 @@ struct Written<std::vector<loop::ScheduledPoint>> {
   }
 };
 
+/// Names.
+template <>
+struct Written<std::vector<loop::BenchInput>> {
+  using Argument = std::vector<std::string>;
+
+  static Argument get(const std::vector<loop::BenchInput>& inputs) {
+    Argument out;
+    for (const loop::BenchInput input : inputs)
+      out.emplace_back(name_of(input));
+    return out;
+  }
+  static void put(std::vector<loop::BenchInput>& inputs, const Argument& given, const FieldInfo& info, std::size_t) {
+    inputs.clear();
+    for (const std::string& name : given)
+      inputs.push_back(parse_name<loop::BenchInput>(info.name, name));
+  }
+};
+
 namespace {
 
 using namespace loop;
 using engine::indicator_fields;
 
-py::dict to_dict(const BenchCycle& c, const std::vector<std::string>& limit_names) {
+bool steers(const BenchSettings& s, BenchInput input) {
+  return std::find(s.inputs.begin(), s.inputs.end(), input) != s.inputs.end();
+}
+
+py::dict to_dict(const BenchCycle& c, const BenchSettings& s) {
   py::dict out;
   out["cycle"] = c.cycle;
   for (const auto& number : bench_cycle_numbers)
     out[as_str(number.name)] = number.of(c);
+  for (std::size_t i = 1; i < s.inputs.size(); ++i)
+    out[as_str(name_of(s.inputs[i]))] = c.applied[i];
+  if (steers(s, BenchInput::egr)) out["intake_o2_fraction"] = c.intake_o2_fraction;
   for (const BenchFlag& flag : bench_flags)
     out[as_str(flag.name)] = c.*(flag.member);
   for (const auto& field : indicator_fields<double>())
@@ -53,7 +79,7 @@ py::dict to_dict(const BenchCycle& c, const std::vector<std::string>& limit_name
   out["components"] = to_array({components.begin(), components.end()});
   py::dict limits;
   for (std::size_t i = 0; i < c.limit_count; ++i)
-    limits[as_str(limit_names[i])] = c.limit_values[i];
+    limits[as_str(s.limits[i])] = c.limit_values[i];
   out["limits"] = limits;
   return out;
 }
@@ -85,6 +111,10 @@ py::dict bench_columns(const std::vector<BenchCycle>& rows, const BenchSettings&
   out["cycle"] = column_of<std::int64_t>(rows, [](const BenchCycle& c) { return c.cycle; });
   for (const auto& number : bench_cycle_numbers)
     out[as_str(number.name)] = column_of<double>(rows, number.of);
+  for (std::size_t i = 1; i < s.inputs.size(); ++i)
+    out[as_str(name_of(s.inputs[i]))] = column_of<double>(rows, [i](const BenchCycle& c) { return c.applied[i]; });
+  if (steers(s, BenchInput::egr))
+    out["intake_o2_fraction"] = column_of<double>(rows, [](const BenchCycle& c) { return c.intake_o2_fraction; });
   for (const BenchFlag& flag : bench_flags)
     out[as_str(flag.name)] = column_of<bool>(rows, [&flag](const BenchCycle& c) { return c.*(flag.member); });
   for (const auto& field : indicator_fields<double>()) {
@@ -98,22 +128,63 @@ py::dict bench_columns(const std::vector<BenchCycle>& rows, const BenchSettings&
 
 namespace {
 
-py::dict run(BoundBench& bound, const InputArray& soc_cad) {
-  const std::vector<double> requests = to_column(soc_cad, "soc_cad");
+/// Requests cycle by cycle: the timing, and in the order of the inputs what is asked of the others.
+class Requests {
+ public:
+  Requests(const BenchSettings& s, const InputArray& soc_cad, const std::vector<InputArray>& further) {
+    require_fitting(s, further.size());
+    columns_.push_back(to_column(soc_cad, "soc_cad"));
+    for (std::size_t i = 0; i < further.size(); ++i) {
+      const std::string name(name_of(s.inputs[i + 1]));
+      columns_.push_back(to_column(further[i], name));
+      if (columns_.back().size() != size()) {
+        throw ShapeError(name + " has " + std::to_string(columns_.back().size()) + " entries: give one per soc_cad, " +
+                         std::to_string(size()));
+      }
+    }
+  }
+  static void require_fitting(const BenchSettings& s, std::size_t further) {
+    if (further < s.inputs.size()) return;
+    throw ShapeError("further has " + std::to_string(further) + " entries: the bench takes " +
+                     std::to_string(s.inputs.size() - 1) + " besides soc_cad");
+  }
+
+  std::size_t size() const noexcept { return columns_[0].size(); }
+  std::span<const double> at(std::size_t k) noexcept {
+    for (std::size_t i = 0; i < columns_.size(); ++i)
+      row_[i] = columns_[i][k];
+    return {row_.data(), columns_.size()};
+  }
+
+ private:
+  std::vector<std::vector<double>> columns_;
+  BenchInputs row_{};
+};
+
+py::dict step(BoundBench& bound, double soc_cad, const std::vector<double>& further) {
+  const BenchSettings& s = bound.constant().settings();
+  Requests::require_fitting(s, further.size());
+  BenchInputs row{soc_cad};
+  std::copy(further.begin(), further.end(), row.begin() + 1);
+  return to_dict(bound.use()->step({row.data(), further.size() + 1}), s);
+}
+
+py::dict run(BoundBench& bound, const InputArray& soc_cad, const std::vector<InputArray>& further) {
+  Requests requests(bound.constant().settings(), soc_cad, further);
   std::vector<BenchCycle> rows;
   rows.reserve(requests.size());
   {
     const auto bench = bound.use();
     const py::gil_scoped_release release;
-    for (const double soc : requests)
-      rows.push_back(bench->step(soc));
+    for (std::size_t k = 0; k < requests.size(); ++k)
+      rows.push_back(bench->step(requests.at(k)));
   }
   return bench_columns(rows, bound.constant().settings());
 }
 
 py::array_t<double> noise_free_limits(BoundBench& bound, const InputArray& soc_cad,
-                                      const std::vector<std::int64_t>& cycles) {
-  const std::vector<double> requests = to_column(soc_cad, "soc_cad");
+                                      const std::vector<std::int64_t>& cycles, const std::vector<InputArray>& further) {
+  Requests requests(bound.constant().settings(), soc_cad, further);
   if (cycles.size() != requests.size()) {
     throw ShapeError("cycle has " + std::to_string(cycles.size()) + " entries: give one per soc_cad, " +
                      std::to_string(requests.size()));
@@ -127,7 +198,7 @@ py::array_t<double> noise_free_limits(BoundBench& bound, const InputArray& soc_c
   const auto bench = bound.use();
   const py::gil_scoped_release release;
   for (std::size_t k = 0; k < requests.size() && width > 0; ++k)
-    at = std::copy_n(bench->noise_free_limits(cycles[k], requests[k]).begin(), width, at);
+    at = std::copy_n(bench->noise_free_limits(cycles[k], requests.at(k)).begin(), width, at);
   return out;
 }
 
@@ -182,6 +253,14 @@ Examples
 void bind_engine_bench(py::module_& m) {
   using py::arg;
   bind_dynamics(m);
+  py::list limits;
+  for (const BenchLimit& limit : bench_limits)
+    limits.append(as_str(limit.name));
+  m.attr("bench_limits") = py::tuple(limits);  // besides indicators and the COV of IMEP
+  py::list inputs;
+  for (const auto& [input, name] : names<BenchInput>())
+    inputs.append(as_str(name));
+  m.attr("bench_inputs") = py::tuple(inputs);
   using B = BoundBench;
   py::class_<B> cls(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.");
   const Members& members = members_of(fields_of(BenchSettings{}), BenchSettings{});
@@ -190,17 +269,17 @@ void bind_engine_bench(py::module_& m) {
          "fields", [&members] { return members.described(); },
          "Every setting by name: unit, bounds or choices, meaning, default.")
       .def(
-          "step",
-          [](B& b, double soc_cad) {
-            const BenchCycle cycle = b.use()->step(soc_cad);
-            return to_dict(cycle, b.constant().settings().limits);
-          },
-          arg("soc_cad"), "Run one cycle: what was measured, by name.")
-      .def("run_columns", &run, arg("soc_cad"), "Run one cycle per request, without the GIL: columns by name.")
-      .def("noise_free_limits", &noise_free_limits, arg("soc_cad"), arg("cycle"),
-           "Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, "
-           "in\n"
-           "the order of limit_names. NaN for the COV of IMEP, which has no such value. The bench itself does not run.")
+          "step", &step, arg("soc_cad"), arg("further") = py::tuple(),
+          "Run one cycle: what was measured, by name. `further` are the other inputs in their order; what is left out\n"
+          "stays.")
+      .def("run_columns", &run, arg("soc_cad"), arg("further") = py::tuple(),
+           "Run one cycle per request, without the GIL: columns by name. `further` are columns of the other inputs.")
+      .def(
+          "noise_free_limits", &noise_free_limits, arg("soc_cad"), arg("cycle"), arg("further") = py::tuple(),
+          "Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, "
+          "in\n"
+          "the order of limit_names; the true steady NOx for every sensor. NaN for the COV of IMEP, which has no such\n"
+          "value. The bench itself does not run. `further` are columns of the other inputs.")
       .def(
           "reset",
           [](B& b, std::optional<std::uint64_t> seed) {
@@ -241,6 +320,18 @@ void bind_engine_bench(py::module_& m) {
       .def_property_readonly(
           "window_cad", [](const B& b) { return b.constant().window_cad(); },
           "Earliest and latest SOC that is not clamped.")
+      .def_property_readonly(
+          "input_bounds",
+          [](const B& b) {
+            const EngineBench& bench = b.constant();
+            py::dict out;
+            for (std::size_t i = 0; i < bench.windows().size(); ++i) {
+              const auto [least, greatest] = bench.windows()[i];
+              out[as_str(name_of(bench.settings().inputs[i]))] = py::make_tuple(least, greatest);
+            }
+            return out;
+          },
+          "Least and greatest value of each input that is not clamped, by name.")
       .def_property_readonly(
           "analyser_delay_cycles", [](const B& b) { return b.use()->analyser_delay_cycles(); },
           "Delay of the analyser at the next cycle.")

@@ -39,6 +39,18 @@ std::vector<Member> members_of(const std::vector<std::string>& names) {
   return members;
 }
 
+std::vector<double BenchCycle::*> readings_of(const std::vector<std::string>& names) {
+  std::vector<double BenchCycle::*> members;
+  for (const std::string& name : names) {
+    double BenchCycle::* member = nullptr;
+    for (const BenchLimit& limit : bench_limits) {
+      if (limit.name == name) member = limit.member;
+    }
+    members.push_back(member);
+  }
+  return members;
+}
+
 std::size_t longest_delay(const SensorDynamics& sensor, const std::vector<ScheduledPoint>& schedule) {
   std::size_t longest = 0;
   for (const ScheduledPoint& entry : schedule)
@@ -76,6 +88,7 @@ EngineBench::EngineBench(const BenchSettings& settings)
       work_(model_.make_workspace()),
       pressure_sensor_(model_, settings_.pressure),
       limit_members_(members_of(settings_.limits)),
+      limit_readings_(readings_of(settings_.limits)),
       closed_(closed_part(settings_.cylinder)),
       window_(timing_window(settings_.cylinder)),
       seed_(settings_.seed),
@@ -90,6 +103,12 @@ EngineBench::EngineBench(const BenchSettings& settings)
     model_.run(prepared_.back().charge, window_[1], work_);
     model_.require_physical(work_);
   }
+  for (const BenchInput input : settings_.inputs) {
+    windows_.push_back(window_of(input, settings_.cylinder));
+    egr_steered_ = egr_steered_ || input == BenchInput::egr;
+    model_moves_ = model_moves_ || input == BenchInput::egr || input == BenchInput::second_fraction;
+  }
+  model_moves_ = model_moves_ || settings_.wall_heat_drift_per_kcycle != 0.0;
   if (settings_.delay_whole_objective) {
     component_lags_.assign(settings_.performance.size(),
                            TransportLag(longest_delay(settings_.analyser, settings_.schedule)));
@@ -99,7 +118,8 @@ EngineBench::EngineBench(const BenchSettings& settings)
 void EngineBench::reset(std::uint64_t seed) noexcept {
   seed_ = seed;
   cycle_ = 0;
-  last_soc_cad_ = last_t_max_k_ = last_imep_bar_ = ln_bias_ = 0.0;
+  last_inputs_.fill(0.0);
+  last_t_max_k_ = last_imep_bar_ = ln_bias_ = 0.0;
   last_components_.fill(0.0);
   imep_bar_.fill(0.0);
 }
@@ -131,12 +151,11 @@ double EngineBench::noise_at(BenchStream stream, std::int64_t cycle) const noexc
   return random::normal(seed_, static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(cycle));
 }
 
-void EngineBench::drift_to(std::int64_t cycle) noexcept {
-  if (settings_.wall_heat_drift_per_kcycle == 0.0) return;
+engine::Cylinder EngineBench::drifted_cylinder(std::int64_t cycle) const noexcept {
   engine::Cylinder drifted = settings_.cylinder;
   drifted.wall_heat.wall_heat_scale = std::clamp(
       drifted.wall_heat.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * kcycles(cycle), 0.0, wall_heat_upper);
-  model_.set_cylinder(drifted);
+  return drifted;
 }
 
 double EngineBench::drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
@@ -159,79 +178,95 @@ bool EngineBench::misfires_at(std::int64_t cycle) const noexcept {
 PressureTrace EngineBench::pressure() noexcept {
   if (cycle_ == 0) return {};
   const std::int64_t last = cycle_ - 1;
-  drift_to(last);
-  model_.run(charge_at(last, misfires_at(last)), burning_soc_cad(last_soc_cad_, last), work_);
+  Filling filling = fill(last, last_inputs_);
+  if (misfires_at(last)) filling.charge.fuel_heat_j = 0.0;
+  model_.run(filling.charge, burning_soc_cad(last_inputs_[0], last), work_);
   return pressure_sensor_.read(model_, work_, seed_, static_cast<std::uint64_t>(BenchStream::pressure), last);
 }
 
-std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle, double soc_cad) noexcept {
+std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle,
+                                                              std::span<const double> inputs) noexcept {
   std::array<double, max_limits> out{};
   out.fill(std::numeric_limits<double>::quiet_NaN());
-  if (std::isnan(soc_cad)) return out;
-  drift_to(cycle);
-  const double applied = std::clamp(soc_cad, window_[0], window_[1]);
-  const double burning = std::clamp(drifted_soc_cad(applied, cycle), closed_[0], closed_[1]);
-  bool unphysical = false;
-  const Indicators<double> steady = burn(prepared_[index_at(cycle)].charge, burning, unphysical);
-  for (std::size_t i = 0; i < limit_members_.size() && !unphysical; ++i) {
-    if (limit_members_[i]) out[i] = steady.*(limit_members_[i]);
+  if (std::any_of(inputs.begin(), inputs.end(), [](double x) { return std::isnan(x); })) return out;
+  const BenchInputs applied = applied_of(inputs);
+  const Filling filling = fill(cycle, applied);
+  const Burned steady = burn(filling, std::clamp(drifted_soc_cad(applied[0], cycle), closed_[0], closed_[1]));
+  for (std::size_t i = 0; i < limit_members_.size() && !steady.unphysical; ++i) {
+    if (limit_members_[i]) {
+      out[i] = steady.indicators.*(limit_members_[i]);
+    } else if (limit_readings_[i]) {
+      out[i] = limit_readings_[i] == &BenchCycle::t_evo_k
+                   ? steady.t_evo_k
+                   : nox_of(settings_.true_nox, steady.indicators.t_max_k, filling);
+    }
   }
   return out;
 }
 
-Indicators<double> EngineBench::burn(const engine::Charge<double>& charge, double soc_cad, bool& unphysical) noexcept {
-  model_.run(charge, soc_cad, work_);
-  unphysical = model_.first_unphysical(work_) < model_.angles_cad().size();
-  return unphysical ? Indicators<double>{} : model_.indicators(charge, soc_cad, work_);
+EngineBench::Burned EngineBench::burn(const Filling& filling, double soc_cad) noexcept {
+  Burned out;
+  model_.run(filling.charge, soc_cad, work_);
+  out.unphysical = model_.first_unphysical(work_) < model_.angles_cad().size();
+  if (out.unphysical) return out;
+  out.indicators = model_.indicators(filling.charge, soc_cad, work_);
+  if (filling.charge.fuel_heat_j != filling.injected_j)
+    out.indicators.efficiency_gross = out.indicators.work_gross_j / filling.injected_j;
+  out.t_evo_k = work_.pressure_pa.back() * model_.volume_m3().back() / filling.charge.gas_j_per_k;
+  return out;
+}
+
+double EngineBench::nox_of(engine::NoxModel model, double t_max_k, const Filling& filling) const noexcept {
+  if (egr_steered_) model.intake_o2_fraction = filling.intake_o2_fraction;
+  return model.ppm(t_max_k);
 }
 
 // Fills every sensor with its steady value at the first request, free of scatter and noise.
-void EngineBench::start(const Prepared& at, double soc_cad) noexcept {
-  bool unphysical = false;
-  const Indicators<double> steady = burn(at.charge, soc_cad, unphysical);
-  if (!unphysical) last_t_max_k_ = steady.t_max_k;
-  const double nox = settings_.true_nox.ppm(last_t_max_k_);
+void EngineBench::start(double soc_cad) noexcept {
+  const Burned steady = burn(filling_, soc_cad);
+  if (!steady.unphysical) last_t_max_k_ = steady.indicators.t_max_k;
+  const double nox = nox_of(settings_.true_nox, last_t_max_k_, filling_);
   analyser_.fill(nox);
   fast_.fill(nox);
-  soft_through_analyser_.fill(settings_.soft_sensor.raw_ppm(last_t_max_k_));
-  if (!unphysical) settings_.performance.components(signals_of(steady, nox), last_components_);
+  soft_through_analyser_.fill(nox_of(settings_.soft_sensor.model, last_t_max_k_, filling_));
+  if (!steady.unphysical) settings_.performance.components(signals_of(steady.indicators, nox), last_components_);
   for (std::size_t i = 0; i < component_lags_.size(); ++i)
     component_lags_[i].fill(last_components_[i]);
 }
 
-BenchCycle EngineBench::step(double soc_cad) noexcept {
-  BenchCycle c = begin(soc_cad);
-  c.indicators = burn(charge_of(c), c.soc_cad, c.unphysical);
+BenchCycle EngineBench::step(std::span<const double> inputs) noexcept {
+  BenchCycle c = begin(inputs);
+  Filling filling = filling_;
+  filling.charge = charge_of(c);
+  const Burned burned = burn(filling, c.soc_cad);
+  c.indicators = burned.indicators;
+  c.t_evo_k = burned.t_evo_k;
+  c.unphysical = burned.unphysical;
   conclude(c);
   return c;
 }
 
 engine::Charge<double> EngineBench::charge_of(const BenchCycle& cycle) const noexcept {
-  return charge_at(cycle.cycle, cycle.misfire);
-}
-
-engine::Charge<double> EngineBench::charge_at(std::int64_t cycle, bool misfire) const noexcept {
-  engine::Charge<double> charge = prepared_[index_at(cycle)].charge;
-  if (misfire) charge.fuel_heat_j = 0.0;
+  engine::Charge<double> charge = filling_.charge;
+  if (cycle.misfire) charge.fuel_heat_j = 0.0;
   return charge;
 }
 
-BenchCycle EngineBench::begin(double soc_cad) noexcept {
-  const Prepared& at = prepared_[index_at(cycle_)];
+BenchCycle EngineBench::begin(std::span<const double> inputs) noexcept {
   BenchCycle c;
   c.cycle = cycle_;
-  c.soc_requested_cad = soc_cad;
+  c.soc_requested_cad = inputs[0];
   c.operating_point_changed = point_changes_at(cycle_);
-  double applied = std::clamp(soc_cad, window_[0], window_[1]);
-  if (std::isnan(soc_cad)) applied = cycle_ > 0 ? last_soc_cad_ : window_[1];
-  c.soc_applied_cad = applied;
-  c.clamped = applied != soc_cad;
-  last_soc_cad_ = applied;
+  last_inputs_ = c.applied = applied_of(inputs);
+  c.soc_applied_cad = c.applied[0];
+  for (std::size_t i = 0; i < std::min(inputs.size(), windows_.size()); ++i)
+    c.clamped = c.clamped || c.applied[i] != inputs[i];
 
-  drift_to(cycle_);
-  if (cycle_ == 0) start(at, applied);
+  filling_ = fill(cycle_, c.applied);
+  c.intake_o2_fraction = filling_.intake_o2_fraction;
+  if (cycle_ == 0) start(c.soc_applied_cad);
 
-  c.soc_cad = burning_soc_cad(applied, cycle_);
+  c.soc_cad = burning_soc_cad(c.soc_applied_cad, cycle_);
   c.misfire = misfires_at(cycle_);
   return c;
 }
@@ -260,12 +295,12 @@ void EngineBench::measure_nox(const Prepared& at, BenchCycle& c) noexcept {
   const auto read = [&](double level, double noise_fraction, BenchStream stream) {
     return noise_fraction > 0.0 ? std::max(0.0, level * (1.0 + noise_fraction * noise(stream))) : level;
   };
-  c.nox_true_ppm = settings_.true_nox.ppm(last_t_max_k_);
+  c.nox_true_ppm = nox_of(settings_.true_nox, last_t_max_k_, filling_);
   c.nox_analyser_ppm = read(analyser_.step(c.nox_true_ppm, at.analyser_delay, at.analyser_gain),
                             settings_.analyser.noise_fraction, BenchStream::analyser);
   c.nox_fast_ppm = read(fast_.step(c.nox_true_ppm, at.fast_delay, at.fast_gain), settings_.fast_sensor.noise_fraction,
                         BenchStream::fast);
-  c.nox_soft_ppm = settings_.soft_sensor.raw_ppm(last_t_max_k_);
+  c.nox_soft_ppm = nox_of(settings_.soft_sensor.model, last_t_max_k_, filling_);
   c.nox_soft_corrected_ppm = c.nox_soft_ppm * std::exp(ln_bias_);
   const double delayed = soft_through_analyser_.step(c.nox_soft_ppm, at.analyser_delay, at.analyser_gain);
   ln_bias_ = settings_.soft_sensor.next_bias(ln_bias_, c.nox_analyser_ppm, delayed);
@@ -288,8 +323,11 @@ void EngineBench::measure_limits(BenchCycle& c) noexcept {
   if (!c.unphysical) last_imep_bar_ = c.indicators.imep_gross_bar;
   imep_bar_[static_cast<std::size_t>(cycle_) % cov_window_cycles] = last_imep_bar_;
   c.limit_count = limit_members_.size();
-  for (std::size_t i = 0; i < c.limit_count; ++i)
-    c.limit_values[i] = limit_members_[i] ? c.indicators.*(limit_members_[i]) : cov_imep_percent();
+  for (std::size_t i = 0; i < c.limit_count; ++i) {
+    c.limit_values[i] = limit_members_[i]    ? c.indicators.*(limit_members_[i])
+                        : limit_readings_[i] ? c.*(limit_readings_[i])
+                                             : cov_imep_percent();
+  }
 }
 
 // Two passes over the window: a running sum would drift and depend on where a run was cut.

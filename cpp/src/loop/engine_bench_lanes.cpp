@@ -1,5 +1,6 @@
 #include "mgdd/loop/engine_bench_lanes.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
@@ -14,8 +15,9 @@ std::vector<EngineBench> checked(std::vector<EngineBench> benches) {
   for (const EngineBench& bench : benches) {
     if (!side_by_side(bench, benches[0])) {
       throw ParameterError(
-          "benches side by side must have a constant gamma and be alike in geometry, gas, step_cad, integrator, "
-          "burn_shape and wall_heat_model");
+          "benches side by side must have a constant gamma, one input and no limit on t_evo_k, and be alike in "
+          "geometry, "
+          "gas, step_cad, integrator, burn_shape and wall_heat_model");
     }
   }
   return benches;
@@ -25,9 +27,12 @@ std::vector<EngineBench> checked(std::vector<EngineBench> benches) {
 
 bool side_by_side(const EngineBench& one, const EngineBench& other) noexcept {
   const BenchSettings &a = one.settings(), &b = other.settings();
-  return a.cylinder.gas.gamma_model == engine::GammaModel::constant && a.cylinder.gas == b.cylinder.gas &&
-         a.cylinder.geometry == b.cylinder.geometry && a.step_cad == b.step_cad && a.integrator == b.integrator &&
-         a.cylinder.burn.burn_shape == b.cylinder.burn.burn_shape &&
+  const auto simple = [](const BenchSettings& s) {
+    return s.inputs.size() == 1 && std::find(s.limits.begin(), s.limits.end(), "t_evo_k") == s.limits.end();
+  };
+  return simple(a) && simple(b) && a.cylinder.gas.gamma_model == engine::GammaModel::constant &&
+         a.cylinder.gas == b.cylinder.gas && a.cylinder.geometry == b.cylinder.geometry && a.step_cad == b.step_cad &&
+         a.integrator == b.integrator && a.cylinder.burn.burn_shape == b.cylinder.burn.burn_shape &&
          a.cylinder.wall_heat.wall_heat_model == b.cylinder.wall_heat.wall_heat_model;
 }
 
@@ -39,7 +44,7 @@ EngineBenchLanes::EngineBenchLanes(std::vector<EngineBench> benches, Instruction
 void EngineBenchLanes::step(std::span<const double> soc_cad, std::span<BenchCycle> out) noexcept {
   for (std::size_t lane = 0; lane < size(); ++lane) {
     EngineBench& bench = benches_[lane];
-    out[lane] = bench.begin(soc_cad[lane]);
+    out[lane] = bench.begin(soc_cad.subspan(lane, 1));
     const engine::Cylinder& cylinder = bench.model().cylinder();  // as it has drifted
     cycles_.set_charge(lane, bench.charge_of(out[lane]), cylinder.wall_heat);
     cycles_.set_burn(lane, cylinder.burn, out[lane].soc_cad);

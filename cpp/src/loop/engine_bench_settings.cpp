@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
@@ -53,8 +54,12 @@ void validate_limits(const BenchSettings& s) {
   std::string known(cov_imep_name);
   for (const auto& field : fields)
     known.append(", ").append(field.name);
+  for (const BenchLimit& limit : bench_limits)
+    known.append(", ").append(limit.name);
   const auto measured = [&](const std::string& name) {
     return name == cov_imep_name ||
+           std::any_of(bench_limits.begin(), bench_limits.end(),
+                       [&](const BenchLimit& limit) { return limit.name == name; }) ||
            std::any_of(fields.begin(), fields.end(), [&](const auto& field) { return field.name == name; });
   };
   const auto stranger = std::find_if_not(s.limits.begin(), s.limits.end(), measured);
@@ -64,6 +69,37 @@ void validate_limits(const BenchSettings& s) {
   refusal.value = *stranger;
   refusal.bound = "one of " + known;
   throw refusal;
+}
+
+void require_input(bool holds, BenchInput input, const std::string& reason) {
+  if (!holds) throw about("inputs", ParameterError("inputs: " + std::string(name_of(input)) + " " + reason));
+}
+
+void validate_inputs(const BenchSettings& s) {
+  if (s.inputs.empty() || s.inputs[0] != BenchInput::soc_cad)
+    throw about("inputs", ParameterError("inputs: must begin with soc_cad; the others stand behind it"));
+  for (std::size_t i = 1; i < s.inputs.size(); ++i) {
+    const BenchInput input = s.inputs[i];
+    const auto before = s.inputs.begin() + static_cast<std::ptrdiff_t>(i);
+    require_input(std::find(s.inputs.begin(), before, input) == before, input, "stands there twice: name it once");
+    if (input == BenchInput::second_fraction) {
+      require_input(s.cylinder.burn.burn_shape == engine::BurnShape::double_wiebe, input,
+                    "needs burn_shape = 'double_wiebe': the cylinder has one burn law only");
+    }
+    if (input == BenchInput::intake_pressure_kpa) {
+      const double least = window_of(input, s.cylinder)[0];
+      require_input(least + s.cylinder.gas.ivc_pressure_rise_kpa > 0.0, input,
+                    "reaches down to " + text(least) + " kPa, where ivc_pressure_rise_kpa = " +
+                        text(s.cylinder.gas.ivc_pressure_rise_kpa) + " leaves no pressure at IVC: raise it");
+    }
+    if (input == BenchInput::egr) {
+      for (const auto& [name, model] :
+           {std::pair{"true_nox", &s.true_nox}, std::pair{"soft_sensor", &s.soft_sensor.model}}) {
+        require_input(model->intake_o2_fraction == engine::air_o2_fraction, input,
+                      "gives the intake oxygen itself: leave intake_o2_fraction of " + std::string(name) + " at 0.209");
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -77,6 +113,22 @@ std::array<double, 2> closed_part(const engine::Cylinder& c) noexcept {
 std::array<double, 2> timing_window(const engine::Cylinder& c) noexcept {
   const std::array<double, 2> closed = closed_part(c);
   return {std::fmax(engine::timing_lower_cad, closed[0]), std::fmin(engine::timing_upper_cad, closed[1])};
+}
+
+std::array<double, 2> window_of(BenchInput input, const engine::Cylinder& cylinder) noexcept {
+  switch (input) {
+    case BenchInput::intake_pressure_kpa:
+      return {50.0, 500.0};
+    case BenchInput::burn_duration_cad:
+      return {5.0, 120.0};
+    case BenchInput::second_fraction:
+      return {0.0, 1.0};
+    case BenchInput::egr:
+      return {0.0, 0.5};
+    case BenchInput::soc_cad:
+      break;
+  }
+  return timing_window(cylinder);
 }
 
 void validate(const BenchSettings& s) {
@@ -94,6 +146,7 @@ void validate(const BenchSettings& s) {
                 ParameterError("nox_sensor = 'none': the performance uses nox_ppm, name the sensor that measures it"));
   }
   validate_limits(s);
+  validate_inputs(s);
 }
 
 }  // namespace mgdd::loop

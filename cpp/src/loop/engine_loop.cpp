@@ -15,12 +15,23 @@ constexpr std::int64_t longest_settling = 1000;  // cycles that do not count for
 
 void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits) {
-  if (estimate.size() != 1) {
-    throw about("start", ParameterError("start has " + std::to_string(estimate.size()) +
-                                        " entries: the bench takes one input, soc_cad"));
+  const std::vector<BenchInput>& inputs = bench.settings().inputs;
+  if (static_cast<std::size_t>(estimate.size()) != inputs.size()) {
+    std::string taken = inputs.size() == 1 ? "one input, " : std::to_string(inputs.size()) + " inputs, ";
+    for (std::size_t i = 0; i < inputs.size(); ++i)
+      taken.append(i > 0 ? ", " : "").append(name_of(inputs[i]));
+    throw about("start",
+                ParameterError("start has " + std::to_string(estimate.size()) + " entries: the bench takes " + taken));
   }
-  const auto [earliest, latest] = bench.window_cad();
-  require_within("estimate of the seeker", estimate[0], earliest, latest, "°CA aTDC");
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const auto [least, greatest] = bench.windows()[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    if (i == 0) {
+      require_within("estimate of the seeker", estimate[at], least, greatest, "°CA aTDC");
+    } else {
+      require_within(std::string(name_of(inputs[i])) + " of the seeker", estimate[at], least, greatest);
+    }
+  }
   const std::size_t terms = bench.settings().performance.size();
   if (components != 1 && components != terms) {
     throw about("components", ParameterError("components has " + std::to_string(components) +

@@ -100,7 +100,7 @@ void run_side_by_side(const MonteCarloPlan& plan, const LoopRange& range, StopRe
     if (k % looks == 0 && stopped()) return;
     for (std::size_t i = 0; i < loops.size(); ++i) {
       soc_cad[i] =
-          std::visit([&](auto& seeker) { return ask(lanes.bench(i), seeker, estimate_cad[i]); }, loops[i].seeker);
+          std::visit([&](auto& seeker) { return ask(lanes.bench(i), seeker, estimate_cad[i])[0]; }, loops[i].seeker);
     }
     lanes.step(soc_cad, cycles);
     for (std::size_t i = 0; i < loops.size(); ++i) {

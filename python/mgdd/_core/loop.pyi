@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualThrottle', 'loop_form', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
+__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualThrottle', 'bench_inputs', 'bench_limits', 'loop_form', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
@@ -114,13 +114,14 @@ class EngineBench:
         """
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
-    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_noise_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, tdc_error_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_gain_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_offset_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_drift_bar_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], inputs: collections.abc.Sequence[str] = ['soc_cad'], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_noise_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, tdc_error_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_gain_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_offset_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_drift_bar_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         cylinder : the engine
         schedule : first cycle of each operating point
         performance : what is to be maximised: gross efficiency in percent
         nox_sensor : whose NOx enters the performance
         limits : indicators to report as limits
+        inputs : what is steered, soc_cad first; whatever is not named stays as the point has it
         soc_scatter_cad : standard deviation of SOC from cycle to cycle [°CA]
         efficiency_noise_percent : standard deviation of the measured efficiency in points, with the work and IMEP that belong to it [%]
         misfire_probability : misfires per cycle, drawn at random
@@ -144,10 +145,11 @@ class EngineBench:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
-    def noise_free_limits(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> numpy.typing.NDArray[numpy.float64]:
+    def noise_free_limits(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], further: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] = ()) -> numpy.typing.NDArray[numpy.float64]:
         """
         Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, in
-        the order of limit_names. NaN for the COV of IMEP, which has no such value. The bench itself does not run.
+        the order of limit_names; the true steady NOx for every sensor. NaN for the COV of IMEP, which has no such
+        value. The bench itself does not run. `further` are columns of the other inputs.
         """
     def point_at(self, cycle: typing.SupportsInt | typing.SupportsIndex) -> mgdd._core.engine.OperatingPoint:
         """
@@ -161,13 +163,14 @@ class EngineBench:
         """
         Back to cycle 0, with another seed if given.
         """
-    def run_columns(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+    def run_columns(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], further: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] = ()) -> dict:
         """
-        Run one cycle per request, without the GIL: columns by name.
+        Run one cycle per request, without the GIL: columns by name. `further` are columns of the other inputs.
         """
-    def step(self, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    def step(self, soc_cad: typing.SupportsFloat | typing.SupportsIndex, further: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = ()) -> dict:
         """
-        Run one cycle: what was measured, by name.
+        Run one cycle: what was measured, by name. `further` are the other inputs in their order; what is left out
+        stays.
         """
     @property
     def analyser_delay_cycles(self) -> int:
@@ -183,6 +186,11 @@ class EngineBench:
     def cycle(self) -> int:
         """
         Index of the next cycle.
+        """
+    @property
+    def input_bounds(self) -> dict:
+        """
+        Least and greatest value of each input that is not clamped, by name.
         """
     @property
     def operating_point_changes(self) -> bool:
@@ -346,4 +354,6 @@ def tracking_figures(*, reference_deg: typing.Annotated[numpy.typing.ArrayLike, 
     """
     How well a reference was followed.
     """
+bench_inputs: tuple = ('soc_cad', 'intake_pressure_kpa', 'burn_duration_cad', 'second_fraction', 'egr')
+bench_limits: tuple = ('t_evo_k', 'nox_true_ppm', 'nox_analyser_ppm', 'nox_fast_ppm', 'nox_soft_ppm', 'nox_soft_corrected_ppm')
 throttle_fault_kinds: tuple = ('jammed', 'jammed_at', 'spring_above', 'spring_below', 'supply_sag', 'missing_sample', 'nan_sample', 'stale_sample')

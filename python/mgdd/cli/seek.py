@@ -8,14 +8,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
 from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
 from mgdd.cli.ranges import bounds_of
+from mgdd.cli.seek_inputs import seek_inputs
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, ParameterError, hinted
 from mgdd.loop import EngineBench
+from mgdd.loop.limit_figures import FIGURES
 from mgdd.loop.seek_limits import COV, SCATTER, limit_report
 from mgdd.loop.timing_search import TimingSearch, TimingSearchRun
 from mgdd.optimize.optimum import Optimum
@@ -51,11 +54,12 @@ def add_seek(verbs: Any) -> None:
     _SEARCH.add(parser)
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=LOW:HIGH",
-        help="bounds of an input of the bench by its name, in place of --lower-cad and --upper-cad",
+        help=f"bounds of an input of the bench ({', '.join(bench_inputs)}), of soc_cad in place of --lower-cad and "
+        "--upper-cad; repeatable: several are sought at once, by gaussian_process_seeking",
     )  # fmt: skip
     parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
-        help=f"keep an indicator, or {COV}, below X; repeatable",
+        help=f"keep an indicator, {', '.join(bench_limits)} or {COV} below X; repeatable",
     )  # fmt: skip
     parser.add_argument("--figure", metavar="FILE", help="draw the run (.png, .svg or .pdf)")
     group = parser.add_argument_group("bench")
@@ -74,9 +78,14 @@ def _seek(args: argparse.Namespace) -> None:
     check_guide(args)
     limits = number_pairs(args.limit, "--limit")
     with _option_names():
-        bench, preset = _bench(args, limits)
+        given = bounds_of(args.input)
+        bench, preset = _bench(args, limits, given)
+        bounds = _bounds(args, bench, given)
+        if len(bench.input_names) > 1:
+            _seek_several(args, bench, preset, bounds, limits)
+            return
         guide = guide_of(args, bench.settings["cylinder"])
-        search = TimingSearch(bench=bench, limits=limits, **guide, **_SEARCH.given(args) | _bounds(args, bench))
+        search = TimingSearch(bench=bench, limits=limits, **guide, **_SEARCH.given(args) | _timings(bounds))
         found = search.run()
         doubts = found.doubts()
     run, table = found.run, search.guide_table
@@ -94,7 +103,10 @@ def _seek(args: argparse.Namespace) -> None:
         raise Stopped(f"{run.dataset.sizes['cycle']} of {found.cycles} cycles are kept")
 
 
-def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[EngineBench, str]:
+def _bench(args: argparse.Namespace, limits: Mapping[str, float], inputs: Mapping[str, Any]) -> tuple[EngineBench, str]:
+    for name in inputs:
+        if name not in bench_inputs:
+            raise ParameterError(hinted(f"--input {name}: the bench has {', '.join(bench_inputs)}", name, bench_inputs))
     cylinder, point, preset = engine_of(args)
     if not point.fuel_mg > 0.0:
         raise ParameterError("fuel_mg = 0: nothing burns, so a best timing does not exist; leave --motored out")
@@ -105,23 +117,77 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[Engin
         performance=Performance.efficiency_and_nox() if nox else Performance.efficiency_only(),
         nox_sensor=args.sensor,
         limits=list(limits),
+        inputs=["soc_cad", *(name for name in inputs if name != "soc_cad")],
         **_BENCH.given(args),
     )
     return bench, preset.name
 
 
-def _bounds(args: argparse.Namespace, bench: EngineBench) -> dict[str, float]:
-    """Read ``--input`` as the bounds of the search."""
-    out: dict[str, float] = {}
-    for name, (low, high) in bounds_of(args.input).items():
-        if name not in bench.input_names:
-            known = ", ".join(bench.input_names)
-            raise ParameterError(hinted(f"--input {name}: the bench has {known}", name, bench.input_names))
-        for option in ("lower_cad", "upper_cad"):
-            if getattr(args, option) is not None:
-                raise ParameterError(f"--input {name} and {as_option(option)} contradict each other: give one")
-        out = {"lower_cad": low, "upper_cad": high}
-    return out
+def _bounds(
+    args: argparse.Namespace, bench: EngineBench, given: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Check the bounds of ``--input`` against the bench."""
+    for name, bounds in given.items():
+        least, greatest = bench.input_bounds[name]
+        for value in bounds:
+            if not least <= value <= greatest:
+                bound = f"must be in [{least:g}, {greatest:g}], the window of the bench"
+                raise ParameterError(f"--input {name}={bounds[0]:g}:{bounds[1]:g}: {value:g} {bound}")
+    for option in ("lower_cad", "upper_cad"):
+        if "soc_cad" in given and getattr(args, option) is not None:
+            raise ParameterError(f"--input soc_cad and {as_option(option)} contradict each other: give one")
+    return dict(given)
+
+
+def _timings(bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+    return dict(zip(("lower_cad", "upper_cad"), bounds["soc_cad"], strict=True)) if bounds else {}
+
+
+def _seek_several(
+    args: argparse.Namespace,
+    bench: EngineBench,
+    preset: str,
+    bounds: Mapping[str, tuple[float, float]],
+    limits: Mapping[str, float],
+) -> None:
+    """Seek several inputs at once."""
+    for option in ("form", "limit_method", "guide_shape"):
+        if getattr(args, option, None):
+            raise ParameterError(
+                f"{as_option(option)} acts with soc_cad alone, not with several of --input: leave it out"
+            )
+    if args.guide not in (None, "none"):
+        raise ParameterError(f"--guide {args.guide} guides soc_cad alone, not several of --input: leave it out")
+    if args.method not in (None, "gaussian_process_seeking"):
+        raise ParameterError(
+            f"--method {args.method} has settings for soc_cad alone here: leave it out, or use mgdd.loop.run_seeker"
+        )
+    if args.sensor == "analyser":
+        raise ParameterError("--sensor analyser is late, and one search takes J of the same cycle: use --sensor soft")
+    low = TimingSearch.lower_cad if args.lower_cad is None else args.lower_cad
+    high = TimingSearch.upper_cad if args.upper_cad is None else args.upper_cad
+    everything = {name: bounds.get(name, (low, high)) for name in bench.input_names}
+    run, payload = seek_inputs(bench, everything, limits, start_cad=args.start_cad, cycles=args.cycles)
+    payload = {"method": "gaussian_process_seeking", "preset": preset, "sensor": args.sensor} | payload
+    table = _table(run.dataset)
+    for name in bench.input_names:
+        for kind in ("estimate", "asked"):
+            table[f"{kind}_{name}"] = run.dataset[kind].sel(input=name, drop=True)
+    text = [
+        f"{name}: start {payload['start'][name]:.4g}, estimate {payload['final'][name]:.4g}, "
+        f"optimum {payload['optimum'][name]:.4g}"
+        for name in bench.input_names
+    ]
+    for name in limits:
+        own = {figure: payload["limit_figures"].get(f"{figure}_{name}") for figure in FIGURES}
+        text.append(f"{name} as measured: {_kept(own, int(payload['limit_figures']['judged_from']))}")
+    emit(args, payload, text=[lines(to_jsonable(payload)), *text], traces=table)
+    if args.figure:
+        from mgdd import plot
+
+        save_figure(drawn(plot.seeking, run.dataset, size=(8.0, 7.0), limit_values=dict(limits)), args.figure)
+    if run.interrupted:
+        raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 
 
 def _payload(args: argparse.Namespace, preset: str, found: TimingSearchRun) -> dict[str, Any]:

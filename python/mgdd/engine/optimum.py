@@ -190,11 +190,11 @@ def _curvature(
     return float((before - 2.0 * at + after) / _SECANT_CAD**2)
 
 
-def check_request(objective: str, limits: Iterable[str]) -> None:
-    """Refuse an unknown objective or limit before any work."""
+def check_request(objective: str, limits: Iterable[str], also: Iterable[str] = ()) -> None:
+    """Refuse an unknown objective or limit before any work; `also` are limits besides indicators."""
     if objective not in OBJECTIVES:
         raise ParameterError.of("objective", objective, f"one of {', '.join(OBJECTIVES)}")
-    known = _core.engine.indicator_units()
+    known = [*_core.engine.indicator_units(), *also]
     for name in limits:
         if name not in known:
             refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}"

@@ -1,9 +1,12 @@
-"""The virtual engine bench: SOC in, what a bench would measure of that cycle out."""
+"""The virtual engine bench: SOC and further inputs in, what a bench would measure of that cycle out."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
+
+import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import OperatingPoint
@@ -12,14 +15,13 @@ from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError, hinted
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.plant import Measurement, checked_inputs
-from mgdd.loop.steady import find_optimum, steady_map
+from mgdd.loop.steady import find_optimum, limits_to_keep, split_inputs, steady_map
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum, limit_names_of
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
@@ -49,7 +51,9 @@ class EngineBench(_core.loop.EngineBench):
     schedule : sequence of (int, OperatingPoint), optional
         First cycle of each operating point, the first being 0, instead of ``point``.
     limits : sequence of str, or limits by name or as Limit
-        Up to eight indicators to report as limits, or ``"cov_imep_percent"`` (of the last 50 cycles; 0 at the first).
+        Up to eight indicators to report as limits, NOx by its sensor (``"nox_true_ppm"``, ``"nox_fast_ppm"``, ...),
+        ``"t_evo_k"`` (gas temperature at EVO [K], as the exhaust begins to leave), or ``"cov_imep_percent"`` (of the
+        last 50 cycles; 0 at the first).
     seed : int
         Of all noise, in [0, 2**64).
     **settings
@@ -70,6 +74,12 @@ class EngineBench(_core.loop.EngineBench):
     >>> cycle = bench.step(-6.0)
     >>> len(cycle["components"]), cycle["misfire"]
     (2, False)
+
+    Three inputs, of which EGR takes NOx:
+
+    >>> bench = EngineBench(inputs=["soc_cad", "egr", "intake_pressure_kpa"], soc_scatter_cad=0.0)
+    >>> [round(bench.step({"soc_cad": -6.0, "egr": egr})["nox_true_ppm"]) for egr in (0.0, 0.3)]
+    [1545, 763]
     """
 
     def __init__(
@@ -103,8 +113,8 @@ class EngineBench(_core.loop.EngineBench):
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """The one input, ``soc_cad`` [°CA aTDC]."""
-        return ("soc_cad",)
+        """What is steered: ``soc_cad`` [°CA aTDC] and what ``inputs`` names besides."""
+        return tuple(self.input_bounds)
 
     @property
     def limit_names(self) -> tuple[str, ...]:
@@ -112,40 +122,43 @@ class EngineBench(_core.loop.EngineBench):
         return tuple(self.settings["limits"])
 
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Set the start of combustion of the next cycle.
+        """Set the inputs of the next cycle.
 
         Parameters
         ----------
         inputs : mapping of str to float
-            ``soc_cad`` [°CA aTDC]; the bench clamps it to its window and says so in ``values["clamped"]``.
+            All of `input_names`; the bench clamps them to `input_bounds` and says so in ``values["clamped"]``.
 
         Raises
         ------
         mgdd.errors.ParameterError
             A missing, unknown or non-finite input.
         """
-        (self._applied_cad,) = checked_inputs(inputs, self.input_names)
+        self._applied = checked_inputs(inputs, self.input_names)
 
     def measure(self) -> Measurement:
-        """Run one cycle at the timing applied last.
+        """Run one cycle at the inputs applied last.
 
         Returns
         -------
         Measurement
             ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1;
-            ``applied`` is the timing within the window of the bench; ``noise_free_limits`` are the
-            limits at this timing without scatter, noise and misfire, COV of IMEP as NaN.
+            ``applied`` are the inputs within `input_bounds`; ``noise_free_limits`` are the limits there without
+            scatter, noise and misfire, the true steady NOx for every sensor and COV of IMEP as NaN.
 
         Raises
         ------
         mgdd.errors.RigError
             Nothing was applied yet.
         """
-        applied = getattr(self, "_applied_cad", None)
+        applied = getattr(self, "_applied", None)
         if applied is None:
             raise RigError("measure() before apply(): apply a timing first")
-        noise_free = self.noise_free_limits([applied], [self.cycle])[0] if self.limit_names else []
-        cycle = self.step(applied)
+        first, further = applied[0], applied[1:]
+        noise_free = (
+            self.noise_free_limits([first], [self.cycle], [[x] for x in further])[0] if self.limit_names else []
+        )
+        cycle = super().step(first, further)
         components, limits = cycle.pop("components"), cycle.pop("limits")
         return Measurement(
             components=tuple(map(float, components)),
@@ -153,9 +166,49 @@ class EngineBench(_core.loop.EngineBench):
             misfire=cycle["misfire"],
             values={name: float(value) for name, value in cycle.items()},
             noise_free_limits=dict(zip(self.limit_names, map(float, noise_free), strict=True)),
-            applied={"soc_cad": float(cycle["soc_applied_cad"])},
+            applied={"soc_cad": float(cycle["soc_applied_cad"])}
+            | {name: float(cycle[name]) for name in self.input_names[1:]},
             pressure_bar=self.pressure()[1],
         )
+
+    def step(
+        self,
+        soc_cad: SupportsFloat | SupportsIndex | Mapping[str, float],
+        further: Sequence[SupportsFloat | SupportsIndex] = (),
+    ) -> dict[str, Any]:
+        """Run one cycle.
+
+        Parameters
+        ----------
+        soc_cad : float or mapping of str to float
+            Start of combustion [°CA aTDC], or inputs by name; clamped to `input_bounds`. NaN and what is left out
+            repeat the last one, at first the value of the operating point.
+        further : sequence of float
+            The other inputs in their order, where ``soc_cad`` is a number.
+
+        Returns
+        -------
+        dict
+            What was measured, by name.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            An unknown input.
+        mgdd.errors.ShapeError
+            More further inputs than the bench has.
+
+        Examples
+        --------
+        >>> from mgdd.loop import EngineBench
+        >>> cycle = EngineBench(inputs=["soc_cad", "egr"], seed=1).step({"soc_cad": -6.0, "egr": 0.9})
+        >>> cycle["egr"], cycle["clamped"]
+        (0.5, True)
+        """
+        if isinstance(soc_cad, Mapping):
+            first, others = split_inputs(self.input_names, soc_cad, math.nan)
+            return super().step(first, others)
+        return super().step(soc_cad, further)
 
     def pressure(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the pressure trace of the last cycle as the sensor reads it.
@@ -185,25 +238,29 @@ class EngineBench(_core.loop.EngineBench):
             raise RigError("pressure() before the first cycle: step the bench first")
         return angle, pressure
 
-    def run(self, soc_cad: ArrayLike) -> xr.Dataset:
+    def run(self, soc_cad: ArrayLike | Mapping[str, ArrayLike]) -> xr.Dataset:
         """Run one cycle per requested start of combustion, without the GIL.
 
         Parameters
         ----------
-        soc_cad : array_like
-            Requests [°CA aTDC], one-dimensional; clamped to `window_cad` and flagged, NaN repeats the last one.
+        soc_cad : array_like, or mapping of str to array_like
+            Requests [°CA aTDC], one-dimensional; clamped to `window_cad` and flagged, NaN repeats the last one. Or
+            columns of several inputs by name, and numbers that hold in every cycle.
 
         Returns
         -------
         xarray.Dataset
-            Over ``cycle``: requested and actual SOC, the indicators as measured, NOx by every sensor, the flags,
+            Over ``cycle``: requested and actual SOC, further inputs as applied (with EGR also the intake oxygen
+            ``intake_o2_fraction``), the indicators as measured, NOx by every sensor, the flags,
             ``components`` over ``component`` and their sum ``j``, and ``limits`` over ``limit`` where limits were
             named.
 
         Raises
         ------
+        mgdd.errors.ParameterError
+            An unknown input.
         mgdd.errors.ShapeError
-            Requests that are not a column.
+            Requests that are not columns of one length.
 
         Examples
         --------
@@ -212,28 +269,32 @@ class EngineBench(_core.loop.EngineBench):
         >>> bench.run([-6.0, -5.0])["p_max_bar"].values.round(1)
         array([107.2, 103. ])
         """
-        return cycles_to_dataset(self, self.run_columns(soc_cad))
+        first, further = split_inputs(self.input_names, soc_cad, math.nan)
+        if further:
+            first, *further = np.broadcast_arrays(first, *further)
+        return cycles_to_dataset(self, self.run_columns(first, further))
 
-    def steady_map(self, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.Dataset:
+    def steady_map(self, soc_cad: ArrayLike | Mapping[str, ArrayLike], *, cycle: int = 0) -> xr.Dataset:
         """Measure without scatter, noise, misfire and drift, each sensor settled; the bench itself does not run.
 
         Parameters
         ----------
-        soc_cad : array_like
-            Starts of combustion [°CA aTDC], one-dimensional.
+        soc_cad : array_like, or mapping of str to array_like
+            Starts of combustion [°CA aTDC], one-dimensional, or values of several inputs by name, whose grid is
+            measured; an input that is not named has the value of the operating point.
         cycle : int
             The operating point is that of this cycle of the schedule.
 
         Returns
         -------
         xarray.Dataset
-            Over ``soc_cad``: ``j``, ``efficiency_gross``, ``imep_gross_bar``, ``p_max_bar``, ``dp_max_bar_per_cad``,
-            ``t_max_k``, ``nox_true_ppm``, ``nox_soft_ppm``.
+            Over ``soc_cad`` and the other inputs named: ``j``, ``efficiency_gross``, ``imep_gross_bar``, ``p_max_bar``,
+            ``dp_max_bar_per_cad``, ``t_max_k``, ``nox_true_ppm``, ``nox_soft_ppm``.
 
         Raises
         ------
         mgdd.errors.ParameterError
-            A timing outside the window of the bench.
+            A value outside the window of the bench, or an unknown input.
 
         Examples
         --------
@@ -248,32 +309,37 @@ class EngineBench(_core.loop.EngineBench):
         limits: Mapping[str, float] | Sequence[Limit] | None = None,
         *,
         bounds_cad: tuple[float, float] = (-30.0, 10.0),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
         cycle: int = 0,
     ) -> Optimum:
-        """Find the best timing without noise: what seekers are judged by. The bench itself does not run.
+        """Find the best inputs without noise: what seekers are judged by. The bench itself does not run.
 
         Parameters
         ----------
         limits : mapping of str to float, or sequence of Limit, optional
-            Upper limits on indicators, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is kept.
+            Upper limits on what the bench can limit, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is
+            kept. NOx of any sensor is the true steady one.
         bounds_cad : tuple of float
-            Searched range [°CA aTDC].
+            Searched range of the timing [°CA aTDC].
+        bounds : mapping of str to (float, float), optional
+            Searched ranges by input; those left out are `input_bounds`, of the timing ``bounds_cad``.
         cycle : int
             The operating point is that of this cycle of the schedule.
 
         Returns
         -------
         Optimum
-            Input ``soc_cad``, to about 0.001 CAD; objective ``j``. ``values`` holds the indicators there and, for every
-            limited one, ``scatter_NAME``: the standard deviation from cycle to cycle that the scatter of SOC causes, to
-            first order, in its unit. The curvature is taken over ±3 CAD at the free optimum.
+            Input ``soc_cad``, to about 0.001 CAD, and the others; objective ``j``. ``values`` holds the indicators
+            there and, for every limited one, ``scatter_NAME``: the standard deviation from cycle to cycle that the
+            scatter of SOC causes, to first order, in its unit. The curvature is taken over ±3 CAD at the free optimum;
+            of several inputs it is NaN, and the optimum is sought by a grid and from its best points by SLSQP.
 
         Raises
         ------
         mgdd.errors.ParameterError
-            Bounds outside the window of the bench, or a limit that is not an indicator.
+            Bounds outside the window of the bench or of an unknown input, or a limit without a steady value.
         mgdd.errors.ConvergenceError
-            No timing in the range meets the limits.
+            Nothing in the range meets the limits.
 
         Examples
         --------
@@ -281,9 +347,13 @@ class EngineBench(_core.loop.EngineBench):
         >>> round(EngineBench().find_optimum()["soc_cad"], 2)
         -5.63
         """
-        return find_optimum(self._quiet(cycle), limits, bounds_cad, float(self.settings["soc_scatter_cad"]))
+        kept = limits_to_keep(limits)
+        split_inputs(self.input_names, bounds or {}, None)
+        searched = self.input_bounds | {"soc_cad": bounds_cad} | dict(bounds or {})
+        quiet = self._quiet(cycle, limits=[limit.name for limit in kept])
+        return find_optimum(quiet, kept, searched, float(self.settings["soc_scatter_cad"]))
 
-    def _quiet(self, cycle: int) -> EngineBench:
+    def _quiet(self, cycle: int, **changes: Any) -> EngineBench:
         """Copy the bench without anything random or slow, at the operating point of one cycle."""
         if cycle < 0:
             raise ParameterError.of("cycle", cycle, ">= 0")
@@ -292,7 +362,7 @@ class EngineBench(_core.loop.EngineBench):
         settings.pop("schedule")
         silent = SensorDynamics(delay_s=0.0, lag_s=0.0, noise_fraction=0.0)
         settings |= {"analyser": silent, "fast_sensor": silent} | dict.fromkeys(_RANDOM, 0.0)
-        return EngineBench(cylinder, self.point_at(cycle), **settings)
+        return EngineBench(cylinder, self.point_at(cycle), **settings | changes)
 
     def _repr_html_(self) -> str:
         return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))

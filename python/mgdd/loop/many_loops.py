@@ -64,7 +64,8 @@ def monte_carlo(
 
     Each loop starts from cycle 0 of its bench and from where its seeker stands. Noise depends on the seed alone, so
     the numbers do not depend on executor, workers or chunks. Sixteen loops and more run side by side and have the
-    numbers of `run_seeker` to rounding; fewer, and those with a gamma of temperature, have its bits.
+    numbers of `run_seeker` to rounding; fewer, and those with a gamma of temperature, several inputs or a limit on
+    ``t_evo_k``, have its bits. Of several inputs the figures of the estimate are those of ``soc_cad``.
 
     Parameters
     ----------
@@ -120,6 +121,12 @@ def monte_carlo(
     for bench in bench_list:
         for seeker in seeker_list:
             require_inputs_of(bench, seeker)
+            named = tuple(getattr(seeker, "input_names", ()))
+            if named and named != bench.input_names:
+                raise ParameterError(
+                    f"inputs of the seeker are {', '.join(named)}: here they stand in the order of the bench, "
+                    f"{', '.join(bench.input_names)}"
+                )
     goals = [own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)]
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({goal[name] for goal in goals}) > 1:

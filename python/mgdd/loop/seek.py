@@ -44,8 +44,9 @@ def run_seeker(
     Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is reported as such. A new operating
     point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
     the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
-    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` the loop
-    runs in the core without the GIL; one ask and tell at a time from Python gives the same trajectory, bit for bit.
+    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` of
+    one input the loop runs in the core without the GIL; one ask and tell at a time from Python gives the same
+    trajectory, bit for bit.
 
     Parameters
     ----------
@@ -90,6 +91,7 @@ def run_seeker(
     criteria = criteria or LoopCriteria()
     if (
         not isinstance(plant, EngineBench)
+        or len(plant.input_names) > 1
         or isinstance(seeker, FeedForward | GuidedEngine)
         or (isinstance(seeker, Seeker) and tuple(seeker.limit_names) != plant.limit_names)  # the core wants the same
     ):

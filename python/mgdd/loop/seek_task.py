@@ -8,7 +8,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError, argument
-from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
+from mgdd.optimize import (
+    BoundedSeeking,
+    ComponentLag,
+    ExtremumSeeking,
+    GaussianProcessSeeking,
+    GoldenSection,
+    Limit,
+    NewtonSeeking,
+    Spsa,
+    tune,
+)
 from mgdd.optimize.by_curvature import approach_gain, newton_settings
 from mgdd.optimize.tuning import Tuning
 
@@ -24,6 +34,7 @@ _NEWTON_LIMITED_CAD = 1.2  # a wide dither keeps its mean far from a limit
 _PERTURBATION_CAD = 1.5  # of SPSA
 _PERIOD, _TIME_CONSTANT = 10, 40.0  # cycles, without a late sensor
 _CYCLES, _LATE_CYCLES, _LATE_TIME_CONSTANTS = 2000, 4000, 16
+_PROCESS_CYCLES = 300  # of Gaussian process seeking, which needs tens
 # Dimensionless, from settings that were tuned to a curvature of 0.051: gain of SPSA and kappa times that curvature.
 _SPSA_GAIN, _BOUNDED_KAPPA = 20.0 * 0.051, 0.051
 _NEWTON_HOLD_PERIODS = 5
@@ -50,7 +61,7 @@ class Task:
 def default_cycles(task: Task) -> int:
     """Return how long the run should be; a late sensor asks for a slow seeker."""
     if not task.late:
-        return _CYCLES
+        return _PROCESS_CYCLES if task.method == "gaussian_process_seeking" else _CYCLES
     return max(_LATE_CYCLES, math.ceil(_LATE_TIME_CONSTANTS * _late_tuning(task).time_constant_cycles))
 
 
@@ -78,6 +89,8 @@ def make_seeker(task: Task) -> Seeker:
     if task.method == "spsa":
         gain = _SPSA_GAIN / curvature
         return Spsa(**space, gain=gain, perturbation=_PERTURBATION_CAD, seed=task.seed, limits=limits)
+    if task.method == "gaussian_process_seeking":
+        return GaussianProcessSeeking(**space, seed=task.seed, limits=limits)
     if task.method == "golden":
         return GoldenSection(**space, noise_sd=task.noise_sd, limits=limits)
     period, time_constant, components = _PERIOD, _TIME_CONSTANT, None
@@ -108,7 +121,7 @@ def make_seeker(task: Task) -> Seeker:
 
 def amplitude_of(task: Task) -> float:
     """Return how far the method moves to both sides of its estimate [°CA]."""
-    if task.method in ("bounded", "golden"):
+    if task.method in ("bounded", "golden", "gaussian_process_seeking"):
         return 0.0
     if task.method == "spsa":
         return _PERTURBATION_CAD

@@ -2,71 +2,130 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core.loop import EngineBench
-from mgdd._core.optimize import Limit
+from mgdd._core.loop import EngineBench, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
-from mgdd.errors import ConvergenceError, ParameterError, ShapeError
+from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["find_optimum", "steady_map"]
+    from mgdd._core.optimize import Limit
+
+    Point = tuple[float, ...] | NDArray[np.float64]
+
+__all__ = ["find_optimum", "limits_to_keep", "split_inputs", "steady_map"]
 
 _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
+_SCAN_POINTS = {2: 31, 3: 13, 4: 7, 5: 5}  # per input, of several
+_STARTS = 3
+_EDGE = 1e-6  # of the searched range, or of a limit
 
 
-def steady_map(quiet: EngineBench, soc_cad: ArrayLike) -> xr.Dataset:
-    """Measure a bench that shows nothing random or slow, each sensor settled."""
-    timings = np.atleast_1d(np.asarray(soc_cad, float))
-    if timings.ndim != 1:
-        raise ShapeError(f"soc_cad has {timings.ndim} dimensions: must be a column")
-    low, high = quiet.window_cad
-    for soc in timings:
-        if not low <= soc <= high:
-            raise ParameterError(f"soc_cad = {soc:g}: must lie in [{low:g}, {high:g}], the window of the bench")
-    rows = [_settled(quiet, float(soc)) for soc in timings]
-    names = ("efficiency_gross", "imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")
-    variables: dict[str, tuple[Any, ...]] = {"soc_cad": ("soc_cad", timings)}
-    variables["j"] = ("soc_cad", [row["j"] for row in rows])
-    for name in (*names, "nox_true_ppm", "nox_soft_ppm"):
-        variables[name] = ("soc_cad", [row[name] for row in rows])
+def split_inputs(names: Sequence[str], inputs: Any, missing: Any) -> tuple[Any, list[Any]]:
+    """Give the timing and the further inputs in their order; a plain value is the timing."""
+    if not isinstance(inputs, Mapping):
+        return inputs, []
+    for name in inputs:
+        if name not in names:
+            raise ParameterError(hinted(f"inputs: {name!r}: the bench has {', '.join(names)}", str(name), names))
+    first, *further = (inputs.get(name, missing) for name in names)
+    return first, further
+
+
+def steady_map(quiet: EngineBench, inputs: ArrayLike | Mapping[str, ArrayLike]) -> xr.Dataset:
+    """Measure a bench that shows nothing random or slow, each sensor settled, over the grid of these values."""
+    names = tuple(quiet.input_bounds)
+    split_inputs(names, inputs, None)
+    given = inputs if isinstance(inputs, Mapping) else {"soc_cad": inputs}
+    axes = {name: np.atleast_1d(np.asarray(given[name], float)) for name in names if name in given}
+    if "soc_cad" not in axes:
+        raise ParameterError("inputs: soc_cad is missing: a steady map needs its timings")
+    for name, values in axes.items():
+        if values.ndim != 1:
+            raise ShapeError(f"{name} has {values.ndim} dimensions: must be a column")
+        low, high = quiet.input_bounds[name]
+        for value in values:
+            if not low <= value <= high:
+                raise ParameterError(f"{name} = {value:g}: must lie in [{low:g}, {high:g}], the window of the bench")
+    at = dict.fromkeys(names, math.nan)  # what is not given stays at the value of the operating point
+    rows = [
+        _settled(quiet, tuple((at | dict(zip(axes, point, strict=True))).values()))
+        for point in itertools.product(*axes.values())
+    ]
+    shape = tuple(values.size for values in axes.values())
+    dims = tuple(axes) if len(axes) > 1 else "soc_cad"
+    shown = ("efficiency_gross", "imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")
+    variables: dict[str, tuple[Any, ...]] = {name: (name, values) for name, values in axes.items()}
+    for name in ("j", *shown, "nox_true_ppm", "nox_soft_ppm", *(("intake_o2_fraction",) if "egr" in names else ())):
+        variables[name] = (dims, np.reshape([row[name] for row in rows], shape))
     return labelled_dataset(variables)
 
 
+def limits_to_keep(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Limit, ...]:
+    """Read limits that have a steady value."""
+    kept = limits_of(limits)
+    check_request(OBJECTIVES[0], [limit.name for limit in kept], bench_limits)
+    return kept
+
+
 def find_optimum(
-    quiet: EngineBench,
-    limits: Mapping[str, float] | Sequence[Limit] | None,
-    bounds_cad: tuple[float, float],
-    scatter_cad: float,
+    quiet: EngineBench, kept: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
 ) -> Optimum:
-    """Find the best timing of such a bench, and what this scatter of SOC would do there."""
+    """Find the best inputs of such a bench, whose limits are those to keep, and what this scatter of SOC would do."""
+    windows = quiet.input_bounds
+    for name, (low, high) in bounds.items():
+        least, greatest = windows[name]
+        if not least <= low < high <= greatest:
+            said = f"bounds_cad = ({low:g}, {high:g})" if name == "soc_cad" else f"bounds: {name} = ({low:g}, {high:g})"
+            raise ParameterError(f"{said}: must increase and lie in [{least:g}, {greatest:g}]")
+    caps = {limit.name: limit.upper - limit.margin for limit in kept}
+    search = _best_timing if len(bounds) == 1 else _best_of_several
+    best, free, curvature = search(quiet, caps, bounds)
+    at, limited = _settled(quiet, best), _limited(quiet, best)
+    early, late = (_limited(quiet, (best[0] + shift, *best[1:])) for shift in (-0.05, 0.05))
+    numbers = {name: float(value) for name, value in at.items() if isinstance(value, float) and name not in bounds}
+    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter_cad for name in caps}
+    edges = [min(x - low, high - x) / (1.0 if name == "soc_cad" else high - low)
+             for x, (name, (low, high)) in zip(best, bounds.items(), strict=True)]  # fmt: skip
+    return Optimum(
+        inputs=dict(zip(bounds, map(float, best), strict=True)),
+        objective="j",
+        value=float(at["j"]),
+        values={**numbers, **limited, **spread},
+        limits=kept,
+        active_limits=tuple(name for name, cap in caps.items() if limited[name] > cap - 1e-3 * max(1.0, abs(cap))),
+        at_bound=min(edges) < 1e-3,
+        bounds=dict(bounds),
+        curvature=curvature,
+        free_inputs=dict(zip(bounds, map(float, free), strict=True)),
+    )
+
+
+def _best_timing(
+    quiet: EngineBench, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[Point, Point, float]:
+    """Give the best timing, that without limits, and the bend of J there."""
     from scipy.optimize import brentq, minimize_scalar
 
-    kept_limits = limits_of(limits)
-    check_request(OBJECTIVES[0], [limit.name for limit in kept_limits])
-    caps = {limit.name: limit.upper - limit.margin for limit in kept_limits}
-    low, high = bounds_cad
-    window = quiet.window_cad
-    if not window[0] <= low < high <= window[1]:
-        raise ParameterError(
-            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in [{window[0]:g}, {window[1]:g}]"
-        )
+    low, high = bounds["soc_cad"]
 
     def j(soc: float) -> float:
-        return float(_settled(quiet, soc)["j"])
+        return float(_settled(quiet, (soc,))["j"])
 
     def excess(soc: float) -> float:
-        now = _settled(quiet, soc)
-        return max((float(now[name]) - limit for name, limit in caps.items()), default=-1.0)
+        now = _limited(quiet, (soc,))
+        return max((now[name] - limit for name, limit in caps.items()), default=-1.0)
 
     def peak(a: float, b: float) -> float:
         return float(minimize_scalar(lambda x: -j(x), bounds=(a, b), method="bounded", options={"xatol": 1e-4}).x)
@@ -84,26 +143,68 @@ def find_optimum(
         step = 1 if grid[best] < free else -1
         outside = grid[best + step] if abs(grid[best + step] - grid[best]) < abs(free - grid[best]) else free
         soc = float(brentq(excess, grid[best], outside, xtol=1e-6)) if excess(outside) > 0.0 else float(grid[best])
-    at = _settled(quiet, soc)
     around = [j(free - _SECANT_CAD), j(free), j(free + _SECANT_CAD)]
-    early, late = _settled(quiet, soc - 0.05), _settled(quiet, soc + 0.05)
-    numbers = {name: float(value) for name, value in at.items() if isinstance(value, float) and name != "soc_cad"}
-    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter_cad for name in caps}
-    return Optimum(
-        inputs={"soc_cad": soc},
-        objective="j",
-        value=float(at["j"]),
-        values={**numbers, **spread},
-        limits=kept_limits,
-        active_limits=tuple(name for name, limit in caps.items() if at[name] > limit - 1e-3 * max(1.0, abs(limit))),
-        at_bound=min(soc - low, high - soc) < 1e-3,
-        bounds={"soc_cad": (low, high)},
-        curvature=(around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2,
-        free_inputs={"soc_cad": free},
-    )
+    return (soc,), (free,), (around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2
 
 
-def _settled(quiet: EngineBench, soc_cad: float) -> dict[str, Any]:
+def _best_of_several(
+    quiet: EngineBench, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[Point, Point, float]:
+    """Give the best inputs and those without limits: a grid, then SLSQP from its best points."""
+    low, span = np.array([b[0] for b in bounds.values()]), np.array([b[1] - b[0] for b in bounds.values()])
+    uppers = np.array(list(caps.values()))
+
+    def j(z: NDArray[np.float64]) -> float:
+        return float(_settled(quiet, low + z * span)["j"])
+
+    def room(z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Room below each limit, as a share of it."""
+        now = np.array(list(_limited(quiet, low + z * span).values()))
+        return (uppers - now) / np.maximum(1.0, np.abs(uppers))  # type: ignore[no-any-return]
+
+    grid = np.array(list(itertools.product(np.linspace(0.0, 1.0, _SCAN_POINTS[low.size]), repeat=low.size)))
+    values, least = np.array([j(z) for z in grid]), np.array([room(z).min(initial=1.0) for z in grid])
+    free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]])
+    if room(free).min(initial=1.0) >= 0.0:
+        return low + free * span, low + free * span, math.nan
+    kept = np.flatnonzero(least >= 0.0)
+    starts = grid[kept[np.argsort(-values[kept])[:_STARTS]]] if kept.size else grid[np.argsort(-least)[:_STARTS]]
+    best = _climbed(j, room, starts)
+    if room(best).min() < -_EDGE:
+        asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
+        raise ConvergenceError(f"no {asked} keeps {dict(caps)}: raise a limit")
+    return low + best * span, low + free * span, math.nan
+
+
+def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Climb from each start, never ending lower or farther outside of the limits than there; give the best end."""
+    from scipy.optimize import minimize
+
+    rules = [{"type": "ineq", "fun": room}] if room else []
+
+    def worth(z: NDArray[np.float64]) -> tuple[float, float]:
+        return (min(float(room(z).min()) + _EDGE, 0.0) if room else 0.0, j(z))
+
+    ends = list(starts)
+    for start in starts:
+        found = minimize(
+            lambda z: -j(z), start, method="SLSQP", bounds=[(0.0, 1.0)] * start.size, constraints=rules,
+            options={"eps": 1e-5, "ftol": 1e-10, "maxiter": 200},
+        )  # fmt: skip
+        ends.append(np.clip(found.x, 0.0, 1.0))
+    return np.asarray(max(ends, key=worth))
+
+
+def _settled(quiet: EngineBench, inputs: Point) -> dict[str, Any]:
     """Measure one cycle from rest: every sensor stands at its steady value."""
     quiet.reset()
-    return quiet.step(soc_cad)
+    first, *further = map(float, inputs)
+    return quiet.step(first, further)
+
+
+def _limited(quiet: EngineBench, inputs: Point) -> dict[str, float]:
+    """Give the limited quantities, the true NOx for every sensor."""
+    quiet.reset()
+    first, *further = map(float, inputs)
+    row = quiet.noise_free_limits([first], [0], [[x] for x in further])[0]
+    return dict(zip(quiet.settings["limits"], map(float, row), strict=True))

@@ -39,7 +39,7 @@ class TimingSearch:
     ----------
     bench : EngineBench
         Where; its sensor, noise and limits are known to the seeker.
-    method : {"extremum_seeking", "newton", "bounded", "spsa", "golden"}, optional
+    method : {"extremum_seeking", "newton", "bounded", "spsa", "golden", "gaussian_process_seeking"}, optional
         Seeker; extremum_seeking if left out. A guide with a curve is a seeker itself.
     form : {"batch", "moving_average", "washout"}, optional
         Of extremum_seeking; batch if left out.
@@ -51,7 +51,8 @@ class TimingSearch:
     upper_cad : float
         Latest SOC [°CA aTDC].
     cycles : int, optional
-        Length of the run; 2000 if left out, behind a late analyser 16 time constants of the seeker, 4000 at least.
+        Length of the run; 2000 if left out, 300 of gaussian_process_seeking, behind a late analyser 16 time constants
+        of the seeker, 4000 at least.
     limits : mapping of str to float
         Upper limits on indicators of the bench, or on ``cov_imep_percent``.
     limit_method : {"switching", "penalty", "barrier"}, optional
@@ -88,6 +89,11 @@ class TimingSearch:
     guide_table: TimingMap | None = None
 
     def __post_init__(self) -> None:
+        if len(self.bench.input_names) > 1:
+            raise ParameterError(
+                f"bench takes {', '.join(self.bench.input_names)}: a search of the timing takes a bench of soc_cad "
+                "alone; use mgdd.loop.run_seeker with GaussianProcessSeeking"
+            )
         self._check_guide()
         if self.method is None and not self.is_curve:
             object.__setattr__(self, "method", "extremum_seeking")
@@ -155,6 +161,10 @@ class TimingSearch:
             cycles = argument("cycles", str(self.cycles))
             raise ParameterError(
                 f"{cycles}: must be in [1, {_MOST_CYCLES}]; mgdd.loop.run_seeker continues longer runs"
+            )
+        if self.limit_method is not None and self.method == "gaussian_process_seeking":
+            raise ParameterError(
+                f"{argument('limit_method')} does not act here; {method} keeps limits with a probability: leave it out"
             )
         if self.method == "bounded" and COV in self.limits:
             raise ParameterError(

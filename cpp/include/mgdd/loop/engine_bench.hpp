@@ -1,7 +1,8 @@
-// A virtual engine test bench: SOC in, what a real bench would measure of that cycle out. The plant is the cycle model
-// with scatter, misfire, drift and a schedule of operating points; its sensors are a NOx analyser, a fast NOx sensor,
-// a soft sensor and a pressure sensor. Angles in °CA aTDC, NOx in ppm. `step` is noexcept and allocation-free.
-// All randomness is a function of (seed, stream, cycle): the same seed gives the same run however it is cut.
+// A virtual engine test bench: SOC and further inputs in, what a real bench would measure of that cycle out. The plant
+// is the cycle model with scatter, misfire, drift and a schedule of operating points; its sensors are a NOx analyser, a
+// fast NOx sensor, a soft sensor and a pressure sensor. Angles in °CA aTDC, NOx in ppm. `step` is noexcept and
+// allocation-free. All randomness is a function of (seed, stream, cycle): the same seed gives the same run however it
+// is cut.
 #pragma once
 
 #include <array>
@@ -26,6 +27,11 @@ namespace mgdd::loop {
 
 /// Which NOx value enters the performance.
 enum class NoxSensor { none, analyser, fast, soft, soft_corrected, true_value };
+
+/// What can be steered. `egr` is the recirculated share of the charge's mass, cooled to the intake temperature.
+enum class BenchInput { soc_cad, intake_pressure_kpa, burn_duration_cad, second_fraction, egr };
+inline constexpr std::size_t max_bench_inputs = names<BenchInput>().size();
+using BenchInputs = std::array<double, max_bench_inputs>;  ///< in the order of BenchSettings::inputs
 
 /// Streams of the random numbers that the bench draws; others are free for seekers and studies.
 enum class BenchStream : std::uint64_t { soc = 0, efficiency = 1, misfire = 2, analyser = 3, fast = 4, pressure = 5 };
@@ -59,6 +65,9 @@ struct BenchSettings {
 
   PressureSensorSettings pressure{};
 
+  std::vector<BenchInput> inputs =
+      std::vector(1, BenchInput::soc_cad);  ///< what is steered, SOC first; the rest is the point's
+
   engine::NoxModel true_nox{.map = engine::NoxMap::arrhenius};
   engine::SoftSensor soft_sensor{};
   SensorDynamics analyser{.delay_s = 3.0, .lag_s = 2.0, .noise_fraction = 0.01};
@@ -67,7 +76,7 @@ struct BenchSettings {
   engine::Performance performance{};
   NoxSensor nox_sensor = NoxSensor::soft;
   bool delay_whole_objective = false;  ///< every component passes the analyser's delay and lag, NOx being the true one
-  std::vector<std::string> limits{};   ///< at most 8 names of indicators, or cov_imep_percent
+  std::vector<std::string> limits{};   ///< at most 8 names of indicators, of `bench_limits`, or cov_imep_percent
   std::uint64_t seed = 0;
 };
 constexpr auto fields_of(const BenchSettings&) {
@@ -79,6 +88,7 @@ constexpr auto fields_of(const BenchSettings&) {
       field<&S::performance>("performance", "what is to be maximised: gross efficiency in percent", DefaultForm::none),
       field<&S::nox_sensor>("nox_sensor", "whose NOx enters the performance"),
       field<&S::limits>("limits", "indicators to report as limits"),
+      field<&S::inputs>("inputs", "what is steered, soc_cad first; whatever is not named stays as the point has it"),
       field<&S::soc_scatter_cad>(
           {"soc_scatter_cad", "°CA", closed(0.0, 5.0), "standard deviation of SOC from cycle to cycle"}),
       field<&S::efficiency_noise_percent>(
@@ -125,6 +135,9 @@ std::array<double, 2> closed_part(const engine::Cylinder& cylinder) noexcept;
 /// Earliest and latest SOC that a bench takes: [-60, 20] °CA aTDC as far as the valves are closed.
 std::array<double, 2> timing_window(const engine::Cylinder& cylinder) noexcept;
 
+/// Range that a bench takes of an input: `timing_window` of the timing, fixed for the others.
+std::array<double, 2> window_of(BenchInput input, const engine::Cylinder& cylinder) noexcept;
+
 /// One measured cycle.
 struct BenchCycle {
   std::int64_t cycle = 0;
@@ -134,7 +147,8 @@ struct BenchCycle {
   engine::Indicators<double> indicators{};  ///< efficiency, work and IMEP with their noise
   bool misfire = false;                     ///< nothing burned: indicators of the motored cycle, efficiency of the
                                             ///< fuel that was injected
-  bool clamped = false;                     ///< the request lay outside the timing window
+  BenchInputs applied{};                    ///< every request as far as its window takes it
+  bool clamped = false;                     ///< a request lay outside its window
   bool unphysical = false;                  ///< no such cycle exists: indicators are NaN, J is that of the last one
   bool operating_point_changed = false;     ///< speed or fuel moved by more than 5 % from the cycle before
   double nox_true_ppm = 0.0;
@@ -142,6 +156,8 @@ struct BenchCycle {
   double nox_fast_ppm = 0.0;
   double nox_soft_ppm = 0.0;
   double nox_soft_corrected_ppm = 0.0;
+  double intake_o2_fraction = engine::air_o2_fraction;    ///< where EGR is steered
+  double t_evo_k = engine::Indicators<double>{}.t_max_k;  ///< gas at EVO, as it begins to leave; NaN in SIMD lanes
   std::array<double, engine::Performance::max_terms> components{};
   std::size_t component_count = 0;
   double j = 0.0;                                 ///< sum of the components
@@ -152,25 +168,45 @@ struct BenchCycle {
   std::span<const double> limits() const noexcept { return {limit_values.data(), limit_count}; }
 };
 
+/// What can be limited besides indicators.
+struct BenchLimit {
+  std::string_view name;
+  double BenchCycle::* member;
+};
+inline constexpr std::array<BenchLimit, 6> bench_limits{{
+    {"t_evo_k", &BenchCycle::t_evo_k},
+    {"nox_true_ppm", &BenchCycle::nox_true_ppm},
+    {"nox_analyser_ppm", &BenchCycle::nox_analyser_ppm},
+    {"nox_fast_ppm", &BenchCycle::nox_fast_ppm},
+    {"nox_soft_ppm", &BenchCycle::nox_soft_ppm},
+    {"nox_soft_corrected_ppm", &BenchCycle::nox_soft_corrected_ppm},
+}};
+
 class EngineBench {
  public:
   /// ParameterError by `validate`; ConvergenceError if a scheduled point has no physical cycle.
   explicit EngineBench(const BenchSettings& settings);
 
-  /// Runs one cycle. Requests are clamped to `window_cad`; NaN repeats the last one. Before the first cycle every
-  /// sensor stands at its steady value for the first request.
-  BenchCycle step(double soc_cad) noexcept;
+  /// Runs one cycle. Requests stand in the order of `BenchSettings::inputs` and are clamped to `windows`; NaN and what
+  /// is left out repeat the last one, at first the value of the operating point. Before the first cycle every sensor
+  /// stands at its steady value for the first request.
+  BenchCycle step(std::span<const double> inputs) noexcept;
+  BenchCycle step(double soc_cad) noexcept { return step({&soc_cad, 1}); }
 
   /// The halves of `step` for who runs the cycle elsewhere, as `EngineBenchLanes` does: what burns, its charge, and
   /// what is measured of it. Once for each cycle and in this order; between them `indicators` and `unphysical` are
   /// filled in.
-  BenchCycle begin(double soc_cad) noexcept;
+  BenchCycle begin(std::span<const double> inputs) noexcept;
   engine::Charge<double> charge_of(const BenchCycle& cycle) const noexcept;  ///< no fuel in a misfire
   void conclude(BenchCycle& cycle) noexcept;
 
   /// Limited quantities of a cycle at that request without scatter, noise and misfire, drift included: in the order of
-  /// BenchSettings::limits, NaN for the COV of IMEP, for NaN requests and where no such cycle exists. Nothing moves.
-  std::array<double, max_limits> noise_free_limits(std::int64_t cycle, double soc_cad) noexcept;
+  /// BenchSettings::limits, the true steady NOx for every sensor. NaN for the COV of IMEP, for NaN requests and where
+  /// no such cycle exists. Nothing moves.
+  std::array<double, max_limits> noise_free_limits(std::int64_t cycle, std::span<const double> inputs) noexcept;
+  std::array<double, max_limits> noise_free_limits(std::int64_t cycle, double soc_cad) noexcept {
+    return noise_free_limits(cycle, {&soc_cad, 1});
+  }
 
   /// What the pressure sensor read of the last cycle, by the crank grid of the cylinder; empty before the first one.
   /// The trace stands until the next call. Indicators of a cycle are those of the true pressure.
@@ -185,7 +221,8 @@ class EngineBench {
   static void visit(Self& self, V& v) {
     v("cycle", self.cycle_, std::int64_t{1} << 53);
     v("seed", self.seed_);
-    v("last_soc_cad", self.last_soc_cad_);
+    for (std::size_t i = 0; i < self.settings_.inputs.size(); ++i)
+      v("last_" + std::string(name_of(self.settings_.inputs[i])), self.last_inputs_[i]);
     v("last_t_max_k", self.last_t_max_k_);
     v("last_imep_bar", self.last_imep_bar_);
     v("ln_bias", self.ln_bias_);
@@ -210,6 +247,8 @@ class EngineBench {
   bool point_changes_at(std::int64_t cycle) const noexcept;
   /// Earliest and latest SOC that is not clamped [°CA aTDC].
   std::array<double, 2> window_cad() const noexcept { return window_; }
+  /// Least and greatest value that is not clamped, of each input.
+  const std::vector<std::array<double, 2>>& windows() const noexcept { return windows_; }
   /// D and g of the analyser at the next cycle.
   std::size_t analyser_delay_cycles() const noexcept;
   double analyser_gain() const noexcept;
@@ -221,15 +260,29 @@ class EngineBench {
     std::size_t analyser_delay = 0, fast_delay = 0;
     double analyser_gain = 1.0, fast_gain = 1.0;
   };
+  /// What stands in the cylinder before a cycle.
+  struct Filling {
+    engine::Charge<double> charge{};
+    double intake_o2_fraction = engine::air_o2_fraction;
+    double injected_j = 0.0;  ///< heat of the fuel, of which the charge may burn less
+  };
+  /// What was measured without sensors of NOx.
+  struct Burned {
+    engine::Indicators<double> indicators{};
+    double t_evo_k = engine::Indicators<double>{}.t_max_k;
+    bool unphysical = true;
+  };
   std::size_t index_at(std::int64_t cycle) const noexcept;
-  engine::Charge<double> charge_at(std::int64_t cycle, bool misfire) const noexcept;
-  engine::Indicators<double> burn(const engine::Charge<double>& charge, double soc_cad, bool& unphysical) noexcept;
-  void start(const Prepared& at, double soc_cad) noexcept;
+  engine::Cylinder drifted_cylinder(std::int64_t cycle) const noexcept;
+  BenchInputs applied_of(std::span<const double> inputs) const noexcept;
+  Filling fill(std::int64_t cycle, const BenchInputs& inputs) noexcept;
+  Burned burn(const Filling& filling, double soc_cad) noexcept;
+  double nox_of(engine::NoxModel model, double t_max_k, const Filling& filling) const noexcept;
+  void start(double soc_cad) noexcept;
   void measure_nox(const Prepared& at, BenchCycle& c) noexcept;
   void judge(const Prepared& at, BenchCycle& c) noexcept;
   void measure_limits(BenchCycle& c) noexcept;
   double cov_imep_percent() const noexcept;
-  void drift_to(std::int64_t cycle) noexcept;
   double drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept;
   double burning_soc_cad(double soc_cad, std::int64_t cycle) const noexcept;
   bool misfires_at(std::int64_t cycle) const noexcept;
@@ -241,12 +294,16 @@ class EngineBench {
   engine::CycleWorkspace<double> work_;
   PressureSensor pressure_sensor_;
   std::vector<Prepared> prepared_;
-  std::vector<double engine::Indicators<double>::*> limit_members_;  // null for the COV of IMEP
+  std::vector<double engine::Indicators<double>::*> limit_members_;  // null for what follows
+  std::vector<double BenchCycle::*> limit_readings_;                 // null for indicators and the COV of IMEP
   std::array<double, 2> closed_, window_;
+  std::vector<std::array<double, 2>> windows_;
+  bool egr_steered_ = false, model_moves_ = false;
 
   std::uint64_t seed_ = 0;
   std::int64_t cycle_ = 0;
-  double last_soc_cad_ = 0.0;
+  BenchInputs last_inputs_{};
+  Filling filling_{};  // of the cycle that runs
   double last_t_max_k_ = 0.0;
   double last_imep_bar_ = 0.0;
   double ln_bias_ = 0.0;

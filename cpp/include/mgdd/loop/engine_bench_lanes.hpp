@@ -13,8 +13,8 @@
 
 namespace mgdd::loop {
 
-/// Whether two benches may run side by side: a constant gamma, and alike in geometry, gas, crank grid, integrator and
-/// the laws of burn and wall heat.
+/// Whether two benches may run side by side: a constant gamma, one input, no limit on t_evo_k, and alike in geometry,
+/// gas, crank grid, integrator and the laws of burn and wall heat.
 bool side_by_side(const EngineBench& one, const EngineBench& other) noexcept;
 
 class EngineBenchLanes {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -29,7 +30,7 @@ struct LoopCycle {
   double estimate_cad = 0.0;
 };
 
-/// ParameterError unless the seeker has one input that stands in the bench's window, as many components as the bench's
+/// ParameterError unless the seeker has the inputs of the bench, each in its window, as many components as the bench's
 /// performance (or one, for their sum) and the bench's limits in the same order.
 void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits);
@@ -39,12 +40,13 @@ void require_match(const EngineBench& bench, const S& seeker) {
   require_match(bench, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
 }
 
-/// What the seeker asks of the next cycle of a bench; a new operating point restarts it first.
+/// What the seeker asks of the next cycle of a bench, valid until it is told; a new operating point restarts it first.
 template <class S>
-double ask(const EngineBench& bench, S& seeker, double& estimate_cad) noexcept {
+std::span<const double> ask(const EngineBench& bench, S& seeker, double& estimate_cad) noexcept {
   if (bench.point_changes_at(bench.cycle())) seeker.restart();
   estimate_cad = seeker.estimate()[0];
-  return seeker.ask()[0];
+  const optimize::Inputs& asked = seeker.ask();
+  return {asked.data(), static_cast<std::size_t>(asked.size())};
 }
 
 /// What the bench gave. Noexcept as the seeker's `tell` is.
@@ -54,7 +56,7 @@ void tell(const BenchCycle& c, S& seeker) noexcept(noexcept(seeker.tell(optimize
   seeker.tell({summed ? std::span<const double>(&c.j, 1) : c.component_values(),
                c.limits(),
                c.misfire || c.unphysical,
-               {&c.soc_applied_cad, 1}});
+               {c.applied.data(), static_cast<std::size_t>(seeker.estimate().size())}});
 }
 
 /// One cycle. Noexcept as the seeker's `tell` is.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -27,8 +28,8 @@ constexpr double planned_readings[] = {1, 4, 16};  // that the worth of an input
 constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
 constexpr double surprise_rate = 0.1, most_surprise = 3.0;
 constexpr std::int64_t calm_cycles = 10;  // after a doubt
-constexpr double doubt_age = 3.0;         // memories: what was known counts a twentieth then
-constexpr double lags_held = 2.0;
+constexpr double doubt_age = 10.0;        // memories
+constexpr double cautious_readings = 5.0;  // per input and one: before them the horizon is shorter
 constexpr double active_room = 0.05;   // scales of a limit
 constexpr double plane_memory = 20.0;  // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
@@ -86,13 +87,17 @@ GaussianProcessSeekingSettings checked(GaussianProcessSeekingSettings s) {
   return s;
 }
 
-// Of the components, then of the limits.
+// Of the components, then of the limits. Lags are taken out of the readings instead (`Window`).
 std::vector<UncertainLag> lags_with_j(const GaussianProcessSeekingSettings& s) {
   std::vector<UncertainLag> out;
   for (const ComponentLag& lag : s.components)
-    out.push_back({lag, lag == ComponentLag{} ? 0 : s.delay_uncertainty, plane_memory});
+    out.push_back({lag, lag.delay_cycles > 0.0 ? s.delay_uncertainty : 0, plane_memory});
   const std::vector<UncertainLag> limits = lags_of(s.limits, plane_memory);
   out.insert(out.end(), limits.begin(), limits.end());
+  for (UncertainLag& one : out) {
+    if (one.lag.lag_cycles > 0.0) one.delay_uncertainty = 0;
+    one.lag.lag_cycles = 0.0;
+  }
   return out;
 }
 
@@ -156,13 +161,19 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       effect_(candidates + most_on_their_way, 0.0),
       breaks_(candidates, 0.0),
       over_(candidates, 0.0),
+      mean_over_(candidates, 0.0),
       order_(candidates, 0) {
   double longest = 0.0;
+  const auto add = [&](const ComponentLag& lag) {
+    longest = std::max(longest, lag.lag_cycles);
+    windows_.push_back({.keep = lag.lag_cycles > 0.0 ? std::exp(-1.0 / lag.lag_cycles) : 0.0,
+                        .inputs = Inputs::Zero(settings_.space.size())});
+  };
   for (const ComponentLag& component : settings_.components)
-    longest = std::max(longest, component.lag_cycles);
+    add(component);
   for (const Limit& limit : settings_.limits)
-    longest = std::max(longest, limit.lag.lag_cycles);
-  hold_ += static_cast<std::int64_t>(std::ceil(lags_held * longest));
+    add(limit.lag);
+  hold_ = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(longest)));
 }
 
 Inputs GaussianProcessSeeking::scaled(const Inputs& input) const noexcept {
@@ -191,32 +202,66 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, j_.size(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
+  Inputs told;
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
+  causes_.record(applied);
   if (status == TellStatus::accepted) {
-    Inputs told;
-    learn(reading, protocol_.applied(reading, applied_, told));
+    learn(reading, applied);
+  } else {
+    for (Window& window : windows_)
+      window.last = std::numeric_limits<double>::quiet_NaN();
   }
-  if (++held_ >= hold_ || star_ < 1) {
+  if (++held_ >= hold_) {
     held_ = 0;
     choose();
   }
   return status;
 }
 
+// One reading per window of `hold` cycles: y_k = keep y_(k-1) + (1 - keep) J of the cycle that it comes from.
+bool GaussianProcessSeeking::Window::take(double& value, Inputs& z, std::int64_t hold) noexcept {
+  if (keep == 0.0) return true;
+  const double before = last;
+  last = value;
+  if (std::isnan(before)) return false;
+  const double own = (value - keep * before) / (1.0 - keep);
+  ++idle;
+  if (count > 0 && z != inputs / static_cast<double>(count) && 2 * count < hold && idle < 2 * hold) count = 0;
+  if (count == 0) {
+    sum = 0.0;
+    inputs.setZero();
+  }
+  sum += own;
+  inputs += z;
+  if (++count < hold) return false;
+  value = sum / static_cast<double>(count);
+  z = inputs / static_cast<double>(count);
+  count = idle = 0;
+  return true;
+}
+
+// Whether the reading of a source says something, of which input, and what.
+bool GaussianProcessSeeking::reads(std::size_t source, const Inputs& applied, double& value, Inputs& z) noexcept {
+  if (!causes_.known(source)) return false;
+  z = scaled(causes_.of(source, applied));
+  return windows_[source].take(value, z, hold_);
+}
+
 void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
-  causes_.record(applied);
   const Inputs about = scaled(estimate_);
+  Inputs z(about.size());
   for (std::size_t i = 0; i < j_.size(); ++i) {
-    const double value = settings_.maximize ? reading.components[i] : -reading.components[i];
+    double value = settings_.maximize ? reading.components[i] : -reading.components[i];
     if (causes_.judge(i, applied, value)) doubt();
-    if (!causes_.known(i)) continue;
-    const Inputs z = scaled(causes_.of(i, applied));
+    if (!reads(i, applied, value, z)) continue;
     watch_surprise(i, value, z);
     j_[i].record(z, value, about);
   }
   const std::size_t all = j_.size();
   for (std::size_t i = 0; i < limited_.size(); ++i) {
-    causes_.judge(all + i, applied, reading.limits[i]);
-    if (causes_.known(all + i)) limited_[i].record(scaled(causes_.of(all + i, applied)), reading.limits[i], about);
+    double value = reading.limits[i];
+    causes_.judge(all + i, applied, value);
+    if (reads(all + i, applied, value, z)) limited_[i].record(z, value, about);
   }
   // Only what has been read widens what may be asked.
   const std::size_t slowest = causes_.slowest();
@@ -275,7 +320,7 @@ void GaussianProcessSeeking::choose() noexcept {
   expected_ = (settings_.maximize ? 1.0 : -1.0) * means_[0];
   expected_sd_ = std::sqrt(variance);
   for (std::size_t i = 0; i < limited_.size(); ++i)
-    room_[i] = -excess(i, 0) / settings_.limits[i].scale;
+    room_[i] = -excess(i, 0, quantile_) / settings_.limits[i].scale;
   send(candidates_.row(most_worth(candidates)).transpose());
 }
 
@@ -292,6 +337,10 @@ void GaussianProcessSeeking::take_in(std::size_t component, int points) noexcept
     if (at == most_on_their_way) continue;
     if (at == more) candidates_.row(points + more++) = z.transpose();
     ++times[static_cast<std::size_t>(at)];
+  }
+  if (windows_[component].keep > 0.0) {
+    for (int& own : times)
+      own = static_cast<int>((own + hold_ - 1) / hold_);
   }
   const int all = points + more;
   model.predict(candidates_, all);
@@ -358,33 +407,36 @@ void GaussianProcessSeeking::send(const Inputs& z) noexcept {
   applied_ = (before + step).cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
 }
 
-// What limit i would be exceeded by at a point of the last prediction, with the stated probability at most.
-double GaussianProcessSeeking::excess(std::size_t i, int point) noexcept {
+// What limit i would be exceeded by at a point of the last prediction, that many standard deviations above the mean.
+double GaussianProcessSeeking::excess(std::size_t i, int point, double quantile) const noexcept {
   const Limit& limit = settings_.limits[i];
   const ProcessModel& model = limited_[i];
   const double sd = std::sqrt(std::max(model.covariance(point, point), 0.0));
-  return model.mean(point) + quantile_ * sd + limit.margin + limit.margin_sd * model.noise_sd() - limit.upper;
+  return model.mean(point) + quantile * sd + limit.margin + limit.margin_sd * model.noise_sd() - limit.upper;
 }
 
-// Largest excess of any limit, in scales, of every candidate.
+// Largest excess of any limit, in scales, of every candidate: with the stated probability, and in the mean.
 void GaussianProcessSeeking::judge_safety(int points) noexcept {
   std::fill(over_.begin(), over_.end(), 0.0);
+  std::fill(mean_over_.begin(), mean_over_.end(), 0.0);
   for (std::size_t i = 0; i < limited_.size(); ++i) {
     limited_[i].predict(candidates_, points);
     for (int p = 0; p < points; ++p) {
-      const double own = excess(i, p) / settings_.limits[i].scale;
-      double& worst = over_[static_cast<std::size_t>(p)];
-      worst = i == 0 ? own : std::max(worst, own);
+      const auto at = static_cast<std::size_t>(p);
+      const double likely = excess(i, p, quantile_) / settings_.limits[i].scale;
+      const double mean = excess(i, p, 0.0) / settings_.limits[i].scale;
+      over_[at] = i == 0 ? likely : std::max(over_[at], likely);
+      mean_over_[at] = i == 0 ? mean : std::max(mean_over_[at], mean);
     }
   }
 }
 
-// The best safe mean around a point, by ever narrower clouds; where nothing is safe, the least excess.
+// The best safe mean around a point, by ever narrower clouds; where nothing is safe, the least mean excess.
 Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
   const Eigen::Index n = from.size();
   Inputs best = reachable(from);
-  double best_mean = 0.0, best_over = 0.0;
-  bool first = true;
+  double best_mean = 0.0, best_excess = 0.0;
+  bool first = true, safe = false;
   double width = search_width;
   for (int round = 0; round < search_rounds; ++round, width *= search_shrinks) {
     candidates_.row(0) = best.transpose();
@@ -397,18 +449,14 @@ Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
     judge_safety(search_points + 1);
     for (ProcessModel& model : j_)
       model.predict_means(candidates_, search_points + 1);
-    const auto better = [&](double over, double mean) {
-      if (over > 0.0 || best_over > 0.0) return over < best_over;
-      return mean > best_mean;
-    };
-    if (first) {
-      best_over = over_[0];
-      best_mean = mean(0);
+    for (int p = first ? 0 : 1; p <= search_points; ++p) {
+      const auto at = static_cast<std::size_t>(p);
+      const bool own_safe = over_[at] <= 0.0;
+      const bool better = own_safe != safe ? own_safe : safe ? mean(p) > best_mean : mean_over_[at] < best_excess;
+      if (!first && !better) continue;
       first = false;
-    }
-    for (int p = 1; p <= search_points; ++p) {
-      if (!better(over_[static_cast<std::size_t>(p)], mean(p))) continue;
-      best_over = over_[static_cast<std::size_t>(p)];
+      safe = own_safe;
+      best_excess = mean_over_[at];
       best_mean = mean(p);
       best = candidates_.row(p).transpose();
     }
@@ -447,7 +495,7 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
   }
   if (!unsafe_.empty()) unsafe_[0] = safe == 0 ? unsafe_[0] + 1.0 : 0.0;
   if (safe == 0) {
-    return static_cast<int>(std::min_element(over_.begin(), over_.begin() + points) - over_.begin());
+    return static_cast<int>(std::min_element(mean_over_.begin(), mean_over_.begin() + points) - mean_over_.begin());
   }
   const std::vector<int>& kept = order_;
   for (int a = 0; a < safe; ++a)
@@ -455,6 +503,9 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
   const double noise = std::max(noise_sd(), least_noise * std::abs(worth_mean_[0]));
   const std::span<const double> means(worth_mean_.data(), at(safe));
   const std::span<double> effects(effect_.data(), at(safe));
+  // In units of what may be asked anew; early numbers of the processes promise too much.
+  const double read = static_cast<double>(j_[0].count()) / (cautious_readings * static_cast<double>(1 + estimate_.size()));
+  const double horizon = settings_.horizon * std::min(1.0, read) / static_cast<double>(hold_);
   double most = 0.0;
   int best = -1;
   std::array<int, candidates> scratch{};
@@ -468,13 +519,13 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
       if (!(sd > 0.0)) continue;
       // The largest of lines through one point rises by their range of slopes times E max(Z, 0) at most.
       const double at_most = rise_of_normal * range / (sd * readings);
-      if (at_most <= taught || (best >= 0 && means[at(a)] + settings_.horizon * at_most <= most)) continue;
+      if (at_most <= taught || (best >= 0 && means[at(a)] + horizon * at_most <= most)) continue;
       for (int b = 0; b < safe; ++b)
         effects[at(b)] = covariance_(kept[at(b)], kept[at(a)]) / sd;
       const double gain = knowledge_gradient(means, effects, {scratch.data(), at(safe)}, {breaks_.data(), at(safe)});
       taught = std::max(taught, gain / readings);
     }
-    const double worth = means[at(a)] + settings_.horizon * taught;
+    const double worth = means[at(a)] + horizon * taught;
     if (best >= 0 && !(worth > most)) continue;
     most = worth;
     best = kept[at(a)];
@@ -504,6 +555,10 @@ void GaussianProcessSeeking::restart() noexcept {
   }
   middle_ = lowest_ = highest_ = scaled(estimate_);
   star_ = held_ = since_doubt_ = 0;
+  for (Window& window : windows_) {
+    window.last = std::numeric_limits<double>::quiet_NaN();
+    window.count = window.idle = 0;
+  }
   std::fill(surprise_.begin(), surprise_.end(), 1.0);
   expected_ = expected_sd_ = 0.0;
   std::fill(room_.begin(), room_.end(), 0.0);

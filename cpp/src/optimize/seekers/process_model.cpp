@@ -22,6 +22,7 @@ constexpr double useless_factor = -6.0;
 constexpr int settling_readings = 30;
 constexpr int evidence_readings = 60;
 constexpr double crowd = 0.75;  // share of the readings, those nearest to the estimate, of which the oldest goes
+constexpr double wander_place = 0.015, wander_level = 0.8;  // in a memory: slopes in bends, the level in noise
 constexpr double jitter = 1e-10;
 constexpr int first_trials = 60, more_trials = 20, late_trials = 3;
 constexpr int first_readings = 15, more_readings = 40;
@@ -208,18 +209,15 @@ double ProcessModel::evidence(const Numbers& numbers, bool same_lengths) noexcep
       const int other = chosen_[static_cast<std::size_t>(b)], i = std::max(one, other), j = std::min(one, other);
       const double matern =
           same_lengths ? matern_(i, j) : kernel_.matern(&points_(i, 0), &points_(j, 0), s.inverse_length);
-      small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s);
+      small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s) + wandered(i, j, s);
     }
-    small_(a, a) += s.noise_variance * std::exp(ages_[one] / settings_.memory) + jitter * s.bend * s.bend;
+    small_(a, a) += s.noise_variance + jitter * s.bend * s.bend;
   }
   cholesky(small_, n);
   solve_lower(small_, n, small_rest_.data());
   double out = -0.5 * dot(small_rest_.data(), small_rest_.data(), n);
-  for (std::int64_t a = 0; a < n; ++a) {
-    // A faded reading counts as a power of its likelihood; without this term it would speak for less noise.
-    const double faded = 1.0 - std::exp(-ages_[chosen_[static_cast<std::size_t>(a)]] / settings_.memory);
-    out += 0.5 * faded * std::log(s.noise_variance) - std::log(small_(a, a));
-  }
+  for (std::int64_t a = 0; a < n; ++a)
+    out -= std::log(small_(a, a));
   out += log_priors(numbers, s);
   return std::isfinite(out) ? out : -std::numeric_limits<double>::infinity();
 }
@@ -314,12 +312,22 @@ void ProcessModel::try_numbers(int trials) noexcept {
   }
 }
 
+// Random walks of level and slopes from the younger of two readings until now.
+double ProcessModel::wandered(std::int64_t i, std::int64_t j, const Scales& s) const noexcept {
+  double slopes = 0.0;
+  for (Eigen::Index k = 0; k < settings_.inputs; ++k)
+    slopes += (points_(i, k) - 0.5) * (points_(j, k) - 0.5);
+  const double place = wander_place * kernel_.whole_bend(s);
+  return (wander_level * wander_level * s.noise_variance + place * place * slopes) * std::min(ages_[i], ages_[j]) /
+         settings_.memory;
+}
+
 void ProcessModel::factor() noexcept {
   for (std::int64_t i = 0; i < count_; ++i) {
     weights_[i] = values_[i] - level_ - kernel_.mean(&points_(i, 0), now_);
     for (std::int64_t j = 0; j <= i; ++j)
-      factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_);
-    factor_(i, i) += now_.noise_variance * std::exp(ages_[i] / settings_.memory) + jitter * now_.bend * now_.bend;
+      factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_) + wandered(i, j, now_);
+    factor_(i, i) += now_.noise_variance + jitter * now_.bend * now_.bend;
   }
   cholesky(factor_, count_);
   solve_lower(factor_, count_, weights_.data());

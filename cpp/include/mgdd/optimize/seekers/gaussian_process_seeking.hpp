@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -117,6 +118,8 @@ class GaussianProcessSeeking {
     v("limit_room", self.room_);
     v("limit_unsafe", self.unsafe_);
     CausingInputs::visit(self.causes_, v, "cause");
+    for (std::size_t i = 0; i < self.windows_.size(); ++i)
+      Window::visit(self.windows_[i], v, "window" + std::to_string(i));
     for (std::size_t i = 0; i < self.j_.size(); ++i)
       ProcessModel::visit(self.j_[i], v, i == 0 ? "j" : "j" + std::to_string(i));
     for (std::size_t i = 0; i < self.limited_.size(); ++i)
@@ -124,11 +127,32 @@ class GaussianProcessSeeking {
   }
 
  private:
+  /// Behind a first-order lag: what J was while an input was held, from the readings and what they had come from.
+  struct Window {
+    double keep = 0.0;  // of a reading in the next; 0: no lag
+    double last = std::numeric_limits<double>::quiet_NaN();
+    double sum = 0.0;
+    std::int64_t count = 0, idle = 0;  // cycles in it; since one was read
+    Inputs inputs{};
+
+    /// True where `value` becomes one reading and `z` the input that it belongs to.
+    bool take(double& value, Inputs& z, std::int64_t hold) noexcept;
+    template <class Self, class V>
+    static void visit(Self& self, V& v, const std::string& name) {
+      if (self.keep == 0.0) return;
+      v(name + "_last", self.last);
+      v(name + "_sum", self.sum);
+      v(name + "_count", self.count);
+      v(name + "_idle", self.idle);
+      v(name + "_inputs", self.inputs);
+    }
+  };
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
   double draw(std::uint64_t stream, int index) const noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
+  bool reads(std::size_t source, const Inputs& applied, double& value, Inputs& z) noexcept;
   void watch_surprise(std::size_t component, double value, const Inputs& z) noexcept;
   void doubt() noexcept;
   void take_in(std::size_t component, int points) noexcept;
@@ -138,7 +162,7 @@ class GaussianProcessSeeking {
   bool guided() const noexcept;
   void draw_candidates(const Inputs& about) noexcept;
   void judge_safety(int points) noexcept;
-  double excess(std::size_t i, int point) noexcept;
+  double excess(std::size_t i, int point, double quantile) const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;
   void explore(const Inputs& z) noexcept;
@@ -148,7 +172,8 @@ class GaussianProcessSeeking {
   double quantile_;
   std::int64_t hold_;  // cycles for which an input is asked behind a lag
   Protocol protocol_;
-  CausingInputs causes_;         // of J, then of the limits
+  CausingInputs causes_;         // of the components, then of the limits
+  std::vector<Window> windows_;  // of the same
   std::vector<ProcessModel> j_;  // of its components
   std::vector<ProcessModel> limited_;
   Inputs estimate_, applied_;
@@ -165,7 +190,7 @@ class GaussianProcessSeeking {
   InputTable candidates_;
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
-  std::vector<double> worth_mean_, effect_, breaks_, over_;
+  std::vector<double> worth_mean_, effect_, breaks_, over_, mean_over_;
   std::vector<int> order_;
 };
 

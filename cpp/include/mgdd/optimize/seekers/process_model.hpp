@@ -1,7 +1,7 @@
 // A Gaussian process of one measured quantity over the inputs (Rasmussen and Williams 2006, ch. 2 and 5), for seekers,
-// with the covariance of `ProcessKernel`. The variance of a reading grows with its age by exp(age/memory). Bend, noise,
-// size and lengths of the rest, and what the guide counts by, go to where the evidence of the readings, with priors, is
-// largest, a few trials per reading. Inputs are counted in their ranges, 0 to 1. noexcept and allocation-free after
+// with the covariance of `ProcessKernel`. Level and slopes wander with time, so that old readings say less of them than of
+// the bends. Bend, noise, size and lengths of the rest, and what the guide counts by, go to where the evidence of the
+// readings, with priors, is largest, a few trials per reading. Inputs are counted in their ranges, 0 to 1. noexcept and allocation-free after
 // construction.
 #pragma once
 
@@ -23,7 +23,7 @@ class ProcessModel {
     Eigen::Index inputs = 1;
     int kept = 100;                    ///< readings, 10 at least
     int most_points = 100;             ///< that `predict` is asked for at once
-    double memory = 143.0;             ///< [readings]
+    double memory = 143.0;             ///< [readings] in which level and slopes wander by what counts
     bool bends_down = true;            ///< whether a maximum is expected, as of J
     std::optional<double> noise_sd{};  ///< of a reading, > 0; none: learnt
     std::uint64_t seed = 0;
@@ -84,6 +84,7 @@ class ProcessModel {
   void tabulate(std::int64_t reading) noexcept;
   void tabulate_lengths() noexcept;
   void know_tables() noexcept;
+  double wandered(std::int64_t i, std::int64_t j, const Scales& s) const noexcept;
   void factor() noexcept;
   void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
