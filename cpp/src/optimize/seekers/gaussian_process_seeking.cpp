@@ -22,16 +22,16 @@ constexpr int most_on_their_way = 8;  // inputs whose readings have not come, th
 constexpr double cloud_nearest = 0.011, cloud_farthest = 0.3;  // of the near ones, as a share of the bounds
 constexpr int search_rounds = 6, search_points = 12;
 constexpr double search_width = 0.08, search_shrinks = 0.45;
-constexpr double growth = 0.4;                     // beyond what has been explored, in widths of that
-constexpr double guided_reach = 0.2;               // beyond it at least where there is a guide, in ranges
-constexpr double planned_readings[] = {1, 4, 16};  // that the worth of an input is reckoned with
+constexpr double growth = 0.4;                          // beyond what has been explored, in widths of that
+constexpr double guided_reach = 0.2;                    // beyond it at least where there is a guide, in ranges
+constexpr double planned_readings[] = {1, 4, 16};       // that the worth of an input is reckoned with
 constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
 constexpr double surprise_rate = 0.1, most_surprise = 3.0;
-constexpr std::int64_t calm_cycles = 10;  // after a doubt
-constexpr double doubt_age = 10.0;        // memories
+constexpr std::int64_t calm_cycles = 10;   // after a doubt
+constexpr double doubt_age = 10.0;         // memories
 constexpr double cautious_readings = 5.0;  // per input and one: before them the horizon is shorter
-constexpr double active_room = 0.05;   // scales of a limit
-constexpr double plane_memory = 20.0;  // cycles of the planes that tell the delays from one another
+constexpr double active_room = 0.05;       // scales of a limit
+constexpr double plane_memory = 20.0;      // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
 
 // None, or one of each; a guide says something of every input, and not the same everywhere.
@@ -504,15 +504,16 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
   const std::span<const double> means(worth_mean_.data(), at(safe));
   const std::span<double> effects(effect_.data(), at(safe));
   // In units of what may be asked anew; early numbers of the processes promise too much.
-  const double read = static_cast<double>(j_[0].count()) / (cautious_readings * static_cast<double>(1 + estimate_.size()));
+  const double read =
+      static_cast<double>(j_[0].count()) / (cautious_readings * static_cast<double>(1 + estimate_.size()));
   const double horizon = settings_.horizon * std::min(1.0, read) / static_cast<double>(hold_);
   double most = 0.0;
   int best = -1;
   std::array<int, candidates> scratch{};
   for (int a = 0; a < safe; ++a) {
     double taught = 0.0;
-    const auto [least, steepest] = std::ranges::minmax_element(
-        kept.begin(), kept.begin() + safe, {}, [&](int b) { return covariance_(b, kept[at(a)]); });
+    const auto [least, steepest] = std::ranges::minmax_element(kept.begin(), kept.begin() + safe, {},
+                                                               [&](int b) { return covariance_(b, kept[at(a)]); });
     const double range = covariance_(*steepest, kept[at(a)]) - covariance_(*least, kept[at(a)]);
     for (const double readings : planned_readings) {
       const double sd = std::sqrt(std::max(covariance_(kept[at(a)], kept[at(a)]), 0.0) + noise * noise / readings);

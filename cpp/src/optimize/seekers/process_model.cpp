@@ -22,7 +22,8 @@ constexpr double useless_factor = -6.0;
 constexpr int settling_readings = 30;
 constexpr int evidence_readings = 60;
 constexpr double crowd = 0.75;  // share of the readings, those nearest to the estimate, of which the oldest goes
-constexpr double wander_place = 0.015, wander_level = 0.8;  // in a memory: slopes in bends, the level in noise
+constexpr double wander_place = 0.04, wander_level = 1.2;  // in a memory: slopes in bends, the level in noise
+constexpr double wander_sd = 1.0;                          // of their logarithms
 constexpr double jitter = 1e-10;
 constexpr int first_trials = 60, more_trials = 20, late_trials = 3;
 constexpr int first_readings = 15, more_readings = 40;
@@ -78,7 +79,7 @@ ProcessModel::ProcessModel(const Settings& settings)
       points_(InputTable::Zero(settings.kept, kernel_.width())),
       values_(Eigen::VectorXd::Zero(settings.kept)),
       ages_(values_),
-      numbers_(Numbers::Zero(3 + settings.inputs + (kernel_.guided() ? 1 : 0))),
+      numbers_(Numbers::Zero(5 + settings.inputs + (kernel_.guided() ? 1 : 0))),
       columns_(InputTable::Zero(kernel_.width(), settings.kept)),
       quadratic_(settings.kept, settings.kept),
       guide_(quadratic_),
@@ -108,6 +109,10 @@ ProcessModel::Scales ProcessModel::scales_of(const Numbers& numbers) const noexc
   const double noise = settings_.noise_sd.value_or(out.bend * std::exp(numbers[1])), rest = std::exp(numbers[2]);
   out.noise_variance = noise * noise;
   out.rest = rest * rest;
+  const double place = std::exp(numbers[3 + settings_.inputs]), level = std::exp(numbers[4 + settings_.inputs]);
+  const double wide = wander_place * place * kernel_.whole_bend(out);
+  out.wander_slope = wide * wide / settings_.memory;
+  out.wander_level = wander_level * wander_level * level * level * out.noise_variance / settings_.memory;
   out.inverse_length = (-numbers.segment(3, settings_.inputs)).array().exp().matrix();
   return out;
 }
@@ -228,6 +233,8 @@ double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const n
                log_prior(numbers[2], rest_prior, rest_prior_sd);
   for (Eigen::Index i = 0; i < settings_.inputs; ++i)
     out += log_prior(numbers[3 + i], length_prior, length_prior_sd);
+  for (Eigen::Index i = 3 + settings_.inputs; i < 5 + settings_.inputs; ++i)
+    out += log_prior(numbers[i], 0.0, wander_sd);
   if (kernel_.guided()) {
     const double factor = numbers[numbers.size() - 1] / factor_width;
     out += log_prior(numbers[0] - whole, guided_bend_prior, guided_bend_prior_sd) - std::log1p(factor * factor);
@@ -262,6 +269,7 @@ void ProcessModel::begin_numbers() noexcept {
   numbers_[1] = noise_prior;
   numbers_[2] = rest_prior;
   numbers_.segment(3, settings_.inputs).setConstant(length_prior);
+  numbers_.segment(3 + settings_.inputs, 2).setZero();
   if (kernel_.guided()) {
     numbers_[numbers_.size() - 1] = 0.0;
     numbers_[0] = std::log(kernel_.guide_bend()) + guided_bend_prior;
@@ -304,7 +312,7 @@ void ProcessModel::try_numbers(int trials) noexcept {
     }
     const auto bounded = trial.segment(1, 2 + settings_.inputs);
     if (bounded.minCoeff() < lowest_log || bounded.maxCoeff() > highest_log) continue;
-    const double found = evidence(trial, !jumps && (which < 3 || which == 3 + settings_.inputs));
+    const double found = evidence(trial, !jumps && (which < 3 || which >= 3 + settings_.inputs));
     if (found <= best) continue;
     best = found;
     numbers_ = trial;
@@ -317,9 +325,7 @@ double ProcessModel::wandered(std::int64_t i, std::int64_t j, const Scales& s) c
   double slopes = 0.0;
   for (Eigen::Index k = 0; k < settings_.inputs; ++k)
     slopes += (points_(i, k) - 0.5) * (points_(j, k) - 0.5);
-  const double place = wander_place * kernel_.whole_bend(s);
-  return (wander_level * wander_level * s.noise_variance + place * place * slopes) * std::min(ages_[i], ages_[j]) /
-         settings_.memory;
+  return (s.wander_level + s.wander_slope * slopes) * std::min(ages_[i], ages_[j]);
 }
 
 void ProcessModel::factor() noexcept {

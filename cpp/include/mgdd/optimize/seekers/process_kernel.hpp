@@ -23,10 +23,11 @@ inline constexpr int most_kept = 200;  ///< readings of a process
 class ProcessKernel {
  public:
   struct Scales {
-    double bend = 1.0;            ///< of what the guide does not say
-    double guide = 0.0;           ///< that the guide is multiplied by
-    double noise_variance = 0.0;  ///< of a reading
-    double rest = 0.0;            ///< variance of the Matern term over bend^2
+    double bend = 1.0;                              ///< of what the guide does not say
+    double guide = 0.0;                             ///< that the guide is multiplied by
+    double noise_variance = 0.0;                    ///< of a reading
+    double rest = 0.0;                              ///< variance of the Matern term over bend^2
+    double wander_level = 0.0, wander_slope = 0.0;  ///< variances per reading
     Inputs inverse_length{};
   };
   /// What the terms without a length amount to for two points, over their scales.

@@ -1,8 +1,8 @@
 // A Gaussian process of one measured quantity over the inputs (Rasmussen and Williams 2006, ch. 2 and 5), for seekers,
-// with the covariance of `ProcessKernel`. Level and slopes wander with time, so that old readings say less of them than of
-// the bends. Bend, noise, size and lengths of the rest, and what the guide counts by, go to where the evidence of the
-// readings, with priors, is largest, a few trials per reading. Inputs are counted in their ranges, 0 to 1. noexcept and allocation-free after
-// construction.
+// with the covariance of `ProcessKernel`. Level and slopes wander with time, so that old readings say less of them than
+// of the bends. Bend, noise, size and lengths of the rest, and what the guide counts by, go to where the evidence of
+// the readings, with priors, is largest, a few trials per reading. Inputs are counted in their ranges, 0 to 1. noexcept
+// and allocation-free after construction.
 #pragma once
 
 #include <cmath>
@@ -70,8 +70,9 @@ class ProcessModel {
   }
 
  private:
-  // Logarithms: bend, noise over bend, size of the rest over bend, lengths; what the guide counts by.
-  using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4 + max_inputs, 1>;
+  // Logarithms: bend, noise over bend, size of the rest over bend, lengths; how fast slopes and level wander, over the
+  // expected; what the guide counts by.
+  using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6 + max_inputs, 1>;
   using Scales = ProcessKernel::Scales;
   Scales scales_of(const Numbers& numbers) const noexcept;
   void choose_readings(const Inputs& about) noexcept;
