@@ -148,14 +148,15 @@ void bind_gaussian_process(py::module_& m) {
           "says nothing.")
       .def_property_readonly(
           "delay_cycles",
-          [](const B& b) {
+          [](const B& b) -> py::object {
             const auto r = b.use();
+            if (r->component_count() == 1) return py::float_(r->seeker().delay_cycles());
             py::list out;
             for (std::size_t i = 0; i < r->component_count(); ++i)
               out.append(r->seeker().delay_cycles(i));
             return out;
           },
-          "Cycles between input and reading of each component that explain the readings best.");
+          "Cycles between input and reading of J that explain the readings best; of several components a list.");
   bind_seeking(cls);
 }
 

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'Surface', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -1401,11 +1401,38 @@ class GoldenSection:
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+class Surface:
+    """
+    Behind guide= of mgdd.optimize.GaussianProcessSeeking: a table over a grid.
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __call__(self, at: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
+        """
+        Value at one point; the edge holds outside of the grid.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, list[list[float]], list[float]]:
+        ...
+    def __init__(self, axes: collections.abc.Sequence, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def axes(self) -> list[list[float]]:
+        """
+        Of the grid, one per input.
+        """
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        At its nodes, shape of the axes.
+        """
 class GaussianProcessSeeking:
     """
     By Gaussian processes; see mgdd.optimize.GaussianProcessSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, kept: typing.SupportsInt | typing.SupportsIndex = 100, first_step: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., inputs: collections.abc.Sequence[Input] | None = None, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, horizon: typing.SupportsFloat | typing.SupportsIndex = 60.0, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, kept: typing.SupportsInt | typing.SupportsIndex = 100, first_step: typing.SupportsFloat | typing.SupportsIndex = 0.1, limit_probability: typing.SupportsFloat | typing.SupportsIndex = 0.95, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, components: collections.abc.Sequence[ComponentLag] | None = None, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], guide: collections.abc.Sequence[Surface | None] | None = None, limit_guides: collections.abc.Sequence[Surface | None] | None = None) -> None:
         """
         start : first estimate, per input
         lower : least applied input, per input
@@ -1419,9 +1446,13 @@ class GaussianProcessSeeking:
         limit_probability : with which a limit holds at every input asked for
         delay_cycles : between the plant and J
         lag_cycles : the same
+        components : delay and lag of each component of J
+        delay_uncertainty : cycles by which a delay may be shorter or longer
         seed : of the inputs that are compared
         maximize : False to minimise J
         limits : measured quantities to keep
+        guide : what a model says of J
+        limit_guides : the same of every limit
         """
     def _clear_history(self) -> None:
         """
@@ -1465,6 +1496,11 @@ class GaussianProcessSeeking:
         Cycles told so far, misfires included.
         """
     @property
+    def delay_cycles(self) -> typing.Any:
+        """
+        Cycles between input and reading of J that explain the readings best; of several components a list.
+        """
+    @property
     def doubts(self) -> int:
         """
         How often the readings were not what the process expects, and what was known was aged.
@@ -1499,6 +1535,11 @@ class GaussianProcessSeeking:
     def failing_everywhere(self) -> bool:
         """
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def guide_factor(self) -> list:
+        """
+        What the guide of each component is multiplied by, as learnt: about 1 where it is right, towards 0 where it says nothing.
         """
     @property
     def input_names(self) -> list[str]:

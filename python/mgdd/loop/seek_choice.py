@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from mgdd.errors import ParameterError
 from mgdd.guide import Curve, CurveSeeking
 from mgdd.optimize import GaussianProcessSeeking, Input, Limit, Spsa
@@ -55,7 +57,7 @@ def chosen(
         told = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
         return Choice(seeker, f"{told}, placed by the readings", first)
     middle = {one.name: 0.5 * (one.lower + one.upper) for one in inputs}
-    space["start"] = start or middle
+    space["start"] = start or (middle if guide is None or limits else _best_of(guide, inputs, middle, maximize))
     if cycles >= MANY_CYCLES and not limits and guide is None and not delay_cycles and not lag_cycles:
         why = f"{cycles} cycles of {len(inputs)} inputs: its gains decrease, and the optimum is taken to stand still"
         return Choice(Spsa(**space, seed=seed), why, first)
@@ -65,6 +67,14 @@ def chosen(
     kept = f", {', '.join(limit.name for limit in limits)} to keep" if limits else ""
     by = " and a guide" if guided else ""
     return Choice(seeker, f"{count}{by}{kept}: it loses least on the way, whatever their units", first)
+
+
+def _best_of(guide: Any, inputs: Sequence[Input], middle: Mapping[str, float], maximize: bool) -> dict[str, float]:
+    """Return where a guide of several inputs is best: without limits a search begins there."""
+    (surface,) = GaussianProcessSeeking(start=middle, inputs=list(inputs), guide=guide).settings["guide"]
+    values = surface.values if maximize else -surface.values
+    at = np.unravel_index(int(np.argmax(values)), values.shape)
+    return {one.name: axis[k] for one, axis, k in zip(inputs, surface.axes, at, strict=True)}
 
 
 def _parabola(one: Input) -> Curve:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core.engine import Cylinder
+from mgdd._core.engine import Cylinder, Performance
 from mgdd.errors import ParameterError, argument
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.loop.bench import EngineBench
-from mgdd.loop.seek_task import Task, amplitude_of, make_seeker
-from mgdd.optimize import Limit
+from mgdd.loop.seek_task import Task, amplitude_of, components_of, make_seeker
+from mgdd.optimize import GaussianProcessSeeking, Limit
 from mgdd.optimize.optimum import Optimum
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ CURVES = ("curve", "calibrated")
 _PARABOLA_BEND = -0.05  # of ten cycle models, wall heat 0 to 1 and 25 to 60 °CA of burn: -0.037 to -0.054
 _CALIBRATED = ("wall_heat_scale",)  # no other setting is better on both engines of the study calibrated-guide
 _REACH_CAD = 60.0
-_STEADY_GRID_CAD = 0.1
+_STEADY_GRID_CAD, _MODEL_GRID_CAD = 0.1, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +94,8 @@ def guided_seeker(task: Task, guided: Guidance) -> Seeker | FeedForward | Guided
     limits = [Limit(name, upper) for name, upper in task.limits.items()]
     drawn = guided.model.limit_curves(task.bench.point, list(task.limits)) if limits else None
     low, high = task.bounds_cad
+    if task.late:
+        return _late_seeker(task, guided, limits, drawn)
     seeker = CurveSeeking(
         start=task.start_cad, lower=low, upper=high, curve=guided.curve, limits=limits, limit_curves=drawn
     )
@@ -104,6 +106,26 @@ def guided_seeker(task: Task, guided: Guidance) -> Seeker | FeedForward | Guided
         soc_scatter_cad=float(task.bench.settings["soc_scatter_cad"]),
     )  # fmt: skip
     return GuidedEngine(seeker, guided.model, task.bench.point, calibration=calibration, keep_start=True)
+
+
+def _late_seeker(task: Task, guided: Guidance, limits: list[Limit], drawn: list[Curve] | None) -> Seeker:
+    """Seek behind a late component: each has a process of its own, with what the model says of it as the mean."""
+    low, high = task.bounds_cad
+    own = {name: value for name, value in task.bench.settings.items() if name != "cylinder"} | {"limits": []}
+    grid = np.linspace(low, high, math.ceil((high - low) / _MODEL_GRID_CAD) + 1)
+    guides = []
+    for term in own["performance"].terms:
+        model = EngineBench(guided.cylinder, **own | {"performance": Performance([term])})
+        guides.append(model.steady_map(grid)["j"])
+    settings: dict[str, Any] = {
+        "inputs": {"soc_cad": task.bounds_cad},
+        "guide": guides,
+        "limits": limits,
+        "seed": task.seed,
+    }
+    if drawn is not None:
+        settings["limit_guides"] = [lambda x, one=one: one(x["soc_cad"]) for one in drawn]
+    return GaussianProcessSeeking(start={"soc_cad": task.start_cad}, components=components_of(task), **settings)
 
 
 def late_loss(bench: EngineBench, cycles: xr.Dataset, best: Optimum) -> float:

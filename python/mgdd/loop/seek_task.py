@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from mgdd.optimize import Seeker
     from mgdd.optimize.optimum import Optimum
 
-__all__ = ["Task", "amplitude_of", "default_cycles", "make_seeker"]
+__all__ = ["Task", "amplitude_of", "components_of", "default_cycles", "make_seeker"]
 
 _AMPLITUDE_CAD, _NEWTON_AMPLITUDE_CAD, _LATE_AMPLITUDE_CAD = 1.0, 2.0, 2.0
 _NEWTON_LIMITED_CAD = 1.2  # a wide dither keeps its mean far from a limit
@@ -35,6 +35,7 @@ _PERTURBATION_CAD = 1.5  # of SPSA
 _PERIOD, _TIME_CONSTANT = 10, 40.0  # cycles, without a late sensor
 _CYCLES, _LATE_CYCLES, _LATE_TIME_CONSTANTS = 2000, 4000, 16
 _PROCESS_CYCLES = 300  # of Gaussian process seeking, which needs tens
+_LATE_PROCESS_CYCLES = 2000  # behind the analyser of the bench: 35 windows of 2 s and a delay of 3 s
 # Dimensionless, from settings that were tuned to a curvature of 0.051: gain of SPSA and kappa times that curvature.
 _SPSA_GAIN, _BOUNDED_KAPPA = 20.0 * 0.051, 0.051
 _NEWTON_HOLD_PERIODS = 5
@@ -62,6 +63,8 @@ def default_cycles(task: Task) -> int:
     """Return how long the run should be; a late sensor asks for a slow seeker."""
     if not task.late:
         return _PROCESS_CYCLES if task.method == "gaussian_process_seeking" else _CYCLES
+    if task.method in ("curve", "gaussian_process_seeking"):
+        return _LATE_PROCESS_CYCLES
     return max(_LATE_CYCLES, math.ceil(_LATE_TIME_CONSTANTS * _late_tuning(task).time_constant_cycles))
 
 
@@ -90,14 +93,13 @@ def make_seeker(task: Task) -> Seeker:
         gain = _SPSA_GAIN / curvature
         return Spsa(**space, gain=gain, perturbation=_PERTURBATION_CAD, seed=task.seed, limits=limits)
     if task.method == "gaussian_process_seeking":
-        return GaussianProcessSeeking(**space, seed=task.seed, limits=limits)
+        return GaussianProcessSeeking(**space, seed=task.seed, limits=limits, components=components_of(task))
     if task.method == "golden":
         return GoldenSection(**space, noise_sd=task.noise_sd, limits=limits)
-    period, time_constant, components = _PERIOD, _TIME_CONSTANT, None
+    period, time_constant = _PERIOD, _TIME_CONSTANT
     if task.late:
         tuning = _late_tuning(task)
         period, time_constant = max(_PERIOD, tuning.period), tuning.time_constant_cycles
-        components = [ComponentLag(), _lag(task)]  # the order of Performance.efficiency_and_nox
     if task.method == "newton":
         return NewtonSeeking(
             **space,
@@ -105,7 +107,7 @@ def make_seeker(task: Task) -> Seeker:
             **newton_settings(curvature, period, reach=5.0),
             time_constant_cycles=time_constant,
             hold_cycles=_NEWTON_HOLD_PERIODS * period if task.late else _HOLD,
-            components=components,
+            components=components_of(task),
             limits=limits,
         )
     return ExtremumSeeking(
@@ -114,7 +116,7 @@ def make_seeker(task: Task) -> Seeker:
         amplitude=amplitude,
         period=period,
         gain=approach_gain(curvature, time_constant, amplitude=amplitude),
-        components=components,
+        components=components_of(task),
         limits=limits,
     )
 
@@ -130,6 +132,11 @@ def amplitude_of(task: Task) -> float:
     if task.method == "newton":
         return _NEWTON_LIMITED_CAD if task.best.active_limits else _NEWTON_AMPLITUDE_CAD
     return _AMPLITUDE_CAD
+
+
+def components_of(task: Task) -> list[ComponentLag] | None:
+    """Return what stands between the plant and each component of J; None where nothing does."""
+    return [ComponentLag(), _lag(task)] if task.late else None  # the order of Performance.efficiency_and_nox
 
 
 def _lag(task: Task) -> ComponentLag:

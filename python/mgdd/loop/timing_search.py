@@ -24,7 +24,7 @@ from mgdd.optimize.optimum import Optimum
 
 __all__ = ["TimingSearch", "TimingSearchRun"]
 
-_LATE = ("extremum_seeking", "newton")
+_LATE = ("extremum_seeking", "newton", "gaussian_process_seeking", None)  # None: a guide that is a seeker
 _COV_TRIAL = 1000
 _START_CAD = -20.0
 _MOST_CYCLES = 2_000_000
@@ -128,10 +128,12 @@ class TimingSearch:
                     raise ParameterError(
                         f"{argument(name)} acts with {plain}, feed_forward or map: {said} is a seeker itself"
                     )
-            if self.bench.settings["nox_sensor"] == "analyser":
-                soft, other = argument("nox_sensor", "soft"), argument("guide", "feed_forward")
+            late = self.bench.settings["nox_sensor"] == "analyser"
+            if late and (self.guide != "curve" or self.guide_shape == "parabola"):
+                soft, other = argument("nox_sensor", "soft"), argument("guide", "curve")
                 raise ParameterError(
-                    f"{said} takes J of the same cycle, and the NOx of the analyser is late: use {soft}, or {other}"
+                    f"{said} takes J of the same cycle, and the NOx of the analyser is late: use {soft}, or {other} "
+                    "with the model's shape"
                 )
             if self.guide == "calibrated" and self.guide_shape == "parabola":
                 shape, curve = argument("guide_shape", "parabola"), argument("guide", "curve")
@@ -174,7 +176,7 @@ class TimingSearch:
         if self.bench.settings["nox_sensor"] == "analyser" and self.method not in _LATE:
             raise ParameterError(
                 f"{method} takes J of the same cycle, and the analyser is late: use {argument('nox_sensor', 'soft')}, "
-                f"or {seeking} or newton, which turn their demodulation back by the lag"
+                f"or {seeking} or newton, which turn their demodulation back by the lag, or gaussian_process_seeking"
             )
 
     def find_optimum(self) -> Optimum:

@@ -17,7 +17,9 @@ __all__ = ["with_guides"]
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7, 5: 5}  # per input: 5 inputs are asked for 3,125 times
 
 
-def surface_of(guide: Any, names: Sequence[str], lower: Sequence[float], upper: Sequence[float], *, argument: str) -> Any:
+def surface_of(
+    guide: Any, names: Sequence[str], lower: Sequence[float], upper: Sequence[float], *, argument: str
+) -> Any:
     """Read a guide in any of its forms.
 
     Parameters
@@ -53,7 +55,9 @@ def surface_of(guide: Any, names: Sequence[str], lower: Sequence[float], upper: 
     model = getattr(guide, "model", guide)
     if hasattr(model, "predict"):
         if not names:
-            raise ParameterError(f"{argument}: a fitted response goes by names: give `inputs` with the names of its factors")
+            raise ParameterError(
+                f"{argument}: a fitted response goes by names: give `inputs` with the names of its factors"
+            )
         columns = [column.ravel() for column in np.meshgrid(*axes, indexing="ij")]
         predicted = model.predict(dict(zip(names, columns, strict=True)))
         values = np.asarray(predicted["mean"], np.float64)
@@ -87,7 +91,9 @@ def _of_map(guide: Any, names: Sequence[str], argument: str) -> Any:
         )
     missing = [name for name in order if name not in guide.coords]
     if missing:
-        raise ParameterError(f"{argument}: {', '.join(map(str, missing))} has no coordinates: say where its values stand")
+        raise ParameterError(
+            f"{argument}: {', '.join(map(str, missing))} has no coordinates: say where its values stand"
+        )
     sorted_map = guide.transpose(*order).sortby(list(order))
     axes = [np.asarray(sorted_map[name], np.float64) for name in order]
     values = np.asarray(sorted_map, np.float64)

@@ -47,14 +47,6 @@ std::int64_t CausingInputs::settling() const noexcept {
   return most;
 }
 
-std::size_t CausingInputs::slowest() const noexcept {
-  std::size_t out = 0;
-  for (std::size_t i = 1; i < sources_.size(); ++i) {
-    if (path(i).wait > path(out).wait) out = i;
-  }
-  return out;
-}
-
 // Gaussian errors of equal count: the logarithm of the likelihood ratio is n/2 times that of the ratio of variances.
 bool CausingInputs::judge(std::size_t i, const Inputs& applied, double value) noexcept {
   Source& source = sources_[i];
@@ -82,8 +74,8 @@ bool CausingInputs::judge(std::size_t i, const Inputs& applied, double value) no
   return true;
 }
 
-Inputs CausingInputs::applied_before(std::int64_t back) const noexcept {
-  const std::int64_t row = (cycles_ - 1 - back) % rows_;
+Inputs CausingInputs::applied_before(std::int64_t cycles) const noexcept {
+  const std::int64_t row = (cycles_ - 1 - cycles) % rows_;
   return Eigen::Map<const Inputs>(&ring_[static_cast<std::size_t>(row * inputs_)], inputs_);
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -30,8 +29,11 @@ constexpr double surprise_rate = 0.1, most_surprise = 3.0;
 constexpr std::int64_t calm_cycles = 10;   // after a doubt
 constexpr double doubt_age = 10.0;         // memories
 constexpr double cautious_readings = 5.0;  // per input and one: before them the horizon is shorter
-constexpr double active_room = 0.05;       // scales of a limit
-constexpr double plane_memory = 20.0;      // cycles of the planes that tell the delays from one another
+constexpr double few_readings = 2.0;       // as Student's quantiles exceed the normal ones
+constexpr double least_share = 1e-3;       // of a limit, that a reading counts as at least
+constexpr double expected_bend = 3.0;  // of a limited quantity, in its scale: few readings must not promise too much
+constexpr double active_room = 0.05;   // scales of a limit
+constexpr double plane_memory = 20.0;  // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
 
 // None, or one of each; a guide says something of every input, and not the same everywhere.
@@ -87,18 +89,29 @@ GaussianProcessSeekingSettings checked(GaussianProcessSeekingSettings s) {
   return s;
 }
 
-// Of the components, then of the limits. Lags are taken out of the readings instead (`Window`).
-std::vector<UncertainLag> lags_with_j(const GaussianProcessSeekingSettings& s) {
-  std::vector<UncertainLag> out;
-  for (const ComponentLag& lag : s.components)
-    out.push_back({lag, lag.delay_cycles > 0.0 ? s.delay_uncertainty : 0, plane_memory});
-  const std::vector<UncertainLag> limits = lags_of(s.limits, plane_memory);
-  out.insert(out.end(), limits.begin(), limits.end());
+// Of the limits. Lags are taken out of the readings instead (`Window`).
+std::vector<UncertainLag> lags_of_limits(const GaussianProcessSeekingSettings& s) {
+  std::vector<UncertainLag> out = lags_of(s.limits, plane_memory);
   for (UncertainLag& one : out) {
     if (one.lag.lag_cycles > 0.0) one.delay_uncertainty = 0;
     one.lag.lag_cycles = 0.0;
   }
   return out;
+}
+
+std::vector<DelayFinder> finders_of(const GaussianProcessSeekingSettings& s) {
+  std::vector<DelayFinder> out;
+  for (const ComponentLag& lag : s.components) {
+    const bool uncertain = lag.delay_cycles > 0.0 && lag.lag_cycles == 0.0;
+    out.emplace_back(lag.delay_cycles, uncertain ? s.delay_uncertainty : 0, s.space.size());
+  }
+  return out;
+}
+
+// Limited quantities spread over powers of ten, as NOx: above 0 their logarithm is learnt, with slope 1 at the limit.
+double learnt_of(const Limit& limit, double value) {
+  if (!(limit.upper > 0.0)) return value;
+  return limit.upper * (1.0 + std::log(std::max(value / limit.upper, least_share)));
 }
 
 ProcessModel::Settings process_settings(const GaussianProcessSeekingSettings& s) {
@@ -129,7 +142,13 @@ std::vector<ProcessModel> limit_processes(const GaussianProcessSeekingSettings& 
   for (std::size_t i = 0; i < s.limits.size(); ++i) {
     ProcessModel::Settings own = process_settings(s);
     own.bends_down = false;
-    if (!s.limit_guides.empty()) own.guide.surface = s.limit_guides[i];
+    own.bend = expected_bend * s.limits[i].scale;
+    if (!s.limit_guides.empty() && !s.limit_guides[i].empty()) {
+      std::vector<double> values = s.limit_guides[i].values();
+      for (double& value : values)
+        value = learnt_of(s.limits[i], value);
+      own.guide.surface = Surface(s.limit_guides[i].axes(), std::move(values));
+    }
     out.emplace_back(own);
   }
   return out;
@@ -142,7 +161,8 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       quantile_(random::normal_quantile(settings_.limit_probability)),
       hold_(1),
       protocol_(settings_.space.size()),
-      causes_(lags_with_j(settings_), settings_.space.size()),
+      causes_(lags_of_limits(settings_), settings_.space.size()),
+      finders_(finders_of(settings_)),
       j_(component_processes(settings_)),
       limited_(limit_processes(settings_)),
       estimate_(settings_.space.start),
@@ -167,7 +187,8 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
   const auto add = [&](const ComponentLag& lag) {
     longest = std::max(longest, lag.lag_cycles);
     windows_.push_back({.keep = lag.lag_cycles > 0.0 ? std::exp(-1.0 / lag.lag_cycles) : 0.0,
-                        .inputs = Inputs::Zero(settings_.space.size())});
+                        .inputs = Inputs::Zero(settings_.space.size()),
+                        .held = Inputs::Zero(settings_.space.size())});
   };
   for (const ComponentLag& component : settings_.components)
     add(component);
@@ -205,11 +226,13 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   Inputs told;
   const Inputs& applied = protocol_.applied(reading, applied_, told);
   causes_.record(applied);
+  for (DelayFinder& finder : finders_)
+    finder.record(scaled(applied));
   if (status == TellStatus::accepted) {
     learn(reading, applied);
   } else {
     for (Window& window : windows_)
-      window.last = std::numeric_limits<double>::quiet_NaN();
+      window.last = unread;
   }
   if (++held_ >= hold_) {
     held_ = 0;
@@ -223,49 +246,70 @@ bool GaussianProcessSeeking::Window::take(double& value, Inputs& z, std::int64_t
   if (keep == 0.0) return true;
   const double before = last;
   last = value;
-  if (std::isnan(before)) return false;
+  if (before == unread) return false;
   const double own = (value - keep * before) / (1.0 - keep);
+  const Inputs now = z;
+  bool full = false;
+  const auto close = [&] {
+    value = sum / static_cast<double>(count);
+    z = inputs / static_cast<double>(count);
+    count = idle = 0;
+    full = true;
+  };
   ++idle;
-  if (count > 0 && z != inputs / static_cast<double>(count) && 2 * count < hold && idle < 2 * hold) count = 0;
+  if (count > 0 && now != held) {  // an input that never rests is taken as it comes
+    if (2 * count >= hold) {
+      close();
+    } else if (idle < 2 * hold) {
+      count = 0;
+    }
+  }
   if (count == 0) {
     sum = 0.0;
     inputs.setZero();
+    held = now;
   }
   sum += own;
-  inputs += z;
-  if (++count < hold) return false;
-  value = sum / static_cast<double>(count);
-  z = inputs / static_cast<double>(count);
-  count = idle = 0;
-  return true;
-}
-
-// Whether the reading of a source says something, of which input, and what.
-bool GaussianProcessSeeking::reads(std::size_t source, const Inputs& applied, double& value, Inputs& z) noexcept {
-  if (!causes_.known(source)) return false;
-  z = scaled(causes_.of(source, applied));
-  return windows_[source].take(value, z, hold_);
+  inputs += now;
+  if (++count >= hold && !full) close();
+  return full;
 }
 
 void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
   const Inputs about = scaled(estimate_);
-  Inputs z(about.size());
+  // Only what has been read widens what may be asked: the inputs behind the latest of all readings.
+  std::optional<Inputs> read;
+  std::int64_t latest = -1;
   for (std::size_t i = 0; i < j_.size(); ++i) {
     double value = settings_.maximize ? reading.components[i] : -reading.components[i];
-    if (causes_.judge(i, applied, value)) doubt();
-    if (!reads(i, applied, value, z)) continue;
+    DelayFinder& finder = finders_[i];
+    finder.read(value);
+    if (finder.judge(j_[i], about)) continue;
+    if (finder.delay() > latest) {
+      latest = finder.delay();
+      read.reset();
+      if (finder.known()) read = finder.cause();
+    }
+    if (!finder.known()) continue;
+    Inputs z = finder.cause();
+    if (!windows_[i].take(value, z, hold_)) continue;
     watch_surprise(i, value, z);
     j_[i].record(z, value, about);
   }
-  const std::size_t all = j_.size();
   for (std::size_t i = 0; i < limited_.size(); ++i) {
     double value = reading.limits[i];
-    causes_.judge(all + i, applied, value);
-    if (reads(all + i, applied, value, z)) limited_[i].record(z, value, about);
+    causes_.judge(i, applied, value);
+    Inputs z = scaled(causes_.of(i, applied));
+    if (causes_.delay_cycles(i) > static_cast<double>(latest)) {
+      latest = static_cast<std::int64_t>(std::ceil(causes_.delay_cycles(i)));
+      read.reset();
+      if (causes_.known(i)) read = z;
+    }
+    if (causes_.known(i) && windows_[j_.size() + i].take(value, z, hold_)) {
+      limited_[i].record(z, learnt_of(settings_.limits[i], value), about);
+    }
   }
-  // Only what has been read widens what may be asked.
-  const std::size_t slowest = causes_.slowest();
-  if (causes_.known(slowest)) explore(scaled(causes_.of(slowest, applied)));
+  if (read) explore(*read);
 }
 
 void GaussianProcessSeeking::explore(const Inputs& z) noexcept {
@@ -329,8 +373,9 @@ void GaussianProcessSeeking::take_in(std::size_t component, int points) noexcept
   ProcessModel& model = j_[component];
   std::array<int, most_on_their_way> times{};
   int more = 0;
-  for (std::int64_t back = 0; back < causes_.on_their_way(component); ++back) {
-    const Inputs z = scaled(causes_.applied_before(back));
+  const DelayFinder& finder = finders_[component];
+  for (std::int64_t back = 0; back < finder.on_their_way(); ++back) {
+    const Inputs z = finder.before(back);
     int at = 0;
     while (at < more && candidates_.row(points + at).transpose() != z)
       ++at;
@@ -412,7 +457,9 @@ double GaussianProcessSeeking::excess(std::size_t i, int point, double quantile)
   const Limit& limit = settings_.limits[i];
   const ProcessModel& model = limited_[i];
   const double sd = std::sqrt(std::max(model.covariance(point, point), 0.0));
-  return model.mean(point) + quantile * sd + limit.margin + limit.margin_sd * model.noise_sd() - limit.upper;
+  const double freedom = std::max(1.0, static_cast<double>(model.count() - estimate_.size()));
+  return model.mean(point) + quantile * (1.0 + few_readings / freedom) * sd + limit.margin +
+         limit.margin_sd * model.noise_sd() - limit.upper;
 }
 
 // Largest excess of any limit, in scales, of every candidate: with the stated probability, and in the mean.
@@ -550,6 +597,8 @@ LimitState GaussianProcessSeeking::limit_state(std::size_t i) const noexcept {
 void GaussianProcessSeeking::restart() noexcept {
   protocol_.failures.forget();
   causes_.forget();
+  for (DelayFinder& finder : finders_)
+    finder.forget();
   for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
     for (ProcessModel& model : *models)
       model.forget();
@@ -557,7 +606,7 @@ void GaussianProcessSeeking::restart() noexcept {
   middle_ = lowest_ = highest_ = scaled(estimate_);
   star_ = held_ = since_doubt_ = 0;
   for (Window& window : windows_) {
-    window.last = std::numeric_limits<double>::quiet_NaN();
+    window.last = unread;
     window.count = window.idle = 0;
   }
   std::fill(surprise_.begin(), surprise_.end(), 1.0);

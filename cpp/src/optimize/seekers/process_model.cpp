@@ -214,7 +214,8 @@ double ProcessModel::evidence(const Numbers& numbers, bool same_lengths) noexcep
       const int other = chosen_[static_cast<std::size_t>(b)], i = std::max(one, other), j = std::min(one, other);
       const double matern =
           same_lengths ? matern_(i, j) : kernel_.matern(&points_(i, 0), &points_(j, 0), s.inverse_length);
-      small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s) + wandered(i, j, s);
+      small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s) +
+                     wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), s);
     }
     small_(a, a) += s.noise_variance + jitter * s.bend * s.bend;
   }
@@ -239,8 +240,56 @@ double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const n
     const double factor = numbers[numbers.size() - 1] / factor_width;
     out += log_prior(numbers[0] - whole, guided_bend_prior, guided_bend_prior_sd) - std::log1p(factor * factor);
   }
+  if (settings_.bend && !kernel_.guided()) out += log_prior(numbers[0], std::log(*settings_.bend), 1.0);
   if (settled_bend_) out += log_prior(numbers[0], *settled_bend_, settled_sd);
   return out;
+}
+
+// Under a wrong input the numbers have gone wrong too: those that the readings suggest by themselves are tried beside.
+double ProcessModel::likelihood(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages,
+                                int count) noexcept {
+  const Inputs wide = at.topRows(count).colwise().maxCoeff() - at.topRows(count).colwise().minCoeff();
+  const double rise = values.head(count).maxCoeff() - values.head(count).minCoeff();
+  Numbers plain = numbers_;
+  plain[0] = std::log(std::max(rise, 1e-300) / (0.3 * std::max(wide.norm(), 1e-6)));
+  plain[1] = noise_prior;
+  plain[2] = rest_prior;
+  plain.segment(3, settings_.inputs).setConstant(length_prior);
+  plain.segment(3 + settings_.inputs, 2).setZero();
+  double most = likelihood_by(numbers_, at, values, ages, count);
+  for (int more = 0; more < 2; ++more, plain[1] += noise_prior_sd)
+    most = std::max(most, likelihood_by(plain, at, values, ages, count));
+  return most;
+}
+
+double ProcessModel::likelihood_by(const Numbers& numbers, const InputTable& at, const Eigen::VectorXd& values,
+                                   const Eigen::VectorXd& ages, int count) noexcept {
+  const Scales s = scales_of(numbers);
+  const double level = values.head(count).mean();
+  for (int a = 0; a < count; ++a) {
+    kernel_.describe(at.row(a).transpose(), &asked_(a, 0));
+    small_rest_[a] = values[a] - level - kernel_.mean(&asked_(a, 0), s);
+    for (int b = 0; b <= a; ++b)
+      small_(a, b) = kernel_.covariance(&asked_(a, 0), &asked_(b, 0), s) +
+                     wandered(&asked_(a, 0), &asked_(b, 0), std::min(ages[a], ages[b]), s);
+    small_(a, a) += s.noise_variance + jitter * s.bend * s.bend;
+  }
+  cholesky(small_, count);
+  solve_lower(small_, count, small_rest_.data());
+  double out = -0.5 * dot(small_rest_.data(), small_rest_.data(), count);
+  for (int a = 0; a < count; ++a)
+    out -= std::log(small_(a, a));
+  return out;
+}
+
+void ProcessModel::replace(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages, int count,
+                           const Inputs& about) noexcept {
+  count_ = told_ = 0;
+  begun_ = false;
+  settled_bend_.reset();
+  for (int a = std::max(0, count - settings_.kept); a < count; ++a)
+    record(at.row(a).transpose(), values[a], about);
+  ages_.head(count_) = ages.segment(count - count_, count_);
 }
 
 // Logarithm of the factor by which the guide fits the readings best, 0 where they do not say.
@@ -320,19 +369,20 @@ void ProcessModel::try_numbers(int trials) noexcept {
   }
 }
 
-// Random walks of level and slopes from the younger of two readings until now.
-double ProcessModel::wandered(std::int64_t i, std::int64_t j, const Scales& s) const noexcept {
+// Random walks of level and slopes, from a reading of that age until now; of two readings the younger one counts.
+double ProcessModel::wandered(const double* a, const double* b, double age, const Scales& s) const noexcept {
   double slopes = 0.0;
   for (Eigen::Index k = 0; k < settings_.inputs; ++k)
-    slopes += (points_(i, k) - 0.5) * (points_(j, k) - 0.5);
-  return (s.wander_level + s.wander_slope * slopes) * std::min(ages_[i], ages_[j]);
+    slopes += (a[k] - 0.5) * (b[k] - 0.5);
+  return (s.wander_level + s.wander_slope * slopes) * age;
 }
 
 void ProcessModel::factor() noexcept {
   for (std::int64_t i = 0; i < count_; ++i) {
     weights_[i] = values_[i] - level_ - kernel_.mean(&points_(i, 0), now_);
     for (std::int64_t j = 0; j <= i; ++j)
-      factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_) + wandered(i, j, now_);
+      factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_) +
+                      wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), now_);
     factor_(i, i) += now_.noise_variance + jitter * now_.bend * now_.bend;
   }
   cholesky(factor_, count_);

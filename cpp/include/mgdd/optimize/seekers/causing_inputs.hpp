@@ -4,7 +4,6 @@
 // on. noexcept and allocation-free after construction.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -43,11 +42,6 @@ class CausingInputs {
   const LocalModel& model(std::size_t i) const noexcept { return path(i).model; }
   /// The delay that is taken for source i [cycles].
   double delay_cycles(std::size_t i) const noexcept { return path(i).delay(); }
-  /// The longest delay of any source that is taken, with twice its lag: its index.
-  std::size_t slowest() const noexcept;
-  /// Whole cycles whose readings of source i have not come yet, and what was applied `back` of them ago, 0 the last.
-  std::int64_t on_their_way(std::size_t i) const noexcept { return std::min(path(i).whole, cycles_); }
-  Inputs applied_before(std::int64_t back) const noexcept;
   /// True where source i is neither delayed nor lagged.
   bool direct(std::size_t i) const noexcept { return path(i).direct; }
   /// Cycles until a reading of every source belongs to an input that has stayed: to five percent of a step.
@@ -93,6 +87,7 @@ class CausingInputs {
     return paths_[static_cast<std::size_t>(sources_[i].first + sources_[i].taken)];
   }
   void pass_on(const Inputs& applied) noexcept;
+  Inputs applied_before(std::int64_t cycles) const noexcept;
 
   Eigen::Index inputs_;
   std::vector<Source> sources_;

@@ -9,7 +9,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -19,6 +18,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/causing_inputs.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/seekers/delay_finder.hpp"
 #include "mgdd/optimize/seekers/process_model.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
@@ -85,14 +85,16 @@ class GaussianProcessSeeking {
   /// What the guide is multiplied by, as learnt: about 1 where it is right, towards 0 where it says nothing.
   double guide_factor(std::size_t component = 0) const noexcept { return j_[component].guide_factor(); }
   /// Whole cycles between input and reading of a component that explain the readings best.
-  double delay_cycles(std::size_t component = 0) const noexcept { return causes_.delay_cycles(component); }
+  double delay_cycles(std::size_t component = 0) const noexcept {
+    return static_cast<double>(finders_[component].delay());
+  }
   const GaussianProcessSeekingSettings& settings() const noexcept { return settings_; }
   const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return j_.size(); }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
   LimitState limit_state(std::size_t i) const noexcept;
-  double limit_delay(std::size_t i) const noexcept { return causes_.delay_cycles(j_.size() + i); }
+  double limit_delay(std::size_t i) const noexcept { return causes_.delay_cycles(i); }
 
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const {
@@ -118,6 +120,8 @@ class GaussianProcessSeeking {
     v("limit_room", self.room_);
     v("limit_unsafe", self.unsafe_);
     CausingInputs::visit(self.causes_, v, "cause");
+    for (std::size_t i = 0; i < self.finders_.size(); ++i)
+      DelayFinder::visit(self.finders_[i], v, "delay" + std::to_string(i));
     for (std::size_t i = 0; i < self.windows_.size(); ++i)
       Window::visit(self.windows_[i], v, "window" + std::to_string(i));
     for (std::size_t i = 0; i < self.j_.size(); ++i)
@@ -130,10 +134,10 @@ class GaussianProcessSeeking {
   /// Behind a first-order lag: what J was while an input was held, from the readings and what they had come from.
   struct Window {
     double keep = 0.0;  // of a reading in the next; 0: no lag
-    double last = std::numeric_limits<double>::quiet_NaN();
+    double last = unread;
     double sum = 0.0;
     std::int64_t count = 0, idle = 0;  // cycles in it; since one was read
-    Inputs inputs{};
+    Inputs inputs{}, held{};           // their sum; the first
 
     /// True where `value` becomes one reading and `z` the input that it belongs to.
     bool take(double& value, Inputs& z, std::int64_t hold) noexcept;
@@ -145,6 +149,7 @@ class GaussianProcessSeeking {
       v(name + "_count", self.count);
       v(name + "_idle", self.idle);
       v(name + "_inputs", self.inputs);
+      v(name + "_held", self.held);
     }
   };
   Inputs scaled(const Inputs& input) const noexcept;
@@ -152,7 +157,6 @@ class GaussianProcessSeeking {
   Inputs reachable(Inputs z) const noexcept;
   double draw(std::uint64_t stream, int index) const noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
-  bool reads(std::size_t source, const Inputs& applied, double& value, Inputs& z) noexcept;
   void watch_surprise(std::size_t component, double value, const Inputs& z) noexcept;
   void doubt() noexcept;
   void take_in(std::size_t component, int points) noexcept;
@@ -172,9 +176,10 @@ class GaussianProcessSeeking {
   double quantile_;
   std::int64_t hold_;  // cycles for which an input is asked behind a lag
   Protocol protocol_;
-  CausingInputs causes_;         // of the components, then of the limits
-  std::vector<Window> windows_;  // of the same
-  std::vector<ProcessModel> j_;  // of its components
+  CausingInputs causes_;              // of the limits
+  std::vector<DelayFinder> finders_;  // of the components
+  std::vector<Window> windows_;       // of the components, then of the limits
+  std::vector<ProcessModel> j_;       // of its components
   std::vector<ProcessModel> limited_;
   Inputs estimate_, applied_;
   Inputs middle_;            // the start, scaled

@@ -26,6 +26,7 @@ class ProcessModel {
     double memory = 143.0;             ///< [readings] in which level and slopes wander by what counts
     bool bends_down = true;            ///< whether a maximum is expected, as of J
     std::optional<double> noise_sd{};  ///< of a reading, > 0; none: learnt
+    std::optional<double> bend{};      ///< that is expected, to a factor of e; none: any
     std::uint64_t seed = 0;
     ProcessGuide guide{};
   };
@@ -47,6 +48,12 @@ class ProcessModel {
   /// Of the quantity, without the noise of a reading, at two of these points.
   double covariance(int i, int j) const noexcept;
 
+  /// Logarithm of the likelihood of `count` readings, 60 at most, at the inputs in the rows of `at`; without priors.
+  double likelihood(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages,
+                    int count) noexcept;
+  /// Knows these readings, the oldest first, in place of its own; its numbers begin anew.
+  void replace(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages, int count,
+               const Inputs& about) noexcept;
   /// Every reading so far counts as if it were this much older.
   void age(double cycles) noexcept;
   void forget() noexcept;
@@ -77,6 +84,8 @@ class ProcessModel {
   Scales scales_of(const Numbers& numbers) const noexcept;
   void choose_readings(const Inputs& about) noexcept;
   double evidence(const Numbers& numbers, bool same_lengths) noexcept;
+  double likelihood_by(const Numbers& numbers, const InputTable& at, const Eigen::VectorXd& values,
+                       const Eigen::VectorXd& ages, int count) noexcept;
   double log_priors(const Numbers& numbers, const Scales& s) const noexcept;
   void begin_numbers() noexcept;
   void try_numbers(int trials) noexcept;
@@ -85,7 +94,7 @@ class ProcessModel {
   void tabulate(std::int64_t reading) noexcept;
   void tabulate_lengths() noexcept;
   void know_tables() noexcept;
-  double wandered(std::int64_t i, std::int64_t j, const Scales& s) const noexcept;
+  double wandered(const double* a, const double* b, double age, const Scales& s) const noexcept;
   void factor() noexcept;
   void refresh() noexcept;
   int crowded_reading(const Inputs& about) noexcept;
