@@ -19,6 +19,7 @@ Before anything is counted, whoever is given the noise and goes on must find the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,13 +27,14 @@ from peers import peer_bayes, peer_seekers
 from peers.peer_seekers import Contender, Plant, Point, installed, scaled, stay
 from support.seeking_maps import WIDTH, SeekingMap
 from support.seeking_report import arguments, print_tables
-from support.seeking_rows import OnMap, Row, tuned, untouched
+from support.seeking_rows import OnMap, Row, driven, tuned, untouched
 from support.several_maps import several_maps
 
 from mgdd import optimize
 
 PACKAGES = {"noisyopt": "noisyopt", "scipy": "scipy", **peer_bayes.PACKAGES}
 KAPPA = 1.0  # of the confidence bound
+Guide = Callable[[np.ndarray], float]
 
 
 def by_hand(on: OnMap) -> OnMap:
@@ -52,11 +54,36 @@ def at_rest(field: SeekingMap) -> Contender:  # noqa: ARG001 - it does nothing a
     return run
 
 
+def off_by_a_fifth(field: SeekingMap, seed: int) -> Guide:
+    """Let the map itself be the guide, moved by a fifth of the bounds in every input, to a drawn side."""
+    moved = field.setting(seed, False).moved
+    sides = np.random.default_rng(seed + 1000).choice([-1.0, 1.0], np.size(field.lower))
+    by = 0.2 * sides * (field.upper - field.lower)
+    return lambda x: 50.0 + moved(x, by)
+
+
+def of_no_use(field: SeekingMap, seed: int) -> Guide:  # noqa: ARG001
+    """Let waves of half the bounds be the guide."""
+    period = (field.upper - field.lower) / 2.2
+    return lambda x: float(np.sum(2.0 * np.sin(2.0 * np.pi * x / period + np.arange(np.size(x)))))
+
+
+def guided(guide: Callable[[SeekingMap, int], Guide]) -> OnMap:
+    def make(field: SeekingMap, start: Point, seed: int) -> optimize.Seeker:
+        return optimize.GaussianProcessSeeking(
+            start=start, lower=field.lower, upper=field.upper, guide=guide(field, seed)
+        )
+
+    return driven(make)
+
+
 def ours() -> list[Row]:
     """Seekers of the package; those under test are set beside the best of the others."""
     return [
         Row("SPSA, scaled", by_hand(untouched(optimize.Spsa))),
         Row("Gaussian process seeking", untouched(optimize.GaussianProcessSeeking), must_arrive=True, is_tested=True),
+        Row("Gaussian process seeking, guide off by a fifth", guided(off_by_a_fifth)),
+        Row("Gaussian process seeking, guide of no use", guided(of_no_use)),
         Row("SPSA by tune, scaled", by_hand(tuned("spsa")), must_arrive=True),
     ]
 

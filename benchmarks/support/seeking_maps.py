@@ -32,6 +32,7 @@ class Setting:
     read: Readings  # NaN where there is no reading
     lost: Readings  # J below that of the best input, without noise
     top: Callable[[], float] = lambda: 0.0  # J of the best input
+    moved: Callable[[Point, Point], float] | None = None  # at the first, of the map moved by the second
 
 
 def within(best: float) -> Callable[[Point], bool]:

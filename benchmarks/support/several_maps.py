@@ -49,6 +49,7 @@ def several(name: str, inputs: int, drop: Drop) -> SeekingMap:
             lambda x: -level(x) <= NEAR * inputs,
             lambda x: level(x) + noise.pop(),
             lambda x: -level(x),
+            moved=lambda x, by: drop((x - best - by) / unit),
         )
 
     return SeekingMap(name, lower, upper, NOISE, CURVATURE, setting)

@@ -121,7 +121,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         r"guide gives nan at soc_cad = 2.5, egr = 0"),
     "no number": ({"guide": lambda _: "x"}, r"guide fails at"),
     "the same": ({"guide": lambda _: 4.0}, r"guide.*same everywhere"),
-    "a gap": ({"guide": grid([-25.0, 15.0], [0.0, 0.4]).where(lambda a: a.egr < 0.3)}, r"guide has no value at .*egr = 0.4"),
+    "a gap": (
+        {"guide": grid([-25.0, 15.0], [0.0, 0.4]).where(lambda a: a.egr < 0.3)},
+        r"guide has no value at .*egr = 0.4",
+    ),
     "other inputs": ({"guide": grid([-25.0, 15.0], [0.0, 0.4]).rename(egr="boost")}, r"must be over soc_cad, egr"),
     "no coordinates": ({"guide": grid([-25.0, 15.0], [0.0, 0.4]).drop_vars("egr")}, r"egr has no coordinates"),
     "two": ({"guide": [guide, guide]}, r"guide has 2 entries"),

@@ -195,9 +195,9 @@ def at_random(_: Any) -> dict[str, float]:
                 "efficiency": -((x["soc_cad"] - 2.0) ** 2),
                 "nox_ppm": 3.0 * (x["soc_cad"] - 2.0) ** 2 + x["egr"],
             },
-            {"cycles": 60},
+            {"cycles": 120},
         ),
-        ("uncertain", engine(40.0), {"cycles": 60}),
+        ("uncertain", engine(20.0), {"cycles": 60}),
         (
             "poor_prediction",
             at_random,
