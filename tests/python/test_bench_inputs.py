@@ -225,7 +225,7 @@ def test_the_command_seeks_several_inputs(capsys: pytest.CaptureFixture[str], tm
     [
         (("--input", "soc_cad=-61:5"), "--input soc_cad=-61:5: -61 must be in [-60, 20]"),
         (("--input", "egr=0:0.9"), "--input egr=0:0.9: 0.9 must be in [0, 0.5]"),
-        (("--input", "ege=0:0.4"), "did you mean 'egr'?"),
+        (("--input", "egt=0:0.4"), "did you mean 'egr'?"),
         ((*SOUGHT, "--method", "spsa"), "--method spsa has settings for soc_cad alone"),
         ((*SOUGHT, "--form", "batch"), "--form acts with soc_cad alone"),
         ((*SOUGHT, "--guide", "curve"), "--guide curve guides soc_cad alone"),

@@ -131,7 +131,7 @@ def seek(
     """Seek the best inputs of a plant or a function, with a seeker that is chosen and said in the result.
 
     One input is sought by `CurveSeeking`, with the curve of the guide or with a parabola. Several inputs are sought by
-    `GaussianProcessSeeking`; by `Spsa` where there are 10 000 cycles or more, no limits, no guide and no delay.
+    `GaussianProcessSeeking`, whose mean is the guide.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def seek(
     else:
         raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
     choice = chosen(
-        given, started(start, given), cycles=cycles, limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
+        given, started(start, given), limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
         lag_cycles=lag_cycles, guide=guide, maximize=maximize, seed=seed,
     )  # fmt: skip
     if cycles < choice.first_cycles:

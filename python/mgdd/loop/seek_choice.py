@@ -10,14 +10,13 @@ import numpy as np
 
 from mgdd.errors import ParameterError
 from mgdd.guide import Curve, CurveSeeking
-from mgdd.optimize import GaussianProcessSeeking, Input, Limit, Spsa
+from mgdd.optimize import GaussianProcessSeeking, Input, Limit
 
 if TYPE_CHECKING:
     from mgdd.optimize import Seeker
 
-__all__ = ["MANY_CYCLES", "Choice", "chosen"]
+__all__ = ["Choice", "chosen"]
 
-MANY_CYCLES = 10_000  # from here on SPSA, whose gains decrease, loses less than a process that goes on looking
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
 
 
@@ -33,7 +32,6 @@ def chosen(
     inputs: Sequence[Input],
     start: Mapping[str, float] | None,
     *,
-    cycles: int,
     limits: Sequence[Limit],
     noise_sd: float | None,
     delay_cycles: float,
@@ -42,7 +40,7 @@ def chosen(
     maximize: bool,
     seed: int,
 ) -> Choice:
-    """Choose: a curve for one input, SPSA for long runs without limits and delay, a Gaussian process for the rest."""
+    """Choose: a curve for one input, a Gaussian process for several."""
     if isinstance(guide, Curve) and len(inputs) > 1:
         names = ", ".join(one.name for one in inputs)
         raise ParameterError(f"guide = {guide!r}: a Curve has one input, not {names}; give a function of them")
@@ -58,9 +56,6 @@ def chosen(
         return Choice(seeker, f"{told}, placed by the readings", first)
     middle = {one.name: 0.5 * (one.lower + one.upper) for one in inputs}
     space["start"] = start or (middle if guide is None or limits else _best_of(guide, inputs, middle, maximize))
-    if cycles >= MANY_CYCLES and not limits and guide is None and not delay_cycles and not lag_cycles:
-        why = f"{cycles} cycles of {len(inputs)} inputs: its gains decrease, and the optimum is taken to stand still"
-        return Choice(Spsa(**space, seed=seed), why, first)
     guided: dict[str, Any] = {} if guide is None else {"guide": guide}
     seeker = GaussianProcessSeeking(**space, **late, **guided, noise_sd=noise_sd, seed=seed)
     count = "one input" if len(inputs) == 1 else f"{len(inputs)} inputs"
