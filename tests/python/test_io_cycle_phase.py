@@ -90,6 +90,14 @@ def test_a_wrong_step_of_samples_is_refused(tmp_path):
         pressure_trace(angles, cycles.ravel(), firing_tdc_deg=360.0)
 
 
+def test_two_cycles_tell_no_period_finer_than_half_a_sample():
+    two = record(np.random.default_rng(3), 2)[:, ::2].ravel()
+    shifted = 1.0 * np.arange(two.size) * (720.45 / 720.0)
+    assert pressure_trace(shifted, two, firing_tdc_deg=360.0).sizes["cycle"] == 2
+    with pytest.raises(DataError, match=r"repeats every 721\.\d+ degrees"):
+        pressure_trace(1.0 * np.arange(two.size) * (721.4 / 720.0), two, firing_tdc_deg=360.0)
+
+
 def test_an_encoder_that_loses_pulses_is_doubted():
     cycles = record(np.random.default_rng(3), 12)
     slipping = np.array([np.roll(pressure, k // 3) for k, pressure in enumerate(cycles)])

@@ -174,7 +174,8 @@ def repetition(degrees: NDArray[np.float64], pressure: NDArray[np.float64], firi
         drift, stderr = placed.drift_cad
         period += scale * drift / (count - 1)
         off = (period - CYCLE_DEG) * (count - 1)
-        differs = abs(off) > max(DRIFT_CAD, _SIGNIFICANT * stderr * scale)
+        blurred = 0.5 * step if count < 3 else 0.0  # two cycles hardly show their scatter
+        differs = abs(off) > max(DRIFT_CAD, _SIGNIFICANT * stderr * scale, blurred)
         if abs(drift) < 0.01:
             break
     return Period(period, max(count, int(span / period)), differs)

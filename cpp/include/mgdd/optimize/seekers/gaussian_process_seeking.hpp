@@ -19,6 +19,7 @@
 #include "mgdd/optimize/seekers/causing_inputs.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/delay_finder.hpp"
+#include "mgdd/optimize/seekers/lag_window.hpp"
 #include "mgdd/optimize/seekers/process_model.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
@@ -62,6 +63,9 @@ inline auto fields_of(const GaussianProcessSeekingSettings&) {
       field<&S::limit_guides>("limit_guides", "the same of every limit", DefaultForm::none),
   };
 }
+
+/// With what is left open filled in. Throws ParameterError or ShapeError naming the field.
+GaussianProcessSeekingSettings resolved(GaussianProcessSeekingSettings settings);
 
 class GaussianProcessSeeking {
  public:
@@ -123,7 +127,7 @@ class GaussianProcessSeeking {
     for (std::size_t i = 0; i < self.finders_.size(); ++i)
       DelayFinder::visit(self.finders_[i], v, "delay" + std::to_string(i));
     for (std::size_t i = 0; i < self.windows_.size(); ++i)
-      Window::visit(self.windows_[i], v, "window" + std::to_string(i));
+      LagWindow::visit(self.windows_[i], v, "window" + std::to_string(i));
     for (std::size_t i = 0; i < self.j_.size(); ++i)
       ProcessModel::visit(self.j_[i], v, i == 0 ? "j" : "j" + std::to_string(i));
     for (std::size_t i = 0; i < self.limited_.size(); ++i)
@@ -131,27 +135,8 @@ class GaussianProcessSeeking {
   }
 
  private:
-  /// Behind a first-order lag: what J was while an input was held, from the readings and what they had come from.
-  struct Window {
-    double keep = 0.0;  // of a reading in the next; 0: no lag
-    double last = unread;
-    double sum = 0.0;
-    std::int64_t count = 0, idle = 0;  // cycles in it; since one was read
-    Inputs inputs{}, held{};           // their sum; the first
-
-    /// True where `value` becomes one reading and `z` the input that it belongs to.
-    bool take(double& value, Inputs& z, std::int64_t hold) noexcept;
-    template <class Self, class V>
-    static void visit(Self& self, V& v, const std::string& name) {
-      if (self.keep == 0.0) return;
-      v(name + "_last", self.last);
-      v(name + "_sum", self.sum);
-      v(name + "_count", self.count);
-      v(name + "_idle", self.idle);
-      v(name + "_inputs", self.inputs);
-      v(name + "_held", self.held);
-    }
-  };
+  static constexpr int far_candidates = 8, near_candidates = 48, candidates = 1 + far_candidates + near_candidates;
+  static constexpr int most_on_their_way = 8;  // inputs whose readings have not come, that are counted on
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
@@ -178,7 +163,7 @@ class GaussianProcessSeeking {
   Protocol protocol_;
   CausingInputs causes_;              // of the limits
   std::vector<DelayFinder> finders_;  // of the components
-  std::vector<Window> windows_;       // of the components, then of the limits
+  std::vector<LagWindow> windows_;    // of the components, then of the limits
   std::vector<ProcessModel> j_;       // of its components
   std::vector<ProcessModel> limited_;
   Inputs estimate_, applied_;

@@ -77,12 +77,14 @@ class ProcessModel {
   }
 
  private:
+  static constexpr int evidence_readings = 60, more_readings = 40;
   // Logarithms: bend, noise over bend, size of the rest over bend, lengths; how fast slopes and level wander, over the
   // expected; what the guide counts by.
   using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6 + max_inputs, 1>;
   using Scales = ProcessKernel::Scales;
   Scales scales_of(const Numbers& numbers) const noexcept;
   void choose_readings(const Inputs& about) noexcept;
+  double squared_distance(Eigen::Index reading, const Inputs& from) const noexcept;
   double evidence(const Numbers& numbers, bool same_lengths) noexcept;
   double likelihood_by(const Numbers& numbers, const InputTable& at, const Eigen::VectorXd& values,
                        const Eigen::VectorXd& ages, int count) noexcept;

@@ -1,0 +1,274 @@
+// What a seeker by Gaussian processes asks next.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr double cloud_nearest = 0.011, cloud_farthest = 0.3;  // of the near ones, as a share of the bounds
+constexpr int search_rounds = 6, search_points = 12;
+constexpr double search_width = 0.08, search_shrinks = 0.45;
+constexpr double growth = 0.4;                          // beyond what has been explored, in widths of that
+constexpr double guided_reach = 0.2;                    // beyond it at least where there is a guide, in ranges
+constexpr double planned_readings[] = {1, 4, 16};       // that the worth of an input is reckoned with
+constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
+constexpr double cautious_readings = 5.0;               // per input and one: before them the horizon is shorter
+constexpr double few_readings = 2.0;                    // as Student's quantiles exceed the normal ones
+constexpr double worth_noise = 1e-12;                   // of J, at least
+
+}  // namespace
+
+// Within the bounds, what may be explored by now, and what is not known to fail.
+Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
+  const double wide = growth * (highest_ - lowest_).maxCoeff(), far = guided() ? std::max(wide, guided_reach) : wide;
+  for (Eigen::Index i = 0; i < z.size(); ++i)
+    z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));
+  return scaled(protocol_.failures.keep(unscaled(z)));
+}
+
+// Standard normal, another one for each stream and index of this cycle.
+double GaussianProcessSeeking::draw(std::uint64_t stream, int index) const noexcept {
+  return random::normal(settings_.seed, stream, static_cast<std::uint64_t>(protocol_.cycle * 4096 + index));
+}
+
+void GaussianProcessSeeking::choose() noexcept {
+  const Eigen::Index n = estimate_.size();
+  const auto enough = [](const ProcessModel& m) { return m.count() >= m.fewest(); };
+  const bool read = std::all_of(j_.begin(), j_.end(), enough) && std::all_of(limited_.begin(), limited_.end(), enough);
+  if (!read || (star_ < n && !guided())) return choose_first();
+  const Inputs about = scaled(estimate_);
+  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
+    for (ProcessModel& model : *models)
+      model.fit(about);
+  }
+  const Inputs best = best_of_mean(about);
+  estimate_ = unscaled(best);
+  draw_candidates(best);
+  judge_safety(candidates);
+  means_.setZero();
+  covariance_.setZero();
+  double variance = 0.0;
+  for (std::size_t i = 0; i < j_.size(); ++i) {
+    take_in(i, candidates);
+    variance += std::max(j_[i].covariance(0, 0), 0.0);
+  }
+  expected_ = (settings_.maximize ? 1.0 : -1.0) * means_[0];
+  expected_sd_ = std::sqrt(variance);
+  for (std::size_t i = 0; i < limited_.size(); ++i)
+    room_[i] = -excess(i, 0, quantile_) / settings_.limits[i].scale;
+  send(candidates_.row(most_worth(candidates)).transpose());
+}
+
+// Adds a component's means and covariances at the candidates, these as they will be once what is on its way is read.
+void GaussianProcessSeeking::take_in(std::size_t component, int points) noexcept {
+  ProcessModel& model = j_[component];
+  std::array<int, most_on_their_way> times{};
+  int more = 0;
+  const DelayFinder& finder = finders_[component];
+  for (std::int64_t back = 0; back < finder.on_their_way(); ++back) {
+    const Inputs z = finder.before(back);
+    int at = 0;
+    while (at < more && candidates_.row(points + at).transpose() != z)
+      ++at;
+    if (at == most_on_their_way) continue;
+    if (at == more) candidates_.row(points + more++) = z.transpose();
+    ++times[static_cast<std::size_t>(at)];
+  }
+  if (windows_[component].lagged()) {
+    for (int& own : times)
+      own = static_cast<int>((own + hold_ - 1) / hold_);
+  }
+  const int all = points + more;
+  model.predict(candidates_, all);
+  for (int a = 0; a < all; ++a) {
+    if (a < points) means_[a] += model.mean(a);
+    for (int b = 0; b <= a; ++b)
+      own_(a, b) = own_(b, a) = model.covariance(a, b);
+  }
+  const double noise = model.noise_sd();
+  for (int k = 0; k < more; ++k) {
+    const int at = points + k;
+    const double variance = own_(at, at) + noise * noise / times[static_cast<std::size_t>(k)];
+    if (!(variance > 0.0)) continue;
+    for (int a = 0; a < all; ++a)
+      effect_[static_cast<std::size_t>(a)] = own_(a, at) / std::sqrt(variance);
+    const Eigen::Map<const Eigen::VectorXd> effect(effect_.data(), all);
+    for (int b = 0; b < all; ++b)
+      own_.col(b).head(all) -= effect[b] * effect;
+  }
+  covariance_.topLeftCorner(points, points) += own_.topLeftCorner(points, points);
+}
+
+double GaussianProcessSeeking::mean(int point) const noexcept {
+  double sum = 0.0;
+  for (const ProcessModel& model : j_)
+    sum += model.mean(point);
+  return sum;
+}
+
+// Whether guides say enough to leave the readings to the side out.
+bool GaussianProcessSeeking::guided() const noexcept {
+  const auto empty = [](const Surface& s) { return s.empty(); };
+  return !settings_.guide.empty() && std::none_of(settings_.guide.begin(), settings_.guide.end(), empty) &&
+         settings_.limit_guides.size() == settings_.limits.size() &&
+         std::none_of(settings_.limit_guides.begin(), settings_.limit_guides.end(), empty);
+}
+
+// The start, then one input to the side of it per cycle, towards the middle of the bounds; in turns until all is read.
+void GaussianProcessSeeking::choose_first() noexcept {
+  const Eigen::Index n = estimate_.size();
+  const std::int64_t side = star_ < n ? star_ : protocol_.cycle % (n + 1) - 1;
+  star_ = std::min<std::int64_t>(star_ + 1, n);
+  Inputs z = middle_;
+  const double step = settings_.first_step * (limited_.empty() ? 1.0 : 0.5);
+  if (side >= 0) z[side] += z[side] < 0.5 ? step : -step;
+  send(scaled(protocol_.failures.keep(unscaled(z))));
+}
+
+void GaussianProcessSeeking::send(const Inputs& z) noexcept {
+  const Inputs before = applied();
+  Inputs step = unscaled(z) - before;
+  for (std::size_t i = 0; i < settings_.space.inputs.size(); ++i) {
+    const double rate = settings_.space.inputs[i].rate;
+    double& own = step[static_cast<Eigen::Index>(i)];
+    own = std::clamp(own, -rate, rate);
+  }
+  applied_ = (before + step).cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
+}
+
+// What limit i would be exceeded by at a point of the last prediction, that many standard deviations above the mean.
+double GaussianProcessSeeking::excess(std::size_t i, int point, double quantile) const noexcept {
+  const Limit& limit = settings_.limits[i];
+  const ProcessModel& model = limited_[i];
+  const double sd = std::sqrt(std::max(model.covariance(point, point), 0.0));
+  const double freedom = std::max(1.0, static_cast<double>(model.count() - estimate_.size()));
+  return model.mean(point) + quantile * (1.0 + few_readings / freedom) * sd + limit.margin +
+         limit.margin_sd * model.noise_sd() - limit.upper;
+}
+
+// Largest excess of any limit, in scales, of every candidate: with the stated probability, and in the mean.
+void GaussianProcessSeeking::judge_safety(int points) noexcept {
+  std::fill(over_.begin(), over_.end(), 0.0);
+  std::fill(mean_over_.begin(), mean_over_.end(), 0.0);
+  for (std::size_t i = 0; i < limited_.size(); ++i) {
+    limited_[i].predict(candidates_, points);
+    for (int p = 0; p < points; ++p) {
+      const auto at = static_cast<std::size_t>(p);
+      const double likely = excess(i, p, quantile_) / settings_.limits[i].scale;
+      const double mean = excess(i, p, 0.0) / settings_.limits[i].scale;
+      over_[at] = i == 0 ? likely : std::max(over_[at], likely);
+      mean_over_[at] = i == 0 ? mean : std::max(mean_over_[at], mean);
+    }
+  }
+}
+
+// The best safe mean around a point, by ever narrower clouds; where nothing is safe, the least mean excess.
+Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
+  const Eigen::Index n = from.size();
+  Inputs best = reachable(from);
+  double best_mean = 0.0, best_excess = 0.0;
+  bool first = true, safe = false;
+  double width = search_width;
+  for (int round = 0; round < search_rounds; ++round, width *= search_shrinks) {
+    candidates_.row(0) = best.transpose();
+    for (int p = 1; p <= search_points; ++p) {
+      Inputs z = best;
+      for (Eigen::Index i = 0; i < n; ++i)
+        z[i] += width * draw(200 + static_cast<std::uint64_t>(round), p * max_inputs + static_cast<int>(i));
+      candidates_.row(p) = reachable(z).transpose();
+    }
+    judge_safety(search_points + 1);
+    for (ProcessModel& model : j_)
+      model.predict_means(candidates_, search_points + 1);
+    for (int p = first ? 0 : 1; p <= search_points; ++p) {
+      const auto at = static_cast<std::size_t>(p);
+      const bool own_safe = over_[at] <= 0.0;
+      const bool better = own_safe != safe ? own_safe : safe ? mean(p) > best_mean : mean_over_[at] < best_excess;
+      if (!first && !better) continue;
+      first = false;
+      safe = own_safe;
+      best_excess = mean_over_[at];
+      best_mean = mean(p);
+      best = candidates_.row(p).transpose();
+    }
+  }
+  return best;
+}
+
+// The estimate first, then a few from everywhere, then a cloud around the estimate at distances of all sizes.
+void GaussianProcessSeeking::draw_candidates(const Inputs& about) noexcept {
+  const Eigen::Index n = about.size();
+  candidates_.row(0) = about.transpose();
+  for (int p = 1; p < candidates; ++p) {
+    Inputs z = about;
+    const bool far = p <= far_candidates;
+    const auto index = static_cast<std::uint64_t>(protocol_.cycle * 4096 + p);
+    const double distance =
+        cloud_nearest * std::pow(cloud_farthest / cloud_nearest, random::uniform(settings_.seed, 300, index));
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto stream = static_cast<std::uint64_t>(301 + i);
+      if (far) {
+        z[i] = random::uniform(settings_.seed, stream, index);
+      } else {
+        z[i] += distance * random::normal(settings_.seed, stream, index);
+      }
+    }
+    candidates_.row(p) = reachable(z).transpose();
+  }
+}
+
+// Of the safe candidates the one whose J, and what it teaches, is worth most; the least unsafe where none is safe.
+int GaussianProcessSeeking::most_worth(int points) noexcept {
+  const auto at = [](int p) { return static_cast<std::size_t>(p); };
+  int safe = 0;
+  for (int p = 0; p < points; ++p) {  // safe ones to the front of the order, in turn
+    if (over_[at(p)] <= 0.0) order_[at(safe++)] = p;
+  }
+  if (!unsafe_.empty()) unsafe_[0] = safe == 0 ? unsafe_[0] + 1.0 : 0.0;
+  if (safe == 0) {
+    return static_cast<int>(std::min_element(mean_over_.begin(), mean_over_.begin() + points) - mean_over_.begin());
+  }
+  const std::vector<int>& kept = order_;
+  for (int a = 0; a < safe; ++a)
+    worth_mean_[at(a)] = means_[kept[at(a)]];
+  const double noise = std::max(noise_sd(), worth_noise * std::abs(worth_mean_[0]));
+  const std::span<const double> means(worth_mean_.data(), at(safe));
+  const std::span<double> effects(effect_.data(), at(safe));
+  // In units of what may be asked anew; early numbers of the processes promise too much.
+  const double read =
+      static_cast<double>(j_[0].count()) / (cautious_readings * static_cast<double>(1 + estimate_.size()));
+  const double horizon = settings_.horizon * std::min(1.0, read) / static_cast<double>(hold_);
+  double most = 0.0;
+  int best = -1;
+  std::array<int, candidates> scratch{};
+  for (int a = 0; a < safe; ++a) {
+    double taught = 0.0;
+    const auto [least, steepest] = std::ranges::minmax_element(kept.begin(), kept.begin() + safe, {},
+                                                               [&](int b) { return covariance_(b, kept[at(a)]); });
+    const double range = covariance_(*steepest, kept[at(a)]) - covariance_(*least, kept[at(a)]);
+    for (const double readings : planned_readings) {
+      const double sd = std::sqrt(std::max(covariance_(kept[at(a)], kept[at(a)]), 0.0) + noise * noise / readings);
+      if (!(sd > 0.0)) continue;
+      // The largest of lines through one point rises by their range of slopes times E max(Z, 0) at most.
+      const double at_most = rise_of_normal * range / (sd * readings);
+      if (at_most <= taught || (best >= 0 && means[at(a)] + horizon * at_most <= most)) continue;
+      for (int b = 0; b < safe; ++b)
+        effects[at(b)] = covariance_(kept[at(b)], kept[at(a)]) / sd;
+      const double gain = knowledge_gradient(means, effects, {scratch.data(), at(safe)}, {breaks_.data(), at(safe)});
+      taught = std::max(taught, gain / readings);
+    }
+    const double worth = means[at(a)] + horizon * taught;
+    if (best >= 0 && !(worth > most)) continue;
+    most = worth;
+    best = kept[at(a)];
+  }
+  return best;
+}
+
+}  // namespace mgdd::optimize
