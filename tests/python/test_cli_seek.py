@@ -92,6 +92,15 @@ def test_seekers_behind_the_analyser_arrive(method: str, form: str | None, capsy
     assert run["mean_nox_ppm"] < 1300.0
 
 
+def test_a_curve_behind_the_analyser_guides_each_component(capsys: pytest.CaptureFixture[str]) -> None:
+    rough = ("--guide", "curve", "--guide-set", "wall_heat_scale=0.25")
+    run = seek(capsys, "--sensor", "analyser", *rough, "--limit", "p_max_bar=100")
+    assert (run["guide"], run["cycles"]) == ("curve", 2000)
+    assert run["start_cad"] != run["optimum_cad"]
+    assert run["final_cad"] == pytest.approx(run["optimum_cad"], abs=2.0)
+    assert run["late_loss_percent"] < 0.15
+
+
 def test_the_period_follows_the_lag_of_the_speed(capsys: pytest.CaptureFixture[str]) -> None:
     run = seek(capsys, "--sensor", "analyser", "--speed-rpm", "4000", "--fuel-mg", "25", "--seed", "2")
     assert run["cycles"] > 8000  # the lag lasts 67 cycles here, 25 at 1500 rpm

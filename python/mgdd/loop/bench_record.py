@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FLAGS", "cycles_to_dataset"]
+__all__ = ["FLAGS", "OWN_LABELS", "cycles_to_dataset"]
 
 FLAGS = {
     "misfire": "nothing burned",
@@ -23,6 +23,8 @@ FLAGS = {
     "unphysical": "no such cycle exists",
     "operating_point_changed": "speed or fuel moved by more than 5 %",
 }
+# Of the bench alone: files have an `egr` in percent too.
+OWN_LABELS = {"egr": ("-", "recirculated exhaust gas, share of the charge's mass")}
 
 
 def cycles_to_dataset(
@@ -39,8 +41,8 @@ def cycles_to_dataset(
     variables |= {name: ("cycle", values) for name, values in more.items()}
     components, limits = columns.pop("components"), columns.pop("limits")
     for name, values in columns.items():
-        label = (("-", FLAGS[name]) if name in FLAGS else ()) if name not in VARIABLES else ()
-        variables[name] = ("cycle", values, *label)
+        flag = ("-", FLAGS[name]) if name in FLAGS and name not in VARIABLES else ()
+        variables[name] = ("cycle", values, *OWN_LABELS.get(name, flag))
     variables["component"] = ("component", terms, "-", "term of the performance")
     variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
     names = settings["limits"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from mgdd.errors import Interrupted, ParameterError, hinted
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.loop.bench_record import FLAGS
+from mgdd.loop.bench_record import FLAGS, OWN_LABELS
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import noise_free_variable
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
@@ -266,7 +266,9 @@ def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...], guided: dict[
         if name in FLAGS and name not in _OWN:
             variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
         elif name not in _OWN:
-            variables[name] = ("cycle", values, *(() if name in VARIABLES else (_UNKNOWN, name)))
+            known: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in names else {}  # of a bench
+            said: tuple[str, ...] = () if name in VARIABLES else known.get(name, (_UNKNOWN, name))
+            variables[name] = ("cycle", values, *said)
     width = max((len(row.components) for row in rows), default=1)
     components = np.full((len(rows), width), math.nan)
     for at, row in enumerate(rows):

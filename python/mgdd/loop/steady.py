@@ -12,6 +12,7 @@ import numpy as np
 from mgdd._core.loop import EngineBench, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
+from mgdd.loop.bench_record import OWN_LABELS
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.results.labels import labelled_dataset
 
@@ -66,7 +67,9 @@ def steady_map(quiet: EngineBench, inputs: ArrayLike | Mapping[str, ArrayLike]) 
     shape = tuple(values.size for values in axes.values())
     dims = tuple(axes) if len(axes) > 1 else "soc_cad"
     shown = ("efficiency_gross", "imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")
-    variables: dict[str, tuple[Any, ...]] = {name: (name, values) for name, values in axes.items()}
+    variables: dict[str, tuple[Any, ...]] = {
+        name: (name, values, *OWN_LABELS.get(name, ())) for name, values in axes.items()
+    }
     for name in ("j", *shown, "nox_true_ppm", "nox_soft_ppm", *(("intake_o2_fraction",) if "egr" in names else ())):
         variables[name] = (dims, np.reshape([row[name] for row in rows], shape))
     return labelled_dataset(variables)

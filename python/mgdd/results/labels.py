@@ -112,7 +112,6 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "estimate_cad": Label(_CAD, "estimate of the best timing"),
         "intake_pressure_kpa": Label("kPa", "intake pressure"),
         "second_fraction": Label("-", "share of the heat in the second Wiebe law"),
-        "egr": Label("-", "recirculated exhaust gas, share of the charge's mass"),
         "intake_o2_fraction": Label("-", "oxygen of the charge by volume"),
         "t_evo_k": Label("K", "gas temperature at EVO"),
         "soi_cad": Label(_CAD, "start of injection"),
