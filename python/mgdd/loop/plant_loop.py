@@ -266,8 +266,8 @@ def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...], guided: dict[
         if name in FLAGS and name not in _OWN:
             variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
         elif name not in _OWN:
-            known: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in names else {}  # of a bench
-            said: tuple[str, ...] = () if name in VARIABLES else known.get(name, (_UNKNOWN, name))
+            labels: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in names else {}  # of a bench
+            said: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
             variables[name] = ("cycle", values, *said)
     width = max((len(row.components) for row in rows), default=1)
     components = np.full((len(rows), width), math.nan)
