@@ -54,9 +54,9 @@ GaussianProcessSeekingSettings resolved(GaussianProcessSeekingSettings s) {
   for (Limit& limit : s.limits) {
     if (limit.scale == 0.0) limit.scale = limit.upper != 0.0 ? std::abs(limit.upper) : 1.0;
   }
-  if (s.components.empty())
+  if (s.components.empty()) {
     s.components.push_back(s.sensor);
-  else if (s.sensor != ComponentLag{}) {
+  } else if (s.sensor != ComponentLag{}) {
     throw ParameterError("delay_cycles", s.sensor.delay_cycles, "must be left out where components say their own");
   }
   validate(s.components);

@@ -142,9 +142,10 @@ double ProcessModel::wandered(const double* a, const double* b, double age, cons
 void ProcessModel::factor() noexcept {
   for (std::int64_t i = 0; i < count_; ++i) {
     weights_[i] = values_[i] - level_ - kernel_.mean(&points_(i, 0), now_);
-    for (std::int64_t j = 0; j <= i; ++j)
+    for (std::int64_t j = 0; j <= i; ++j) {
       factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_) +
                       wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), now_);
+    }
     factor_(i, i) += now_.noise_variance + jitter * now_.bend * now_.bend;
   }
   cholesky(factor_, count_);

@@ -128,9 +128,10 @@ double ProcessModel::likelihood_by(const Numbers& numbers, const InputTable& at,
   for (int a = 0; a < count; ++a) {
     kernel_.describe(at.row(a).transpose(), &asked_(a, 0));
     small_rest_[a] = values[a] - level - kernel_.mean(&asked_(a, 0), s);
-    for (int b = 0; b <= a; ++b)
+    for (int b = 0; b <= a; ++b) {
       small_(a, b) = kernel_.covariance(&asked_(a, 0), &asked_(b, 0), s) +
                      wandered(&asked_(a, 0), &asked_(b, 0), std::min(ages[a], ages[b]), s);
+    }
     small_(a, a) += s.noise_variance + jitter * s.bend * s.bend;
   }
   cholesky(small_, count);
@@ -159,9 +160,10 @@ void ProcessModel::begin_numbers() noexcept {
   const double spread = values_.head(count_).maxCoeff() - values_.head(count_).minCoeff();
   const double highest = values_.head(count_).cwiseAbs().maxCoeff();
   double farthest = 1e-6;
-  for (std::int64_t i = 0; i < count_; ++i)
+  for (std::int64_t i = 0; i < count_; ++i) {
     for (std::int64_t j = 0; j < i; ++j)
       farthest = std::max(farthest, (points_.row(i) - points_.row(j)).head(settings_.inputs).norm());
+  }
   const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), 1e-300});
   numbers_[0] = std::log(rise / (0.3 * farthest));
   numbers_[1] = noise_prior;
