@@ -222,7 +222,7 @@ TEST(BenchInputs, WhatFindsNoOxygenDoesNotBurn) {
 }
 
 TEST(BenchInputs, ALoopOfTheCoreSteersThemAll) {
-  BenchSettings s = steering({soc_cad, egr, intake_pressure_kpa}, BenchSettings{});
+  const BenchSettings s = steering({soc_cad, egr, intake_pressure_kpa}, BenchSettings{});
   optimize::SpsaSettings o;
   o.space.start = Eigen::Vector3d(-15.0, 0.2, 160.0);
   o.space.lower = Eigen::Vector3d(-25.0, 0.0, 120.0);

@@ -273,7 +273,7 @@ TEST(GaussianProcessSeeking, ANewPointBeginsAnewAndRatesHold) {
 }
 
 TEST(GaussianProcessSeeking, KeepsOutOfInputsThatFail) {
-  auto s = two_inputs(7);
+  const auto s = two_inputs(7);
   GaussianProcessSeeking seeker(s);
   int failed = 0;
   for (int k = 0; k < 200; ++k) {

@@ -54,7 +54,7 @@ double off_by_a_fifth(double soc, double egr) {
 struct Outcome {
   double arrived, lost;
 };
-Outcome run(GaussianProcessSeekingSettings s, int cycles = 60) {
+Outcome run(const GaussianProcessSeekingSettings& s, int cycles = 60) {
   GaussianProcessSeeking seeker(s);
   Outcome out{static_cast<double>(cycles), 0.0};
   for (int k = 0; k < cycles; ++k) {
