@@ -119,6 +119,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "nan": (
         {"guide": lambda x: float("nan") if x["soc_cad"] > 0 else 1.0},
         r"guide gives nan at soc_cad = 2.5, egr = 0"),
+    "by name": ({"guide": {"soc_cad": guide}}, r"guide = \{.*must be a callable of the inputs"),
     "no number": ({"guide": lambda _: "x"}, r"guide fails at"),
     "the same": ({"guide": lambda _: 4.0}, r"guide.*same everywhere"),
     "a gap": (

@@ -1440,7 +1440,7 @@ class GaussianProcessSeeking:
         inputs : names, units, bounds and scales
         noise_sd : of one reading of J
         horizon : cycles for which what is learnt pays
-        memory_cycles : time constant with which readings fade
+        memory_cycles : in which level and place are expected to wander by what counts
         kept : readings at most
         first_step : of the first readings, share of the bounds
         limit_probability : with which a limit holds at every input asked for

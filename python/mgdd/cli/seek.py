@@ -218,7 +218,7 @@ def _payload(args: argparse.Namespace, preset: str, found: TimingSearchRun) -> d
     }
     if search.method == "extremum_seeking":
         out["form"] = search.form or "batch"
-    if search.limits and not search.is_curve:
+    if search.limits and not search.is_curve and search.method != "gaussian_process_seeking":
         out["limit_method"] = search.limit_method or "switching"
     return out
 

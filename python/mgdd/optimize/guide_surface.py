@@ -121,8 +121,8 @@ def with_guides(settings: Mapping[str, Any]) -> dict[str, Any]:
         given = out.get(argument)
         if given is None:
             continue
-        if isinstance(given, Mapping):
-            given = _in_order(given, of or [], argument)
+        if isinstance(given, Mapping) and of is not None:
+            given = _in_order(given, of, argument)
         several = isinstance(given, list | tuple)
         out[argument] = [
             surface_of(one, names, lower, upper, argument=f"{argument}[{k}]" if several else argument)

@@ -73,7 +73,7 @@ def with_inputs(settings: Mapping[str, Any]) -> dict[str, Any]:
     inputs = inputs_of(settings.get("inputs"))
     names = [one.name for one in inputs]
     own = {
-        name: value if name == "limit_guides" else named_values(name, value, names)  # those go by names of limits
+        name: value if name in ("guide", "limit_guides") else named_values(name, value, names)  # no numbers
         for name, value in settings.items()
     }
     return {**own, "inputs": list(inputs)}

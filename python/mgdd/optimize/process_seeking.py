@@ -16,7 +16,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
 
     Bayesian optimisation made for an engine that runs while it is sought on. After a reading at the start and one to
     the side per input, the next input is the one whose J, and what a few readings there would teach about the best
-    input, is worth most over `horizon` cycles. Nothing is asked farther from the start than half as far again as what
+    input, is worth most over `horizon` cycles. Nothing is asked farther beyond what was read than 0.4 of the width that
     has been. Level, slopes and bends of J have a prior that takes its scale from the readings, so any unit of J and of
     the inputs does. All arguments are keywords.
 
@@ -37,7 +37,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     horizon : float
         Cycles for which what is learnt pays: more looks farther, 0 only at J.
     memory_cycles : float
-        Readings fade with this time constant, >= 10: their variance grows by exp(age/memory_cycles).
+        In which the level of J is expected to wander by 1.2 noise deviations and its slopes by 0.04 bends, >= 10; how
+        fast they do is learnt beside. Shorter follows a drift faster.
     kept : int
         Readings at most, 10 to 200; the oldest of those near the estimate makes room.
     first_step : float
@@ -52,7 +53,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         takes one number per component, each with a process of its own.
     delay_uncertainty : int
         Cycles by which a delay may be shorter or longer than told, at most 20; ``delay_cycles`` says which one the
-        readings show. A delay and lag of 0 are taken as told.
+        readings show. A delay of 0, and one beside a lag, is taken as told.
     guide : callable, fitted response or DataArray, optional
         What a model says of J over one to five inputs: a callable of what `ask` gives, asked on a grid between the
         bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates per input. A
@@ -76,7 +77,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
 
     Notes
     -----
-    Readings that the process does not explain age what was known by three times `memory_cycles`; `doubts` counts that.
+    Readings that the process does not explain age what was known by ten times `memory_cycles`; `doubts` counts that.
+    Of a limit above 0 the logarithm is learnt: quantities as NOx spread over powers of ten.
 
     References
     ----------

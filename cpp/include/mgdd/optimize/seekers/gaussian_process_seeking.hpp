@@ -2,10 +2,10 @@
 // reading at the start and one to the side per input, the next input is the one that is worth most: its J, plus what a
 // few readings there would teach about the best input (knowledge gradient, Frazier, Powell and Dayanik 2009), used for
 // `horizon` cycles. With a guide the readings to the side are left out: what a rough model says of J is the mean of the
-// process, whose factor, place and error are learnt. Nothing is asked farther from the start than half as far again as
-// what has been, nor where a limit holds with less than the stated probability: the safe set grows from the start (Sui
-// et al. 2015). Readings fade; ones that the process cannot explain age all that was known. ask and tell are noexcept
-// and allocation-free; all randomness is a function of (seed, cycle).
+// process, whose factor, place and error are learnt. Nothing is asked farther beyond what was read than a part of its
+// width, nor where a limit holds with less than the stated probability: the safe set grows from the start (Sui et al.
+// 2015). Level and place wander; readings that the process cannot explain age all that was known. ask and tell are
+// noexcept and allocation-free; all randomness is a function of (seed, cycle).
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct GaussianProcessSeekingSettings {
   SearchSpace space;                       ///< finite bounds
   std::optional<double> noise_sd{};        ///< of one reading of J, > 0; none: learnt
   double horizon = 60.0;                   ///< cycles for which what is learnt pays
-  double memory_cycles = 143.0;            ///< readings fade with this time constant
+  double memory_cycles = 143.0;            ///< in which level and place are expected to wander by what counts
   int kept = 100;                          ///< readings at most, 10 to 200
   double first_step = 0.1;                 ///< of the first readings to the side, as a share of the bounds
   double limit_probability = 0.95;         ///< with which a limit holds at every input asked for
@@ -48,7 +48,7 @@ inline auto fields_of(const GaussianProcessSeekingSettings&) {
       space_fields<&S::space>(),
       field<&S::noise_sd>("noise_sd", "of one reading of J"),
       field<&S::horizon>("horizon", "cycles for which what is learnt pays"),
-      field<&S::memory_cycles>("memory_cycles", "time constant with which readings fade"),
+      field<&S::memory_cycles>("memory_cycles", "in which level and place are expected to wander by what counts"),
       field<&S::kept>("kept", "readings at most"),
       field<&S::first_step>("first_step", "of the first readings, share of the bounds"),
       field<&S::limit_probability>("limit_probability", "with which a limit holds at every input asked for"),
