@@ -1,6 +1,7 @@
 // What a seeker by Gaussian processes asks next.
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -20,16 +21,22 @@ constexpr double planned_readings[] = {1, 4, 16};       // that the worth of an 
 constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
 constexpr double cautious_readings = 5.0;               // per input and one: before them the horizon is shorter
 constexpr double few_readings = 2.0;                    // as Student's quantiles exceed the normal ones
-constexpr double worth_noise = 1e-12;                   // of J, at least
+constexpr std::int64_t resting = 8;                     // inputs at the estimate, then the search is over
+constexpr double failing_quantile = 2.0;                // of the label of a cycle, -1 where it works, 1 where it fails
+constexpr double most_failing = 0.0, wary_failing = -0.5;  // quantile that is asked for, and after a failure
+constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may exceed the least one
+constexpr double turned = -0.7;                            // what a first step is multiplied by after a failure
+constexpr std::int64_t most_turns = 6;                     // for them; then inputs that cannot move are left alone
+constexpr double worth_noise = 1e-12;                      // of J, at least
 
 }  // namespace
 
-// Within the bounds, what may be explored by now, and what is not known to fail.
+// Within the bounds, and what may be explored by now.
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
   const double wide = growth * (highest_ - lowest_).maxCoeff(), far = guided() ? std::max(wide, guided_reach) : wide;
   for (Eigen::Index i = 0; i < z.size(); ++i)
     z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));
-  return scaled(protocol_.failures.keep(unscaled(z)));
+  return z;
 }
 
 // Standard normal, another one for each stream and index of this cycle.
@@ -41,28 +48,60 @@ void GaussianProcessSeeking::choose() noexcept {
   const Eigen::Index n = estimate_.size();
   const auto enough = [](const ProcessModel& m) { return m.count() >= m.fewest(); };
   const bool read = std::all_of(j_.begin(), j_.end(), enough) && std::all_of(limited_.begin(), limited_.end(), enough);
-  if (!read || (star_ < n && !guided())) return choose_first();
-  const Inputs about = scaled(estimate_);
-  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
-    for (ProcessModel& model : *models)
-      model.fit(about);
-  }
+  const bool to_every_side = (highest_ - lowest_).minCoeff() > 0.0 || star_ >= most_turns * (n + 1);
+  if (!read || !(guided() || (star_ >= n && to_every_side))) return choose_first();
+  const Inputs about = since_failure_ > 0 ? scaled(estimate_) : good_;
+  fit(about);
   const Inputs best = best_of_mean(about);
   estimate_ = unscaled(best);
-  draw_candidates(best);
-  judge_safety(candidates);
+  const double aside = dither();
+  candidates_.row(0) = best.transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto bits = static_cast<std::uint64_t>(protocol_.cycle / hold_ * (2 * i + 1));
+    candidates_(1, i) = best[i] + (std::popcount(bits) % 2 == 0 ? aside : -aside);
+  }
+  candidates_.row(1) = reachable(candidates_.row(1).transpose()).transpose();
+  std::int64_t awaited = 0;
+  for (const DelayFinder& finder : finders_)
+    awaited = std::max(awaited, finder.on_their_way());
+  const bool over = rested_ * hold_ >= resting * hold_ + awaited;
+  const int points = over ? 2 : candidates;
+  if (!over) draw_candidates();
+  judge_safety(points);
   means_.setZero();
   covariance_.setZero();
   double variance = 0.0;
   for (std::size_t i = 0; i < j_.size(); ++i) {
-    take_in(i, candidates);
+    take_in(i, points);
     variance += std::max(j_[i].covariance(0, 0), 0.0);
   }
   expected_ = (settings_.maximize ? 1.0 : -1.0) * means_[0];
   expected_sd_ = std::sqrt(variance);
   for (std::size_t i = 0; i < limited_.size(); ++i)
     room_[i] = -excess(i, 0, quantile_) / settings_.limits[i].scale;
-  send(candidates_.row(most_worth(candidates)).transpose());
+  const int next = over ? 0 : most_worth(points);
+  const bool rests = over_[0] <= 0.0 && (candidates_.row(next) - candidates_.row(0)).cwiseAbs().maxCoeff() <= aside;
+  rested_ = rests ? rested_ + 1 : 0;
+  send(candidates_.row(rests && over_[1] <= 0.0 ? 1 : next).transpose());
+}
+
+void GaussianProcessSeeking::fit(const Inputs& about) noexcept {
+  for (std::vector<ProcessModel>* models : {&j_, &limited_}) {
+    for (ProcessModel& model : *models)
+      model.fit(about);
+  }
+  if (failures_known()) failing_.fit(about);
+}
+
+// How far to the side of the estimate it pays to ask on and on: what is lost by it equals half of what is lost since
+// place wanders, in a balance of what readings tell and what is forgotten. In ranges.
+double GaussianProcessSeeking::dither() const noexcept {
+  double wander = 0.0, bend = 0.0;
+  for (const ProcessModel& model : j_) {
+    wander += model.slope_wander();
+    bend += model.bend();
+  }
+  return bend > 0.0 ? std::cbrt(std::sqrt(wander) * noise_sd() / (4.0 * bend * bend)) : 0.0;
 }
 
 // Adds a component's means and covariances at the candidates, these as they will be once what is on its way is read.
@@ -120,15 +159,16 @@ bool GaussianProcessSeeking::guided() const noexcept {
          std::none_of(settings_.limit_guides.begin(), settings_.limit_guides.end(), empty);
 }
 
-// The start, then one input to the side of it per cycle, towards the middle of the bounds; in turns until all is read.
+// The start, then one input to the side of it per cycle, towards the middle of the bounds; in turns until all is read,
+// to the other side and nearer where something has failed.
 void GaussianProcessSeeking::choose_first() noexcept {
   const Eigen::Index n = estimate_.size();
-  const std::int64_t side = star_ < n ? star_ : protocol_.cycle % (n + 1) - 1;
-  star_ = std::min<std::int64_t>(star_ + 1, n);
+  const std::int64_t turn = ++star_ / (n + 1), side = star_ % (n + 1) - 1;
   Inputs z = middle_;
-  const double step = settings_.first_step * (limited_.empty() ? 1.0 : 0.5);
+  const double step = settings_.first_step * (limited_.empty() ? 1.0 : 0.5) *
+                      (failing_.count_above(0.0) > 0 ? std::pow(turned, static_cast<double>(turn)) : 1.0);
   if (side >= 0) z[side] += z[side] < 0.5 ? step : -step;
-  send(scaled(protocol_.failures.keep(unscaled(z))));
+  send(z);
 }
 
 void GaussianProcessSeeking::send(const Inputs& z) noexcept {
@@ -152,19 +192,37 @@ double GaussianProcessSeeking::excess(std::size_t i, int point, double quantile)
          limit.margin_sd * model.noise_sd() - limit.upper;
 }
 
+void GaussianProcessSeeking::judge(double likely, double mean, int point) noexcept {
+  const auto at = static_cast<std::size_t>(point);
+  over_[at] = std::max(over_[at], likely);
+  mean_over_[at] = std::max(mean_over_[at], mean);
+}
+
+// A candidate that may fail is out of the question, unless all of them may: as where cycles fail by chance.
+void GaussianProcessSeeking::judge_failures(int points) noexcept {
+  failing_.predict(candidates_, points);
+  double least = largest_reading;
+  const auto likely = [&](int p) {
+    return failing_.mean(p) + failing_quantile * std::sqrt(std::max(failing_.covariance(p, p), 0.0));
+  };
+  for (int p = 0; p < points; ++p)
+    least = std::min(least, likely(p));
+  const bool wary = since_failure_ < wary_;
+  const double most = std::max(wary ? wary_failing : most_failing, least + (wary ? wary_room : failing_room));
+  for (int p = 0; p < points; ++p)
+    judge(likely(p) - most, failing_.mean(p), p);
+}
+
 // Largest excess of any limit, in scales, of every candidate: with the stated probability, and in the mean.
 void GaussianProcessSeeking::judge_safety(int points) noexcept {
-  std::fill(over_.begin(), over_.end(), 0.0);
-  std::fill(mean_over_.begin(), mean_over_.end(), 0.0);
+  std::fill(over_.begin(), over_.end(), -largest_reading);
+  std::fill(mean_over_.begin(), mean_over_.end(), -largest_reading);
+  if (failures_known()) judge_failures(points);
   for (std::size_t i = 0; i < limited_.size(); ++i) {
     limited_[i].predict(candidates_, points);
-    for (int p = 0; p < points; ++p) {
-      const auto at = static_cast<std::size_t>(p);
-      const double likely = excess(i, p, quantile_) / settings_.limits[i].scale;
-      const double mean = excess(i, p, 0.0) / settings_.limits[i].scale;
-      over_[at] = i == 0 ? likely : std::max(over_[at], likely);
-      mean_over_[at] = i == 0 ? mean : std::max(mean_over_[at], mean);
-    }
+    const double scale = settings_.limits[i].scale;
+    for (int p = 0; p < points; ++p)
+      judge(excess(i, p, quantile_) / scale, excess(i, p, 0.0) / scale, p);
   }
 }
 
@@ -201,13 +259,14 @@ Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
   return best;
 }
 
-// The estimate first, then a few from everywhere, then a cloud around the estimate at distances of all sizes.
-void GaussianProcessSeeking::draw_candidates(const Inputs& about) noexcept {
+// After the estimate and what is to the side of it a few from everywhere, then a cloud around it, at distances of all
+// sizes.
+void GaussianProcessSeeking::draw_candidates() noexcept {
+  const Inputs about = candidates_.row(0).transpose();
   const Eigen::Index n = about.size();
-  candidates_.row(0) = about.transpose();
-  for (int p = 1; p < candidates; ++p) {
+  for (int p = 2; p < candidates; ++p) {
     Inputs z = about;
-    const bool far = p <= far_candidates;
+    const bool far = p < 2 + far_candidates;
     const auto index = static_cast<std::uint64_t>(protocol_.cycle * 4096 + p);
     const double distance =
         cloud_nearest * std::pow(cloud_farthest / cloud_nearest, random::uniform(settings_.seed, 300, index));

@@ -20,8 +20,10 @@ constexpr std::int64_t calm_cycles = 10;  // after a doubt
 constexpr double doubt_age = 10.0;        // memories
 constexpr double least_share = 1e-3;      // of a limit, that a reading counts as at least
 constexpr double expected_bend = 3.0;     // of a limited quantity, in its scale: few readings must not promise too much
-constexpr double active_room = 0.05;      // scales of a limit
-constexpr double plane_memory = 20.0;     // cycles of the planes that tell the delays from one another
+constexpr double label_noise = 0.3;       // of whether a cycle works: 1 or -1
+constexpr std::int64_t least_wary = 2, most_wary = 64;
+constexpr double active_room = 0.05;   // scales of a limit
+constexpr double plane_memory = 20.0;  // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
 
 // Of the limits. Lags are taken out of the readings instead (`LagWindow`).
@@ -89,6 +91,16 @@ std::vector<ProcessModel> limit_processes(const GaussianProcessSeekingSettings& 
   return out;
 }
 
+ProcessModel::Settings failing_settings(const GaussianProcessSeekingSettings& s, int most_points) {
+  ProcessModel::Settings out = process_settings(s, most_points);
+  out.guide = {};
+  out.bends_down = false;
+  out.bend = expected_bend;
+  out.noise_sd = label_noise;
+  out.labels = true;
+  return out;
+}
+
 }  // namespace
 
 GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings settings)
@@ -100,9 +112,11 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       finders_(finders_of(settings_)),
       j_(component_processes(settings_, candidates + most_on_their_way)),
       limited_(limit_processes(settings_, candidates + most_on_their_way)),
+      failing_(failing_settings(settings_, candidates)),
       estimate_(settings_.space.start),
       applied_(estimate_),
       middle_(scaled(estimate_)),
+      good_(middle_),
       lowest_(middle_),
       highest_(middle_),
       surprise_(j_.size(), 1.0),
@@ -139,6 +153,12 @@ Inputs GaussianProcessSeeking::unscaled(const Inputs& z) const noexcept {
   return out.cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
 }
 
+// Its own process keeps it out of what fails; only where nothing works any more others look for what does.
+const Inputs& GaussianProcessSeeking::ask() noexcept {
+  if (protocol_.asked) return protocol_.sent(applied_);
+  return protocol_.failures.failing_everywhere() ? protocol_.ask(applied_) : protocol_.pass(applied_);
+}
+
 TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, j_.size(), limit_count(), applied_.size());
   protocol_.count(status);
@@ -148,7 +168,15 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   causes_.record(applied);
   for (DelayFinder& finder : finders_)
     finder.record(scaled(applied));
-  if (status == TellStatus::accepted) {
+  const bool worked = status == TellStatus::accepted;
+  since_failure_ = worked ? since_failure_ + 1 : 0;
+  if (worked) {
+    good_ = scaled(applied);
+  } else {
+    wary_ = std::min(2 * wary_, most_wary);
+  }
+  failing_.record(scaled(applied), worked ? -1.0 : 1.0, scaled(estimate_));
+  if (worked) {
     learn(reading, applied);
   } else {
     for (LagWindow& window : windows_)
@@ -222,7 +250,7 @@ void GaussianProcessSeeking::doubt() noexcept {
   for (ProcessModel& model : j_)
     model.age(doubt_age * settings_.memory_cycles);
   std::fill(surprise_.begin(), surprise_.end(), 1.0);
-  since_doubt_ = 0;
+  since_doubt_ = rested_ = 0;
   ++doubts_;
 }
 
@@ -255,8 +283,10 @@ void GaussianProcessSeeking::restart() noexcept {
     for (ProcessModel& model : *models)
       model.forget();
   }
-  middle_ = lowest_ = highest_ = scaled(estimate_);
-  star_ = held_ = since_doubt_ = 0;
+  failing_.forget();
+  wary_ = least_wary;
+  middle_ = good_ = lowest_ = highest_ = scaled(estimate_);
+  star_ = held_ = rested_ = since_doubt_ = since_failure_ = 0;
   for (LagWindow& window : windows_)
     window.forget();
   std::fill(surprise_.begin(), surprise_.end(), 1.0);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -86,6 +87,12 @@ double ProcessModel::squared_distance(Eigen::Index reading, const Inputs& from) 
 int ProcessModel::crowded_reading(const Inputs& about) noexcept {
   for (std::int64_t i = 0; i < count_; ++i)
     distance_[i] = squared_distance(i, about);
+  if (settings_.labels) {
+    const bool above_is_rarer = 2 * count_above(0.0) < count_;
+    for (std::int64_t i = 0; i < count_; ++i) {
+      if ((values_[i] > 0.0) == above_is_rarer) distance_[i] = std::numeric_limits<double>::infinity();
+    }
+  }
   const auto begin = order_.begin(), end = begin + count_;
   std::iota(begin, end, 0);
   const auto near = begin + static_cast<std::ptrdiff_t>(crowd * static_cast<double>(count_));

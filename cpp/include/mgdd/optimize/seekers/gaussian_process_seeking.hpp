@@ -4,8 +4,10 @@
 // `horizon` cycles. With a guide the readings to the side are left out: what a rough model says of J is the mean of the
 // process, whose factor, place and error are learnt. Nothing is asked farther beyond what was read than a part of its
 // width, nor where a limit holds with less than the stated probability: the safe set grows from the start (Sui et al.
-// 2015). Level and place wander; readings that the process cannot explain age all that was known. ask and tell are
-// noexcept and allocation-free; all randomness is a function of (seed, cycle).
+// 2015), nor where cycles are likely to fail, as one more process knows. Level and place wander; readings that the
+// process cannot explain age all that was known. Where several inputs in a row stay at the estimate, the search is
+// over: a small dither, as large as noise and wandering make it pay, goes on until a doubt. ask and tell are noexcept
+// and allocation-free; all randomness is a function of (seed, cycle).
 #pragma once
 
 #include <cstdint>
@@ -72,7 +74,7 @@ class GaussianProcessSeeking {
   /// Throws ParameterError or ShapeError naming the field.
   explicit GaussianProcessSeeking(GaussianProcessSeekingSettings settings);
 
-  const Inputs& ask() noexcept { return protocol_.ask(applied_); }
+  const Inputs& ask() noexcept;
   TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: what was learnt is void, the estimate stays, and the search begins anew around it.
   void restart() noexcept;
@@ -112,10 +114,14 @@ class GaussianProcessSeeking {
     v("estimate", self.estimate_);
     v("applied", self.applied_);
     v("middle", self.middle_);
+    v("good", self.good_);
     v("lowest", self.lowest_);
     v("highest", self.highest_);
-    v("star", self.star_, 1 + self.estimate_.size());
+    v("star", self.star_);
     v("held", self.held_);
+    v("rested", self.rested_);
+    v("since_failure", self.since_failure_);
+    v("wary", self.wary_);
     v("expected", self.expected_);
     v("expected_sd", self.expected_sd_);
     v("surprise", self.surprise_);
@@ -132,6 +138,7 @@ class GaussianProcessSeeking {
       ProcessModel::visit(self.j_[i], v, i == 0 ? "j" : "j" + std::to_string(i));
     for (std::size_t i = 0; i < self.limited_.size(); ++i)
       ProcessModel::visit(self.limited_[i], v, "limit" + std::to_string(i));
+    ProcessModel::visit(self.failing_, v, "failing");
   }
 
  private:
@@ -141,6 +148,7 @@ class GaussianProcessSeeking {
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
   double draw(std::uint64_t stream, int index) const noexcept;
+  void fit(const Inputs& about) noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   void watch_surprise(std::size_t component, double value, const Inputs& z) noexcept;
   void doubt() noexcept;
@@ -149,7 +157,13 @@ class GaussianProcessSeeking {
   void choose() noexcept;
   void choose_first() noexcept;
   bool guided() const noexcept;
-  void draw_candidates(const Inputs& about) noexcept;
+  void draw_candidates() noexcept;
+  double dither() const noexcept;
+  bool failures_known() const noexcept {
+    return failing_.count_above(0.0) > 0 && failing_.count() >= failing_.fewest();
+  }
+  void judge_failures(int points) noexcept;
+  void judge(double likely, double mean, int point) noexcept;
   void judge_safety(int points) noexcept;
   double excess(std::size_t i, int point, double quantile) const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
@@ -166,11 +180,15 @@ class GaussianProcessSeeking {
   std::vector<LagWindow> windows_;    // of the components, then of the limits
   std::vector<ProcessModel> j_;       // of its components
   std::vector<ProcessModel> limited_;
+  ProcessModel failing_;  // -1 where a cycle worked, 1 where it failed
   Inputs estimate_, applied_;
   Inputs middle_;            // the start, scaled
+  Inputs good_;              // the input that worked last, scaled
   Inputs lowest_, highest_;  // of each input that was asked, scaled
   std::int64_t star_ = 0;    // first readings asked for
   std::int64_t held_ = 0;
+  std::int64_t since_failure_ = 0, wary_ = 2;  // cycles; so many of them nothing is asked that may fail
+  std::int64_t rested_ = 0;                    // inputs in a row that stayed at the estimate
   double expected_ = 0.0, expected_sd_ = 0.0;
   std::vector<double> surprise_;  // running means of squared normalised innovations, of the components
   std::int64_t since_doubt_ = 0, doubts_ = 0;

@@ -27,6 +27,7 @@ class ProcessModel {
     bool bends_down = true;            ///< whether a maximum is expected, as of J
     std::optional<double> noise_sd{};  ///< of a reading, > 0; none: learnt
     std::optional<double> bend{};      ///< that is expected, to a factor of e; none: any
+    bool labels = false;               ///< readings are below or above 0: of the rarer ones those far away are kept
     std::uint64_t seed = 0;
     ProcessGuide guide{};
   };
@@ -57,6 +58,11 @@ class ProcessModel {
   /// Every reading so far counts as if it were this much older.
   void age(double cycles) noexcept;
   void forget() noexcept;
+  /// Variance by which its slopes wander per reading, and how much it bends, as of the last fit.
+  double slope_wander() const noexcept { return now_.wander_slope; }
+  double bend() const noexcept { return kernel_.whole_bend(now_); }
+  /// Kept readings above `value`.
+  std::int64_t count_above(double value) const noexcept { return (values_.head(count_).array() > value).count(); }
   void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
   /// What the guide counts by, in its own unit; 0 without one.
   double guide_factor() const noexcept { return kernel_.guided() ? std::exp(numbers_[numbers_.size() - 1]) : 0.0; }
