@@ -28,9 +28,20 @@ void check(const MonteCarloPlan& plan) {
   if (plan.threads < 0) throw ParameterError("threads", plan.threads, "must be >= 0 (0: all)");
   for (const LoopCriteria& criteria : plan.criteria)
     validate(criteria, plan.cycles);
+  if (!plan.answers.empty() && plan.answers.size() != plan.benches.size() * plan.seekers.size()) {
+    throw about("answers", ShapeError("answers has " + std::to_string(plan.answers.size()) +
+                                      " entries: one per bench and seeker, or none"));
+  }
   for (const EngineBench& bench : plan.benches) {
-    for (const Seeker& seeker : plan.seekers)
+    for (const LoopSeeker& seeker : plan.seekers)
       std::visit([&](const auto& s) { require_match(bench, s); }, seeker);
+  }
+  for (const LoopSeeker& seeker : plan.seekers) {
+    const auto* const guided = std::get_if<guide::GuidedEngine>(&seeker);
+    if (guided != nullptr && guided->protocol().asked) {
+      throw about("seekers", ParameterError("seekers: a GuidedEngine stands between ask() and tell(): tell what was "
+                                            "measured first"));
+    }
   }
 }
 
@@ -51,6 +62,8 @@ struct Loop {
           if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
         },
         seeker);
+    auto* const scheduled = std::get_if<guide::ScheduledFeedForward>(&seeker);
+    if (scheduled != nullptr && !plan.answers.empty()) scheduled->follow(plan.answers[number / plan.seeds.size()]);
   }
   EngineBench bench(const MonteCarloPlan& plan) const {
     EngineBench out = plan.benches[bench_index];
@@ -60,7 +73,7 @@ struct Loop {
 
   std::size_t bench_index;
   std::uint64_t seed;
-  Seeker seeker;
+  LoopSeeker seeker;
   LoopStatistics statistics;
 };
 
@@ -104,7 +117,7 @@ void run_side_by_side(const MonteCarloPlan& plan, const LoopRange& range, StopRe
     }
     lanes.step(soc_cad, cycles);
     for (std::size_t i = 0; i < loops.size(); ++i) {
-      std::visit([&](auto& seeker) { tell(cycles[i], seeker); }, loops[i].seeker);
+      std::visit([&](auto& seeker) { tell(lanes.bench(i), cycles[i], seeker); }, loops[i].seeker);
       loops[i].statistics.add({cycles[i], estimate_cad[i]});
     }
   }

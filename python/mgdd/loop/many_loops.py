@@ -11,6 +11,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, or_partial
+from mgdd.guide import FeedForward, GuidedEngine
+from mgdd.guide.asked_ahead import Said, answers_along
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import limit_label, with_a_limit
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-    _Call = tuple[list[EngineBench], list[Seeker], Sequence[int], list[Mapping[str, Any]]]
+    _Seeker = Seeker | FeedForward | GuidedEngine
+    _Call = tuple[list[EngineBench], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
 
 __all__ = ["monte_carlo"]
 
@@ -51,7 +54,7 @@ _SUMMARY = {
 
 def monte_carlo(
     benches: EngineBench | Sequence[EngineBench],
-    seekers: Seeker | Sequence[Seeker],
+    seekers: _Seeker | Sequence[_Seeker],
     seeds: Iterable[int],
     *,
     cycles: int,
@@ -65,16 +68,18 @@ def monte_carlo(
     Each loop starts from cycle 0 of its bench and from where its seeker stands. Noise depends on the seed alone, so
     the numbers do not depend on executor, workers or chunks. Sixteen loops and more run side by side and have the
     numbers of `run_seeker` to rounding; fewer, and those with a gamma of temperature, several inputs or a limit on
-    ``t_evo_k``, have its bits. Of several inputs the figures of the estimate are those of ``soc_cad``.
+    ``t_evo_k``, have its bits; means of a seeker with a guide are summed in another order. Of several inputs the
+    figures of the estimate are those of ``soc_cad``.
 
     Parameters
     ----------
     benches : EngineBench or sequence
         Plants, for example several operating points; read, not advanced.
     seekers : seeker or sequence
-        For example several gains; read, not advanced.
+        As in `run_seeker`, for example several gains; read, not advanced. The guide of a `FeedForward` is asked once at
+        every operating point of a bench, before the loops, and once more where it held or refused.
     seeds : iterable of int
-        Of the bench, and of SPSA.
+        Of the bench, and of a seeker that draws.
     cycles : int
         Length of each loop.
     criteria : LoopCriteria or sequence of LoopCriteria, optional
@@ -132,7 +137,8 @@ def monte_carlo(
         if len({goal[name] for goal in goals}) > 1:
             raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
     form = _core.loop.loop_form(len(bench_list) * len(seeker_list) * len(seed_list))  # of all, however they are cut
-    call = (bench_list, seeker_list, seed_list, goals, cycles, form)
+    answers = [_answers(bench, seeker, cycles) for bench in bench_list for seeker in seeker_list]
+    call = (bench_list, seeker_list, seed_list, answers, goals, cycles, form)
     stop: Interrupted | WorkerLostError | None
     if executor is None and progress is None:
         threads = threads_of(workers)
@@ -160,8 +166,9 @@ def monte_carlo(
 
 def _loops(
     benches: Sequence[EngineBench],
-    seekers: Sequence[Seeker],
+    seekers: Sequence[_Seeker],
     seeds: Sequence[int],
+    answers: Sequence[list[Said]],
     goals: Sequence[Mapping[str, Any]],
     cycles: int,
     form: str,
@@ -172,15 +179,16 @@ def _loops(
     shared: dict[str, Any] = {name: first[name] for name in ("arrival_cad", "tail_cycles", "exceed_from")}
     shared |= {name: [goal[name] for goal in goals] for name in ("optimum_cad", "exceed_above", "limits")}
     columns: dict[str, NDArray[Any]] = _core.loop.monte_carlo(
-        benches, list(seekers), seeds, cycles=cycles, threads=threads, form=form, **shared
+        benches, list(seekers), seeds, answers, cycles=cycles, threads=threads, form=form, **shared
     )
     return columns
 
 
 def _in_chunks(
     benches: Sequence[EngineBench],
-    seekers: Sequence[Seeker],
+    seekers: Sequence[_Seeker],
     seeds: Sequence[int],
+    answers: Sequence[list[Said]],
     goals: Sequence[Mapping[str, Any]],
     cycles: int,
     form: str,
@@ -191,16 +199,15 @@ def _in_chunks(
 ) -> tuple[dict[str, NDArray[Any]], Interrupted | WorkerLostError | None]:
     # What does not fit is found by one cycle of every pair, before any work; whose cycles count is checked by a chunk.
     shown = [{**goal, "exceed_from": None} for goal in goals]
-    columns, stop = or_partial(lambda: _loops(benches, seekers, seeds[:1], shown, min(cycles, 1), form))
-    own, begun = [copy.deepcopy(bench) for bench in benches], [copy.deepcopy(seeker) for seeker in seekers]
-    for seeker in begun:
-        seeker.clear_history()
+    columns, stop = or_partial(lambda: _loops(benches, seekers, seeds[:1], answers, shown, min(cycles, 1), form))
+    own, begun = [copy.deepcopy(bench) for bench in benches], [_bare(seeker) for seeker in seekers]
     n = len(benches) * len(seekers) * len(seeds)
     columns = {name: np.full(n, False if name == "finished" else np.nan) for name in columns}
 
     def cut(start: int, stop: int) -> tuple[list[_Call], int, str]:
         pairs = [(divmod(row, len(seekers)), seeds[a:b]) for row, a, b in pieces(start, stop, len(seeds))]
-        return [([own[b]], [begun[s]], these, [goals[b]]) for (b, s), these in pairs], cycles, form
+        calls = [([own[b]], [begun[s]], these, [answers[b * len(seekers) + s]], [goals[b]]) for (b, s), these in pairs]
+        return calls, cycles, form
 
     def keep(start: int, stop: int, parts: list[dict[str, NDArray[Any]]]) -> None:
         for name, column in columns.items():
@@ -212,6 +219,20 @@ def _in_chunks(
 
 def _some_loops(calls: Sequence[_Call], cycles: int, form: str) -> list[dict[str, NDArray[Any]]]:
     return [_loops(*call, cycles, form) for call in calls]
+
+
+def _answers(bench: EngineBench, seeker: _Seeker, cycles: int) -> list[Said]:
+    return answers_along(seeker, bench.settings["schedule"], cycles) if isinstance(seeker, FeedForward) else []
+
+
+def _bare(seeker: _Seeker) -> _Seeker:
+    """Copy a seeker as it stands, without its history."""
+    if isinstance(seeker, FeedForward | GuidedEngine):
+        bare: FeedForward | GuidedEngine = seeker._bare()
+        return bare
+    own = copy.deepcopy(seeker)
+    own.clear_history()
+    return own
 
 
 def _whole_seeds(seeds: Iterable[int]) -> list[int]:

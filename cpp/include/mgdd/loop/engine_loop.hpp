@@ -40,31 +40,43 @@ void require_match(const EngineBench& bench, const S& seeker) {
   require_match(bench, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
 }
 
-/// What the seeker asks of the next cycle of a bench, valid until it is told; a new operating point restarts it first.
+/// What the seeker asks of the next cycle of a bench, valid until it is told. First it hears of the operating point:
+/// one with a guide in every cycle, any other is restarted by a new one.
 template <class S>
 std::span<const double> ask(const EngineBench& bench, S& seeker, double& estimate_cad) noexcept {
-  if (bench.point_changes_at(bench.cycle())) seeker.restart();
+  if constexpr (requires { seeker.at(bench.point()); }) {
+    seeker.at(bench.point());
+  } else if constexpr (requires { seeker.at_cycle(bench.cycle()); }) {
+    seeker.at_cycle(bench.cycle());
+  } else if (bench.point_changes_at(bench.cycle())) {
+    seeker.restart();
+  }
   estimate_cad = seeker.estimate()[0];
   const optimize::Inputs& asked = seeker.ask();
   return {asked.data(), static_cast<std::size_t>(asked.size())};
 }
 
-/// What the bench gave. Noexcept as the seeker's `tell` is.
+/// What the bench gave, with the pressure for a seeker that calibrates its model. Noexcept as the seeker's `tell` is.
 template <class S>
-void tell(const BenchCycle& c, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
+void tell(EngineBench& bench, const BenchCycle& c, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
   const bool summed = seeker.component_count() == 1;
-  seeker.tell({summed ? std::span<const double>(&c.j, 1) : c.component_values(),
-               c.limits(),
-               c.misfire || c.unphysical,
-               {c.applied.data(), static_cast<std::size_t>(seeker.estimate().size())}});
+  const optimize::Reading reading{summed ? std::span<const double>(&c.j, 1) : c.component_values(),
+                                  c.limits(),
+                                  c.misfire || c.unphysical,
+                                  {c.applied.data(), static_cast<std::size_t>(seeker.estimate().size())}};
+  if constexpr (requires { seeker.calibration(); }) {
+    seeker.tell(reading, seeker.calibration() ? bench.pressure().pressure_bar : std::span<const double>());
+  } else {
+    seeker.tell(reading);
+  }
 }
 
 /// One cycle. Noexcept as the seeker's `tell` is.
 template <class S>
-LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(tell(BenchCycle{}, seeker))) {
+LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(tell(bench, BenchCycle{}, seeker))) {
   LoopCycle out;
   out.bench = bench.step(ask(bench, seeker, out.estimate_cad));
-  tell(out.bench, seeker);
+  tell(bench, out.bench, seeker);
   return out;
 }
 

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "mgdd/engine/batch/batch.hpp"
+#include "mgdd/guide/guided_engine.hpp"
+#include "mgdd/guide/scheduled_feed_forward.hpp"
 #include "mgdd/loop/engine_loop.hpp"
 
 namespace mgdd::loop {
@@ -16,10 +18,14 @@ namespace mgdd::loop {
 /// numbers to rounding; `automatic` takes lanes for sixteen loops and more. Gamma of temperature is always `single`.
 using LoopForm = engine::BatchForm;
 
+/// Every seeker that runs in many loops, those with a guide among them.
+using LoopSeeker = WithKinds<Seeker, guide::GuidedEngine, guide::ScheduledFeedForward>;
+
 struct MonteCarloPlan {
   std::vector<EngineBench> benches;
   std::vector<LoopCriteria> criteria;  ///< one per bench
-  std::vector<Seeker> seekers;
+  std::vector<LoopSeeker> seekers;
+  std::vector<std::vector<guide::GuideAnswer>> answers{};  ///< [bench][seeker] for feed-forwards; empty: no guide
   std::vector<std::uint64_t> seeds;  ///< of the bench and of a seeker that draws; each loop starts at cycle 0
   std::int64_t cycles = 1000;
   int threads = 0;  ///< 0 = all cores
