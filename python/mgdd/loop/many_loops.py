@@ -1,4 +1,4 @@
-"""Seekers on the virtual bench by the thousand: benches, seekers and seeds on cores, processes or machines."""
+"""Seekers on a plant of the core by the thousand: plants, seekers and seeds on cores, processes or machines."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.guide.asked_ahead import Said, answers_along
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.limit_figures import limit_label, with_a_limit
-from mgdd.loop.plant_loop import require_inputs_of
+from mgdd.loop.plant_loop import require_inputs_of, require_point_for
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.parallel.rows import pieces
@@ -28,8 +29,9 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
+    _Plant = EngineBench | FunctionPlant
     _Seeker = Seeker | FeedForward | GuidedEngine
-    _Call = tuple[list[EngineBench], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
+    _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
 
 __all__ = ["monte_carlo"]
 
@@ -52,8 +54,11 @@ _SUMMARY = {
 }
 
 
+_OF_AN_ENGINE = ("mean_efficiency_percent", "mean_nox_ppm")
+
+
 def monte_carlo(
-    benches: EngineBench | Sequence[EngineBench],
+    benches: _Plant | Sequence[_Plant],
     seekers: _Seeker | Sequence[_Seeker],
     seeds: Iterable[int],
     *,
@@ -73,8 +78,10 @@ def monte_carlo(
 
     Parameters
     ----------
-    benches : EngineBench or sequence
-        Plants, for example several operating points; read, not advanced.
+    benches : EngineBench, FunctionPlant or sequence
+        Plants, for example several operating points; read, not advanced. Either benches, or compiled functions, which
+        run from cycle 0 with the seed of the loop; several threads call one function at once, and no other process
+        does.
     seekers : seeker or sequence
         As in `run_seeker`, for example several gains; read, not advanced. The guide of a `FeedForward` is asked once at
         every operating point of a bench, before the loops, and once more where it held or refused.
@@ -92,7 +99,8 @@ def monte_carlo(
     -------
     xarray.Dataset
         Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker` without its noise-free figures, which would
-        double the work, and ``finished``, true everywhere.
+        double the work, and ``finished``, true everywhere. Of functions without figures of an engine, and where the
+        first input is not an angle (``..._cad``) figures of it are named without ``_cad``, in its unit.
 
     Raises
     ------
@@ -114,7 +122,7 @@ def monte_carlo(
     >>> dict(table.sizes)
     {'bench': 1, 'seeker': 2, 'seed': 4}
     """
-    bench_list = [benches] if isinstance(benches, EngineBench) else list(benches)
+    bench_list = [benches] if isinstance(benches, EngineBench | FunctionPlant) else list(benches)
     seeker_list = list(seekers) if isinstance(seekers, Sequence) else [seekers]
     seed_list = _whole_seeds(seeds)
     for seed in seed_list:
@@ -132,6 +140,7 @@ def monte_carlo(
                     f"inputs of the seeker are {', '.join(named)}: here they stand in the order of the bench, "
                     f"{', '.join(bench.input_names)}"
                 )
+    functions = _functions_of(bench_list)
     goals = [own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)]
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({goal[name] for goal in goals}) > 1:
@@ -155,8 +164,13 @@ def monte_carlo(
         "finished": (dims, finished, "-", "whether the loop ran to its end"),
     }
     names = bench_list[0].limit_names
+    plain = bool(functions) and not functions[0].input_names[0].endswith("_cad")
     for name, values in with_a_limit(raw, names).items():
+        if functions and name in _OF_AN_ENGINE:
+            continue
         label = _SUMMARY.get(name) or limit_label(name, names)
+        if plain and name.endswith("_cad") and name in _SUMMARY:
+            name, label = name.removesuffix("_cad"), ("unit of the input", label[1].replace("timing", "input"))  # noqa: PLW2901
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *label)
     for name in dict.fromkeys(name for own in given for name in own.exceed_above):
         above = [float(own.exceed_above.get(name, np.nan)) for own in given]
@@ -165,7 +179,7 @@ def monte_carlo(
 
 
 def _loops(
-    benches: Sequence[EngineBench],
+    benches: Sequence[_Plant],
     seekers: Sequence[_Seeker],
     seeds: Sequence[int],
     answers: Sequence[list[Said]],
@@ -178,14 +192,15 @@ def _loops(
     first = goals[0] if goals else LoopCriteria().to_core(())
     shared: dict[str, Any] = {name: first[name] for name in ("arrival_cad", "tail_cycles", "exceed_from")}
     shared |= {name: [goal[name] for goal in goals] for name in ("optimum_cad", "exceed_above", "limits")}
+    plants: Any = [plant._core for plant in _functions_of(benches)] or benches
     columns: dict[str, NDArray[Any]] = _core.loop.monte_carlo(
-        benches, list(seekers), seeds, answers, cycles=cycles, threads=threads, form=form, **shared
+        plants, list(seekers), seeds, answers, cycles=cycles, threads=threads, form=form, **shared
     )
     return columns
 
 
 def _in_chunks(
-    benches: Sequence[EngineBench],
+    benches: Sequence[_Plant],
     seekers: Sequence[_Seeker],
     seeds: Sequence[int],
     answers: Sequence[list[Said]],
@@ -221,8 +236,24 @@ def _some_loops(calls: Sequence[_Call], cycles: int, form: str) -> list[dict[str
     return [_loops(*call, cycles, form) for call in calls]
 
 
-def _answers(bench: EngineBench, seeker: _Seeker, cycles: int) -> list[Said]:
-    return answers_along(seeker, bench.settings["schedule"], cycles) if isinstance(seeker, FeedForward) else []
+def _functions_of(plants: Sequence[_Plant]) -> list[FunctionPlant]:
+    """Give the compiled functions, none of benches; ParameterError for a mixture, and for a function in Python."""
+    functions = [plant for plant in plants if isinstance(plant, FunctionPlant)]
+    if functions and len(functions) < len(plants):
+        raise ParameterError("benches: EngineBench and FunctionPlant were both given: run them one after the other")
+    for plant in functions:
+        if not plant.compiled:
+            raise ParameterError(f"benches: {plant!r}: must be compiled and give J; run_seeker runs others")
+        if plant.input_names != functions[0].input_names:
+            raise ParameterError("benches: every FunctionPlant must have the same inputs")
+    return functions
+
+
+def _answers(plant: _Plant, seeker: _Seeker, cycles: int) -> list[Said]:
+    require_point_for(plant, seeker)
+    if isinstance(seeker, FeedForward) and isinstance(plant, EngineBench):
+        return answers_along(seeker, plant.settings["schedule"], cycles)
+    return []
 
 
 def _bare(seeker: _Seeker) -> _Seeker:
