@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import ctypes
 import math
+import os
 import pickle
 import shutil
+import signal
 import subprocess
 import threading
 import time
@@ -20,7 +23,7 @@ import pytest
 import xarray as xr
 
 from mgdd import optimize
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import Interrupted, InUseError, ParameterError, RigError
 from mgdd.guide import Curve, CurveSeeking, FeedForward
 from mgdd.loop import EngineBench, FunctionPlant, LoopCriteria, monte_carlo, run_seeker, seek, seek_front
 
@@ -265,10 +268,15 @@ def test_a_callback_into_python_is_kept_alive_and_may_fail() -> None:
 
 def test_what_is_not_one_is_refused_by_name(library: ctypes.CDLL) -> None:
     wrong = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(("plant", library))
+    single = list(FunctionPlant.C_TYPE._argtypes_)
+    single[2] = ctypes.POINTER(ctypes.c_float)
+    scipy = pytest.importorskip("scipy")
     for function, message in (
         (0, "function = 0: must be the address of a function, not null"),
         (FunctionPlant.C_TYPE(), "not null"),
         (wrong, r"its signature is c_double \(c_double\): must be int \(const double \*inputs"),
+        (ctypes.CFUNCTYPE(ctypes.c_int, *single)(("plant", library)), r"LP_c_float, c_\w+, c_void_p\): must be int"),
+        (scipy.LowLevelCallable(wrong), r"its signature is double \(double\): must be int"),
         (ctypes.CDLL(None).printf, "argtypes are not declared"),
         (-4, "function = -4"),
         (True, "function = True: must be a function of the inputs by name"),
@@ -279,6 +287,8 @@ def test_what_is_not_one_is_refused_by_name(library: ctypes.CDLL) -> None:
     for change, message in (
         ({"noise_sd": -1.0}, "noise_sd = -1: must be finite and >= 0"),
         ({"seed": -1}, "seed = -1"),
+        ({"inputs": "x"}, "inputs = 'x': must be a sequence of different names"),
+        ({"limits": ["q", "q"]}, "limits = "),
         ({"inputs": []}, r"inputs = 0: must be in \[1, 8\]"),
         ({"limits": [f"q{k}" for k in range(9)]}, r"limits = 9: must be in \[0, 8\]"),
         ({"user_data": "text"}, "user_data = 'text'"),
@@ -344,9 +354,36 @@ def test_the_gil_is_released_while_it_runs(library: ctypes.CDLL) -> None:
 
     thread = threading.Thread(target=work)
     thread.start()
-    turns = 0
+    turns, refused = 0, False
     while not done.is_set():
         turns += 1
+        with contextlib.suppress(InUseError):
+            plant.cycle  # noqa: B018
+            continue
+        refused = True
         time.sleep(0.001)
     thread.join()
     assert turns > 5
+    assert refused
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+def test_ctrl_c_leaves_what_was_run(library: ctypes.CDLL) -> None:
+    def interrupted(call: Callable[[], Any]) -> Any:
+        timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        with pytest.raises(Interrupted) as stop:
+            call()
+        return stop.value.partial
+
+    plant, seeker = of(library, "slow"), SEEKERS["Spsa"]()
+    run = interrupted(lambda: run_seeker(plant, seeker, 100_000))
+    n = run.dataset.sizes["cycle"]
+    assert run.interrupted
+    assert 0 < n == plant.cycle == seeker.cycle < 100_000
+    begun = run_seeker(of(library, "slow"), SEEKERS["Spsa"](), n)
+    np.testing.assert_array_equal(run.dataset["estimate_cad"], begun.dataset["estimate_cad"])
+    assert run.summary["mean_j"] == begun.summary["mean_j"]
+    table = interrupted(lambda: monte_carlo(plant, SEEKERS["Spsa"](), range(3), cycles=100_000))
+    assert not table["finished"].any()
+    assert np.isnan(table["mean_j"]).all()

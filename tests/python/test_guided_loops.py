@@ -56,6 +56,7 @@ def calibrated(seeker: Any) -> GuidedEngine:
 
 SEEKERS: dict[str, Callable[[], Any]] = {
     "feed-forward": lambda: FeedForward(ExtremumSeeking(**SPACE), by_fuel),
+    "one whose trust alone decides": lambda: FeedForward(ExtremumSeeking(**SPACE), by_fuel, probe_cycles=0),
     "one that has run": begun,
     "one that keeps its start": lambda: FeedForward(NewtonSeeking(**SPACE), by_fuel, keep_start=True),
     "one that draws": lambda: FeedForward(Spsa(**SPACE, seed=SEED), by_fuel),

@@ -35,8 +35,9 @@ class FunctionPlant:
     function : callable, int, or compiled function
         ``function({"soc_cad": -6.0}) -> J``, or ``-> (J, {"p_max_bar": 96.0})``. Compiled: a ctypes function of type
         ``FunctionPlant.C_TYPE``, a `numba.cfunc`, a `scipy.LowLevelCallable`, or a bare address as a number, whose
-        signature cannot be checked. What runs on several threads at once must bear it; a ctypes callback of a Python
-        function takes the GIL in every cycle, and an exception in it is a failed cycle.
+        signature cannot be checked and whose code the caller keeps alive. Loops call it on threads of their own,
+        `monte_carlo` on several at once. A ctypes callback of a Python function takes the GIL in every cycle; an
+        exception in it is a failed cycle.
     inputs : sequence of str
         Names of the inputs, one to eight.
     limits : sequence of str
@@ -77,6 +78,9 @@ class FunctionPlant:
         noise_sd: float = 0.0,
         seed: int = 0,
     ) -> None:
+        for name, given in (("inputs", inputs), ("limits", limits), ("values", values)):
+            if isinstance(given, str) or len(set(given)) != len(given):
+                raise ParameterError.of(name, given, "a sequence of different names")
         if not 0 <= seed < 2**64:
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
         if not (math.isfinite(noise_sd) and noise_sd >= 0.0):
@@ -210,7 +214,7 @@ class FunctionPlant:
 
     def __repr__(self) -> str:
         what = "Python" if self._core is None else "compiled"
-        return f"<FunctionPlant of {', '.join(self.input_names)}, {what}, cycle {self.cycle}>"
+        return f"<FunctionPlant of {', '.join(self.input_names)}, {what}>"
 
 
 def core_of(plant: Any, seeker: Seeker) -> _core.loop.FunctionPlant | None:
