@@ -8,17 +8,21 @@ to one is of wall time, interleaved, and means nothing while others keep the cor
 threads cost each other shows in their processor time even then.
 
 Before anything is timed, the loop in the core must equal the one driven from Python bit for bit, two threads must give
-the numbers of one, and loops side by side those of single loops to 1e-9.
+the numbers of one, and loops side by side those of single loops to 1e-9. With a C compiler a plant of one line of
+arithmetic runs as well, in C and in Python, whose loops must be equal bit for bit.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import json
 import os
+import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -29,7 +33,7 @@ from peers.peer_seekers import Contender, Plant, null_time_us
 from support import machine
 
 from mgdd import optimize
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import EngineBench, FunctionPlant, monte_carlo, run_seeker
 
 CYCLES, PAIRS, STEPS = 1000, 20_000, 20_000
 START, LOWER, UPPER = -20.0, -30.0, 10.0
@@ -83,6 +87,37 @@ def check_agreement(loops: int) -> np.ndarray:
     return seeker.history["applied"].values[:, 0].copy()
 
 
+PLANT = """#include <stddef.h>
+int plant(const double *x, size_t n, double *out, size_t m, void *data) {
+  out[0] = 50.0 - 0.03 * (x[0] + 4.0) * (x[0] + 4.0);
+  return 0;
+}
+"""
+
+
+def function_plants() -> dict[str, FunctionPlant]:
+    """Give a plant in Python and the same in C; none without a compiler. SystemExit where their loops differ."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        return {}
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "plant.c").write_text(PLANT, encoding="utf-8")
+        subprocess.run(
+            [compiler, "-shared", "-fPIC", "-O2", "-ffp-contract=off", "plant.c", "-o", "plant.so"],
+            cwd=folder,
+            check=True,
+        )
+        library = ctypes.CDLL(str(Path(folder, "plant.so")))
+    found = {
+        "in Python": FunctionPlant(lambda x: 50.0 - 0.03 * (x["x_cad"] + 4.0) * (x["x_cad"] + 4.0), ["x_cad"]),
+        "in C": FunctionPlant(FunctionPlant.C_TYPE(("plant", library)), ["x_cad"]),
+    }
+    runs = [run_seeker(plant, loop_seeker(), CYCLES).dataset for plant in found.values()]
+    if not runs[0].identical(runs[1]):
+        sys.exit("a plant in C and the same in Python differ: nothing timed")
+    return found
+
+
 def seekers() -> dict[str, Callable[[], object]]:
     bounds = {"start": 0.0, "lower": LOWER, "upper": UPPER}
     return {
@@ -127,8 +162,8 @@ def null_contenders() -> dict[str, Contender]:
     return found
 
 
-def time_loops(applied: np.ndarray, into: Times) -> None:
-    """Milliseconds of processor time for 1000 cycles: whole loops of three kinds, and the bench without a seeker."""
+def time_loops(applied: np.ndarray, plants: dict[str, FunctionPlant], into: Times) -> None:
+    """Milliseconds of processor time for 1000 cycles: whole loops, the bench without a seeker, plants of one line."""
 
     def timed(name: str, loops: int, call: Callable[[], object]) -> None:
         begin = time.process_time()
@@ -149,6 +184,15 @@ def time_loops(applied: np.ndarray, into: Times) -> None:
         lambda: monte_carlo(EngineBench(), loop_seeker(), lanes, cycles=CYCLES, workers=1),
     )
     timed(BENCH_ALONE, SEVERAL, lambda: EngineBench().run_columns(requests))
+    for name, plant in plants.items():
+        timed(f"run_seeker, a plant {name}", 1, lambda plant=plant: run_seeker(plant, loop_seeker(), CYCLES))
+    if compiled := plants.get("in C"):
+        seeds = range(100 * SEVERAL)
+        timed(
+            "monte_carlo, a plant in C",
+            len(seeds),
+            lambda: monte_carlo(compiled, loop_seeker(), seeds, cycles=CYCLES, workers=1),
+        )
 
 
 def time_threads(options: argparse.Namespace) -> dict[str, float]:
@@ -198,7 +242,7 @@ def main() -> None:
     context = machine.versions()
     for package, version in peer_seekers.installed().items():
         context[package] = version or "missing: left out (pip install --group bench)"
-    applied = check_agreement(8)
+    applied, plants = check_agreement(8), function_plants()
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
     threads = time_threads(options)
     context["load after the threads"] = machine.load()
@@ -207,7 +251,7 @@ def main() -> None:
     pairs: Times = {}
     null: Times = {}
     for _ in range(options.repeats):
-        time_loops(applied, loops)
+        time_loops(applied, plants, loops)
         for name, make in seekers().items():
             values = (0.0, (80.0,)) if name.endswith("limit") else (0.0,)
             pairs.setdefault(name, []).append(time_pairs(make, values))

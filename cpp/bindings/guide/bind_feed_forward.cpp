@@ -6,8 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "mgdd/guide/feed_forward.hpp"
-#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "guide/guided_binding.hpp"
 #include "optimize/seeker_binding.hpp"
 #include "optimize/seeker_inputs.hpp"
 
@@ -16,7 +15,6 @@ namespace {
 
 using Recorded = optimize::RecordedSeeker<optimize::VariantSeeker>;
 using Core = guide::FeedForward<Recorded>;
-using BoundFeedForward = Guarded<Core>;
 
 // Seeker, state and history are copied: the one that Python holds goes its own way.
 BoundFeedForward make_feed_forward(const py::object& seeker, const py::object& calibration_rate, double following_share,
@@ -37,6 +35,15 @@ std::vector<double> known_or_nan(const Core& core, const optimize::Inputs& value
 
 }  // namespace
 
+guide::GuideValue guide_value_from(const std::vector<double>& optimum, const std::vector<double>& curvature) {
+  guide::GuideValue value;
+  if (optimum.size() <= optimize::max_inputs)
+    value.optimum = optimize::Inputs::Map(optimum.data(), static_cast<Eigen::Index>(optimum.size()));
+  if (curvature.size() <= optimize::max_inputs)
+    value.curvature = optimize::Inputs::Map(curvature.data(), static_cast<Eigen::Index>(curvature.size()));
+  return value;
+}
+
 void bind_feed_forward(py::module_& m) {
   using py::arg;
   py::class_<BoundFeedForward> cls(m, "FeedForward", "A seeker with feed-forward; see mgdd.guide.FeedForward.");
@@ -49,12 +56,7 @@ void bind_feed_forward(py::module_& m) {
          [](BoundFeedForward& b, const std::vector<double>& optimum, const std::vector<double>& curvature,
             const std::string& cause) {
            const guide::GuideCause why = parse_name<guide::GuideCause>("cause", cause);
-           guide::GuideValue value;
-           if (optimum.size() <= optimize::max_inputs)
-             value.optimum = optimize::Inputs::Map(optimum.data(), static_cast<Eigen::Index>(optimum.size()));
-           if (curvature.size() <= optimize::max_inputs)
-             value.curvature = optimize::Inputs::Map(curvature.data(), static_cast<Eigen::Index>(curvature.size()));
-           const guide::GuideStatus status = b.use()->offer(value, why);
+           const guide::GuideStatus status = b.use()->offer(guide_value_from(optimum, curvature), why);
            if (status == guide::GuideStatus::busy) {
              throw ParameterError("at() between ask() and tell(): tell what was measured first");
            }

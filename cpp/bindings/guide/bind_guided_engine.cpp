@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "mgdd/guide/guided_engine.hpp"
+#include "guide/guided_binding.hpp"
 #include "optimize/seeker_binding.hpp"
 #include "optimize/seeker_inputs.hpp"
 
@@ -14,7 +14,6 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace guide;
-using BoundGuided = Guarded<GuidedEngine>;
 using AnySeeker =
     std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking, optimize::Spsa,
                  optimize::GradientDescent, optimize::GoldenSection, optimize::GaussianProcessSeeking, CurveSeeking>;
@@ -33,11 +32,11 @@ GuidedEngine::Seeking seeking_of(const py::object& seeker, const FeedForwardSett
 }
 
 // Everything is copied: what Python holds goes its own way.
-BoundGuided make_guided(const py::object& seeker, const Guarded<ModelOptimum>& model,
-                        std::optional<const Guarded<OnlineCalibration>*> calibration,
-                        const engine::OperatingPoint& point, double changed_share, double calibrated_sd_cad,
-                        double recalibrated_cad, double calibration_rate_cad, std::optional<double> noise_sd,
-                        bool keep_start) {
+BoundGuidedEngine make_guided(const py::object& seeker, const Guarded<ModelOptimum>& model,
+                              std::optional<const Guarded<OnlineCalibration>*> calibration,
+                              const engine::OperatingPoint& point, double changed_share, double calibrated_sd_cad,
+                              double recalibrated_cad, double calibration_rate_cad, std::optional<double> noise_sd,
+                              bool keep_start) {
   FeedForwardSettings trimmed;
   trimmed.calibration_rate = optimize::scalar_input(calibration_rate_cad);
   trimmed.trust.noise_sd = noise_sd;
@@ -66,15 +65,15 @@ py::dict to_dict(const GuidedEngine& engine) {
 
 void bind_guided_engine(py::module_& m) {
   using py::arg;
-  py::class_<BoundGuided> cls(m, "GuidedEngine", "The guided loop of an engine; see mgdd.guide.GuidedEngine.");
+  py::class_<BoundGuidedEngine> cls(m, "GuidedEngine", "The guided loop of an engine; see mgdd.guide.GuidedEngine.");
   cls.def(py::init(&make_guided), arg("seeker"), arg("model"), arg("calibration"), arg("point"), py::kw_only(),
           arg("changed_share"), arg("calibrated_sd_cad"), arg("recalibrated_cad"), arg("calibration_rate_cad"),
           arg("noise_sd"), arg("keep_start"));
   bind_asking(cls);
   cls.def(
          "_tell",
-         [](BoundGuided& b, const py::object& j, const py::object& limits, bool misfire, const py::object& applied,
-            const std::optional<InputArray>& pressure_bar) {
+         [](BoundGuidedEngine& b, const py::object& j, const py::object& limits, bool misfire,
+            const py::object& applied, const std::optional<InputArray>& pressure_bar) {
            ReadingBuffer buffer;
            const optimize::Reading reading = reading_from(b.constant(), j, limits, misfire, applied, buffer);
            std::vector<double> trace;
@@ -86,7 +85,7 @@ void bind_guided_engine(py::module_& m) {
          arg("J"), arg("limits"), arg("misfire"), arg("applied"), arg("pressure_bar"), "tell, with the pressure.")
       .def(
           "_at",
-          [](BoundGuided& b, const engine::OperatingPoint& point) {
+          [](BoundGuidedEngine& b, const engine::OperatingPoint& point) {
             switch (b.use()->at(point)) {
               case GuideStatus::busy:
                 throw ParameterError("at() between ask() and tell(): tell what was measured first");
@@ -99,38 +98,38 @@ void bind_guided_engine(py::module_& m) {
           },
           arg("point"), "The operating point of the next cycle.")
       .def(
-          "_now", [](const BoundGuided& b) { return to_dict(*b.use()); }, "What the next cycle is made of.")
+          "_now", [](const BoundGuidedEngine& b) { return to_dict(*b.use()); }, "What the next cycle is made of.")
       .def_property_readonly(
-          "applied", [](const BoundGuided& b) { return input_array(b.use()->applied()); },
+          "applied", [](const BoundGuidedEngine& b) { return input_array(b.use()->applied()); },
           "The input of the last ask, shape (1,).")
       .def_property_readonly(
-          "trust", [](const BoundGuided& b) { return b.use()->now().trust; }, "Trust in the guide, 0 to 1.")
+          "trust", [](const BoundGuidedEngine& b) { return b.use()->now().trust; }, "Trust in the guide, 0 to 1.")
       .def_property_readonly(
-          "estimate_sd", [](const BoundGuided& b) { return b.use()->now().estimate_sd_cad; },
+          "estimate_sd", [](const BoundGuidedEngine& b) { return b.use()->now().estimate_sd_cad; },
           "Standard deviation of the estimate as stated [°CA]; NaN where the seeker states none.")
       .def_property_readonly(
           "cylinder",
-          [](const BoundGuided& b) {
+          [](const BoundGuidedEngine& b) {
             const auto engine = b.use();
             return engine->calibration() ? engine->calibration()->cylinder() : engine->model().settings().cylinder;
           },
           "The guide's cylinder as calibrated.")
       .def_property_readonly(
-          "refusals", [](const BoundGuided& b) { return b.use()->refusals(); },
+          "refusals", [](const BoundGuidedEngine& b) { return b.use()->refusals(); },
           "Answers of the model, and operating points, that could not be used.")
       .def_property_readonly(
-          "recalibrations", [](const BoundGuided& b) { return b.use()->recalibrations(); },
+          "recalibrations", [](const BoundGuidedEngine& b) { return b.use()->recalibrations(); },
           "How often a calibration moved what the guide says.")
       .def_property_readonly(
           "calibration_status",
-          [](const BoundGuided& b) {
+          [](const BoundGuidedEngine& b) {
             const auto engine = b.use();
             return std::string(engine->calibration() ? name_of(engine->calibration()->status()) : "none");
           },
           "What became of the last cycle in the calibration; ``none`` without one.")
       .def_property(
-          "state", [](const BoundGuided& b) { return save_state(*b.use()); },
-          [](BoundGuided& b, const StateColumns& columns) { restore_state(*b.use(), columns); },
+          "state", [](const BoundGuidedEngine& b) { return save_state(*b.use()); },
+          [](BoundGuidedEngine& b, const StateColumns& columns) { restore_state(*b.use(), columns); },
           "What the run needs to go on bit for bit, the history excepted: named lists of numbers, JSON-able.");
 }
 

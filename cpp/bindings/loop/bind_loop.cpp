@@ -4,11 +4,15 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "guide/guided_binding.hpp"
 #include "interruptible.hpp"
 #include "loop/bench_columns.hpp"
+#include "loop/function_plant_binding.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/monte_carlo.hpp"
 #include "mgdd/loop/run_loop.hpp"
@@ -67,7 +71,16 @@ py::dict run(BoundBench& bound_bench, BoundSeeker<S>& bound_seeker, std::int64_t
 }
 
 template <class S>
+std::int64_t run_function(BoundFunctionPlant& bound_plant, BoundSeeker<S>& bound_seeker, std::int64_t cycles) {
+  const auto plant = bound_plant.use();
+  const auto seeker = bound_seeker.use();
+  return hand_over(interruptible([&](const std::stop_token& stop) { return run_loop(*plant, *seeker, cycles, stop); }));
+}
+
+template <class S>
 void bind_run(py::module_& m) {
+  m.def("run_function", &run_function<S>, py::arg("plant"), py::arg("seeker"), py::arg("cycles"),
+        "Run a seeker on a function without the GIL: how many cycles were run.");
   m.def("run_loop", &run<S>, py::arg("bench"), py::arg("seeker"), py::arg("cycles"), py::kw_only(),
         py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"), py::arg("exceed_from"),
         py::arg("exceed_above"), py::arg("limits"),
@@ -94,22 +107,53 @@ py::dict to_dict(const MonteCarloResult& result, const std::vector<std::string>&
   return out;
 }
 
-py::dict seek_many(const std::vector<BoundBench*>& benches, const py::list& seekers,
-                   const std::vector<std::uint64_t>& seeds, std::int64_t cycles, const std::vector<double>& optimum_cad,
-                   double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
+/// A copy of what Python holds, without its record.
+LoopSeeker loop_seeker_of(const py::handle& object) {
+  if (py::isinstance<BoundGuidedEngine>(object)) return *object.cast<const BoundGuidedEngine&>().use();
+  if (py::isinstance<BoundFeedForward>(object)) {
+    const auto core = object.cast<const BoundFeedForward&>().use();
+    return guide::ScheduledFeedForward(core->around(core->seeker().seeker()));
+  }
+  return std::visit([](auto&& seeker) -> LoopSeeker { return std::forward<decltype(seeker)>(seeker); },
+                    seeker_of<Seeker>(object, "seekers"));
+}
+
+/// First cycle, end, optimum, curvature and cause of what a guide said; without an optimum it said nothing.
+using Answer =
+    std::tuple<std::int64_t, std::int64_t, std::optional<std::vector<double>>, std::vector<double>, std::string>;
+
+std::vector<guide::GuideAnswer> answers_from(const std::vector<Answer>& given) {
+  std::vector<guide::GuideAnswer> out;
+  for (const auto& [first, end, optimum, curvature, cause] : given) {
+    guide::GuideAnswer& said = out.emplace_back();
+    said.first = first;
+    said.end = end;
+    if (optimum) said.value = guide_value_from(*optimum, curvature);
+    said.cause = parse_name<guide::GuideCause>("cause", cause);
+  }
+  return out;
+}
+
+template <class Plant>
+py::dict seek_many(const std::vector<Guarded<Plant>*>& benches, const py::list& seekers,
+                   const std::vector<std::uint64_t>& seeds, const std::vector<std::vector<Answer>>& answers,
+                   std::int64_t cycles, const std::vector<double>& optimum_cad, double arrival_cad,
+                   std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
                    const std::vector<std::vector<double>>& exceed_above, const std::vector<std::vector<double>>& limits,
                    int threads, const std::string& form) {
   if (optimum_cad.size() != benches.size() || exceed_above.size() != benches.size() ||
       limits.size() != benches.size()) {
     throw ShapeError("optimum_cad, exceed_above and limits: give one entry per bench");
   }
-  MonteCarloPlan plan;
+  MonteCarloPlanOf<Plant> plan;
   for (std::size_t i = 0; i < benches.size(); ++i) {
     plan.benches.push_back(*benches[i]->use());
     plan.criteria.push_back({optimum_cad[i], arrival_cad, tail_cycles, exceed_from, exceed_above[i], limits[i]});
   }
   for (const py::handle& object : seekers)
-    plan.seekers.push_back(seeker_of<Seeker>(object, "seekers"));
+    plan.seekers.push_back(loop_seeker_of(object));
+  for (const std::vector<Answer>& said : answers)
+    plan.answers.push_back(answers_from(said));
   plan.seeds = seeds;
   plan.cycles = cycles;
   plan.threads = threads;
@@ -121,6 +165,14 @@ py::dict seek_many(const std::vector<BoundBench*>& benches, const py::list& seek
       [&plan](const MonteCarloResult& result) { return to_dict(result, plan.benches.front().settings().limits); });
 }
 
+template <class Plant>
+void bind_many(py::module_& m) {
+  m.def("monte_carlo", &seek_many<Plant>, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::arg("answers"),
+        py::kw_only(), py::arg("cycles"), py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"),
+        py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),
+        py::arg("form") = "automatic", "Whole loops on all cores; behind mgdd.loop.monte_carlo.");
+}
+
 template <class... S>
 void bind_runs(py::module_& m, const std::variant<S...>*) {
   (bind_run<S>(m), ...);
@@ -130,10 +182,8 @@ void bind_runs(py::module_& m, const std::variant<S...>*) {
 
 void bind_loop(py::module_& m) {
   bind_runs(m, static_cast<const Seeker*>(nullptr));
-  m.def("monte_carlo", &seek_many, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::kw_only(),
-        py::arg("cycles"), py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"),
-        py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),
-        py::arg("form") = "automatic", "Whole loops on all cores; behind mgdd.loop.monte_carlo.");
+  bind_many<EngineBench>(m);
+  bind_many<FunctionPlant>(m);
   m.def(
       "loop_form", [](std::size_t loops) { return std::string(name_of(form_of_loops(loops, LoopForm::automatic))); },
       py::arg("loops"), "Form that so many loops take; who cuts them into pieces passes it on.");

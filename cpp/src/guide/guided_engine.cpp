@@ -183,6 +183,11 @@ void GuidedEngine::restart() noexcept {
 void GuidedEngine::shift_estimate(const Inputs& by) noexcept {
   on(seeking_, [&](auto& s) { s.shift_estimate(by); });
 }
+void GuidedEngine::reseed(std::uint64_t seed) noexcept {
+  on(seeking_, [seed](auto& s) {
+    if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
+  });
+}
 
 const Inputs& GuidedEngine::estimate() const noexcept {
   return on(seeking_, [](const auto& s) -> const Inputs& { return s.estimate(); });

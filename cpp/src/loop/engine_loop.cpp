@@ -11,6 +11,22 @@ namespace {
 
 constexpr std::int64_t longest_settling = 1000;  // cycles that do not count for the limits unless the caller says so
 
+void require_same_limits(const std::string& plant, const std::vector<std::string>& measured,
+                         const std::vector<optimize::Limit>& limits) {
+  std::vector<std::string> names;
+  for (const optimize::Limit& limit : limits)
+    names.push_back(limit.name);
+  if (names == measured) return;
+  const auto list = [](const std::vector<std::string>& all) {
+    std::string out = "[";
+    for (const std::string& name : all)
+      out += (out.size() > 1 ? ", " : "") + name;
+    return out + "]";
+  };
+  throw ParameterError("limits of the seeker " + list(names) + " and of the " + plant + " " + list(measured) +
+                       " differ: name the same ones in the same order");
+}
+
 }  // namespace
 
 void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
@@ -38,18 +54,21 @@ void require_match(const EngineBench& bench, const optimize::Inputs& estimate, s
                                              " entries: the performance of the bench has " + std::to_string(terms) +
                                              " terms; give as many, or one for their sum"));
   }
-  std::vector<std::string> names;
-  for (const optimize::Limit& limit : limits)
-    names.push_back(limit.name);
-  if (names == bench.settings().limits) return;
-  const auto list = [](const std::vector<std::string>& all) {
-    std::string out = "[";
-    for (const std::string& name : all)
-      out += (out.size() > 1 ? ", " : "") + name;
-    return out + "]";
-  };
-  throw ParameterError("limits of the seeker " + list(names) + " and of the bench " + list(bench.settings().limits) +
-                       " differ: name the same ones in the same order");
+  require_same_limits("bench", bench.settings().limits, limits);
+}
+
+void require_match(const FunctionPlant& plant, const optimize::Inputs& estimate, std::size_t components,
+                   const std::vector<optimize::Limit>& limits) {
+  const std::size_t inputs = plant.settings().inputs;
+  if (static_cast<std::size_t>(estimate.size()) != inputs) {
+    throw about("start", ParameterError("start has " + std::to_string(estimate.size()) + " entries: the plant takes " +
+                                        std::to_string(inputs)));
+  }
+  if (components != 1) {
+    throw about("components", ParameterError("components has " + std::to_string(components) +
+                                             " entries: the plant measures 1; give as many, or one for their sum"));
+  }
+  require_same_limits("plant", plant.settings().limits, limits);
 }
 
 std::int64_t counted_from(const LoopCriteria& criteria, std::int64_t cycles) noexcept {

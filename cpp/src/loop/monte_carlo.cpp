@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -14,7 +16,8 @@ namespace {
 
 constexpr std::int64_t cycles_between_looks = 256;
 
-void check(const MonteCarloPlan& plan) {
+template <class Plant>
+void check(const MonteCarloPlanOf<Plant>& plan) {
   for (const auto& [name, empty] :
        {std::pair{"benches", plan.benches.empty()}, std::pair{"seekers", plan.seekers.empty()},
         std::pair{"seeds", plan.seeds.empty()}}) {
@@ -28,49 +31,70 @@ void check(const MonteCarloPlan& plan) {
   if (plan.threads < 0) throw ParameterError("threads", plan.threads, "must be >= 0 (0: all)");
   for (const LoopCriteria& criteria : plan.criteria)
     validate(criteria, plan.cycles);
-  for (const EngineBench& bench : plan.benches) {
-    for (const Seeker& seeker : plan.seekers)
+  if (!plan.answers.empty() && plan.answers.size() != plan.benches.size() * plan.seekers.size()) {
+    throw about("answers", ShapeError("answers has " + std::to_string(plan.answers.size()) +
+                                      " entries: one per bench and seeker, or none"));
+  }
+  for (const Plant& bench : plan.benches) {
+    for (const LoopSeeker& seeker : plan.seekers)
       std::visit([&](const auto& s) { require_match(bench, s); }, seeker);
+  }
+  for (const LoopSeeker& seeker : plan.seekers) {
+    const auto* const guided = std::get_if<guide::GuidedEngine>(&seeker);
+    if (guided != nullptr && guided->protocol().asked) {
+      throw about("seekers", ParameterError("seekers: a GuidedEngine stands between ask() and tell(): tell what was "
+                                            "measured first"));
+    }
   }
 }
 
-std::size_t loops_per_bench(const MonteCarloPlan& plan) noexcept {
+template <class Plant>
+std::size_t loops_per_bench(const MonteCarloPlanOf<Plant>& plan) noexcept {
   return plan.seekers.size() * plan.seeds.size();
 }
 
 /// One loop of the plan, at its start.
 struct Loop {
-  Loop(const MonteCarloPlan& plan, std::size_t number)
+  template <class Plant>
+  Loop(const MonteCarloPlanOf<Plant>& plan, std::size_t number)
       : bench_index(number / loops_per_bench(plan)),
         seed(plan.seeds[number % plan.seeds.size()]),
         seeker(plan.seekers[number % loops_per_bench(plan) / plan.seeds.size()]),
         statistics(std::visit([&](const auto& s) { return with_limits_of(plan.criteria[bench_index], s); }, seeker),
                    plan.cycles) {
+    std::span<const guide::GuideAnswer> said;
+    if (!plan.answers.empty()) said = plan.answers[number / plan.seeds.size()];
     std::visit(
-        [this](auto& s) {
+        [this, said](auto& s) {
           if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
+          if constexpr (requires { s.follow(said); }) s.follow(said);
         },
         seeker);
   }
-  EngineBench bench(const MonteCarloPlan& plan) const {
-    EngineBench out = plan.benches[bench_index];
+  template <class Plant>
+  Plant bench(const MonteCarloPlanOf<Plant>& plan) const {
+    Plant out = plan.benches[bench_index];
     out.reset(seed);
     return out;
   }
 
   std::size_t bench_index;
   std::uint64_t seed;
-  Seeker seeker;
+  LoopSeeker seeker;
   LoopStatistics statistics;
 };
 
-void run_alone(const MonteCarloPlan& plan, std::size_t number, StopRequest& stopped, std::vector<LoopSummary>& out) {
+template <class Plant>
+void run_alone(const MonteCarloPlanOf<Plant>& plan, std::size_t number, StopRequest& stopped,
+               std::vector<LoopSummary>& out) {
   Loop loop(plan, number);
-  EngineBench bench = loop.bench(plan);
+  Plant bench = loop.bench(plan);
+  constexpr std::int64_t looks =
+      std::is_same_v<Plant, EngineBench> ? cycles_between_looks : 1;  // a function may be slow
   std::visit(
       [&](auto& seeker) {
         for (std::int64_t k = 0; k < plan.cycles; ++k) {
-          if (k % cycles_between_looks == 0 && stopped()) return;
+          if (k % looks == 0 && stopped()) return;
           loop.statistics.add(loop_step(bench, seeker));
         }
       },
@@ -104,7 +128,7 @@ void run_side_by_side(const MonteCarloPlan& plan, const LoopRange& range, StopRe
     }
     lanes.step(soc_cad, cycles);
     for (std::size_t i = 0; i < loops.size(); ++i) {
-      std::visit([&](auto& seeker) { tell(cycles[i], seeker); }, loops[i].seeker);
+      std::visit([&](auto& seeker) { tell(lanes.bench(i), cycles[i], seeker); }, loops[i].seeker);
       loops[i].statistics.add({cycles[i], estimate_cad[i]});
     }
   }
@@ -133,6 +157,22 @@ std::vector<LoopRange> groups_of(const MonteCarloPlan& plan, LoopForm form) {
   return groups;
 }
 
+/// The groups of a plan on its threads; `run` does one of them.
+template <class Plan, class Run>
+MonteCarloResult run_groups(const Plan& plan, const std::vector<LoopRange>& groups, const std::function<bool()>& stop,
+                            const Run& run) {
+  const std::size_t loops = groups.back().last;
+  MonteCarloResult result{std::vector<LoopSummary>(loops), std::vector<bool>(loops)};
+  const std::vector<bool> finished = parallel_for(
+      groups.size(), static_cast<std::size_t>(plan.threads),
+      [&](std::size_t group, std::size_t, StopRequest& stopped) { run(groups[group], stopped, result.loops); }, stop);
+  for (std::size_t group = 0; group < groups.size(); ++group) {
+    for (std::size_t loop = groups[group].first; loop < groups[group].last; ++loop)
+      result.finished[loop] = finished[group];
+  }
+  return result;
+}
+
 }  // namespace
 
 LoopForm form_of_loops(std::size_t loops, LoopForm wanted) {
@@ -146,20 +186,22 @@ LoopForm form_of_loops(std::size_t loops, LoopForm wanted) {
 MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<bool()>& stop) {
   check(plan);
   const std::size_t loops = plan.benches.size() * loops_per_bench(plan);
-  const std::vector<LoopRange> groups = groups_of(plan, form_of_loops(loops, plan.form));
-  MonteCarloResult result{std::vector<LoopSummary>(loops), std::vector<bool>(loops)};
-  const std::vector<bool> finished = parallel_for(
-      groups.size(), static_cast<std::size_t>(plan.threads),
-      [&](std::size_t group, std::size_t, StopRequest& stopped) {
-        groups[group].lanes ? run_side_by_side(plan, groups[group], stopped, result.loops)
-                            : run_alone(plan, groups[group].first, stopped, result.loops);
-      },
-      stop);
-  for (std::size_t group = 0; group < groups.size(); ++group) {
-    for (std::size_t loop = groups[group].first; loop < groups[group].last; ++loop)
-      result.finished[loop] = finished[group];
-  }
-  return result;
+  return run_groups(plan, groups_of(plan, form_of_loops(loops, plan.form)), stop,
+                    [&plan](const LoopRange& group, StopRequest& stopped, std::vector<LoopSummary>& out) {
+                      group.lanes ? run_side_by_side(plan, group, stopped, out)
+                                  : run_alone(plan, group.first, stopped, out);
+                    });
+}
+
+MonteCarloResult monte_carlo(const MonteCarloPlanOf<FunctionPlant>& plan, const std::function<bool()>& stop) {
+  check(plan);
+  std::vector<LoopRange> groups;
+  for (std::size_t loop = 0; loop < plan.benches.size() * loops_per_bench(plan); ++loop)
+    groups.push_back({loop, loop + 1, false});
+  return run_groups(plan, groups, stop,
+                    [&plan](const LoopRange& group, StopRequest& stopped, std::vector<LoopSummary>& out) {
+                      run_alone(plan, group.first, stopped, out);
+                    });
 }
 
 }  // namespace mgdd::loop

@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualThrottle', 'bench_inputs', 'bench_limits', 'loop_form', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
+__all__: list[str] = ['EngineBench', 'FunctionPlant', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualThrottle', 'bench_inputs', 'bench_limits', 'loop_form', 'monte_carlo', 'plant_noise', 'run_function', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
@@ -226,6 +226,25 @@ class EngineBench:
         """
         Earliest and latest SOC that is not clamped.
         """
+class FunctionPlant:
+    """
+    A compiled function as a plant; use mgdd.loop.FunctionPlant.
+    """
+    def __deepcopy__(self, memo: dict) -> FunctionPlant:
+        """
+        The same function and data at the same cycle.
+        """
+    def __init__(self, address: typing.SupportsInt | typing.SupportsIndex, user_data: typing.SupportsInt | typing.SupportsIndex, *, inputs: typing.SupportsInt | typing.SupportsIndex, values: typing.SupportsInt | typing.SupportsIndex, limits: collections.abc.Sequence[str], noise_sd: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def measure(self, inputs: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[float] | None:
+        """
+        Run one cycle without the GIL: its outputs, None where it failed.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Index of the next cycle.
+        """
 class VirtualThrottle:
     """
     A throttle with its sensors, sample by sample; behind mgdd.loop.VirtualThrottle.
@@ -294,9 +313,59 @@ def loop_form(loops: typing.SupportsInt | typing.SupportsIndex) -> str:
     """
     Form that so many loops take; who cuts them into pieces passes it on.
     """
-def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex, form: str = 'automatic') -> dict:
+@typing.overload
+def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], answers: collections.abc.Sequence[collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], str]]], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex, form: str = 'automatic') -> dict:
     """
     Whole loops on all cores; behind mgdd.loop.monte_carlo.
+    """
+@typing.overload
+def monte_carlo(benches: collections.abc.Sequence[FunctionPlant], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], answers: collections.abc.Sequence[collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], str]]], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex, form: str = 'automatic') -> dict:
+    """
+    Whole loops on all cores; behind mgdd.loop.monte_carlo.
+    """
+def plant_noise(seed: typing.SupportsInt | typing.SupportsIndex, cycle: typing.SupportsInt | typing.SupportsIndex) -> float:
+    """
+    Standard normal noise of a cycle.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.Spsa, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.GradientDescent, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.GoldenSection, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.GaussianProcessSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
+    """
+@typing.overload
+def run_function(plant: FunctionPlant, seeker: mgdd._core.guide.CurveSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    Run a seeker on a function without the GIL: how many cycles were run.
     """
 @typing.overload
 def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:

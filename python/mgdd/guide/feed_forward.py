@@ -248,6 +248,12 @@ class FeedForward(Guided, _core.guide.FeedForward):
     def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
         return (self.seeker, self._guide), {}
 
+    def _bare(self) -> FeedForward:
+        seeker = self.seeker
+        seeker.clear_history()
+        bare: FeedForward = self._as(type(self), seeker, None)  # whoever takes it has the answers of the guide
+        return bare
+
     @property
     def history(self) -> xr.Dataset:
         """What came from the guide and what from the trim, cycle by cycle.

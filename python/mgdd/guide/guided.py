@@ -129,6 +129,14 @@ class Guided(SeekerFindings, _CoreGuided):
         """What it was made of: those of the seeker, and its own."""
         return {**self._seeker_settings, **self._options}
 
+    def _bare(self) -> Any:
+        """Copy it as it stands, without its finished cycles."""
+        arguments, named = self._arguments()
+        return self._as(type(self), *arguments, **named)
+
+    def _as(self, cls: type[Any], *arguments: Any, **named: Any) -> Any:
+        return _rebuild(cls, arguments, named, self._options, self.state, [])
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, (type(self), *self._arguments(), self._options, self.state, list(self._rows))
 

@@ -1,10 +1,10 @@
 """Closed loops: plants behind one protocol, a seeker on any of them, and thousands of runs on the virtual bench.
 
-`EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
-closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
-bench on all cores or an executor, `EngineBench.find_optimum` says where a seeker should end. `track` and `track_many`
-run controllers of the throttle along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's
-torque.
+`EngineBench`, `SurrogatePlant`, `VirtualThrottle` and `FunctionPlant`, a function of your own, are plants: ``apply``
+inputs by name, ``measure``. `run_seeker` closes the loop on any of them and on a test rig, `monte_carlo` does so for
+seeds, gains and operating points of the bench, or on a compiled function, on all cores or an executor,
+`EngineBench.find_optimum` says where a seeker should end. `track` and `track_many` run controllers of the throttle
+along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's torque.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.drive import simulate_drive
+from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.many_loops import monte_carlo
 from mgdd.loop.many_tracks import track_many
 from mgdd.loop.plant import Measurement, Plant
@@ -28,6 +29,7 @@ from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
     "EngineBench",
+    "FunctionPlant",
     "LoopCriteria",
     "Measurement",
     "Plant",

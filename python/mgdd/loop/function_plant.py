@@ -1,68 +1,176 @@
-"""A Python function of inputs by name, as a plant."""
+"""A function of your own as a plant: in Python, or compiled."""
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import DataError
+from mgdd import _core
+from mgdd.errors import DataError, ParameterError, RigError
+from mgdd.loop.compiled_function import C_TYPE, address_of, data_address_of
 from mgdd.loop.plant import Measurement, checked_inputs
 
-__all__ = ["FunctionPlant"]
+if TYPE_CHECKING:
+    from mgdd.optimize import Seeker
+
+__all__ = ["FunctionPlant", "core_of"]
 
 _FORMS = "return J, or (J, {limit: value}), or None for a failed cycle"
 
 
 class FunctionPlant:
-    """A function that takes inputs by name and gives J, or J and limits by name, or None for a failed cycle.
+    """A function of your own as a plant: in Python, or compiled.
+
+    A Python function takes inputs by name and gives J, or J and limits by name, or None for a failed cycle. A compiled
+    one runs in loops of the core, without the GIL and on all cores. It is ``int f(const double *inputs, size_t
+    n_inputs, double *outputs, size_t n_outputs, void *user_data)``: it reads the inputs in their order, writes J and
+    then the limits, and returns 0. Any other status, a number that is not finite or beyond 1e30, and one that is not
+    written make a failed cycle.
 
     Parameters
     ----------
-    function : callable
-        ``function({"soc_cad": -6.0}) -> J``, or ``-> (J, {"p_max_bar": 96.0})``.
+    function : callable, int, or compiled function
+        ``function({"soc_cad": -6.0}) -> J``, or ``-> (J, {"p_max_bar": 96.0})``. Compiled: a ctypes function of type
+        ``FunctionPlant.C_TYPE``, a `numba.cfunc`, a `scipy.LowLevelCallable`, or a bare address as a number, whose
+        signature cannot be checked and whose code the caller keeps alive. Loops call it on threads of their own,
+        `monte_carlo` on several at once. A ctypes callback of a Python function takes the GIL in every cycle; an
+        exception in it is a failed cycle.
     inputs : sequence of str
-        Names of the inputs.
+        Names of the inputs, one to eight.
     limits : sequence of str
-        Names of the limits that it has to give.
+        Names of the limits that it has to give, at most eight of a compiled function.
     values : sequence of str
-        Names of quantities that it gives instead of J, in one mapping together with the limits.
+        Names of quantities that it gives instead of J: in one mapping together with the limits, compiled before them.
+    user_data : numpy array, ctypes array or structure, or int, optional
+        Whose address a compiled function gets as its last argument.
+    noise_sd : float
+        Standard deviation of Gaussian noise that is added to J [unit of J].
+    seed : int
+        Of that noise, in [0, 2**64); it depends on seed and cycle alone.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Null or another signature, a setting outside its domain.
 
     Examples
     --------
-    >>> from mgdd.loop.function_plant import FunctionPlant
+    >>> from mgdd.loop import FunctionPlant
     >>> plant = FunctionPlant(lambda x: 56.0 - 0.03 * x["soc_cad"] ** 2, ["soc_cad"])
     >>> plant.apply({"soc_cad": -10.0})
     >>> plant.measure().performance
     53.0
     """
 
+    C_TYPE = C_TYPE
+
     def __init__(
         self,
-        function: Callable[[Any], Any],
+        function: Any,
         inputs: Sequence[str],
         limits: Sequence[str] = (),
         *,
         values: Sequence[str] = (),
+        user_data: Any = None,
+        noise_sd: float = 0.0,
+        seed: int = 0,
     ) -> None:
-        self._function, self._values = function, tuple(values)
+        for name, given in (("inputs", inputs), ("limits", limits), ("values", values)):
+            if isinstance(given, str) or len(set(given)) != len(given):
+                raise ParameterError.of(name, given, "a sequence of different names")
+        if not 0 <= seed < 2**64:
+            raise ParameterError.of("seed", seed, "in [0, 2**64)")
+        if not (math.isfinite(noise_sd) and noise_sd >= 0.0):
+            raise ParameterError.of("noise_sd", noise_sd, "finite and >= 0")
+        if noise_sd > 0.0 and values:
+            raise ParameterError("noise_sd and values were both given: noise is added to J, and there is none")
+        self._function, self._values, self._user_data = function, tuple(values), user_data  # kept alive
+        self._noise_sd, self._seed, self._cycle = float(noise_sd), int(seed), 0
         self.input_names, self.limit_names = tuple(inputs), tuple(limits)
-        self._applied = dict[str, float]()
+        self._applied: dict[str, float] | None = None
+        self._core: _core.loop.FunctionPlant | None = None
+        if (found := address_of(function)) is not None:
+            address, data = found
+            self._core = _core.loop.FunctionPlant(
+                address, data if user_data is None else data_address_of(user_data), inputs=len(self.input_names),
+                values=len(self._values) or 1, limits=list(self.limit_names), noise_sd=self._noise_sd, seed=self._seed,
+            )  # fmt: skip
+        elif not callable(function):
+            raise ParameterError.of("function", function, "a function of the inputs by name, or a compiled one")
+        elif user_data is not None:
+            raise ParameterError("user_data: goes to a compiled function; bind it to one in Python")
+
+    @property
+    def cycle(self) -> int:
+        """Index of the next cycle."""
+        return self._cycle if self._core is None else self._core.cycle
+
+    @property
+    def compiled(self) -> bool:
+        """Whether loops of the core can run it: a compiled function that gives J."""
+        return self._core is not None and not self._values
 
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Set the inputs of the next call."""
+        """Set the inputs of the next call.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+            One finite number for every name of `input_names`.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A missing, unknown or non-finite input.
+        """
         self._applied = dict(zip(self.input_names, checked_inputs(inputs, self.input_names), strict=True))
 
     def measure(self) -> Measurement:
-        """Call the function; DataError for an answer that is not one."""
-        answer = self._function(dict(self._applied))
+        """Call the function at the inputs applied last.
+
+        Returns
+        -------
+        Measurement
+            J with its noise, or the values, and the limits; NaN in a failed cycle, which is a misfire.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            An answer of a Python function that is not one.
+        mgdd.errors.RigError
+            Nothing was applied yet.
+        """
+        if self._applied is None:
+            raise RigError("measure() before apply(): apply inputs first")
+        if self._core is not None:
+            return self._measurement(self._core.measure([*self._applied.values()]))
+        measured = self._answer(self._function(dict(self._applied)))
+        self._cycle += 1
+        return measured
+
+    def _measurement(self, outputs: Sequence[float] | None) -> Measurement:
+        if outputs is None:
+            return self._failed()
+        limits = dict(zip(self.limit_names, outputs[len(self._values) or 1 :], strict=True))
+        if not self._values:
+            return Measurement(components=(outputs[0],), limits=limits)
+        return Measurement(values=dict(zip(self._values, outputs, strict=False)) | limits, limits=limits)
+
+    def _failed(self) -> Measurement:
+        return Measurement(components=(math.nan,), limits=dict.fromkeys(self.limit_names, math.nan), misfire=True)
+
+    def _answer(self, answer: Any) -> Measurement:
         if answer is None:
-            return Measurement(components=(math.nan,), limits=dict.fromkeys(self.limit_names, math.nan), misfire=True)
+            return self._failed()
         if self._values:
             return self._named(answer)
         j, limits = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, {})
         number = self._number("J", j)
+        if self._noise_sd > 0.0:
+            number += self._noise_sd * _core.loop.plant_noise(self._seed, self._cycle)
         if not isinstance(limits, Mapping) or set(self.limit_names) - set(limits):
             gave = ", ".join(map(str, limits)) if isinstance(limits, Mapping) else repr(limits)
             raise DataError(
@@ -87,4 +195,31 @@ class FunctionPlant:
         return float(number)
 
     def _where(self) -> str:
-        return " at " + ", ".join(f"{name} = {value:.6g}" for name, value in self._applied.items())
+        return " at " + ", ".join(f"{name} = {value:.6g}" for name, value in (self._applied or {}).items())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> FunctionPlant:
+        made = object.__new__(type(self))
+        shared = () if self._core is None else ("_function", "_user_data")  # which may not be copied
+        for name, value in vars(self).items():
+            vars(made)[name] = value if name in shared else copy.deepcopy(value, memo)
+        return made
+
+    def __copy__(self) -> FunctionPlant:
+        return self.__deepcopy__({})
+
+    def __getstate__(self) -> dict[str, Any]:
+        if self._core is not None:
+            raise TypeError("a FunctionPlant of a compiled function stands in this process only: take threads")
+        return vars(self)
+
+    def __repr__(self) -> str:
+        what = "Python" if self._core is None else "compiled"
+        return f"<FunctionPlant of {', '.join(self.input_names)}, {what}>"
+
+
+def core_of(plant: Any, seeker: Seeker) -> _core.loop.FunctionPlant | None:
+    """Give what a loop of the core runs with that seeker; None where the loop has to run in Python."""
+    if not isinstance(plant, FunctionPlant) or not plant.compiled:
+        return None
+    alike = tuple(seeker.input_names) in ((), plant.input_names) and tuple(seeker.limit_names) == plant.limit_names
+    return plant._core if alike and seeker.component_count == 1 else None

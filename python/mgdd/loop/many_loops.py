@@ -1,4 +1,4 @@
-"""Seekers on the virtual bench by the thousand: benches, seekers and seeds on cores, processes or machines."""
+"""Seekers on a plant of the core by the thousand: plants, seekers and seeds on cores, processes or machines."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, or_partial
+from mgdd.guide import FeedForward, GuidedEngine
+from mgdd.guide.asked_ahead import Said, answers_along
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.limit_figures import limit_label, with_a_limit
-from mgdd.loop.plant_loop import require_inputs_of
+from mgdd.loop.plant_loop import require_inputs_of, require_point_for
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.parallel.rows import pieces
@@ -26,7 +29,9 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-    _Call = tuple[list[EngineBench], list[Seeker], Sequence[int], list[Mapping[str, Any]]]
+    _Plant = EngineBench | FunctionPlant
+    _Seeker = Seeker | FeedForward | GuidedEngine
+    _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
 
 __all__ = ["monte_carlo"]
 
@@ -49,9 +54,12 @@ _SUMMARY = {
 }
 
 
+_OF_AN_ENGINE = ("mean_efficiency_percent", "mean_nox_ppm")
+
+
 def monte_carlo(
-    benches: EngineBench | Sequence[EngineBench],
-    seekers: Seeker | Sequence[Seeker],
+    benches: _Plant | Sequence[_Plant],
+    seekers: _Seeker | Sequence[_Seeker],
     seeds: Iterable[int],
     *,
     cycles: int,
@@ -65,16 +73,20 @@ def monte_carlo(
     Each loop starts from cycle 0 of its bench and from where its seeker stands. Noise depends on the seed alone, so
     the numbers do not depend on executor, workers or chunks. Sixteen loops and more run side by side and have the
     numbers of `run_seeker` to rounding; fewer, and those with a gamma of temperature, several inputs or a limit on
-    ``t_evo_k``, have its bits. Of several inputs the figures of the estimate are those of ``soc_cad``.
+    ``t_evo_k``, have its bits; means of a seeker with a guide are summed in another order. Of several inputs the
+    figures of the estimate are those of ``soc_cad``.
 
     Parameters
     ----------
-    benches : EngineBench or sequence
-        Plants, for example several operating points; read, not advanced.
+    benches : EngineBench, FunctionPlant or sequence
+        Plants, for example several operating points; read, not advanced. Either benches, or compiled functions, which
+        run from cycle 0 with the seed of the loop; several threads call one function at once, and no other process
+        does.
     seekers : seeker or sequence
-        For example several gains; read, not advanced.
+        As in `run_seeker`, for example several gains; read, not advanced. The guide of a `FeedForward` is asked once at
+        every operating point of a bench, before the loops, and once more where it held or refused.
     seeds : iterable of int
-        Of the bench, and of SPSA.
+        Of the bench, and of a seeker that draws.
     cycles : int
         Length of each loop.
     criteria : LoopCriteria or sequence of LoopCriteria, optional
@@ -87,7 +99,8 @@ def monte_carlo(
     -------
     xarray.Dataset
         Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker` without its noise-free figures, which would
-        double the work, and ``finished``, true everywhere.
+        double the work, and ``finished``, true everywhere. Of functions without figures of an engine, and where the
+        first input is not an angle (``..._cad``) figures of it are named without ``_cad``, in its unit.
 
     Raises
     ------
@@ -109,7 +122,7 @@ def monte_carlo(
     >>> dict(table.sizes)
     {'bench': 1, 'seeker': 2, 'seed': 4}
     """
-    bench_list = [benches] if isinstance(benches, EngineBench) else list(benches)
+    bench_list = [benches] if isinstance(benches, EngineBench | FunctionPlant) else list(benches)
     seeker_list = list(seekers) if isinstance(seekers, Sequence) else [seekers]
     seed_list = _whole_seeds(seeds)
     for seed in seed_list:
@@ -127,12 +140,14 @@ def monte_carlo(
                     f"inputs of the seeker are {', '.join(named)}: here they stand in the order of the bench, "
                     f"{', '.join(bench.input_names)}"
                 )
+    functions = _functions_of(bench_list)
     goals = [own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)]
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({goal[name] for goal in goals}) > 1:
             raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
     form = _core.loop.loop_form(len(bench_list) * len(seeker_list) * len(seed_list))  # of all, however they are cut
-    call = (bench_list, seeker_list, seed_list, goals, cycles, form)
+    answers = [_answers(bench, seeker, cycles) for bench in bench_list for seeker in seeker_list]
+    call = (bench_list, seeker_list, seed_list, answers, goals, cycles, form)
     stop: Interrupted | WorkerLostError | None
     if executor is None and progress is None:
         threads = threads_of(workers)
@@ -149,8 +164,13 @@ def monte_carlo(
         "finished": (dims, finished, "-", "whether the loop ran to its end"),
     }
     names = bench_list[0].limit_names
+    plain = bool(functions) and not functions[0].input_names[0].endswith("_cad")
     for name, values in with_a_limit(raw, names).items():
+        if functions and name in _OF_AN_ENGINE:
+            continue
         label = _SUMMARY.get(name) or limit_label(name, names)
+        if plain and name.endswith("_cad") and name in _SUMMARY:
+            name, label = name.removesuffix("_cad"), ("unit of the input", label[1].replace("timing", "input"))  # noqa: PLW2901
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *label)
     for name in dict.fromkeys(name for own in given for name in own.exceed_above):
         above = [float(own.exceed_above.get(name, np.nan)) for own in given]
@@ -159,9 +179,10 @@ def monte_carlo(
 
 
 def _loops(
-    benches: Sequence[EngineBench],
-    seekers: Sequence[Seeker],
+    benches: Sequence[_Plant],
+    seekers: Sequence[_Seeker],
     seeds: Sequence[int],
+    answers: Sequence[list[Said]],
     goals: Sequence[Mapping[str, Any]],
     cycles: int,
     form: str,
@@ -171,16 +192,18 @@ def _loops(
     first = goals[0] if goals else LoopCriteria().to_core(())
     shared: dict[str, Any] = {name: first[name] for name in ("arrival_cad", "tail_cycles", "exceed_from")}
     shared |= {name: [goal[name] for goal in goals] for name in ("optimum_cad", "exceed_above", "limits")}
+    plants: Any = [plant._core for plant in _functions_of(benches)] or benches
     columns: dict[str, NDArray[Any]] = _core.loop.monte_carlo(
-        benches, list(seekers), seeds, cycles=cycles, threads=threads, form=form, **shared
+        plants, list(seekers), seeds, answers, cycles=cycles, threads=threads, form=form, **shared
     )
     return columns
 
 
 def _in_chunks(
-    benches: Sequence[EngineBench],
-    seekers: Sequence[Seeker],
+    benches: Sequence[_Plant],
+    seekers: Sequence[_Seeker],
     seeds: Sequence[int],
+    answers: Sequence[list[Said]],
     goals: Sequence[Mapping[str, Any]],
     cycles: int,
     form: str,
@@ -191,16 +214,15 @@ def _in_chunks(
 ) -> tuple[dict[str, NDArray[Any]], Interrupted | WorkerLostError | None]:
     # What does not fit is found by one cycle of every pair, before any work; whose cycles count is checked by a chunk.
     shown = [{**goal, "exceed_from": None} for goal in goals]
-    columns, stop = or_partial(lambda: _loops(benches, seekers, seeds[:1], shown, min(cycles, 1), form))
-    own, begun = [copy.deepcopy(bench) for bench in benches], [copy.deepcopy(seeker) for seeker in seekers]
-    for seeker in begun:
-        seeker.clear_history()
+    columns, stop = or_partial(lambda: _loops(benches, seekers, seeds[:1], answers, shown, min(cycles, 1), form))
+    own, begun = [copy.deepcopy(bench) for bench in benches], [_bare(seeker) for seeker in seekers]
     n = len(benches) * len(seekers) * len(seeds)
     columns = {name: np.full(n, False if name == "finished" else np.nan) for name in columns}
 
     def cut(start: int, stop: int) -> tuple[list[_Call], int, str]:
         pairs = [(divmod(row, len(seekers)), seeds[a:b]) for row, a, b in pieces(start, stop, len(seeds))]
-        return [([own[b]], [begun[s]], these, [goals[b]]) for (b, s), these in pairs], cycles, form
+        calls = [([own[b]], [begun[s]], these, [answers[b * len(seekers) + s]], [goals[b]]) for (b, s), these in pairs]
+        return calls, cycles, form
 
     def keep(start: int, stop: int, parts: list[dict[str, NDArray[Any]]]) -> None:
         for name, column in columns.items():
@@ -212,6 +234,36 @@ def _in_chunks(
 
 def _some_loops(calls: Sequence[_Call], cycles: int, form: str) -> list[dict[str, NDArray[Any]]]:
     return [_loops(*call, cycles, form) for call in calls]
+
+
+def _functions_of(plants: Sequence[_Plant]) -> list[FunctionPlant]:
+    """Give the compiled functions, none of benches; ParameterError for a mixture, and for a function in Python."""
+    functions = [plant for plant in plants if isinstance(plant, FunctionPlant)]
+    if functions and len(functions) < len(plants):
+        raise ParameterError("benches: EngineBench and FunctionPlant were both given: run them one after the other")
+    for plant in functions:
+        if not plant.compiled:
+            raise ParameterError(f"benches: {plant!r}: must be compiled and give J; run_seeker runs others")
+        if plant.input_names != functions[0].input_names:
+            raise ParameterError("benches: every FunctionPlant must have the same inputs")
+    return functions
+
+
+def _answers(plant: _Plant, seeker: _Seeker, cycles: int) -> list[Said]:
+    require_point_for(plant, seeker)
+    if isinstance(seeker, FeedForward) and isinstance(plant, EngineBench):
+        return answers_along(seeker, plant.settings["schedule"], cycles)
+    return []
+
+
+def _bare(seeker: _Seeker) -> _Seeker:
+    """Copy a seeker as it stands, without its history."""
+    if isinstance(seeker, FeedForward | GuidedEngine):
+        bare: FeedForward | GuidedEngine = seeker._bare()
+        return bare
+    own = copy.deepcopy(seeker)
+    own.clear_history()
+    return own
 
 
 def _whole_seeds(seeds: Iterable[int]) -> list[int]:

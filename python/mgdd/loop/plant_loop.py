@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError, hinted
+from mgdd import _core
+from mgdd.errors import Interrupted, ParameterError, hand_over, hinted, or_partial
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.loop.bench_record import FLAGS, OWN_LABELS
 from mgdd.loop.criteria import LoopCriteria
-from mgdd.loop.limit_figures import noise_free_variable
+from mgdd.loop.function_plant import core_of
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
+from mgdd.loop.plant_record import Cycles, Row, cycles_told, dataset_of
 from mgdd.loop.summary import summarize_cycles
+from mgdd.optimize import Seeker
 from mgdd.results.finding import Finding
-from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.results.result import Figures, Result
 
 if TYPE_CHECKING:
@@ -26,23 +27,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from mgdd.optimize import Seeker
 
-__all__ = ["LoopRun", "require_inputs_of", "steer"]
+__all__ = ["LoopRun", "require_inputs_of", "require_point_for", "steer"]
 
 _CHANGED = "operating_point_changed"
-_UNKNOWN = "not given by the plant"
-_OWN = ("estimate_cad", "soc_requested_cad", "soc_applied_cad", "j", "misfire")  # columns that the loop itself knows
-
-
-class _Row(NamedTuple):
-    """One measured cycle."""
-
-    estimate: NDArray[np.float64]
-    asked: NDArray[np.float64]
-    applied: NDArray[np.float64]
-    void: bool
-    measured: Measurement
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -104,12 +92,7 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
             f"start has {seeker.estimate.size} entries: the plant takes {len(plant.input_names)}, "
             f"{', '.join(plant.input_names)}"
         )
-    unasked = isinstance(seeker, FeedForward) and seeker.guide is not None and seeker.point is None
-    if unasked and not hasattr(plant, "point"):
-        raise ParameterError(
-            "plant has no point: the guide of a FeedForward would never be asked; give the plant a property `point`, "
-            "or call at(point) of the FeedForward before the run"
-        )
+    require_point_for(plant, seeker)
     names = tuple(seeker.limit_names)
     if not set(names) <= set(plant.limit_names):
         raise ParameterError(
@@ -121,19 +104,31 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     criteria = replace(criteria, limits=judged)
     criteria.require_counted(cycles)
     announcing = plant if isinstance(plant, AnnouncingPlant) else None
-    first, log, interrupted = seeker.cycle, list[_Row](), False
+    first, log, interrupted = seeker.cycle, list[Row](), False
+
+    def told() -> LoopRun:
+        """Give the run so far, without a cycle that was measured and not told: it is asked again."""
+        del log[seeker.cycle - first :]
+        guided = _guided(seeker, len(log))
+        own = Cycles.of(log, len(plant.input_names))
+        return _run_of(plant, seeker, own, first, criteria, uppers, guided, interrupted=interrupted)
+
+    if isinstance(seeker, Seeker) and (compiled := core_of(plant, seeker)) is not None:
+        run_function: Any = _core.loop.run_function  # one overload for each class of seeker
+        done, stop = or_partial(lambda: int(run_function(compiled, seeker, cycles)))
+        own = cycles_told(seeker, done)
+        run = _run_of(plant, seeker, own, first, criteria, uppers, {}, interrupted=stop is not None)
+        return hand_over(run, stop)
     try:
         for _ in range(cycles):
             _one_cycle(plant, announcing, seeker, log)
     except KeyboardInterrupt:
         interrupted = True
-        del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
     except Exception as error:
-        del log[seeker.cycle - first :]
         with contextlib.suppress(AttributeError):  # of a class with slots
-            error.partial = _run_of(plant, seeker, log, first, criteria, uppers)  # type: ignore[attr-defined]
+            error.partial = told()  # type: ignore[attr-defined]
         raise
-    run = _run_of(plant, seeker, log, first, criteria, uppers, interrupted=interrupted)
+    run = told()
     if interrupted:
         raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
     return run
@@ -142,14 +137,15 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
 def _run_of(
     plant: Plant,
     seeker: Seeker | FeedForward | GuidedEngine,
-    log: list[_Row],
+    cycles: Cycles,
     first: int,
     criteria: LoopCriteria,
     uppers: Sequence[float],
+    guided: Mapping[str, tuple[Any, ...]],
     *,
-    interrupted: bool = False,
+    interrupted: bool,
 ) -> LoopRun:
-    dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
+    dataset = dataset_of(cycles, first, plant.input_names, guided)
     dataset.attrs |= {"interrupted": int(interrupted), **criteria.attributes(tuple(plant.limit_names), uppers)}
     summary = Figures(summarize_cycles(dataset, criteria))
     return LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
@@ -164,8 +160,18 @@ def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine)
         )
 
 
+def require_point_for(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:
+    """ParameterError where a guide would never be asked."""
+    unasked = isinstance(seeker, FeedForward) and seeker.guide is not None and seeker.point is None
+    if unasked and not hasattr(plant, "point"):
+        raise ParameterError(
+            "plant has no point: the guide of a FeedForward would never be asked; give the plant a property `point`, "
+            "or call at(point) of the FeedForward before the run"
+        )
+
+
 def _one_cycle(
-    plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker | FeedForward | GuidedEngine, log: list[_Row]
+    plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker | FeedForward | GuidedEngine, log: list[Row]
 ) -> None:
     if isinstance(seeker, FeedForward | GuidedEngine) and hasattr(plant, "point"):
         seeker.at(plant.point)
@@ -185,7 +191,7 @@ def _one_cycle(
     told = measured.performance if summed else np.array(measured.components)
     limits = [measured.limits[name] for name in seeker.limit_names]
     applied = _applied(plant.input_names, asked, measured)
-    log.append(_Row(estimate, asked, applied, void, measured))
+    log.append(Row(estimate, asked, applied, void, measured))
     told_inputs = dict(zip(plant.input_names, applied.tolist(), strict=True)) if seeker.input_names else applied
     reading: dict[str, Any] = {"misfire": void, "applied": told_inputs if measured.applied else None}
     if isinstance(seeker, GuidedEngine):
@@ -217,26 +223,6 @@ def _require_match(seeker: Seeker | FeedForward | GuidedEngine, measured: Measur
             raise ParameterError(hinted(refused, name, measured.limits))
 
 
-def _steered(log: list[_Row], inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
-    """Label what the seeker thought and asked for."""
-    estimate = np.array([row.estimate for row in log], np.float64).reshape(-1, len(inputs))
-    asked = np.array([row.asked for row in log], np.float64).reshape(-1, len(inputs))
-    applied = np.array([row.applied for row in log], np.float64).reshape(-1, len(inputs))
-    if inputs == ("soc_cad",):
-        return {
-            "estimate_cad": ("cycle", estimate[:, 0]),
-            "soc_requested_cad": ("cycle", asked[:, 0]),
-            "soc_applied_cad": ("cycle", applied[:, 0]),
-        }
-    over, unit = ("cycle", "input"), "unit of the input"
-    return {
-        "input": ("input", list(inputs), "-", "input of the plant"),
-        "estimate": (over, estimate, unit, "estimate of the best input"),
-        "asked": (over, asked, unit, "input that was asked for"),
-        "applied": (over, applied, unit, "input that the plant applied"),
-    }
-
-
 def _guided(seeker: Seeker | FeedForward | GuidedEngine, cycles: int) -> dict[str, tuple[Any, ...]]:
     """Give what came from the guide, what from the trim, and the trust, of the last cycles of a guided engine."""
     if not isinstance(seeker, GuidedEngine) or not cycles:
@@ -245,46 +231,3 @@ def _guided(seeker: Seeker | FeedForward | GuidedEngine, cycles: int) -> dict[st
     names = ("guide_cad", "feed_forward_cad", "trim_cad", "estimate_sd_cad", "trust", "wall_heat_scale")
     labels = {name: (last[name].attrs["units"], last[name].attrs["long_name"]) for name in names}
     return {name: ("cycle", last[name].to_numpy(), *labels[name]) for name in names}
-
-
-def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...], guided: dict[str, tuple[Any, ...]]) -> xr.Dataset:
-    """Label what was measured; a value that is missing in some cycles is NaN there."""
-    rows = [row.measured for row in log]
-    names = dict.fromkeys(name for row in rows for name in row.values)
-    columns = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in names}
-    count = columns.pop("cycle", None)
-    cycle = np.arange(first, first + len(rows)) if count is None or not np.isfinite(count).all() else count
-    variables: dict[str, tuple[Any, ...]] = {
-        "cycle": ("cycle", cycle.astype(np.int64)),
-        **_steered(log, inputs),
-        "j": ("cycle", np.array([row.performance for row in rows], np.float64)),
-        "misfire": ("cycle", np.array([row.misfire for row in rows], np.bool_), "-", FLAGS["misfire"]),
-        "void": ("cycle", np.array([row.void for row in log], np.bool_), "-", "cycle that the seeker did not use"),
-        **guided,
-    }
-    for name, values in columns.items():
-        if name in FLAGS and name not in _OWN:
-            variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
-        elif name not in _OWN:
-            labels: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in names else {}  # of a bench
-            said: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
-            variables[name] = ("cycle", values, *said)
-    width = max((len(row.components) for row in rows), default=1)
-    components = np.full((len(rows), width), math.nan)
-    for at, row in enumerate(rows):
-        components[at, : len(row.components)] = row.components
-    variables["component"] = ("component", np.arange(width), "-", "term of the performance")
-    variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
-    limits = list(dict.fromkeys(name for row in rows for name in row.limits))
-    if limits:
-        table = np.array([[row.limits.get(name, math.nan) for name in limits] for row in rows])
-        units = [VARIABLES[name].units if name in VARIABLES else _UNKNOWN for name in limits]
-        own = "unit of the limit"
-        variables["limit"] = ("limit", limits, "-", "limited quantity")
-        variables["limit_units"] = ("limit", units, "-", own)
-        variables["limits"] = (("cycle", "limit"), table, own, "measured value of a limited quantity")
-        if any(row.noise_free_limits for row in rows):
-            known = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
-            variables["noise_free_limits"] = noise_free_variable(known)
-    out = labelled_dataset(variables)
-    return out.set_coords("limit_units") if limits else out

@@ -45,8 +45,9 @@ def run_seeker(
     point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
     the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
     point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` of
-    one input the loop runs in the core without the GIL; one ask and tell at a time from Python gives the same
-    trajectory, bit for bit.
+    one input, and on a compiled `FunctionPlant`, the loop runs in the core without the GIL where a seeker of
+    `mgdd.optimize` or a `CurveSeeking` has the inputs and limits of the plant in their order; one ask and tell at a
+    time from Python gives the same trajectory, bit for bit.
 
     Parameters
     ----------
@@ -137,7 +138,7 @@ def seek(
     ----------
     plant : Plant or callable
         It advances by `cycles`. A function takes the inputs by name and gives J, or ``(J, {limit: value})`` where there
-        are limits, or None for a failed cycle.
+        are limits, or None for a failed cycle; a compiled one is as `FunctionPlant` takes it.
     inputs : mapping of str to (float, float), or sequence of Input
         Bounds of every input, finite, in its unit; one to eight.
     start : mapping of str to float, or float for one input, optional

@@ -10,6 +10,7 @@
 // `offer`, `ask` and `tell` are noexcept and allocation-free where those of the seeker are.
 #pragma once
 
+#include <cstdint>
 #include <utility>
 
 #include "mgdd/common/state.hpp"
@@ -83,6 +84,21 @@ class FeedForward {
     protocol_.failures.forget();
   }
   void shift_estimate(const optimize::Inputs& by) noexcept { seeker_.shift_estimate(by); }
+  /// Of a seeker that draws.
+  void reseed(std::uint64_t seed) noexcept
+    requires requires(S s) { s.reseed(seed); }
+  {
+    seeker_.reseed(seed);
+  }
+  /// The same around another seeker that stands where this one does, for example without its record.
+  template <class T>
+  FeedForward<T> around(T seeker) const {
+    FeedForward<T> out(std::move(seeker));
+    out.path_ = path_;
+    out.protocol_ = protocol_;
+    out.applied_ = applied_;
+    return out;
+  }
 
   const optimize::Inputs& estimate() const noexcept { return seeker_.estimate(); }
   /// The input of the last ask.
@@ -114,6 +130,9 @@ class FeedForward {
   }
 
  private:
+  template <class T>
+  friend class FeedForward;
+
   S seeker_;
   GuidePath path_;
   optimize::Protocol protocol_;

@@ -61,6 +61,8 @@ class GuidedEngine {
   /// The operating point has changed in a way that `at` does not see.
   void restart() noexcept;
   void shift_estimate(const optimize::Inputs& by) noexcept;
+  /// Another seed where its seeker draws.
+  void reseed(std::uint64_t seed) noexcept;
 
   const optimize::Inputs& estimate() const noexcept;
   const optimize::Inputs& applied() const noexcept;

@@ -1,4 +1,4 @@
-// The closed loop: a seeker on the virtual bench, one ask, one cycle, one tell; and what such a run comes to.
+// The closed loop: a seeker on the virtual bench or a function, one ask, one cycle, one tell; what such a run comes to.
 // `loop_step` and `LoopStatistics::add` are noexcept and allocation-free. The same seeker driven from Python one
 // ask/tell at a time goes the same way, bit for bit. Angles in °CA aTDC.
 #pragma once
@@ -10,11 +10,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "mgdd/guide/curve_seeking.hpp"
 #include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/function_plant.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
 
 namespace mgdd::loop {
@@ -34,37 +36,52 @@ struct LoopCycle {
 /// performance (or one, for their sum) and the bench's limits in the same order.
 void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits);
+void require_match(const FunctionPlant& plant, const optimize::Inputs& estimate, std::size_t components,
+                   const std::vector<optimize::Limit>& limits);
 
-template <optimize::AnySeeker S>
-void require_match(const EngineBench& bench, const S& seeker) {
-  require_match(bench, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
+template <class Plant, optimize::AnySeeker S>
+void require_match(const Plant& plant, const S& seeker) {
+  require_match(plant, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
 }
 
-/// What the seeker asks of the next cycle of a bench, valid until it is told; a new operating point restarts it first.
-template <class S>
-std::span<const double> ask(const EngineBench& bench, S& seeker, double& estimate_cad) noexcept {
-  if (bench.point_changes_at(bench.cycle())) seeker.restart();
+/// What the seeker asks of the next cycle of a plant, valid until it is told. First it hears of the operating point
+/// where the plant has one: a seeker with a guide in every cycle, any other is restarted by a new one.
+template <class Plant, class S>
+std::span<const double> ask(const Plant& plant, S& seeker, double& estimate_cad) noexcept {
+  if constexpr (requires { seeker.at_cycle(plant.cycle()); }) {
+    seeker.at_cycle(plant.cycle());
+  } else if constexpr (requires { seeker.at(plant.point()); }) {
+    seeker.at(plant.point());
+  } else if constexpr (requires { plant.point_changes_at(plant.cycle()); }) {
+    if (plant.point_changes_at(plant.cycle())) seeker.restart();
+  }
   estimate_cad = seeker.estimate()[0];
   const optimize::Inputs& asked = seeker.ask();
   return {asked.data(), static_cast<std::size_t>(asked.size())};
 }
 
-/// What the bench gave. Noexcept as the seeker's `tell` is.
-template <class S>
-void tell(const BenchCycle& c, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
+/// What the plant gave: of a bench also what it applied, and the pressure for a seeker that calibrates its model.
+/// Noexcept as the seeker's `tell` is.
+template <class Plant, class S>
+void tell(Plant& plant, const BenchCycle& c, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
   const bool summed = seeker.component_count() == 1;
-  seeker.tell({summed ? std::span<const double>(&c.j, 1) : c.component_values(),
-               c.limits(),
-               c.misfire || c.unphysical,
-               {c.applied.data(), static_cast<std::size_t>(seeker.estimate().size())}});
+  const std::span<const double> components = summed ? std::span<const double>(&c.j, 1) : c.component_values();
+  const std::size_t applied =
+      std::is_same_v<Plant, EngineBench> ? static_cast<std::size_t>(seeker.estimate().size()) : 0;
+  const optimize::Reading reading{components, c.limits(), c.misfire || c.unphysical, {c.applied.data(), applied}};
+  if constexpr (requires { seeker.tell(reading, plant.pressure().pressure_bar); }) {
+    seeker.tell(reading, seeker.calibration() ? plant.pressure().pressure_bar : std::span<const double>());
+  } else {
+    seeker.tell(reading);
+  }
 }
 
 /// One cycle. Noexcept as the seeker's `tell` is.
-template <class S>
-LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(tell(BenchCycle{}, seeker))) {
+template <class Plant, class S>
+LoopCycle loop_step(Plant& plant, S& seeker) noexcept(noexcept(tell(plant, BenchCycle{}, seeker))) {
   LoopCycle out;
-  out.bench = bench.step(ask(bench, seeker, out.estimate_cad));
-  tell(out.bench, seeker);
+  out.bench = plant.step(ask(plant, seeker, out.estimate_cad));
+  tell(plant, out.bench, seeker);
   return out;
 }
 

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "mgdd/engine/batch/batch.hpp"
+#include "mgdd/guide/guided_engine.hpp"
+#include "mgdd/guide/scheduled_feed_forward.hpp"
 #include "mgdd/loop/engine_loop.hpp"
 
 namespace mgdd::loop {
@@ -16,15 +18,21 @@ namespace mgdd::loop {
 /// numbers to rounding; `automatic` takes lanes for sixteen loops and more. Gamma of temperature is always `single`.
 using LoopForm = engine::BatchForm;
 
-struct MonteCarloPlan {
-  std::vector<EngineBench> benches;
+/// Every seeker that runs in many loops, those with a guide among them.
+using LoopSeeker = WithKinds<Seeker, guide::GuidedEngine, guide::ScheduledFeedForward>;
+
+template <class Plant>
+struct MonteCarloPlanOf {
+  std::vector<Plant> benches;
   std::vector<LoopCriteria> criteria;  ///< one per bench
-  std::vector<Seeker> seekers;
+  std::vector<LoopSeeker> seekers;
+  std::vector<std::vector<guide::GuideAnswer>> answers{};  ///< [bench][seeker] for feed-forwards; empty: no guide
   std::vector<std::uint64_t> seeds;  ///< of the bench and of a seeker that draws; each loop starts at cycle 0
   std::int64_t cycles = 1000;
-  int threads = 0;  ///< 0 = all cores
-  LoopForm form = LoopForm::automatic;
+  int threads = 0;                      ///< 0 = all cores
+  LoopForm form = LoopForm::automatic;  ///< of functions always `single`
 };
+using MonteCarloPlan = MonteCarloPlanOf<EngineBench>;
 
 struct MonteCarloResult {
   std::vector<LoopSummary> loops;  ///< [bench][seeker][seed], the last index fastest
@@ -38,5 +46,6 @@ LoopForm form_of_loops(std::size_t loops, LoopForm wanted);
 /// ParameterError for an empty plan or a seeker that does not fit a bench. `stop` is polled by the calling thread about
 /// every 50 ms; loops that are running then are dropped, finished ones stay.
 MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<bool()>& stop);
+MonteCarloResult monte_carlo(const MonteCarloPlanOf<FunctionPlant>& plan, const std::function<bool()>& stop);
 
 }  // namespace mgdd::loop

@@ -39,4 +39,17 @@ LoopRun run_loop(EngineBench& bench, optimize::RecordedSeeker<S>& seeker, std::i
   return run;
 }
 
+/// The same on a function, whose cycles stand in the history of the seeker: how many were run.
+template <optimize::AnySeeker S>
+std::int64_t run_loop(FunctionPlant& plant, optimize::RecordedSeeker<S>& seeker, std::int64_t cycles,
+                      const std::stop_token& stop = {}) {
+  if (cycles < 1) throw ParameterError("cycles", cycles, "must be >= 1");
+  require_match(plant, seeker.seeker());
+  seeker.history().make_room(static_cast<std::size_t>(cycles));
+  std::int64_t done = 0;
+  for (; done < cycles && !stop.stop_requested(); ++done)
+    loop_step(plant, seeker);
+  return done;
+}
+
 }  // namespace mgdd::loop

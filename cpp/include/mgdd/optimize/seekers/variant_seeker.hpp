@@ -2,6 +2,7 @@
 // it holds, bit for bit. ask and tell are noexcept and allocation-free.
 #pragma once
 
+#include <cstdint>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -33,6 +34,12 @@ class VariantSeeker {
   }
   void shift_estimate(const Inputs& by) noexcept {
     on(seeker_, [&](auto& s) { s.shift_estimate(by); });
+  }
+  /// Another seed where the seeker draws.
+  void reseed(std::uint64_t seed) noexcept {
+    on(seeker_, [seed](auto& s) {
+      if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
+    });
   }
 
   const Inputs& estimate() const noexcept {

@@ -1,0 +1,148 @@
+"""What a loop kept of a plant's cycles, as columns and as a Dataset."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mgdd.loop.bench_record import FLAGS, OWN_LABELS
+from mgdd.loop.limit_figures import noise_free_variable
+from mgdd.loop.plant import Measurement
+from mgdd.results.labels import VARIABLES, labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from mgdd.optimize import Seeker
+
+__all__ = ["Cycles", "Row", "cycles_told", "dataset_of"]
+
+_UNKNOWN = "not given by the plant"
+_OWN = ("estimate_cad", "soc_requested_cad", "soc_applied_cad", "j", "misfire")  # columns that the loop itself knows
+
+
+class Row(NamedTuple):
+    """One measured cycle."""
+
+    estimate: NDArray[np.float64]
+    asked: NDArray[np.float64]
+    applied: NDArray[np.float64]
+    void: bool
+    measured: Measurement
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cycles:
+    """The cycles of a run, a row each."""
+
+    estimate: NDArray[np.float64]  # cycle, input
+    asked: NDArray[np.float64]
+    applied: NDArray[np.float64]
+    j: NDArray[np.float64]
+    components: NDArray[np.float64]  # cycle, component
+    misfire: NDArray[np.bool_]
+    void: NDArray[np.bool_]
+    limits: Mapping[str, NDArray[np.float64]]
+    values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    noise_free: NDArray[np.float64] | None = None  # cycle, limit
+
+    @classmethod
+    def of(cls, log: Sequence[Row], inputs: int) -> Cycles:
+        """Take the rows of a log; a value that is missing in some cycles is NaN there."""
+        rows = [row.measured for row in log]
+        width = max((len(row.components) for row in rows), default=1)
+        components = np.full((len(rows), width), math.nan)
+        for at, row in enumerate(rows):
+            components[at, : len(row.components)] = row.components
+
+        def columns(tables: list[Mapping[str, float]]) -> dict[str, NDArray[np.float64]]:
+            names = dict.fromkeys(name for table in tables for name in table)
+            return {name: np.array([table.get(name, math.nan) for table in tables]) for name in names}
+
+        limits = columns([row.limits for row in rows])
+        known = None
+        if any(row.noise_free_limits for row in rows):
+            known = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
+        return cls(
+            estimate=np.array([row.estimate for row in log], np.float64).reshape(-1, inputs),
+            asked=np.array([row.asked for row in log], np.float64).reshape(-1, inputs),
+            applied=np.array([row.applied for row in log], np.float64).reshape(-1, inputs),
+            j=np.array([row.performance for row in rows], np.float64),
+            components=components,
+            misfire=np.array([row.misfire for row in rows], np.bool_),
+            void=np.array([row.void for row in log], np.bool_),
+            limits=limits,
+            values=columns([row.values for row in rows]),
+            noise_free=known,
+        )
+
+
+def cycles_told(seeker: Seeker, count: int) -> Cycles:
+    """Take the last cycles from the history of a seeker, of a plant that applies what it is asked for."""
+    history = {name: column[len(column) - count :] for name, column in seeker._history_columns().items()}
+    missed = history["misfire"] != 0.0
+    names = list(seeker.limit_names)
+    return Cycles(
+        estimate=history["estimate"], asked=history["applied"], applied=history["applied"], j=history["objective"],
+        components=history["objective"][:, np.newaxis], misfire=missed, void=missed,
+        limits={name: history["limits"][:, k] for k, name in enumerate(names)},
+    )  # fmt: skip
+
+
+def _steered(cycles: Cycles, inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
+    """Label what the seeker thought and asked for."""
+    if inputs == ("soc_cad",):
+        return {
+            "estimate_cad": ("cycle", cycles.estimate[:, 0]),
+            "soc_requested_cad": ("cycle", cycles.asked[:, 0]),
+            "soc_applied_cad": ("cycle", cycles.applied[:, 0]),
+        }
+    over, unit = ("cycle", "input"), "unit of the input"
+    return {
+        "input": ("input", list(inputs), "-", "input of the plant"),
+        "estimate": (over, cycles.estimate, unit, "estimate of the best input"),
+        "asked": (over, cycles.asked, unit, "input that was asked for"),
+        "applied": (over, cycles.applied, unit, "input that the plant applied"),
+    }
+
+
+def dataset_of(
+    cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapping[str, tuple[Any, ...]]
+) -> xr.Dataset:
+    """Label what was measured; a plant that counts its cycles numbers them, others from the first."""
+    columns = dict(cycles.values)
+    count = columns.pop("cycle", None)
+    cycle = np.arange(first, first + cycles.j.size) if count is None or not np.isfinite(count).all() else count
+    variables: dict[str, tuple[Any, ...]] = {
+        "cycle": ("cycle", cycle.astype(np.int64)),
+        **_steered(cycles, inputs),
+        "j": ("cycle", cycles.j),
+        "misfire": ("cycle", cycles.misfire, "-", FLAGS["misfire"]),
+        "void": ("cycle", cycles.void, "-", "cycle that the seeker did not use"),
+        **guided,
+    }
+    for name, values in columns.items():
+        if name in FLAGS and name not in _OWN:
+            variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
+        elif name not in _OWN:
+            labels: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in columns else {}  # of a bench
+            said: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
+            variables[name] = ("cycle", values, *said)
+    width = cycles.components.shape[1]
+    variables["component"] = ("component", np.arange(width), "-", "term of the performance")
+    variables["components"] = (("cycle", "component"), cycles.components, "unit of J", "component of the performance")
+    if cycles.limits:
+        units = [VARIABLES[name].units if name in VARIABLES else _UNKNOWN for name in cycles.limits]
+        own, table = "unit of the limit", np.stack(list(cycles.limits.values()), axis=1)
+        variables["limit"] = ("limit", list(cycles.limits), "-", "limited quantity")
+        variables["limit_units"] = ("limit", units, "-", own)
+        variables["limits"] = (("cycle", "limit"), table, own, "measured value of a limited quantity")
+        if cycles.noise_free is not None:
+            variables["noise_free_limits"] = noise_free_variable(cycles.noise_free)
+    out = labelled_dataset(variables)
+    return out.set_coords("limit_units") if cycles.limits else out
