@@ -23,11 +23,12 @@ from collections.abc import Callable
 
 from peers import peer_bayes
 from peers.peer_seekers import Contender, installed
-from support.seeking_maps import SeekingMap, all_maps
+from support.seeking_maps import all_maps
 from support.seeking_report import arguments, print_tables
 from support.seeking_rows import Row, driven, tuned, untouched
 
 from mgdd import guide, optimize
+from mgdd.studies.several_maps import SeekingMap
 
 
 def golden(field: SeekingMap, start: float, seed: int) -> optimize.Seeker:  # noqa: ARG001 - no chance in it

@@ -16,43 +16,24 @@ from pathlib import Path
 
 import numpy as np
 
-from mgdd.loop import EngineBench, run_seeker
-from mgdd.optimize import GaussianProcessSeeking, Limit
-
-BOUNDS = {"soc_cad": (-25.0, 10.0), "egr": (0.0, 0.4), "intake_pressure_kpa": (120.0, 220.0)}
-START = {"soc_cad": 2.0, "egr": 0.35, "intake_pressure_kpa": 200.0}
-LIMITS = {"p_max_bar": 118.0, "nox_fast_ppm": 150.0}
-EARLY = 40
-
-
-def told(bench: EngineBench) -> list[Limit]:
-    """Say what stands between the plant and a limit: the fast sensor is 0.05 s late and slow, a cycle takes 0.08 s."""
-    cycle_s = 120.0 / bench.point.speed_rpm
-    sensor = bench.settings["fast_sensor"]
-    late = {"delay_cycles": round(sensor.delay_s / cycle_s), "lag_cycles": sensor.lag_s / cycle_s}
-    return [Limit(name, upper, **(late if name.startswith("nox") else {})) for name, upper in LIMITS.items()]
+from mgdd.loop import EngineBench
+from mgdd.optimize import GaussianProcessSeeking
+from mgdd.studies.several_maps import EARLY
+from mgdd.studies.three_input_bench import BOUNDS, LIMITS, START, bench_optimum, bench_run, noisy_bench, told
 
 
 def run_of(seed: int, cycles: int, best: float) -> dict[str, float]:
-    bench = EngineBench(inputs=list(BOUNDS), limits=list(LIMITS), seed=seed)
+    bench = noisy_bench(seed)
     seeker = GaussianProcessSeeking(inputs=BOUNDS, start=START, limits=told(bench), seed=seed)
-    parts = [run_seeker(bench, seeker, EARLY)]
-    at = dict(zip(BOUNDS, map(float, seeker.estimate), strict=True))
-    if cycles > EARLY:
-        parts.append(run_seeker(bench, seeker, cycles - EARLY))
-    quiet = EngineBench(inputs=list(BOUNDS), limits=list(LIMITS), soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
-    steady = float(quiet.steady_map({name: [value] for name, value in at.items()})["j"].squeeze())
-    uppers = np.array(list(LIMITS.values()))
-    first, *further = ([value] for value in at.values())
-    excess = (quiet.noise_free_limits(first, [0], further)[0] - uppers) / uppers
-    over = np.concatenate([part.dataset["noise_free_limits"].to_numpy() for part in parts]) / uppers - 1.0
+    run = bench_run(bench, seeker, sorted({EARLY, max(cycles, EARLY)}), best)
+    over = run.excess > 0.0
     return {
-        "lost": best - steady,
-        "estimate_excess_percent": 100.0 * float(excess.max()),
-        "broken": float((over > 0.0).any(axis=1).mean()),
-        **{f"broken_{name}": float(share) for name, share in zip(LIMITS, (over > 0.0).mean(axis=0), strict=True)},
-        "worst_percent": 100.0 * float(over.max()),
-        **at,
+        "lost": run.lost[0],
+        "estimate_excess_percent": 100.0 * run.estimate_excess[0],
+        "broken": float(over.any(axis=1).mean()),
+        **{f"broken_{name}": float(share) for name, share in zip(LIMITS, over.mean(axis=0), strict=True)},
+        "worst_percent": 100.0 * float(run.excess.max()),
+        **run.estimates[0],
     }
 
 
@@ -63,7 +44,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     bench = EngineBench(inputs=list(BOUNDS))
-    best = bench.find_optimum(LIMITS, bounds=BOUNDS)
+    best = bench_optimum()
     start = float(bench.steady_map({name: [value] for name, value in START.items()})["j"].squeeze())
     print(f"{best}; the start loses {best.value - start:.2f} points")
     rows = [run_of(seed, options.cycles, best.value) for seed in range(options.seeds)]

@@ -25,16 +25,14 @@ from dataclasses import replace
 import numpy as np
 from peers import peer_bayes, peer_seekers
 from peers.peer_seekers import Contender, Plant, Point, installed, scaled, stay
-from support.seeking_maps import WIDTH, SeekingMap
 from support.seeking_report import arguments, print_tables
 from support.seeking_rows import OnMap, Row, driven, tuned, untouched
-from support.several_maps import several_maps
 
 from mgdd import optimize
+from mgdd.studies.several_maps import WIDTH, Guide, SeekingMap, of_no_use, off_by_a_fifth, several_maps
 
 PACKAGES = {"noisyopt": "noisyopt", "scipy": "scipy", **peer_bayes.PACKAGES}
 KAPPA = 1.0  # of the confidence bound
-Guide = Callable[[np.ndarray], float]
 
 
 def by_hand(on: OnMap) -> OnMap:
@@ -52,20 +50,6 @@ def at_rest(field: SeekingMap) -> Contender:  # noqa: ARG001 - it does nothing a
         stay(plant)
 
     return run
-
-
-def off_by_a_fifth(field: SeekingMap, seed: int) -> Guide:
-    """Let the map itself be the guide, moved by a fifth of the bounds in every input, to a drawn side."""
-    moved = field.setting(seed, False).moved
-    sides = np.random.default_rng(seed + 1000).choice([-1.0, 1.0], np.size(field.lower))
-    by = 0.2 * sides * (field.upper - field.lower)
-    return lambda x: 50.0 + moved(x, by)
-
-
-def of_no_use(field: SeekingMap, seed: int) -> Guide:  # noqa: ARG001
-    """Let waves of half the bounds be the guide."""
-    period = (field.upper - field.lower) / 2.2
-    return lambda x: float(np.sum(2.0 * np.sin(2.0 * np.pi * x / period + np.arange(np.size(x)))))
 
 
 def guided(guide: Callable[[SeekingMap, int], Guide]) -> OnMap:

@@ -17,6 +17,8 @@ OUT = Path(__file__).parents[1] / "docs" / "_static"
 # Study, number of the figure, resolution: a file stays below 150 kB.
 FIGURES = {
     "study_seekers.png": ("seeker-comparison", 0, 72),
+    "study_several_paths.png": ("seekers-several-inputs", 1, 72),
+    "study_several_limits.png": ("seekers-several-inputs", 2, 72),
     "study_sensors.png": ("nox-sensors", 1, 72),
     "study_delay.png": ("sensor-delay", 0, 90),
     "study_cures.png": ("sensor-delay", 1, 90),

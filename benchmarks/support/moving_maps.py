@@ -6,8 +6,20 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from support.seeking_maps import AWAY, CURVATURE, CYCLES, NOISE, WIDTH, SeekingMap, Setting
-from support.several_maps import LOWER, NEAR, UPPER, coupled
+
+from mgdd.studies.several_maps import (
+    AWAY,
+    CURVATURE,
+    CYCLES,
+    LOWER,
+    NEAR,
+    NOISE,
+    UPPER,
+    WIDTH,
+    SeekingMap,
+    Setting,
+    coupled,
+)
 
 INPUTS = 2
 FAILED = 10.0  # J lost by a cycle that fails

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 from peers.peer_seekers import FinishedError, Point
@@ -12,46 +11,17 @@ from peers.peer_seekers import FinishedError, Point
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, ModelOptimum
 from mgdd.loop import EngineBench
+from mgdd.studies.several_maps import AWAY, CURVATURE, CYCLES, EARLY, NOISE, WIDTH, SeekingMap, Setting
 
-CYCLES, EARLY, NEAR = 300, 40, 1.0
+NEAR = 1.0
 STATED_FROM, STATED_SDS = 20, 1.44  # cycle; half width of an interval of 85 %
-WIDTH, AWAY = 40.0, 12.0
-NOISE, CURVATURE = 0.3, -0.06
 ENGINE_BOUNDS, ENGINE_STARTS = (-30.0, 10.0), (-20.0, 0.0)
 ENGINE_NOISE, ENGINE_SCATTER = 0.25, 0.3
-
-Readings = Callable[[Point], float]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One run: where it starts, which inputs are near the best one, what is read at an input."""
-
-    start: Point
-    near: Callable[[Point], bool]
-    read: Readings  # NaN where there is no reading
-    lost: Readings  # J below that of the best input, without noise
-    top: Callable[[], float] = lambda: 0.0  # J of the best input
-    moved: Callable[[Point, Point], float] | None = None  # at the first, of the map moved by the second
 
 
 def within(best: float) -> Callable[[Point], bool]:
     """Whether an input is within 1 of the best one."""
     return lambda x: abs(x - best) <= NEAR
-
-
-@dataclass(frozen=True)
-class SeekingMap:
-    """A map and what may be told of it."""
-
-    name: str
-    lower: Point
-    upper: Point
-    noise_sd: float
-    curvature: float
-    setting: Callable[[int, bool], Setting]  # of this seed, with or without noise
-    guides: dict[str, Curve] = field(default_factory=dict)
-    prior_sd: float | None = None
 
 
 class CountedPlant:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from peers.peer_seekers import installed
 from support import machine
-from support.seeking_maps import CYCLES, EARLY, SeekingMap
 from support.seeking_rows import Row, check_agreement, run_once
 
+from mgdd.studies.several_maps import CYCLES, EARLY, SeekingMap
 from mgdd.studies.statistics import mean_interval
 
 HEADS = (

@@ -7,11 +7,11 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 from peers.peer_seekers import Contender, Plant, Point, like, run_to_end
-from support.seeking_maps import CountedPlant, SeekingMap
+from support.seeking_maps import CountedPlant
 
 from mgdd import optimize
+from mgdd.studies.several_maps import SeekingMap, tuned_seeker
 
 OnMap = Callable[[SeekingMap], Contender]
 Make = Callable[[SeekingMap, Point, int], optimize.Seeker]  # map, start, seed
@@ -59,15 +59,7 @@ def untouched(kind: Callable[..., optimize.Seeker], **settings: object) -> OnMap
 
 def tuned(method: str) -> OnMap:
     """Given noise and curvature; the perturbation is kept inside the bounds at the start."""
-
-    def make(field: SeekingMap, start: Point, seed: int) -> optimize.Seeker:
-        room = 0.99 * float(np.min([start - field.lower, field.upper - start]))
-        found = optimize.tune(field.noise_sd, field.curvature, method=method)
-        if found.amplitude > room:
-            found = optimize.tune(field.noise_sd, field.curvature, method=method, amplitude_max=room)
-        return found.seeker(start=start, lower=field.lower, upper=field.upper, seed=seed)
-
-    return driven(make)
+    return driven(lambda field, start, seed: tuned_seeker(field, start, seed, method, field.curvature))
 
 
 def run_once(row: Row, field: SeekingMap, seed: int, *, noisy: bool = True) -> CountedPlant:

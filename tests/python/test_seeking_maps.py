@@ -1,4 +1,4 @@
-"""Maps and plants of the benchmarks of seeking: inputs of unlike units, counted in fortieths of their bounds."""
+"""Maps, guides and plants that seekers are judged on: inputs of unlike units, counted in fortieths of their bounds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from mgdd.studies.several_maps import (
+    CURVATURE,
+    Setting,
+    bent_by_half,
+    of_no_use,
+    off_by_a_fifth,
+    several_maps,
+    tuned_seeker,
+)
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 UNIT = np.array([1.0, 0.01, 3.75])
@@ -31,8 +41,8 @@ def best_of(setting: Any, field: Any) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["coupled", "skewed", "ridge", "three"])
-def test_every_map_has_its_best_input_off_the_middle_and_12_from_the_start(load: Any, name: str) -> None:
-    (field,) = [field for field in load("support.several_maps").several_maps() if field.name == name]
+def test_every_map_has_its_best_input_off_the_middle_and_12_from_the_start(name: str) -> None:
+    (field,) = [field for field in several_maps() if field.name == name]
     sides = set()
     for seed in range(8):
         setting = field.setting(seed, True)
@@ -50,8 +60,8 @@ def test_every_map_has_its_best_input_off_the_middle_and_12_from_the_start(load:
     assert len(sides) == 2**field.lower.size
 
 
-def test_near_means_a_loss_below_three_hundredths_per_input(load: Any) -> None:
-    coupled, three = (load("support.several_maps").several_maps()[k] for k in (0, 3))
+def test_near_means_a_loss_below_three_hundredths_per_input() -> None:
+    coupled, three = (several_maps()[k] for k in (0, 3))
     for field, threshold in ((coupled, 0.06), (three, 0.09)):
         setting = field.setting(5, False)
         best = best_of(setting, field)
@@ -63,10 +73,36 @@ def test_near_means_a_loss_below_three_hundredths_per_input(load: Any) -> None:
         assert not setting.near(far)
 
 
-def test_an_input_outside_of_its_bounds_is_an_error_of_the_contender(load: Any) -> None:
-    setting = load("support.several_maps").several_maps()[0].setting(0, True)
+def test_an_input_outside_of_its_bounds_is_an_error_of_the_contender() -> None:
+    setting = several_maps()[0].setting(0, True)
     with pytest.raises(ValueError, match="outside"):
         setting.read(np.array([3.0, 0.41]))
+
+
+@pytest.mark.parametrize("at", [1, 3])
+def test_a_guide_is_the_map_bent_or_moved_and_one_of_no_use_knows_nothing_of_it(at: int) -> None:
+    from scipy.optimize import minimize
+
+    field = several_maps()[at]
+    setting, unit = field.setting(6, False), UNIT[: field.lower.size]
+    best = best_of(setting, field)
+    x = best + np.array([3.0, -1.0, 2.0])[: unit.size] * unit
+    assert bent_by_half(field, 6)(x) == pytest.approx(50.0 - 1.5 * setting.lost(x))
+    moved = off_by_a_fifth(field, 6)
+    peak = minimize(lambda z: -moved(z * unit), best / unit, method="L-BFGS-B", options={"ftol": 1e-15}).x
+    np.testing.assert_allclose(np.abs(peak - best / unit), 8.0, atol=0.02)
+    assert moved(peak * unit) == pytest.approx(50.0, abs=1e-5)
+    assert of_no_use(field, 6)(x) == of_no_use(field, 7)(x) != of_no_use(field, 6)(best)
+
+
+@pytest.mark.parametrize("method", ["spsa", "batch"])
+def test_a_tuned_seeker_keeps_its_perturbation_inside_the_bounds(method: str) -> None:
+    field = several_maps()[3]
+    start = np.array([19.0, 0.2, 230.0])  # 1, 20 and 5.3 fortieths from a bound
+    seeker = tuned_seeker(field, start, 1, method, CURVATURE / UNIT**2)
+    sizes = np.broadcast_to(seeker.settings["perturbation" if method == "spsa" else "amplitude"], 3) / UNIT
+    assert sizes[0] == pytest.approx(0.99)
+    assert sizes[1] > 2.0 * sizes[0]
 
 
 def test_a_scaled_contender_sees_bounds_alike_and_applies_the_input_they_stand_for(load: Any) -> None:
@@ -96,7 +132,7 @@ def test_a_scaled_contender_sees_bounds_alike_and_applies_the_input_they_stand_f
 
 def test_the_plant_counts_what_was_lost_over_all_cycles_and_over_the_first_40(load: Any) -> None:
     maps, peers = load("support.seeking_maps"), load("peers.peer_seekers")
-    setting = maps.Setting(5.0, lambda x: abs(x) < 1.0, lambda x: -x, abs)
+    setting = Setting(5.0, lambda x: abs(x) < 1.0, lambda x: -x, abs)
     plant = maps.CountedPlant(setting)
 
     def run(plant: Any, start: float, seed: int) -> None:  # noqa: ARG001

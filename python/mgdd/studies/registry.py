@@ -29,6 +29,9 @@ _STUDIES = {
     ),
     "throttle-characteristics": _Study("holding-duty hysteresis, rate dependence and air flow of a throttle", 2),
     "seeker-comparison": _Study("every seeker on the same engine, noise, start and budget", 3),
+    "seekers-several-inputs": _Study(
+        "which seeker for several inputs: with and without a guide, beside tuned dithers, also under limits"
+    ),
     "nox-sensors": _Study("NOx analyser, fast sensor and soft sensor, steady and in transients", 4),
     "sensor-delay": _Study("what a late NOx analyser does to extremum seeking, and three cures", 4),
     "timing-tests": _Study(

@@ -43,6 +43,12 @@ _SAID: Mapping[str, tuple[_Range | _Share, ...]] = {
         _Range(_CYCLES, "cycles_to_1_cad", ("seeker",)),
         _Range("loss of efficiency at the end", "j_lost", ("seeker",), "percentage points"),
     ),
+    "seekers-several-inputs": (
+        _Range("J lost per cycle on the maps", "j_lost", ("seeker", "map"), "points"),
+        _Range("J lost by the estimate after 40 cycles of the bench", "j_lost_after_40", ("seeker",), "points",
+               rows="bench"),
+        _Range("cycles of the bench truly above a limit", "above_percent", ("seeker",), "%", rows="bench"),
+    ),
     "nox-sensors": (
         _Range("steady error", "steady_error_percent", ("sensor",), "%"),
         _Range("time to 90 % of a timing step", "timing_step_t90_s", ("sensor",), "s"),

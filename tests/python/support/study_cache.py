@@ -33,6 +33,7 @@ QUICK: dict[str, dict[str, int]] = {
     "measured-engine-seek": {"seeds": 1},
     "model-validation": {"seeds": 6},
     "online-calibration": {"seeds": 2},
+    "seekers-several-inputs": {"seeds": 4},
     "sensor-delay": {"seeds": 4},
     "throttle-first-principle": {"seeds": 1},
     "throttle-pseudo-wiener": {"starts": 4},
