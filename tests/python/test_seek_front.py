@@ -113,7 +113,7 @@ def test_a_front_of_the_bench_is_that_of_its_steady_map() -> None:
     assert found[-1] == pytest.approx(best[-1], abs=0.5)
     predicted = front.dataset["objectives"].to_numpy()
     exact = np.stack([np.interp(found, at, column) for column in table.T], axis=1) * [1.0, -1.0]
-    assert np.max(np.abs(predicted - exact) / np.ptp(exact, axis=0)) < 0.06
+    assert np.max(np.abs(predicted - exact) / np.ptp(exact, axis=0)) < 0.08
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -141,7 +141,7 @@ class Drifting:
     ("code", "settings", "plant"),
     [
         ("few_cycles", {"cycles": 12}, engine()),
-        ("not_settled", {"cycles": 100}, Drifting(0.25)),
+        ("not_settled", {"cycles": 100}, Drifting(0.4)),
         ("at_bound", {"cycles": 80}, engine(best={"soc_cad": -40.0, "egr": 0.15})),
         ("no_gain", {"cycles": 60, "start": BEST}, engine()),
         ("no_reading", {"cycles": 20}, lambda _: None),
@@ -169,6 +169,12 @@ def test_a_curve_that_does_not_fit_is_doubted() -> None:
     guide = Curve.parabola(curvature=-0.05, best=2.0, reach=60.0)
     assert "untrusted_guide" in codes(seek(lambda x: 3.0 * math.sin(x["soc_cad"]), ONE, guide=guide))
     assert "handed_over" in codes(seek(lambda _: 0.0, ONE, guide=guide))
+    of_no_use = lambda x: math.sin(0.4 * x["soc_cad"]) + math.sin(40.0 * x["egr"])  # noqa: E731
+    moved = lambda x: 0.6 * engine(0.0)({"soc_cad": x["soc_cad"] + 5.0, "egr": x["egr"] + 0.05})  # noqa: E731
+    start = {"soc_cad": 8.0, "egr": 0.3}
+    for seed in range(4):
+        searched = [codes(seek(engine(seed=seed), TWO, start=start, guide=g, cycles=60)) for g in (of_no_use, moved)]
+        assert ["untrusted_guide" in each for each in searched] == [True, False], seed
     path: list[float] = []
 
     def late(x: dict[str, float]) -> float:

@@ -133,6 +133,10 @@ void bind_gaussian_process(py::module_& m) {
           "doubts", [](const B& b) { return b.use()->seeker().doubts(); },
           "How often the readings were not what the process expects, and what was known was aged.")
       .def_property_readonly(
+          "trust", [](const B& b) { return b.use()->seeker().trust(); },
+          "Least share of the bends of J that a guide holds, as learnt: above 0.5 where it helps, towards 0 where it "
+          "says nothing; 1 without a guide.")
+      .def_property_readonly(
           "guide_factor",
           [](const B& b) {
             const auto r = b.use();

@@ -1587,6 +1587,11 @@ class GaussianProcessSeeking:
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+    @property
+    def trust(self) -> float:
+        """
+        Least share of the bends of J that a guide holds, as learnt: above 0.5 where it helps, towards 0 where it says nothing; 1 without a guide.
+        """
 class IterativeLearning:
     """
     Iterative learning control, ask and tell.

@@ -21,7 +21,7 @@ constexpr double planned_readings[] = {1, 4, 16};       // that the worth of an 
 constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
 constexpr double cautious_readings = 5.0;               // per input and one: before them the horizon is shorter
 constexpr double few_readings = 2.0;                    // as Student's quantiles exceed the normal ones
-constexpr std::int64_t resting = 8;                     // inputs at the estimate, then the search is over
+constexpr std::int64_t resting = 40;                    // inputs at the estimate, then the search is over
 constexpr double failing_quantile = 2.0;                // of the label of a cycle, -1 where it works, 1 where it fails
 constexpr double most_failing = 0.0, wary_failing = -0.5;  // quantile that is asked for, and after a failure
 constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may exceed the least one

@@ -261,6 +261,13 @@ double GaussianProcessSeeking::noise_sd() const noexcept {
   return std::sqrt(squares);
 }
 
+double GaussianProcessSeeking::trust() const noexcept {
+  double least = 1.0;
+  for (const ProcessModel& model : j_)
+    least = std::min(least, model.guide_share());
+  return least;
+}
+
 void GaussianProcessSeeking::reseed(std::uint64_t seed) noexcept {
   settings_.seed = seed;
   for (ProcessModel& model : j_)

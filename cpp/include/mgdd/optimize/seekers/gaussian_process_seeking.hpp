@@ -90,6 +90,8 @@ class GaussianProcessSeeking {
   std::int64_t doubts() const noexcept { return doubts_; }
   /// What the guide is multiplied by, as learnt: about 1 where it is right, towards 0 where it says nothing.
   double guide_factor(std::size_t component = 0) const noexcept { return j_[component].guide_factor(); }
+  /// Least share of the bends of J that a guide holds, as learnt; 1 without a guide.
+  double trust() const noexcept;
   /// Whole cycles between input and reading of a component that explain the readings best.
   double delay_cycles(std::size_t component = 0) const noexcept {
     return static_cast<double>(finders_[component].delay());

@@ -66,6 +66,11 @@ class ProcessModel {
   void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
   /// What the guide counts by, in its own unit; 0 without one.
   double guide_factor() const noexcept { return kernel_.guided() ? std::exp(numbers_[numbers_.size() - 1]) : 0.0; }
+  /// Share of the bend that the guide holds: towards 0 where it says nothing; 1 without one.
+  double guide_share() const noexcept {
+    const double own = guide_factor() * kernel_.guide_bend();
+    return begun_ && kernel_.guided() ? own / (own + std::exp(numbers_[0])) : 1.0;
+  }
   /// Readings from which on predictions are possible.
   int fewest() const noexcept { return kernel_.guided() ? 1 : static_cast<int>(settings_.inputs) + 1; }
 
