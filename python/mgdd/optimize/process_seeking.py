@@ -59,7 +59,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates per input. A
         sequence gives one per component.
     limit_guides : mapping of str to guides, or sequence, optional
-        The same of limits. With those of all limits the readings to the side are left out there too.
+        The same of limits. With those of all limits the readings to the side are left out there too, and what a wrong
+        one allows is asked for before it is read: leave them out where one cycle far above a limit does harm.
     seed : int
         Of the inputs that are compared: the same seed gives the same run.
     maximize : bool
