@@ -56,7 +56,7 @@ def inputs_of(inputs: Any) -> tuple[Input, ...]:
 
 
 def named_values(argument: str, values: Any, names: Sequence[str]) -> Any:
-    """Put numbers by name into the order of the inputs; anything that is no mapping stays as it is."""
+    """Put numbers by name into the order of the inputs; anything that is not a mapping stays as it is."""
     if not isinstance(values, Mapping):
         return values
     if not names:

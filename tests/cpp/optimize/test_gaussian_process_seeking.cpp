@@ -5,34 +5,15 @@
 #include <cmath>
 #include <vector>
 
-#include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "support/coupled_map.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
 using test_support::AllocationCounter;
-
-// Timing and EGR: unlike scales, coupled.
-GaussianProcessSeekingSettings two_inputs(std::uint64_t seed) {
-  GaussianProcessSeekingSettings s;
-  s.space.inputs = {{.name = "soc_cad", .lower = -25.0, .upper = 15.0}, {.name = "egr", .lower = 0.0, .upper = 0.4}};
-  s.space.start = Inputs(2);
-  s.space.start << 4.0, 0.31;
-  s.seed = seed;
-  return s;
-}
-
-double lost(const Inputs& x, double best_soc = -4.0) {
-  const double a = x[0] - best_soc, b = 100.0 * (x[1] - 0.2);
-  return 0.03 * (a * a + b * b + 1.2 * a * b);
-}
-
-double noise(std::uint64_t seed, int cycle, double sd = 0.3) {
-  return sd * random::normal(seed, 9, static_cast<std::uint64_t>(cycle));
-}
 
 TEST(GaussianProcessSeeking, ArrivesInAboutTenReadingsAndStays) {
   std::vector<int> arrivals;
@@ -271,58 +252,6 @@ TEST(GaussianProcessSeeking, ANewPointBeginsAnewAndRatesHold) {
     seeker.tell({j, {}});
   }
   EXPECT_NEAR(seeker.estimate()[0], -1.0, 1.0);
-}
-
-TEST(GaussianProcessSeeking, KeepsOutOfInputsThatFail) {
-  const auto s = two_inputs(7);
-  GaussianProcessSeeking seeker(s);
-  int failed = 0;
-  for (int k = 0; k < 200; ++k) {
-    const Inputs x = seeker.ask();
-    const bool fails = x[1] < 0.22;  // the best input lies in there
-    const double j[] = {-lost(x) + noise(7, k)};
-    seeker.tell({j, {}, fails});
-    if (k >= 100) failed += fails ? 1 : 0;
-  }
-  EXPECT_LE(failed, 10);
-  EXPECT_GE(seeker.estimate()[1], 0.2);
-}
-
-// Beyond an oblique edge 3 past the best input: edges per input would shut the best one out.
-TEST(GaussianProcessSeeking, FindsTheBestInputBesideAnObliqueEdge) {
-  int failed = 0, late_failed = 0;
-  double late = 0.0;
-  constexpr int seeds = 10, cycles = 200;
-  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-    GaussianProcessSeeking seeker(two_inputs(seed));
-    for (int k = 0; k < cycles; ++k) {
-      const Inputs x = seeker.ask();
-      const bool fails = 100.0 * (x[1] - 0.2) - (x[0] + 4.0) > 3.0 * std::sqrt(2.0);
-      const double j[] = {-lost(x) + noise(seed, k)};
-      seeker.tell({j, {}, fails});
-      failed += fails ? 1 : 0;
-      late_failed += fails && k >= cycles / 2 ? 1 : 0;
-    }
-    late += lost(seeker.estimate()) / seeds;
-  }
-  EXPECT_LT(late, 0.1);
-  EXPECT_LE(failed, 8 * seeds);
-  EXPECT_LE(late_failed, 2 * seeds);
-}
-
-// Cycles that fail by chance, wherever they are, fence nothing off.
-TEST(GaussianProcessSeeking, FailuresByChanceKeepItFromNothing) {
-  double late = 0.0;
-  constexpr int seeds = 10;
-  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-    GaussianProcessSeeking seeker(two_inputs(seed));
-    for (int k = 0; k < 200; ++k) {
-      const double j[] = {-lost(seeker.ask()) + noise(seed, k)};
-      seeker.tell({j, {}, random::uniform(seed, 77, static_cast<std::uint64_t>(k)) < 0.1});
-    }
-    late += lost(seeker.estimate()) / seeds;
-  }
-  EXPECT_LT(late, 0.1);
 }
 
 // After arrival: to both sides of every input, by little, as long as nothing changes; then it looks around again.

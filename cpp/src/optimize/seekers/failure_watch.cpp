@@ -19,7 +19,8 @@ constexpr double sign(std::size_t side) noexcept {
 
 }  // namespace
 
-FailureWatch::FailureWatch(Eigen::Index inputs) noexcept : sent_(Inputs::Zero(inputs)), good_(sent_) {
+FailureWatch::FailureWatch(Eigen::Index inputs, bool edges) noexcept
+    : edges_(edges), sent_(Inputs::Zero(inputs)), good_(sent_) {
   for (Side& side : sides_)
     side.reach = side.farthest = Inputs::Constant(inputs, -none);
   forget();
@@ -114,7 +115,7 @@ void FailureWatch::worked() noexcept {
 // last, or from the middle of what has worked where that is the same input.
 void FailureWatch::failed() noexcept {
   ++in_a_row_;
-  if (!worked_) return;  // nowhere to go back to
+  if (!worked_ || !edges_) return;  // nowhere to go back to
   if (failing_everywhere()) {
     for (Side& side : sides_) {
       side.edge.setConstant(none);

@@ -198,7 +198,7 @@ void GaussianProcessSeeking::judge(double likely, double mean, int point) noexce
   mean_over_[at] = std::max(mean_over_[at], mean);
 }
 
-// A candidate that may fail is out of the question, unless all of them may: as where cycles fail by chance.
+// A candidate that may fail is out of the question, unless all of them may: as where cycles fail at random.
 void GaussianProcessSeeking::judge_failures(int points) noexcept {
   failing_.predict(candidates_, points);
   double least = largest_reading;

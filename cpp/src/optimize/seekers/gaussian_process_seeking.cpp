@@ -21,9 +21,9 @@ constexpr double doubt_age = 10.0;        // memories
 constexpr double least_share = 1e-3;      // of a limit, that a reading counts as at least
 constexpr double expected_bend = 3.0;     // of a limited quantity, in its scale: few readings must not promise too much
 constexpr double label_noise = 0.3;       // of whether a cycle works: 1 or -1
-constexpr std::int64_t least_wary = 2, most_wary = 64;
-constexpr double active_room = 0.05;   // scales of a limit
-constexpr double plane_memory = 20.0;  // cycles of the planes that tell the delays from one another
+constexpr std::int64_t most_wary = 64;    // cycles that work, after a failure
+constexpr double active_room = 0.05;      // scales of a limit
+constexpr double plane_memory = 20.0;     // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
 
 // Of the limits. Lags are taken out of the readings instead (`LagWindow`).
@@ -107,7 +107,7 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
     : settings_(resolved(std::move(settings))),
       quantile_(random::normal_quantile(settings_.limit_probability)),
       hold_(1),
-      protocol_(settings_.space.size()),
+      protocol_(settings_.space.size(), false),  // its own process knows what fails
       causes_(lags_of_limits(settings_), settings_.space.size()),
       finders_(finders_of(settings_)),
       j_(component_processes(settings_, candidates + most_on_their_way)),
@@ -151,12 +151,6 @@ Inputs GaussianProcessSeeking::scaled(const Inputs& input) const noexcept {
 Inputs GaussianProcessSeeking::unscaled(const Inputs& z) const noexcept {
   const Inputs out = settings_.space.lower + z.cwiseProduct(settings_.space.upper - settings_.space.lower);
   return out.cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
-}
-
-// Its own process keeps it out of what fails; only where nothing works any more others look for what does.
-const Inputs& GaussianProcessSeeking::ask() noexcept {
-  if (protocol_.asked) return protocol_.sent(applied_);
-  return protocol_.failures.failing_everywhere() ? protocol_.ask(applied_) : protocol_.pass(applied_);
 }
 
 TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {

@@ -18,7 +18,8 @@ namespace mgdd::optimize {
 
 class FailureWatch {
  public:
-  explicit FailureWatch(Eigen::Index inputs) noexcept;
+  /// Without `edges` it only counts, for a seeker that keeps out of what fails by itself.
+  explicit FailureWatch(Eigen::Index inputs, bool edges = true) noexcept;
 
   /// What to ask of the plant where a seeker wants `wanted`: the same object as long as nothing speaks against it. One
   /// call per cycle.
@@ -77,6 +78,7 @@ class FailureWatch {
   Inputs middle() const noexcept { return 0.5 * (sides_[0].reach - sides_[1].reach); }
   void set_edge(Side& side, Eigen::Index i, double failing, double good) noexcept;
 
+  bool edges_;
   std::array<Side, 2> sides_;
   Inputs sent_, good_;
   bool differs_ = false;

@@ -74,7 +74,7 @@ class GaussianProcessSeeking {
   /// Throws ParameterError or ShapeError naming the field.
   explicit GaussianProcessSeeking(GaussianProcessSeekingSettings settings);
 
-  const Inputs& ask() noexcept;
+  const Inputs& ask() noexcept { return protocol_.ask(applied_); }
   TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: what was learnt is void, the estimate stays, and the search begins anew around it.
   void restart() noexcept;
@@ -144,8 +144,9 @@ class GaussianProcessSeeking {
   }
 
  private:
-  static constexpr int far_candidates = 8, near_candidates = 48, candidates = 1 + far_candidates + near_candidates;
-  static constexpr int most_on_their_way = 8;  // inputs whose readings have not come, that are counted on
+  static constexpr int far_candidates = 8, near_candidates = 47, candidates = 2 + far_candidates + near_candidates;
+  static constexpr std::int64_t least_wary = 2;  // cycles that work, after a failure
+  static constexpr int most_on_their_way = 8;    // inputs whose readings have not come, that are counted on
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
@@ -189,8 +190,8 @@ class GaussianProcessSeeking {
   Inputs lowest_, highest_;  // of each input that was asked, scaled
   std::int64_t star_ = 0;    // first readings asked for
   std::int64_t held_ = 0;
-  std::int64_t since_failure_ = 0, wary_ = 2;  // cycles; so many of them nothing is asked that may fail
-  std::int64_t rested_ = 0;                    // inputs in a row that stayed at the estimate
+  std::int64_t since_failure_ = 0, wary_ = least_wary;  // cycles; so many of them nothing is asked that may fail
+  std::int64_t rested_ = 0;                             // inputs in a row that stayed at the estimate
   double expected_ = 0.0, expected_sd_ = 0.0;
   std::vector<double> surprise_;  // running means of squared normalised innovations, of the components
   std::int64_t since_doubt_ = 0, doubts_ = 0;

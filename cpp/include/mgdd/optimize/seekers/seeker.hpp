@@ -117,7 +117,7 @@ enum class TellStatus {
 
 /// The bookkeeping of ask and tell, and the one place through which every input passes on its way to the plant.
 struct Protocol {
-  explicit Protocol(Eigen::Index inputs) noexcept : failures(inputs) {}
+  explicit Protocol(Eigen::Index inputs, bool failing_edges = true) noexcept : failures(inputs, failing_edges) {}
 
   std::int64_t cycle = 0;  ///< cycles told so far, misfires included
   std::int64_t misfires = 0;
