@@ -215,8 +215,12 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   sent_[static_cast<std::size_t>(sent_count_ % ring)] = applied;
   ++sent_count_;
   if (plain_at_work_) {
-    // After a misfire it is asked again, or elsewhere as the protocol says.
-    if (status == TellStatus::accepted) tell_plain(reading.components[0], applied);
+    // After a misfire it is asked again, or elsewhere as the protocol says; where J is late its dither goes on.
+    if (status == TellStatus::accepted) {
+      tell_plain(reading.components[0], applied);
+    } else if (settings_.sensor != optimize::ComponentLag{} && held_count_ > 0) {
+      tell_plain(last_held() * taken_over_scale_, applied);
+    }
     return status;
   }
   if (sent_count_ < ring) return status;
@@ -227,6 +231,10 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
     learn(cause, objective_of(reading, settings_.maximize));
   }
   return status;
+}
+
+double CurveSeeking::last_held() const noexcept {
+  return held_back_[static_cast<std::size_t>((held_count_ - 1) % static_cast<std::int64_t>(held_back_.size()))];
 }
 
 void CurveSeeking::tell_plain(double j, double applied) noexcept {

@@ -46,7 +46,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     limit_probability : float
         With which every limit holds at every input asked for, in [0.5, 1), as far as the processes know [-].
     delay_cycles, lag_cycles : float
-        Transport delay and time constant between the plant and J [cycles]; behind a lag an input is held for two time
+        Transport delay and time constant between the plant and J [cycles]; behind a lag an input is held for 0.7 time
         constants. Readings that are on their way are counted on.
     components : sequence of ComponentLag, optional
         Delay and lag of each component of J, for example efficiency at once and NOx behind its analyser; `tell` then
@@ -59,8 +59,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates per input. A
         sequence gives one per component.
     limit_guides : mapping of str to guides, or sequence, optional
-        The same of limits. With those of all limits the readings to the side are left out there too, and what a wrong
-        one allows is asked for before it is read: leave them out where one cycle far above a limit does harm.
+        The same of limits. With those of all limits the readings to the side are left out there too; nothing is asked
+        farther beyond what was read than a first step, or 0.4 of its width.
     seed : int
         Of the inputs that are compared: the same seed gives the same run.
     maximize : bool

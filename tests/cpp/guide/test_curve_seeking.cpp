@@ -160,6 +160,31 @@ TEST(CurveSeeking, HandsOverWhereTheGuideIsNothingLikeThePlant) {
   EXPECT_FALSE(stubborn.handed_over());
 }
 
+// The plain seeker that took over dithers on where a late reading is missing.
+TEST(CurveSeeking, MissingReadingsBehindADelayDoNotLeadThePlainSeekerAstray) {
+  const auto spike = [](double x) { return -2.0 * std::abs(std::tanh(3.0 * x)) - 0.3 * std::abs(x); };
+  double off[2] = {0.0, 0.0};
+  constexpr int seeds = 10, cycles = 2000;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    for (const int some : {0, 1}) {
+      CurveSeekingSettings settings = guided(8.0, 0.0);
+      settings.sensor = {13.0, 0.0};
+      settings.delay_uncertainty = 0;
+      CurveSeeking seeker(settings);
+      std::vector<double> on_their_way(13, spike(6.0));
+      for (int k = 0; k < cycles; ++k) {
+        const auto at = static_cast<std::uint64_t>(k);
+        on_their_way.push_back(spike(seeker.ask()[0] + 6.0) + 0.05 * random::normal(seed, 1, at));
+        const double j[] = {on_their_way[at]};
+        seeker.tell({j, {}, some == 1 && random::bernoulli(0.15, seed, 2, at)});
+        if (k >= cycles / 2) off[some] += std::abs(seeker.estimate()[0] + 6.0) / (seeds * cycles / 2);
+      }
+      EXPECT_TRUE(seeker.handed_over());
+    }
+  }
+  EXPECT_LT(off[1], 1.3 * off[0]);
+}
+
 TEST(CurveSeeking, APlantWithoutNoiseIsNoReasonToGiveTheGuideUp) {
   for (const double best : {-15.0, -4.0, 8.0}) {
     CurveSeeking seeker(guided(best, best));

@@ -118,6 +118,22 @@ TEST(FirstReadings, BendIsWhatIsSeenOrWhatTheNoiseWouldHideOrWhatTheSlopeAsksFor
   EXPECT_NEAR(std::exp(hidden), 0.4 * 0.5 / (1.5 * 1.5), 0.03);
 }
 
+/// Cycles until the bend is known, where J comes `late` and every `missing`th reading not at all.
+int cycles_until_known(FirstReadings& first, std::int64_t late, int missing = 1 << 20) {
+  std::vector<double> asked;
+  for (int k = 0; k < 1000; ++k) {
+    asked.push_back(first.ask(scalar_input(2.0))[0]);
+    const double x = asked[asked.size() - 1 - static_cast<std::size_t>(std::min<std::int64_t>(k, late))] - 2.0;
+    if (k % missing == missing - 1) {
+      first.skip(scalar_input(asked.back()));
+    } else {
+      first.learn(scalar_input(asked.back()), 0.4 * x - 0.3 * x * x);
+    }
+    if (!first.open()) return k + 1;
+  }
+  return -1;
+}
+
 TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
   FirstReadings late(scalar_input(1.0), 0.4, true, {}, {{3.0, 0.0}});
   EXPECT_NEAR(bend_of(late, 0.4, -0.6, 0.0, 0.0, 1, 3), 0.6, 1e-12);
@@ -127,6 +143,28 @@ TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
   const FirstReadings known(scalar_input(1.0), 0.4, true, -0.7);
   EXPECT_FALSE(known.open());
   EXPECT_EQ(known.bend().maxCoeff(), 0.7);
+}
+
+// 24 points one after the other, whatever the delay; a lag or two delays hold every point for as long as it takes.
+TEST(FirstReadings, WaitForADelayOnce) {
+  const auto of = [](std::vector<ComponentLag> components) {
+    return FirstReadings(scalar_input(1.0), 0.4, true, {}, components);
+  };
+  FirstReadings at_once = of({{}}), late = of({{17.0, 0.0}}), lagged = of({{17.0, 2.0}}), two = of({{}, {5.0, 0.0}});
+  EXPECT_EQ(cycles_until_known(at_once, 0), 24);
+  EXPECT_EQ(cycles_until_known(late, 17), 24 + 17);
+  EXPECT_EQ(cycles_until_known(lagged, 17), 24 * 7 + 17);
+  EXPECT_EQ(cycles_until_known(two, 5), 24 * 6);
+}
+
+TEST(FirstReadings, WhatIsMissingIsAskedAgainOrLeftOutBehindADelay) {
+  FirstReadings at_once(scalar_input(1.0), 0.4, true), late(scalar_input(1.0), 0.4, true, {}, {{17.0, 0.0}});
+  EXPECT_EQ(cycles_until_known(at_once, 0, 5), 24 + 5);
+  EXPECT_EQ(cycles_until_known(late, 17, 5), 24 + 17);
+  EXPECT_NEAR(at_once.bend()[0], 0.6, 1e-12);
+  EXPECT_NEAR(late.bend()[0], 0.6, 1e-12);
+  FirstReadings never(scalar_input(1.0), 0.4, true, {}, {{17.0, 0.0}});
+  EXPECT_EQ(cycles_until_known(never, 17, 4), -1) << "one point is never read";
 }
 
 // A plant that goes 0.7 of the way to one side: slope and bend are those between the inputs that it applied. What was

@@ -189,6 +189,30 @@ TEST(GaussianProcessSeeking, WaitsForWhatIsOnItsWay) {
   EXPECT_LT(asked_far, 3.2);  // the start itself loses 9.6
 }
 
+// J at the estimate lies within 1.44 standard deviations of what is expected, from the first readings on.
+TEST(GaussianProcessSeeking, StatesIntervalsThatHoldBehindDelayAndLag) {
+  double held = 0.0, stated = 0.0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    auto s = two_inputs(seed);
+    s.sensor = {20.0, 10.0};
+    GaussianProcessSeeking seeker(s);
+    std::vector<double> on_their_way(20, -lost(s.space.start));
+    double lagged = on_their_way[0];
+    for (int k = 0; k < 260; ++k) {
+      on_their_way.push_back(-lost(seeker.ask()));
+      if (seeker.expected_sd() > 0.0) {
+        stated += 1.0;
+        held += std::abs(-lost(seeker.estimate()) - seeker.expected()) < 1.44 * seeker.expected_sd() ? 1.0 : 0.0;
+      }
+      lagged += (1.0 - std::exp(-0.1)) * (on_their_way[static_cast<std::size_t>(k)] - lagged);
+      const double j[] = {lagged + noise(seed, k)};
+      seeker.tell({j, {}});
+    }
+  }
+  EXPECT_GT(stated, 20 * 180.0);
+  EXPECT_GE(held / stated, 0.85);
+}
+
 // y += (1 - exp(-1/3)) (x - y): an input is held for 3 cycles, and the lag is taken out of what is read meanwhile.
 TEST(GaussianProcessSeeking, HoldsItsInputsBehindALag) {
   auto s = two_inputs(4);

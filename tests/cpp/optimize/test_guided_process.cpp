@@ -157,6 +157,27 @@ TEST(GuidedProcess, GuidesOfLimitsKeepThemFromTheFirstStepOn) {
   EXPECT_LT(late, 1.0);  // the limit cuts the best input off
 }
 
+// A guide that says a limit is far away: nothing is asked farther out than a first step, or a part of what was asked.
+TEST(GuidedProcess, AGuideOfALimitIsNotFollowedFartherThanItWasRead) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    auto s = settings_of(seed, off_by_a_fifth);
+    s.limits = {{.name = "nox_ppm", .upper = 500.0}};
+    s.limit_guides = {table([](double soc, double egr) { return 10.0 - 0.01 * soc - egr; })};
+    GaussianProcessSeeking seeker(s);
+    Inputs lowest = s.space.start, highest = lowest;
+    for (int k = 0; k < 12; ++k) {
+      const Inputs x = seeker.ask(), range = seeker.settings().space.upper - seeker.settings().space.lower;
+      const double wide = ((highest - lowest).cwiseQuotient(range)).maxCoeff();
+      const double beyond = (x - highest).cwiseMax(lowest - x).cwiseQuotient(range).maxCoeff();
+      ASSERT_LE(beyond, std::max(0.05, 0.4 * wide) + 1e-9) << k;
+      lowest = lowest.cwiseMin(x);
+      highest = highest.cwiseMax(x);
+      const double j[] = {-lost(x)}, limits[] = {200.0 * std::exp(-0.1 * (x[0] - 4.0))};
+      seeker.tell({j, limits});
+    }
+  }
+}
+
 // Efficiency at once, NOx behind an analyser that is told three cycles short: each by its own guide and its own delay.
 TEST(GuidedProcess, ComponentsHaveTheirOwnGuidesAndDelays) {
   const auto efficiency = [](double soc, double egr) {

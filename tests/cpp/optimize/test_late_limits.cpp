@@ -61,7 +61,7 @@ struct Outcome {
 
 // J is best at +8; the limited quantity is 100 + 2 x, so that a limit of 104 stands at x = 2.
 template <class S>
-Outcome late_run(S& seeker, ComponentLag truth, double noise_sd, std::uint64_t seed) {
+Outcome late_run(S& seeker, ComponentLag truth, double noise_sd, std::uint64_t seed, double missing = 0.0) {
   Outcome out;
   Sensor sensor(truth);
   const int cycles = 4000, from = 1000;
@@ -70,7 +70,7 @@ Outcome late_run(S& seeker, ComponentLag truth, double noise_sd, std::uint64_t s
     const double x = seeker.ask()[0], value = 100.0 + 2.0 * x;
     const double j[] = {quadratic(x - 8.0) + noise_sd * random::normal(seed, 1, index)};
     const double limits[] = {sensor.read(value) + 4.0 * noise_sd * random::normal(seed, 2, index)};
-    seeker.tell({j, limits});
+    seeker.tell({j, limits, random::bernoulli(missing, seed, 3, index)});
     if (k < from) continue;
     out.above += (value > 104.0 + 1e-6 ? 1.0 : 0.0) / (cycles - from);
     out.mean += seeker.estimate()[0] / (cycles - from);
@@ -101,6 +101,26 @@ TEST(LateLimits, EverySeekerKeepsALimitThatComesTenCyclesLate) {
       EXPECT_LE(sum[i].above, 0.01) << names[i].first << ", noise " << noise;
       EXPECT_GT(sum[i].mean, noise > 0.0 ? 0.3 : 0.9) << names[i].first << ", noise " << noise;
     }
+  }
+}
+
+TEST(LateLimits, StayWithTheirInputsWhereReadingsAreMissing) {
+  const ComponentLag late{10.0, 0.0};
+  Limit limit{"p_max_bar", 104.0};
+  limit.lag = late;
+  auto all = every_seeker(space_at(scalar_input(-8.0), 20.0), 0.0, 2, {limit});
+  for (auto& [name, any] : all) {
+    if (name == "golden_section") continue;
+    std::visit(
+        [&](auto& seeker) {
+          const Outcome one = late_run(seeker, late, 0.0, 5, 0.1);
+          EXPECT_LE(one.above, 0.01) << name;
+          EXPECT_GT(one.mean, 0.5) << name;
+          if constexpr (requires { seeker.filter(); }) {
+            EXPECT_NEAR(seeker.filter().model(0).predict(scalar_input(1.5)), 103.0, 1e-6) << name;
+          }
+        },
+        any);
   }
 }
 

@@ -163,6 +163,7 @@ class CurveSeeking {
   void judge_surprise(double input, double j) noexcept;
   void take_over() noexcept;
   void tell_plain(double j, double applied) noexcept;
+  double last_held() const noexcept;
   void begin_at(const Curve& curve, double mean, double sd) noexcept;
   bool usable(const Curve& curve) const noexcept;
 

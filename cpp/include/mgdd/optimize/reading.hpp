@@ -6,6 +6,7 @@
 namespace mgdd::optimize {
 
 inline constexpr double largest_reading = 1e30;
+inline constexpr double unread = 1e300;  ///< where nothing was read; a state does not hold NaN
 
 /// False for NaN too.
 constexpr bool is_reading(double value) noexcept {

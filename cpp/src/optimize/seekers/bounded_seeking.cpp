@@ -75,7 +75,6 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
 }
 
 void BoundedSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
-  filter_.record(applied, reading.limits);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);

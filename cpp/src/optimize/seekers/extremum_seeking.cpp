@@ -80,6 +80,7 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       dither_(settings_.dither, settings_.components, false),
       first_(settings_.dither.amplitude, dither_unseen_bend, settings_.gain.size() == 0, settings_.curvature,
              settings_.components),
+      last_(settings_.components, limit_count()),
       gradient_(Inputs::Zero(estimate_.size())),
       held_(settings_.hold_cycles.value_or(0)),
       mean_(component_count(), 0.0),
@@ -110,7 +111,7 @@ const Inputs& ExtremumSeeking::ask() noexcept {
 }
 
 TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  return take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
 }
 
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.
@@ -153,7 +154,6 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
 }
 
 void ExtremumSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
-  filter_.record(applied, reading.limits);
   if (first_.open()) {
     double j = filter_.shaping(applied, reading.limits);
     for (const double c : reading.components)
@@ -238,6 +238,7 @@ void ExtremumSeeking::restart() noexcept {
   response_.setOnes();
   limited_cycles_ = 0;
   first_.restart();
+  last_.forget();
   forget();
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "mgdd/optimize/reading.hpp"
+
 namespace mgdd::optimize {
 namespace {
 
@@ -15,11 +17,20 @@ constexpr double least_of_all = 1e-3;
 constexpr double least_movement = 1e-13;  // of J
 constexpr double lags = 3.0;              // after which a first-order lag has settled
 
+// Whole cycles by which every component is late.
+std::int64_t delay_of(const std::vector<ComponentLag>& components) {
+  double shortest = components.empty() ? 0.0 : components[0].delay_cycles;
+  for (const ComponentLag& c : components)
+    shortest = std::min(shortest, c.delay_cycles);
+  return static_cast<std::int64_t>(shortest);
+}
+
+// Cycles after these until all of them have settled.
 std::int64_t settling_cycles(const std::vector<ComponentLag>& components) {
   double longest = 0.0;
   for (const ComponentLag& c : components)
     longest = std::max(longest, c.delay_cycles + lags * c.lag_cycles);
-  return 1 + static_cast<std::int64_t>(std::ceil(longest));
+  return 1 + static_cast<std::int64_t>(std::ceil(longest)) - delay_of(components);
 }
 
 }  // namespace
@@ -28,6 +39,7 @@ FirstReadings::FirstReadings(Inputs reach, double share, bool wanted, std::optio
                              const std::vector<ComponentLag>& components)
     : reach_(std::move(reach)),
       share_(share),
+      delay_(delay_of(components)),
       settle_(settling_cycles(components)),
       open_(wanted && !(curvature && *curvature != 0.0)),
       bend_(Inputs::Constant(reach_.size(), curvature ? std::abs(*curvature) : 0.0)),
@@ -40,21 +52,39 @@ FirstReadings::FirstReadings(Inputs reach, double share, bool wanted, std::optio
 const Inputs& FirstReadings::ask(const Inputs& estimate) noexcept {
   asked_ = estimate;
   const Eigen::Index slot = told_ / settle_ % slots();
-  if (slot % 2 == 1) asked_[slot / 4] += slot % 4 == 1 ? reach_[slot / 4] : -reach_[slot / 4];
+  if (slot % 2 == 1 && told_ < cycles()) asked_[slot / 4] += slot % 4 == 1 ? reach_[slot / 4] : -reach_[slot / 4];
   return asked_;
 }
 
 void FirstReadings::learn(const Inputs& applied, double j) noexcept {
-  if ((told_ + 1) % settle_ == 0) {
-    const std::int64_t read = told_ / settle_, slot = read % slots();
-    readings_[static_cast<std::size_t>(read)] = j;
+  if ((told_ + 1) % settle_ == 0 && told_ < cycles()) {
+    const Eigen::Index slot = told_ / settle_ % slots();
     applied_[static_cast<std::size_t>(slot)] += applied[slot / 4];
   }
-  if (++told_ == settle_ * rounds * slots()) close();
+  const std::int64_t read = told_ - delay_;
+  if (read >= 0 && (read + 1) % settle_ == 0) readings_[static_cast<std::size_t>(read / settle_)] = j;
+  if (++told_ == cycles() + delay_) close();
+}
+
+void FirstReadings::skip(const Inputs& applied) noexcept {
+  if (delay_ > 0) learn(applied, unread);
+}
+
+// The mean of the same point in place of what was not read; false where a point was never read.
+bool FirstReadings::fill() noexcept {
+  Eigen::Map<Eigen::MatrixXd> y(readings_.data(), slots(), rounds);
+  for (Eigen::Index s = 0; s < slots(); ++s) {
+    const Eigen::Array<bool, 1, Eigen::Dynamic, Eigen::RowMajor, 1, rounds> read = y.row(s).array() != unread;
+    if (!read.any()) return false;
+    const double mean = read.select(y.row(s).array(), 0.0).sum() / static_cast<double>(read.count());
+    y.row(s) = read.select(y.row(s).array(), mean);
+  }
+  return true;
 }
 
 void FirstReadings::close() noexcept {
   told_ = 0;
+  if (!fill()) return restart();
   Eigen::Map<Eigen::MatrixXd> y(readings_.data(), slots(), rounds);
   const double highest = y.cwiseAbs().maxCoeff();
   // A steady drift of the level is neither a bend nor noise.
@@ -96,8 +126,7 @@ void FirstReadings::restart() noexcept {
 }
 
 void FirstReadings::require_usable() const {
-  const auto whole = settle_ * static_cast<std::int64_t>(readings_.size());
-  if (open_ && !(told_ < whole)) {
+  if (open_ && !(told_ < cycles() + delay_)) {
     throw ParameterError("state column 'first_open' holds 1: must be 0, as these settings give the gain");
   }
   if (!open_ && !readings_.empty() && !((bend_.array() > 0.0).all() && bend_.allFinite())) {

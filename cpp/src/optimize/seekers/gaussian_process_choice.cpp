@@ -20,20 +20,18 @@ constexpr double guided_reach = 0.2;                    // beyond it at least wh
 constexpr double planned_readings[] = {1, 4, 16};       // that the worth of an input is reckoned with
 constexpr double rise_of_normal = 0.39894228040143268;  // E max(Z, 0)
 constexpr double cautious_readings = 5.0;               // per input and one: before them the horizon is shorter
-constexpr double few_readings = 2.0;                    // as Student's quantiles exceed the normal ones
 constexpr std::int64_t resting = 40;                    // inputs at the estimate, then the search is over
-constexpr double failing_quantile = 2.0;                // of the label of a cycle, -1 where it works, 1 where it fails
-constexpr double most_failing = 0.0, wary_failing = -0.5;  // quantile that is asked for, and after a failure
-constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may exceed the least one
-constexpr double turned = -0.7;                            // what a first step is multiplied by after a failure
-constexpr std::int64_t most_turns = 6;                     // for them; then inputs that cannot move are left alone
-constexpr double worth_noise = 1e-12;                      // of J, at least
+constexpr double turned = -0.7;                         // what a first step is multiplied by after a failure
+constexpr std::int64_t most_turns = 6;                  // for them; then inputs that cannot move are left alone
+constexpr double worth_noise = 1e-12;                   // of J, at least
 
 }  // namespace
 
 // Within the bounds, and what may be explored by now.
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
-  const double wide = growth * (highest_ - lowest_).maxCoeff(), far = guided() ? std::max(wide, guided_reach) : wide;
+  const double wide = growth * (highest_ - lowest_).maxCoeff();
+  const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach : 0.5 * settings_.first_step;
+  const double far = std::max(wide, least);
   for (Eigen::Index i = 0; i < z.size(); ++i)
     z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));
   return z;
@@ -75,8 +73,14 @@ void GaussianProcessSeeking::choose() noexcept {
     take_in(i, points);
     variance += std::max(j_[i].covariance(0, 0), 0.0);
   }
-  expected_ = (settings_.maximize ? 1.0 : -1.0) * means_[0];
-  expected_sd_ = std::sqrt(variance);
+  double off = 0.0;
+  for (ProcessModel& model : j_) {
+    const ProcessModel::Correction own = model.over_bends(candidates_.row(0).transpose());
+    off += own.mean;
+    variance += own.variance;
+  }
+  expected_ = (settings_.maximize ? 1.0 : -1.0) * (means_[0] + off);
+  expected_sd_ = student(j_[0]) * std::sqrt(std::max(variance, 0.0));
   for (std::size_t i = 0; i < limited_.size(); ++i)
     room_[i] = -excess(i, 0, quantile_) / settings_.limits[i].scale;
   const int next = over ? 0 : most_worth(points);
@@ -180,50 +184,6 @@ void GaussianProcessSeeking::send(const Inputs& z) noexcept {
     own = std::clamp(own, -rate, rate);
   }
   applied_ = (before + step).cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
-}
-
-// What limit i would be exceeded by at a point of the last prediction, that many standard deviations above the mean.
-double GaussianProcessSeeking::excess(std::size_t i, int point, double quantile) const noexcept {
-  const Limit& limit = settings_.limits[i];
-  const ProcessModel& model = limited_[i];
-  const double sd = std::sqrt(std::max(model.covariance(point, point), 0.0));
-  const double freedom = std::max(1.0, static_cast<double>(model.count() - estimate_.size()));
-  return model.mean(point) + quantile * (1.0 + few_readings / freedom) * sd + limit.margin +
-         limit.margin_sd * model.noise_sd() - limit.upper;
-}
-
-void GaussianProcessSeeking::judge(double likely, double mean, int point) noexcept {
-  const auto at = static_cast<std::size_t>(point);
-  over_[at] = std::max(over_[at], likely);
-  mean_over_[at] = std::max(mean_over_[at], mean);
-}
-
-// A candidate that may fail is out of the question, unless all of them may: as where cycles fail at random.
-void GaussianProcessSeeking::judge_failures(int points) noexcept {
-  failing_.predict(candidates_, points);
-  double least = largest_reading;
-  const auto likely = [&](int p) {
-    return failing_.mean(p) + failing_quantile * std::sqrt(std::max(failing_.covariance(p, p), 0.0));
-  };
-  for (int p = 0; p < points; ++p)
-    least = std::min(least, likely(p));
-  const bool wary = since_failure_ < wary_;
-  const double most = std::max(wary ? wary_failing : most_failing, least + (wary ? wary_room : failing_room));
-  for (int p = 0; p < points; ++p)
-    judge(likely(p) - most, failing_.mean(p), p);
-}
-
-// Largest excess of any limit, in scales, of every candidate: with the stated probability, and in the mean.
-void GaussianProcessSeeking::judge_safety(int points) noexcept {
-  std::fill(over_.begin(), over_.end(), -largest_reading);
-  std::fill(mean_over_.begin(), mean_over_.end(), -largest_reading);
-  if (failures_known()) judge_failures(points);
-  for (std::size_t i = 0; i < limited_.size(); ++i) {
-    limited_[i].predict(candidates_, points);
-    const double scale = settings_.limits[i].scale;
-    for (int p = 0; p < points; ++p)
-      judge(excess(i, p, quantile_) / scale, excess(i, p, 0.0) / scale, p);
-  }
 }
 
 // The best safe mean around a point, by ever narrower clouds; where nothing is safe, the least mean excess.

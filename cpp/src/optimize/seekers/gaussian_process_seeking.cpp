@@ -22,6 +22,7 @@ constexpr double least_share = 1e-3;      // of a limit, that a reading counts a
 constexpr double expected_bend = 3.0;     // of a limited quantity, in its scale: few readings must not promise too much
 constexpr double label_noise = 0.3;       // of whether a cycle works: 1 or -1
 constexpr std::int64_t most_wary = 64;    // cycles that work, after a failure
+constexpr double held_share = 0.7;        // of the longest lag, for which an input is asked
 constexpr double active_room = 0.05;      // scales of a limit
 constexpr double plane_memory = 20.0;     // cycles of the planes that tell the delays from one another
 constexpr double least_noise = 1e-12;
@@ -141,7 +142,7 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
     add(component);
   for (const Limit& limit : settings_.limits)
     add(limit.lag);
-  hold_ = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(longest)));
+  hold_ = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(held_share * longest)));
 }
 
 Inputs GaussianProcessSeeking::scaled(const Inputs& input) const noexcept {

@@ -78,7 +78,6 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
 
 void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
-  filter_.record(applied, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
   sample_input_[slot] = applied[0];
   sample_j_[slot] = j;

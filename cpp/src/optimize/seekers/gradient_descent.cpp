@@ -69,7 +69,6 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
 }
 
 void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexcept {
-  filter_.record(applied, reading.limits);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);

@@ -74,6 +74,7 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
       dither_(settings_.dither, settings_.components, true),
       first_(settings_.dither.amplitude, newton_unseen_bend, settings_.initial_hessian.size() == 0, {},
              settings_.components),
+      last_(settings_.components, limit_count()),
       gradient_(Inputs::Zero(estimate_.size())),
       slow_(gradient_),
       hessian_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
@@ -95,7 +96,7 @@ const Inputs& NewtonSeeking::ask() noexcept {
 }
 
 TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  return take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
 }
 
 double NewtonSeeking::largest_inverse() const noexcept {
@@ -116,7 +117,6 @@ void NewtonSeeking::update_inverse() noexcept {
 }
 
 void NewtonSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
-  filter_.record(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits));
     if (!first_.open()) {
@@ -183,6 +183,7 @@ void NewtonSeeking::restart() noexcept {
   limited_cycles_ = 0;
   slow_.setZero();
   first_.restart();
+  last_.forget();
   forget();
 }
 

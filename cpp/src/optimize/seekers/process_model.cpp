@@ -34,6 +34,7 @@ ProcessModel::ProcessModel(const Settings& settings)
       small_(evidence_readings, evidence_readings),
       weights_(values_),
       small_rest_(Eigen::VectorXd::Zero(evidence_readings)),
+      mean_of_(small_rest_),
       distance_(values_),
       mean_(Eigen::VectorXd::Zero(settings.most_points)),
       order_(static_cast<std::size_t>(settings.kept), 0),

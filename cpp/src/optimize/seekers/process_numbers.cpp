@@ -1,5 +1,6 @@
 // How a process finds its numbers: evidence, priors and the trials that follow them.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -23,6 +24,7 @@ constexpr double useless_factor = -6.0;
 constexpr double wander_place = 0.04, wander_level = 1.2;  // in a memory: slopes in bends, the level in noise
 constexpr double wander_sd = 1.0;                          // of their logarithms
 constexpr double coarse_step = 0.8, fine_step = 0.25;
+constexpr double bend_offsets[] = {0.0, -0.7, 0.7, 1.4};  // logarithms; what is learnt first
 constexpr double lowest_log = -12.0, highest_log = 3.0;
 
 double log_prior(double value, double middle, double sd) noexcept {
@@ -85,6 +87,41 @@ double ProcessModel::evidence(const Numbers& numbers, bool same_lengths) noexcep
     out -= std::log(small_(a, a));
   out += log_priors(numbers, s);
   return std::isfinite(out) ? out : -std::numeric_limits<double>::infinity();
+}
+
+// The bend integrated out by a few points (Rasmussen and Williams 2006, eq. 5.3): one alone promises too much.
+ProcessModel::Correction ProcessModel::over_bends(const Inputs& z) noexcept {
+  if (told_ > evidence_readings) return {};  // nothing is open any more
+  std::array<double, std::size(bend_offsets)> weight{}, mean{}, variance{};
+  const auto n = std::min<std::int64_t>(count_, evidence_readings);
+  kernel_.describe(z, &asked_(0, 0));
+  const double* const point = &asked_(0, 0);
+  double most = 0.0;
+  for (std::size_t k = 0; k < weight.size(); ++k) {
+    Numbers numbers = numbers_;
+    numbers[0] += bend_offsets[k];
+    numbers[1] -= bend_offsets[k];  // the noise stays
+    weight[k] = evidence(numbers, true);
+    const Scales s = scales_of(numbers);
+    for (std::int64_t a = 0; a < n; ++a)
+      mean_of_[a] = kernel_.covariance(point, &points_(chosen_[static_cast<std::size_t>(a)], 0), s);
+    solve_lower(small_, n, mean_of_.data());
+    mean[k] = kernel_.mean(point, s) + dot(mean_of_.data(), small_rest_.data(), n);
+    variance[k] = kernel_.covariance(point, point, s) - dot(mean_of_.data(), mean_of_.data(), n);
+    most = k == 0 ? weight[k] : std::max(most, weight[k]);
+  }
+  if (!std::isfinite(most)) return {};
+  double sum = 0.0;
+  for (double& one : weight)
+    sum += one = std::exp(one - most);
+  Correction out;
+  for (std::size_t k = 0; k < weight.size(); ++k)
+    out.mean += weight[k] / sum * (mean[k] - mean[0]);
+  for (std::size_t k = 0; k < weight.size(); ++k) {
+    const double off = mean[k] - mean[0] - out.mean;
+    out.variance += weight[k] / sum * (variance[k] - variance[0] + off * off);
+  }
+  return out;
 }
 
 double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const noexcept {

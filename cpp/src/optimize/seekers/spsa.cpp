@@ -171,7 +171,6 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
 
 void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
-  filter_.record(applied, reading.limits);
   if (first_.open()) {
     first_.learn(applied, j);
     if (!first_.open() && settings_.initial_hessian.size() == 0) hessian_.diagonal() = -first_.bend();

@@ -88,6 +88,10 @@ class ConstraintFilter {
 
   /// Learns from one cycle: the input that was applied and the values that it gave.
   void record(const Inputs& applied, std::span<const double> values) noexcept;
+  /// A cycle in which nothing was read: what comes late moves on.
+  void skip(const Inputs& applied) noexcept {
+    if (settling() > 0) causes_.record(applied);
+  }
 
   /// What penalty and barrier add to J (to be maximised) for these values, <= 0 for penalties; of a limit that comes
   /// late, for what is predicted at the applied input.

@@ -10,8 +10,6 @@
 
 namespace mgdd::optimize {
 
-inline constexpr double unread = 1e300;  ///< beyond any reading; a state does not hold NaN
-
 class DelayFinder {
  public:
   /// `told` is rounded to whole cycles; 0 as `uncertainty` takes it as told.

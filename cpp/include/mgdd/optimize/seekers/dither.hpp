@@ -3,6 +3,7 @@
 // (Ghaffari, Krstic and Nesic 2012). Each component of J may come through its own delay and lag.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -48,6 +49,37 @@ void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian)
 void validate(const std::vector<ComponentLag>& components);
 /// ParameterError whose message has `at` in front.
 void validate(const ComponentLag& lag, const std::string& at);
+
+/// The last reading of a seeker that dithers, which stands in where one is missing while others are on their way.
+class LastReading {
+ public:
+  LastReading(const std::vector<ComponentLag>& components, std::size_t limits)
+      : late_(std::any_of(components.begin(), components.end(),
+                          [](const ComponentLag& c) { return c != ComponentLag{}; })),
+        components_(components.size(), 0.0),
+        limits_(limits, 0.0) {}
+
+  void keep(const Reading& reading) noexcept {
+    std::copy(reading.components.begin(), reading.components.end(), components_.begin());
+    std::copy(reading.limits.begin(), reading.limits.end(), limits_.begin());
+    known_ = true;
+  }
+  bool stands_in() const noexcept { return late_ && known_; }
+  Reading reading() const noexcept { return {components_, limits_}; }
+  void forget() noexcept { known_ = false; }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    if (!self.late_) return;
+    v("last_known", self.known_);
+    v("last_components", self.components_);
+    v("last_limits", self.limits_);
+  }
+
+ private:
+  bool late_, known_ = false;
+  std::vector<double> components_, limits_;
+};
 
 /// Amplitude and phase of delay and discrete lag at n cycles per window of M.
 struct SensorResponse {

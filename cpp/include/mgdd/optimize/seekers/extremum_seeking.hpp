@@ -113,6 +113,7 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
     v("origin", self.origin_);
     v("limited_cycles", self.limited_cycles_);
     FirstReadings::visit(self.first_, v);
+    LastReading::visit(self.last_, v);
   }
 
  private:
@@ -124,6 +125,7 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
 
   Dither dither_;
   FirstReadings first_;
+  LastReading last_;
   Inputs gradient_;
   std::int64_t phase_ = 0;      // of the window
   std::int64_t seen_ = 0;       // cycles since the last restart

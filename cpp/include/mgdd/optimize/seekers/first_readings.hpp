@@ -1,5 +1,6 @@
 // The scale of J, from readings about the start, for a seeker whose gain the user leaves open: start, `reach` c above
-// it, start, c below it, per input, six times over. Their slope, bend and scatter give the curvature to reckon with,
+// it, start, c below it, per input, six times over, each for as long as lags need and none waiting for a delay. Their
+// slope, bend and scatter give the curvature to reckon with,
 //   |J''| = max(share sigma/c^2, measured |J''| less 1.5 standard errors, slope/(20 c)),
 // so that gains made of it lead along the same path when J is told in another unit. noexcept and allocation-free.
 #pragma once
@@ -16,7 +17,7 @@ namespace mgdd::optimize {
 class FirstReadings {
  public:
   /// Nothing is measured where J'' is known, or not `wanted`. `share` of the noise: what of |J''| c^2 to sigma is too
-  /// little to be seen, and harmless to the seeker. `components`: each point is asked until J has settled.
+  /// little to be seen, and harmless to the seeker. `components`: what J comes late by.
   FirstReadings(Inputs reach, double share, bool wanted, std::optional<double> curvature = {},
                 const std::vector<ComponentLag>& components = {});
 
@@ -24,6 +25,8 @@ class FirstReadings {
   /// The next input, about the present estimate.
   const Inputs& ask(const Inputs& estimate) noexcept;
   void learn(const Inputs& applied, double j) noexcept;
+  /// A cycle without a reading: its point is asked again, or behind a delay left out.
+  void skip(const Inputs& applied) noexcept;
   /// |J''| to reckon with, per input, > 0 once nothing is open and something was wanted.
   const Inputs& bend() const noexcept { return bend_; }
   /// Step per slope that takes all inputs alike, counted in reaches: `share` over J'' for the one that bends most.
@@ -39,7 +42,7 @@ class FirstReadings {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     v("first_open", self.open_);
-    v("first_told", self.told_, 1 + self.settle_ * static_cast<std::int64_t>(self.readings_.size()));
+    v("first_told", self.told_, 1 + self.cycles() + self.delay_);
     v("first_readings", self.readings_);
     v("first_applied", self.applied_);
     v("first_bend", self.bend_);
@@ -47,10 +50,13 @@ class FirstReadings {
 
  private:
   Eigen::Index slots() const noexcept { return 4 * reach_.size(); }  // per round: start, above, start, below each input
+  std::int64_t cycles() const noexcept { return settle_ * static_cast<std::int64_t>(readings_.size()); }
+  bool fill() noexcept;
   void close() noexcept;
 
   Inputs reach_;
   double share_;
+  std::int64_t delay_;   // cycles until the first reading of a point
   std::int64_t settle_;  // cycles for which a point is asked
   bool open_;
   std::int64_t told_ = 0;

@@ -3,11 +3,12 @@
 // few readings there would teach about the best input (knowledge gradient, Frazier, Powell and Dayanik 2009), used for
 // `horizon` cycles. With a guide the readings to the side are left out: what a rough model says of J is the mean of the
 // process, whose factor, place and error are learnt. Nothing is asked farther beyond what was read than a part of its
-// width, nor where a limit holds with less than the stated probability: the safe set grows from the start (Sui et al.
-// 2015), nor where cycles are likely to fail, as one more process knows. Level and place wander; readings that the
-// process cannot explain age all that was known. Where several inputs in a row stay at the estimate, the search is
-// over: a small dither, as large as noise and wandering make it pay, goes on until a doubt. ask and tell are noexcept
-// and allocation-free; all randomness is a function of (seed, cycle).
+// width, with a guide a fifth of the bounds where nothing is limited, nor where a limit holds with less than the stated
+// probability: the safe set grows from the start (Sui et al. 2015), nor where cycles are likely to fail, as one more
+// process knows. Level and place wander; readings that the process cannot explain age all that was known. Where several
+// inputs in a row stay at the estimate, the search is over: a small dither, as large as noise and wandering make it
+// pay, goes on until a doubt. ask and tell are noexcept and allocation-free; all randomness is a function of (seed,
+// cycle).
 #pragma once
 
 #include <cstdint>
@@ -168,6 +169,7 @@ class GaussianProcessSeeking {
   void judge_failures(int points) noexcept;
   void judge(double likely, double mean, int point) noexcept;
   void judge_safety(int points) noexcept;
+  double student(const ProcessModel& model) const noexcept;
   double excess(std::size_t i, int point, double quantile) const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;

@@ -1,11 +1,11 @@
-// A first-order lag taken out of readings: what a quantity was while an input was held, of the readings and what they
-// had come from. noexcept.
+// A first-order lag taken out of readings: what a quantity was while an input was held. A Kalman filter (Kalman 1960)
+// follows the sensor, known from window to window, and the quantity, which every window begins to learn anew. noexcept.
 #pragma once
 
 #include <cstdint>
 #include <string>
 
-#include "mgdd/optimize/seekers/delay_finder.hpp"
+#include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
 
 namespace mgdd::optimize {
@@ -18,14 +18,17 @@ class LagWindow {
   bool take(double& value, Inputs& z, std::int64_t hold) noexcept;
   bool lagged() const noexcept { return keep_ > 0.0; }
   /// A cycle without a reading.
-  void skip() noexcept { last_ = unread; }
+  void skip() noexcept { sensor_ = unread; }
   void forget() noexcept;
 
   template <class Self, class V>
   static void visit(Self& self, V& v, const std::string& name) {
     if (!self.lagged()) return;
-    v(name + "_last", self.last_);
-    v(name + "_sum", self.sum_);
+    v(name + "_sensor", self.sensor_);
+    v(name + "_quantity", self.quantity_);
+    v(name + "_sensor_variance", self.sensor_variance_);
+    v(name + "_quantity_variance", self.quantity_variance_);
+    v(name + "_covariance", self.covariance_);
     v(name + "_count", self.count_);
     v(name + "_idle", self.idle_);
     v(name + "_inputs", self.inputs_);
@@ -33,11 +36,13 @@ class LagWindow {
   }
 
  private:
-  double keep_;  // of a reading in the next; 0: no lag
-  double last_ = unread;
-  double sum_ = 0.0;
-  std::int64_t count_ = 0, idle_ = 0;  // cycles in it; since one was read
-  Inputs inputs_, held_;               // their sum; the first
+  void learn(double reading) noexcept;
+
+  double keep_;  // of the sensor in the next cycle; 0: no lag
+  double sensor_ = unread, quantity_ = 0.0;
+  double sensor_variance_ = 1.0, quantity_variance_ = 0.0, covariance_ = 0.0;  // over that of a reading's noise
+  std::int64_t count_ = 0, idle_ = 0;                                          // cycles in it; since one was read
+  Inputs inputs_, held_;                                                       // their sum; the first
 };
 
 }  // namespace mgdd::optimize

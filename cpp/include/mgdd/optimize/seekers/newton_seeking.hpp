@@ -94,6 +94,7 @@ class NewtonSeeking : public SeekerCore<NewtonSeekingSettings> {
     v("limited_cycles", self.limited_cycles_);
     v("window", self.window_);
     FirstReadings::visit(self.first_, v);
+    LastReading::visit(self.last_, v);
   }
 
  private:
@@ -103,6 +104,7 @@ class NewtonSeeking : public SeekerCore<NewtonSeekingSettings> {
 
   Dither dither_;
   FirstReadings first_;
+  LastReading last_;
   Inputs gradient_;
   Inputs slow_;  // mean of the slope over about a window: what steps along a limit
   InputMatrix hessian_, inverse_;

@@ -49,6 +49,12 @@ class ProcessModel {
   /// Of the quantity, without the noise of a reading, at two of these points.
   double covariance(int i, int j) const noexcept;
 
+  /// What the bend, where readings leave it open, makes of the prediction at `z`: to be added to mean and variance.
+  struct Correction {
+    double mean = 0.0, variance = 0.0;
+  };
+  Correction over_bends(const Inputs& z) noexcept;
+
   /// Logarithm of the likelihood of `count` readings, 60 at most, at the inputs in the rows of `at`; without priors.
   double likelihood(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages,
                     int count) noexcept;
@@ -128,7 +134,7 @@ class ProcessModel {
   InputTable quadratic_, guide_, matern_;  // lower triangles, of all readings
   Inputs table_lengths_;                   // inverse ones that the last table is of
   InputTable factor_, small_;              // lower triangles
-  Eigen::VectorXd weights_, small_rest_, distance_, mean_;
+  Eigen::VectorXd weights_, small_rest_, mean_of_, distance_, mean_;
   std::vector<int> order_, chosen_;
   InputTable kernels_;  // a row per point: of the readings, solved with the factor
   InputTable asked_;

@@ -7,6 +7,7 @@
 
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -37,15 +38,42 @@ class SeekerCore {
         estimate_(settings_.space.start),
         applied_(estimate_) {}
 
-  /// Counts a reading; of an accepted one `learn(the input that the plant applied)`.
-  template <class Learn>
-  TellStatus take(const Reading& reading, Learn&& learn) noexcept {
+  /// Counts a reading and takes its limits; of an accepted one `learn(the input that the plant applied)`, else
+  /// `miss(the same)`: nothing was read, but what comes late has moved on by a cycle.
+  template <class Learn, class Miss>
+  TellStatus take(const Reading& reading, Learn&& learn, Miss&& miss) noexcept {
     const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
     protocol_.count(status);
-    if (status != TellStatus::accepted) return status;
+    if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
     Inputs told;
-    learn(protocol_.applied(reading, applied_, told));
+    const Inputs& applied = protocol_.applied(reading, applied_, told);
+    if (status == TellStatus::accepted) {
+      filter_.record(applied, reading.limits);
+      learn(applied);
+    } else {
+      filter_.skip(applied);
+      miss(applied);
+    }
     return status;
+  }
+  template <class Learn>
+  TellStatus take(const Reading& reading, Learn&& learn) noexcept {
+    return take(reading, std::forward<Learn>(learn), [](const Inputs&) noexcept {});
+  }
+  /// The same where J may come late: there a dither goes on, and `learn(reading, applied)` with the last one.
+  template <class Learn>
+  TellStatus take_late(const Reading& reading, FirstReadings& first, LastReading& last, Learn&& learn) noexcept {
+    const auto read = [&](const Inputs& applied) {
+      last.keep(reading);
+      learn(reading, applied);
+    };
+    return take(reading, read, [&](const Inputs& applied) {
+      if (first.open()) {
+        first.skip(applied);
+      } else if (last.stands_in()) {
+        learn(last.reading(), applied);
+      }
+    });
   }
   /// What a new operating point makes void.
   void forget() noexcept {
