@@ -37,7 +37,7 @@ InstructionSet wanted_instruction_set() {
   return set;
 }
 
-InstructionSet instruction_set() noexcept {
+InstructionSet instruction_set() noexcept {  // NOLINT(bugprone-exception-escape): out of memory at the start
   static const InstructionSet chosen = [] {
     try {
       return wanted_instruction_set();

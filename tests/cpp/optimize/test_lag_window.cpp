@@ -16,7 +16,7 @@ constexpr int hold = 7, windows = 2000;
 
 /// A quantity that is another one in every window, noisy before the sensor, after it, or not at all.
 struct Plant {
-  double before, after;
+  double before = 0.0, after = 0.0;
   double quantity = 0.0, sensor = 0.0;
 
   double read(int cycle) {
@@ -41,12 +41,13 @@ Errors errors_of(Plant plant) {
     double value = plant.read(k);
     inverted += (value - keep * last) / (1.0 - keep) / hold;
     last = value;
-    Inputs z = scalar_input(static_cast<double>(k / hold));
+    const int number = k / hold;
+    Inputs z = scalar_input(number);
     const bool full = window.take(value, z, hold);
     EXPECT_TRUE(k < 2 * hold || full == ((k + 1) % hold == 0)) << k;
     if ((k + 1) % hold != 0) continue;
     if (k >= 2 * hold) {  // the first reading only says where the sensor is
-      EXPECT_DOUBLE_EQ(z[0], k / hold);
+      EXPECT_DOUBLE_EQ(z[0], number);
       out.ours += (value - plant.quantity) * (value - plant.quantity);
       out.inverted += (inverted - plant.quantity) * (inverted - plant.quantity);
       ++out.windows;
@@ -79,7 +80,8 @@ TEST(LagWindow, WhatWasNotReadSaysNothing) {
       plant.sensor -= 30.0;  // what a failed cycle did to the sensor, nobody knows
       continue;
     }
-    Inputs z = scalar_input(static_cast<double>(k / hold));
+    const int number = k / hold;
+    Inputs z = scalar_input(number);
     if (window.take(value, z, hold - 2) && k >= 2 * hold) {
       EXPECT_NEAR(value, plant.quantity, 1e-5) << k;
     }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mgdd/optimize/reading.hpp"
+
 namespace mgdd::optimize {
 namespace {
 
