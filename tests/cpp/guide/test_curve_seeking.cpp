@@ -177,7 +177,7 @@ TEST(CurveSeeking, MissingReadingsBehindADelayDoNotLeadThePlainSeekerAstray) {
         on_their_way.push_back(spike(seeker.ask()[0] + 6.0) + 0.05 * random::normal(seed, 1, at));
         const double j[] = {on_their_way[at]};
         seeker.tell({j, {}, some == 1 && random::bernoulli(0.15, seed, 2, at)});
-        if (k >= cycles / 2) off[some] += std::abs(seeker.estimate()[0] + 6.0) / (seeds * cycles / 2);
+        if (k >= cycles / 2) off[some] += std::abs(seeker.estimate()[0] + 6.0) / (0.5 * seeds * cycles);
       }
       EXPECT_TRUE(seeker.handed_over());
     }
