@@ -147,7 +147,7 @@ TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
 
 // 24 points one after the other, whatever the delay; a lag or two delays hold every point for as long as it takes.
 TEST(FirstReadings, WaitForADelayOnce) {
-  const auto of = [](std::vector<ComponentLag> components) {
+  const auto of = [](const std::vector<ComponentLag>& components) {
     return FirstReadings(scalar_input(1.0), 0.4, true, {}, components);
   };
   FirstReadings at_once = of({{}}), late = of({{17.0, 0.0}}), lagged = of({{17.0, 2.0}}), two = of({{}, {5.0, 0.0}});

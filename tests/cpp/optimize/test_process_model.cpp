@@ -56,16 +56,17 @@ TEST(ProcessModel, CovariancesAreThoseOfOneNormalDistribution) {
   points << 0.1, 0.1, 0.9, 0.3, 0.5, 0.8, 0.4, 0.6, 0.0, 1.0;
   model.predict(points, 5);
   Eigen::MatrixXd c(5, 5);
-  for (int i = 0; i < 5; ++i)
+  for (int i = 0; i < 5; ++i) {
     for (int j = 0; j < 5; ++j)
       c(i, j) = model.covariance(i, j);
+  }
   EXPECT_LT((c - c.transpose()).cwiseAbs().maxCoeff(), 1e-9 * c.cwiseAbs().maxCoeff());
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(c).eigenvalues().minCoeff(), -1e-8 * c.maxCoeff());
 }
 
 // One more reading with known noise changes mean and variance as the rule of Bayes says for two normal numbers.
 TEST(ProcessModel, AReadingChangesItsOwnPointAsBayesSays) {
-  ProcessModel::Settings settings{.memory = 1e12, .noise_sd = 0.3};
+  const ProcessModel::Settings settings{.memory = 1e12, .noise_sd = 0.3};
   ProcessModel model = told(80, 0.3, settings);  // so many that the numbers of the process hardly move any more
   InputTable point(1, 2);
   point << 0.95, 0.95;
@@ -80,7 +81,7 @@ TEST(ProcessModel, AReadingChangesItsOwnPointAsBayesSays) {
 }
 
 TEST(ProcessModel, FullItForgetsOldReadingsNearTheEstimateAndKeepsFarOnes) {
-  ProcessModel::Settings settings{.inputs = 1, .kept = 10};
+  const ProcessModel::Settings settings{.inputs = 1, .kept = 10};
   ProcessModel model(settings);
   const Inputs about = scalar_input(0.5);
   model.record(scalar_input(0.0), -5.0, about);
