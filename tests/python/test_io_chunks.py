@@ -374,6 +374,7 @@ except MemoryError:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.skipif("libasan" in os.environ.get("LD_PRELOAD", ""), reason="its allocator ends the process")
 def test_a_record_that_memory_does_not_hold_becomes_figures(tmp_path: Path) -> None:
     cad = np.arange(-360.0, 360.0, 0.4)
     body = "".join(f"{a!r},{p!r}\n" for a, p in zip(cad.tolist(), cycles_at(cad, 0.0, 1)[0].tolist(), strict=True))
