@@ -12,7 +12,16 @@ import pytest
 
 from mgdd.guide import Curve, CurveSeeking, FeedForward
 from mgdd.loop import Measurement, run_seeker
-from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, NewtonSeeking, Seeker, Spsa
+from mgdd.optimize import (
+    BoundedSeeking,
+    ExtremumSeeking,
+    GaussianProcessSeeking,
+    GoldenSection,
+    GradientDescent,
+    NewtonSeeking,
+    Seeker,
+    Spsa,
+)
 
 SPACE: dict[str, Any] = {"start": -5.0, "lower": -20.0, "upper": 20.0}
 CURVE = Curve.parabola(curvature=-0.06, best=0.0, reach=60.0)
@@ -99,6 +108,26 @@ def test_failures_that_do_not_depend_on_the_input_change_nothing_for_long(name: 
     assert run.dataset["estimate"].to_numpy()[-300:].mean() == pytest.approx(6.0, abs=2.5)
 
 
+@every
+def test_three_failures_in_ten_by_chance_are_said_and_set_no_edge(name: str) -> None:
+    said = []
+    for seed in range(8):
+        plant, seeker = Failing(edge=99.0, share=0.3, seed=seed), MAKERS[name]()
+        run = run_seeker(plant, seeker, 600)
+        said += [
+            (finding.code, str(run.dataset["misfire"].to_numpy().sum()) in finding.text) for finding in run.findings
+        ]
+    assert said.count(("failing_cycles", True)) >= 6, said
+    assert len(said) == 8
+
+
+def test_a_process_says_that_cycles_fail() -> None:
+    plant = Failing(edge=99.0, share=0.3, seed=1)
+    run = run_seeker(plant, GaussianProcessSeeking(start=-5.0, lower=-20.0, upper=20.0, seed=2), 60)
+    assert [finding.code for finding in run.findings] == ["failing_cycles"]
+    assert "of 60 cycles" in run.findings[0].text
+
+
 def test_what_is_asked_in_its_place_stands_in_the_history_and_survives_a_journey(tmp_path: Path) -> None:
     for name, make in MAKERS.items():
         seeker, twin = make(), make()
@@ -122,7 +151,7 @@ def test_asking_twice_and_a_start_that_fails_are_the_same_input() -> None:
     assert np.isposinf(seeker.failing_above[0])
     seeker.ask()
     seeker.tell(1.0)
-    assert not seeker.findings
+    assert [finding.code for finding in seeker.findings] == ["failing_cycles"]
 
 
 def test_two_inputs_of_which_one_fails_or_both_together() -> None:

@@ -62,6 +62,8 @@ template <class S>
 py::dict watched(const S& seeker) {
   const auto& failures = seeker.protocol().failures;
   py::dict out;
+  out["cycle"] = seeker.protocol().cycle;
+  out["misfires"] = seeker.protocol().misfires;
   out["failing_above"] = input_array(failures.failing_above());
   out["failing_below"] = input_array(failures.failing_below());
   out["failing_everywhere"] = failures.failing_everywhere();
@@ -113,7 +115,9 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
           "failing_above", [](const B& b) { return input_array(b.use()->protocol().failures.failing_above()); },
           "The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures "
           "on\n"
-          "one side no more is asked than what has worked, but for single cycles that try whether it still fails.")
+          "one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles "
+          "that\n"
+          "try whether it still fails.")
       .def_property_readonly(
           "failing_below", [](const B& b) { return input_array(b.use()->protocol().failures.failing_below()); },
           "The same on the lower side; minus infinity: none.")

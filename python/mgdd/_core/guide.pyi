@@ -190,7 +190,8 @@ class CurveSeeking:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -342,7 +343,8 @@ class FeedForward:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -606,7 +608,8 @@ class GuidedEngine:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:

@@ -634,7 +634,8 @@ class ExtremumSeeking:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -773,7 +774,8 @@ class NewtonSeeking:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -909,7 +911,8 @@ class BoundedSeeking:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1051,7 +1054,8 @@ class Spsa:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1203,7 +1207,8 @@ class GradientDescent:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1348,7 +1353,8 @@ class GoldenSection:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1524,7 +1530,8 @@ class GaussianProcessSeeking:
     def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
-        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        one side (more where cycles fail by chance) no more is asked than what has worked, but for single cycles that
+        try whether it still fails.
         """
     @property
     def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:

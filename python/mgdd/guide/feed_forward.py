@@ -286,7 +286,8 @@ class FeedForward(Guided, _core.guide.FeedForward):
     def state(self, saved: Mapping[str, Sequence[float]]) -> None:
         counted = list(saved.get("points", ()))
         if len(counted) != 2 or counted[1] not in range(len(_CAUSES)):
-            raise ParameterError("state column 'points' is missing or wrong: it belongs to another kind of object")
+            message = "state column 'points' is missing or wrong: it belongs to another kind or version of object"
+            raise ParameterError(message)
         own = {name for name in saved if name == "points" or name.startswith(_POINT)}
         self._core_state = {name: list(column) for name, column in saved.items() if name not in own}
         point = {name.removeprefix(_POINT): float(saved[name][0]) for name in own - {"points"}}

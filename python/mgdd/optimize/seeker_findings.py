@@ -22,6 +22,10 @@ if TYPE_CHECKING:
         """What every seeker has of its class of the core, and what stands around one."""
 
         @property
+        def cycle(self) -> int: ...
+        @property
+        def misfires(self) -> int: ...
+        @property
         def failing_above(self) -> NDArray[np.float64]: ...
         @property
         def failing_below(self) -> NDArray[np.float64]: ...
@@ -40,7 +44,10 @@ class SeekerFindings(_Watching):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What speaks against the run so far: codes ``failing_inputs``, ``failing_everywhere`` and ``limit_delay``.
+        """What speaks against the run so far.
+
+        Codes: ``failing_inputs``, ``failing_everywhere``, ``failing_cycles`` (a tenth of all, and no input is known
+        to fail) and ``limit_delay``.
 
         Examples
         --------
@@ -54,6 +61,8 @@ class SeekerFindings(_Watching):
         """
         return findings_of(
             self.settings,
+            cycle=self.cycle,
+            misfires=self.misfires,
             failing_above=self.failing_above,
             failing_below=self.failing_below,
             failing_everywhere=self.failing_everywhere,
@@ -64,6 +73,8 @@ class SeekerFindings(_Watching):
 def findings_of(
     settings: Mapping[str, Any],
     *,
+    cycle: int,
+    misfires: int,
     failing_above: NDArray[np.float64],
     failing_below: NDArray[np.float64],
     failing_everywhere: bool,
@@ -81,6 +92,11 @@ def findings_of(
             text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
             remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
             out.append(Finding("failing_inputs", (name,), text, remedy))
+    if not out and misfires >= max(4, 0.1 * cycle):
+        text = f"{misfires} of {cycle} cycles gave no reading: J is learnt from the others"
+        out.append(
+            Finding("failing_cycles", (), text, "mend what makes them fail, or set bounds inside of where they do")
+        )
     for limit in settings["limits"]:
         taken = limit_delays[limit.name]
         if taken != limit.delay_cycles:

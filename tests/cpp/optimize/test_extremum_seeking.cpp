@@ -329,30 +329,5 @@ TEST(ExtremumSeeking, RefusesSettingsByName) {
   EXPECT_NE(message([](auto& s) { s.limit_amplitude = std::nan(""); }).find("limit_amplitude"), std::string::npos);
 }
 
-// Behind a delay the dither goes on where a reading is missing: what is on its way stays with its input.
-TEST(ExtremumSeeking, MissingReadingsBehindADelayCostLittle) {
-  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average}) {
-    double lost[2] = {0.0, 0.0};
-    for (std::uint64_t seed = 0; seed < 40; ++seed) {
-      for (const int some : {0, 1}) {
-        ExtremumSeekingSettings s = plain_seeking(7.0);
-        s.form = form;
-        s.dither.period = 12;
-        s.components = {{7.0, 0.0}};
-        ExtremumSeeking seeker(s);
-        std::vector<double> on_their_way(7, quadratic(7.0));
-        for (int k = 0; k < 600; ++k) {
-          const auto at = static_cast<std::uint64_t>(k);
-          on_their_way.push_back(quadratic(seeker.ask()[0]) + 0.1 * random::normal(seed, 7, at));
-          lost[some] -= quadratic(seeker.estimate()[0]) / 24000.0;
-          const double j[] = {on_their_way[at]};
-          seeker.tell({j, {}, some == 1 && random::bernoulli(0.1, seed, 8, at)});
-        }
-      }
-    }
-    EXPECT_LT(lost[1], 1.1 * lost[0]) << name_of(form);
-  }
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

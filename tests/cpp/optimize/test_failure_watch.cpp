@@ -58,6 +58,61 @@ TEST(FailureWatch, ASuccessAsFarOutClearsWhatFailedByChance) {
   EXPECT_EQ(watch.failing_above()[0], unlimited);
 }
 
+// Each input farther in than the last, and of these some fail: as far out has worked since the failures before.
+TEST(FailureWatch, FailuresByChanceOfASeekerOnItsWayInSetNoEdge) {
+  for (const double side : {1.0, -1.0}) {
+    FailureWatch watch(2);
+    for (int k = 0; k < 300; ++k) {
+      const Inputs input = inputs({side * (300.0 - k + 2.0 * (k % 2)), 0.1});
+      watch.admit(input);
+      k % 5 == 0 ? watch.failed() : watch.worked();
+    }
+    EXPECT_TRUE(watch.failing_above().array().isInf().all()) << watch.failing_above();
+    EXPECT_TRUE(watch.failing_below().array().isInf().all()) << watch.failing_below();
+  }
+}
+
+// Where many fail by chance it takes more to set an edge, and a true one is found all the same.
+TEST(FailureWatch, TheMoreFailByChanceTheMoreFailuresSetAnEdge) {
+  int last = 4;
+  for (const int every : {12, 4, 2}) {
+    FailureWatch watch(1);
+    for (int k = 0; k < 240; ++k) {
+      watch.admit(scalar_input(0.5 * (k % 3)));
+      k % every == 0 ? watch.failed() : watch.worked();
+    }
+    cycle_at(watch, 1.0, 3.0);
+    int asked = 0;
+    while (cycle_at(watch, 8.0, 3.0) > 3.0 && asked < 40)
+      ++asked;
+    EXPECT_EQ(watch.failing_above()[0], 8.0) << every;
+    EXPECT_GE(asked, last) << every;
+    EXPECT_LE(asked, 11) << every;
+    last = asked + (every == 12 ? 1 : 0);
+  }
+}
+
+// Three cycles in ten fail anywhere: runs of an extremum seeker behind a delay, whose dither goes on over failed
+// cycles.
+TEST(FailureWatch, ThreeFailuresInTenByChanceSeldomSetAnEdge) {
+  ExtremumSeekingSettings settings = plain_seeking(10.0);
+  settings.components[0].delay_cycles = 7.0;
+  int with_edge = 0;
+  const int runs = 40, cycles = 600;
+  for (std::uint64_t run = 0; run < runs; ++run) {
+    ExtremumSeeking seeker(settings);
+    std::vector<double> on_their_way(7, quadratic(10.0));
+    for (std::uint64_t k = 0; k < cycles; ++k) {
+      on_their_way.push_back(quadratic(seeker.ask()[0]) + 0.25 * random::normal(run, 1, k));
+      const double value[] = {on_their_way[k]};
+      seeker.tell({value, {}, random::bernoulli(0.3, run, 3, k)});
+      const FailureWatch& failures = seeker.protocol().failures;
+      with_edge += failures.failing_above()[0] < unlimited || failures.failing_below()[0] > -unlimited ? 1 : 0;
+    }
+  }
+  EXPECT_LT(with_edge, runs * cycles / 8);  // four failures, whatever fails by chance: 0.7 of the cycles
+}
+
 // From 3 on it fails: the edge is closed in on from both sides, and fewer and fewer cycles are spent on it.
 TEST(FailureWatch, TheEdgeIsFoundByHalvesAndLookedAtEverLessOften) {
   FailureWatch watch(1);

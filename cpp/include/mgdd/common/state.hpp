@@ -103,13 +103,13 @@ class StateReader {
   void finish() const {
     if (used_ == columns_.size()) return;
     fail(ParameterError("state has " + std::to_string(columns_.size()) + " columns, " + std::to_string(used_) +
-                        " are known here: it belongs to another kind of object"));
+                        " are known here: it belongs to another kind of object, or version of mgdd"));
   }
 
  private:
   const std::vector<double>& known(std::string_view name) const {
     const auto found = columns_.find(std::string(name));
-    if (found == columns_.end()) refuse(name, "is missing: it belongs to another kind of object");
+    if (found == columns_.end()) refuse(name, "is missing: it belongs to another kind of object, or version of mgdd");
     return found->second;
   }
   static void require_size(std::string_view name, const std::vector<double>& stored, std::size_t size) {

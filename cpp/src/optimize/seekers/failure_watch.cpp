@@ -6,8 +6,9 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr double failures_of_an_edge = 4.0;
-constexpr std::int64_t hopeless = 12;  // in a row: at two places that worked as well
+constexpr std::int64_t hopeless = 12;                                 // in a row: at two places that worked as well
+constexpr double chance_of_an_edge = 1e-4;                            // that so many fail by chance
+constexpr double remembered_cycles = 200.0, faultless_cycles = 10.0;  // behind the share by chance, and before it
 constexpr double first_wait = 5.0, longest_wait = 320.0;
 constexpr double finest_share = 0.01;  // of what works: an edge is not looked for more closely
 constexpr double none = largest_reading;
@@ -15,6 +16,10 @@ constexpr std::array places{0.0, 1.0, 0.5, 0.25, 0.75};  // between the lowest a
 
 constexpr double sign(std::size_t side) noexcept {
   return side == 0 ? 1.0 : -1.0;
+}
+
+constexpr double number_of(Eigen::Index i, std::size_t side) noexcept {
+  return static_cast<double>(2 * i) + static_cast<double>(side);
 }
 
 }  // namespace
@@ -30,7 +35,10 @@ void FailureWatch::forget() noexcept {
   const Eigen::Index n = sent_.size();
   const Inputs far = Inputs::Constant(n, none), zero = Inputs::Zero(n);
   for (Side& side : sides_)
-    side = {side.farthest, side.farthest, far, far, zero, Inputs::Constant(n, first_wait), zero, Inputs::Ones(n)};
+    side = {side.farthest, side.farthest, far, Inputs::Constant(n, first_wait), zero, Inputs::Ones(n)};
+  failures_.side.fill(-1.0);
+  failures_.at.fill(0.0);
+  failures_.since.fill(0.0);
   in_a_row_ = 0;
   probe_ = -1;
 }
@@ -90,6 +98,7 @@ void FailureWatch::worked() noexcept {
   good_ = sent_;
   worked_ = true;
   in_a_row_ = 0;
+  count_cycle();
   for (std::size_t s = 0; s < 2; ++s) {
     Side& side = sides_[s];
     for (Eigen::Index i = 0; i < sent_.size(); ++i) {
@@ -100,9 +109,13 @@ void FailureWatch::worked() noexcept {
         side.edge[i] = none;
         side.wait[i] = std::max(0.5 * side.wait[i], first_wait);
       }
-      if (at < side.suspect[i]) continue;
-      side.suspect[i] = none;
-      side.failures[i] = 0.0;
+      for (std::size_t k = 0; k < failures_.at.size(); ++k) {
+        if (failures_.side[k] != number_of(i, s)) continue;
+        failures_.since[k] = std::max(failures_.since[k], at);
+        if (at < failures_.at[k]) continue;
+        failures_.side[k] = -1.0;
+        by_chance_ += 1.0;
+      }
     }
   }
   if (probe_ < 0) return;
@@ -115,13 +128,12 @@ void FailureWatch::worked() noexcept {
 // last, or from the middle of what has worked where that is the same input.
 void FailureWatch::failed() noexcept {
   ++in_a_row_;
+  count_cycle();
   if (!worked_ || !edges_) return;  // nowhere to go back to
   if (failing_everywhere()) {
-    for (Side& side : sides_) {
+    for (Side& side : sides_)
       side.edge.setConstant(none);
-      side.suspect.setConstant(none);
-      side.failures.setZero();
-    }
+    failures_.side.fill(-1.0);
     return;
   }
   if (probe_ >= 0) {
@@ -149,13 +161,39 @@ void FailureWatch::failed() noexcept {
   }
   if (input < 0) return;
   Side& side = sides_[which];
-  side.suspect[input] = std::min(side.suspect[input], sign(which) * sent_[input]);
-  side.failures[input] += 1.0;
-  if (side.failures[input] < failures_of_an_edge) return;
+  const double number = number_of(input, which);
+  for (auto* column : {&failures_.side, &failures_.at, &failures_.since})
+    std::rotate(column->begin(), column->begin() + 1, column->end());
+  failures_.side.back() = number;
+  failures_.at.back() = sign(which) * sent_[input];
+  failures_.since.back() = -none;
+  const double edge = fails_from(number);
+  if (!(edge < none)) return;
   side.again[input] = 1.0;
-  set_edge(side, input, side.suspect[input], sign(which) * from[input]);
-  side.suspect[input] = none;
-  side.failures[input] = 0.0;
+  set_edge(side, input, edge, sign(which) * from[input]);
+  for (std::size_t k = 0; k < failures_.at.size(); ++k)
+    if (failures_.side[k] == number && failures_.at[k] >= edge) failures_.side[k] = -1.0;
+}
+
+void FailureWatch::count_cycle() noexcept {
+  cycles_ += 1.0 - cycles_ / remembered_cycles;
+  by_chance_ -= by_chance_ / remembered_cycles;
+}
+
+double FailureWatch::fails_from(double side) const noexcept {
+  constexpr double fewest = 4.0;
+  const double share = by_chance_ / (cycles_ + faultless_cycles);
+  const double needed =
+      share > 0.0 ? std::clamp(std::log(chance_of_an_edge) / std::log(share), fewest, hopeless - 1.0) : fewest;
+  double nearest = none;
+  for (std::size_t k = 0; k < failures_.at.size(); ++k) {
+    if (failures_.side[k] != side) continue;
+    double count = 0.0;
+    for (std::size_t m = 0; m < failures_.at.size(); ++m)
+      count += failures_.side[m] == side && failures_.at[m] >= failures_.at[k] && failures_.since[m] < failures_.at[k];
+    if (count >= needed) nearest = std::min(nearest, failures_.at[k]);
+  }
+  return nearest;
 }
 
 void FailureWatch::set_edge(Side& side, Eigen::Index i, double failing, double good) noexcept {

@@ -1,10 +1,10 @@
 // Watches which inputs make a plant fail, as a misfire or a trip does, and keeps a seeker out of them. Four failures
-// on one side of what works, with no success as far out, set an edge there: from then on no more is asked than what has
-// worked, and a seeker learns from that as from a plant that clamps. Beyond the edge one cycle is tried at a time, at
-// the edge and half way to it in turn, after a wait that doubles with each failure; what works moves the edge or takes
-// it away. Failures of what has
-// just worked as well say nothing of the input: then no edge stays, and other inputs that have worked are asked in
-// turn. Inputs in their own units. noexcept and allocation-free.
+// on one side of what works, with no later success as far out, set an edge there; more than four where cycles fail by
+// chance, which those failures tell that a later success as far out contradicts. From then on no more is asked than
+// what has worked, and a seeker learns from that as from a plant that clamps. Beyond the edge one cycle is tried at a
+// time, at the edge and half way to it in turn, after a wait that doubles with each failure; what works moves the edge
+// or takes it away. Failures of what has just worked as well say nothing of the input: then no edge stays, and other
+// inputs that have worked are asked in turn. Inputs in their own units. noexcept and allocation-free.
 #pragma once
 
 #include <array>
@@ -51,13 +51,16 @@ class FailureWatch {
     v("failing_worked", self.worked_);
     v("failing_in_a_row", self.in_a_row_);
     v("failing_probe", self.probe_);
+    v("failing_cycles", self.cycles_);
+    v("failing_by_chance", self.by_chance_);
+    v("failing_side", self.failures_.side);
+    v("failing_at", self.failures_.at);
+    v("failing_since", self.failures_.since);
     for (std::size_t s = 0; s < 2; ++s) {
       const std::string name = s == 0 ? "failing_above_" : "failing_below_";
       v(name + "farthest", self.sides_[s].farthest);
       v(name + "reach", self.sides_[s].reach);
       v(name + "edge", self.sides_[s].edge);
-      v(name + "suspect", self.sides_[s].suspect);
-      v(name + "failures", self.sides_[s].failures);
       v(name + "wait", self.sides_[s].wait);
       v(name + "held", self.sides_[s].held);
       v(name + "again", self.sides_[s].again);
@@ -69,13 +72,20 @@ class FailureWatch {
     Inputs farthest;    // that has ever worked
     Inputs reach;       // the same of late: less where an edge has come nearer
     Inputs edge;        // the nearest that is known to fail
-    Inputs suspect;     // the nearest that failed since something as far out worked
-    Inputs failures;    // in number, of these
     Inputs wait, held;  // cycles until the next try beyond, and how many have passed
     Inputs again;       // 1: that one is at the edge itself
   };
+  struct Failures {  // the last ones that no later success contradicts, newest last
+    using Column = std::array<double, 24>;
+    Column side;   // 2 i + side; -1: none
+    Column at;     // input times sign of the side
+    Column since;  // the farthest on that side that has worked later
+  };
   Inputs edge(std::size_t side) const noexcept;
   Inputs middle() const noexcept { return 0.5 * (sides_[0].reach - sides_[1].reach); }
+  void count_cycle() noexcept;
+  /// The nearest place on this side from which on more have failed, and none worked since, than chance explains.
+  double fails_from(double side) const noexcept;
   void set_edge(Side& side, Eigen::Index i, double failing, double good) noexcept;
 
   bool edges_;
@@ -84,7 +94,10 @@ class FailureWatch {
   bool differs_ = false;
   bool worked_ = false;        // anything at all
   std::int64_t in_a_row_ = 0;  // failures
-  std::int64_t probe_ = -1;    // 2 i + side while a try beyond the edge of input i is out, else -1
+  double cycles_ = 0.0;        // of late
+  double by_chance_ = 0.0;     // of them, those that failed where a later one worked
+  Failures failures_;
+  std::int64_t probe_ = -1;  // 2 i + side while a try beyond the edge of input i is out, else -1
 };
 
 }  // namespace mgdd::optimize
