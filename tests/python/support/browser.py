@@ -41,7 +41,16 @@ class Browser:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
+            env={name: value for name, value in os.environ.items() if name != "LD_PRELOAD"},  # sanitizers end it
         )
+        try:
+            self._open(folder, width, height)
+        except BaseException:
+            self.kill()
+            self._loop.close()
+            raise
+
+    def _open(self, folder: Path, width: int, height: int) -> None:
         port_file, until = folder / "DevToolsActivePort", time.monotonic() + 60.0
         while not (port_file.exists() and port_file.read_text()) and time.monotonic() < until:
             time.sleep(0.05)
