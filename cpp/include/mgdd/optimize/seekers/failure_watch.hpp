@@ -96,7 +96,7 @@ class FailureWatch {
   std::int64_t in_a_row_ = 0;  // failures
   double cycles_ = 0.0;        // of late
   double by_chance_ = 0.0;     // of them, those that failed where a later one worked
-  Failures failures_;
+  Failures failures_{};
   std::int64_t probe_ = -1;  // 2 i + side while a try beyond the edge of input i is out, else -1
 };
 
