@@ -1,6 +1,6 @@
 // Watches which inputs make a plant fail, as a misfire or a trip does, and keeps a seeker out of them. Four failures
-// on one side of what works, with no later success as far out, set an edge there; more than four where cycles fail by
-// chance, which those failures tell that a later success as far out contradicts. From then on no more is asked than
+// on one side of what works, with no later success as far out, set an edge there; more are needed where cycles fail by
+// chance, as those do that a later success as far out contradicts. From then on no more is asked than
 // what has worked, and a seeker learns from that as from a plant that clamps. Beyond the edge one cycle is tried at a
 // time, at the edge and half way to it in turn, after a wait that doubles with each failure; what works moves the edge
 // or takes it away. Failures of what has just worked as well say nothing of the input: then no edge stays, and other
