@@ -26,9 +26,8 @@ bool is_unbounded(const Domain& domain) {
 }
 
 [[noreturn]] void unknown_field(const char* owner, const py::handle& key, const py::dict& known) {
-  const py::object close = py::module_::import("difflib").attr("get_close_matches")(key, known.attr("keys")(), 1);
-  std::string hint = "one of " + std::string(py::str(py::str(", ").attr("join")(known.attr("keys")())));
-  if (py::len(close) > 0) hint = "did you mean '" + close[py::int_(0)].cast<std::string>() + "'?";
+  std::string hint = py::module_::import("mgdd.errors").attr("did_you_mean")(key, known.attr("keys")()).cast<std::string>();
+  if (hint.empty()) hint = "one of " + std::string(py::str(py::str(", ").attr("join")(known.attr("keys")())));
   throw about(owner, ParameterError(std::string(owner) + " has no field '" + std::string(py::str(key)) + "': " + hint));
 }
 

@@ -322,7 +322,6 @@ def test_a_held_scale_beyond_the_search_is_still_compared(
         (["--pegging-exponent", "1.3"], "two_point or least_squares"),
         (["--inlet-pressure-kpa", "150"], "--pegging inlet"),
         (["--motored"], "does not act on measured traces"),
-        (["--fuel-mg", "20"], "--fuel-mg does not act here"),
         (["--set", "bore_mm=90", "--set", "bore_mm=80"], "given twice"),
         (["--burn", "wiebe", "--set", "burn_shape=triangle"], "contradict"),
         (["--speed-rpm", "1000", "--set", "speed_rpm=2000"], "contradict"),

@@ -27,13 +27,41 @@ def test_every_file_has_a_verdict(files: list[str], capsys: pytest.CaptureFixtur
     assert main(["engine", "check", *files, *HD, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["files"]
     assert [(each["file"], each["verdict"]) for each in found] == [
-        ("sound.csv", "pass"), ("clipped.csv", "fail"), ("torn.csv", "fail"),
+        ("sound.csv", "no fault found"), ("clipped.csv", "fail"), ("torn.csv", "fail"),
     ]  # fmt: skip
     (samples,) = [check for check in found[1]["checks"] if check["name"] == "samples"]
     assert samples["verdict"] == "fail"
     assert "equal samples" in samples["text"]
     assert "amplifier" in samples["remedy"]
     assert "line 3" in found[2]["checks"][0]["text"]
+
+
+def test_without_an_engine_the_geometry_is_open(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    def seen(*options: str) -> dict[str, object]:
+        assert main(["engine", "check", files[0], "--json", *options]) == 0
+        return dict(json.loads(capsys.readouterr().out))
+
+    bare = seen()
+    assert [each["verdict"] for each in bare["files"]] == ["open"]
+    assert "bore_mm = 86" in bare["assumed"]
+    assert bare["engine"]["bore_mm"] == 86.0
+    part = seen("--set", "bore_mm=128", "--set", "stroke_mm=144")
+    assert "bore_mm" not in part["assumed"]
+    assert "compression_ratio" in part["assumed"]
+    assert [each["verdict"] for each in part["files"]] == ["doubt"]  # the compression ratio is that of another engine
+    whole = seen(*HD)
+    assert (whole["assumed"], whole["files"][0]["verdict"]) == ("", "no fault found")
+    assert whole["files"][0]["checks_made"] == 7
+    assert whole["files"][0]["warnings"] == []
+
+
+def test_fuel_by_set_is_fuel(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    texts = []
+    for stated in (["--fuel-mg", "400"], ["--set", "fuel_mg=400"]):
+        assert main(["engine", "check", files[0], *HD, *stated]) == 0
+        texts.append(capsys.readouterr().out)
+    assert texts[0] == texts[1]
+    assert "of the heat of the stated fuel" in texts[0]
 
 
 def test_text_says_the_worst_first(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,7 +79,7 @@ def test_what_is_stated_is_judged(files: list[str], tmp_path: Path, capsys: pyte
         verdicts = {check["name"]: check["verdict"] for check in file["checks"]}
         return str(verdicts.get("work and heat", file["verdict"]))
 
-    assert verdict("--bmep-bar", "12.5") == "pass"  # closed IMEP is 13.7 bar
+    assert verdict("--bmep-bar", "12.5") == "no fault found"  # closed IMEP is 13.7 bar
     assert verdict("--bmep-bar", "8") == "doubt"
     assert verdict("--bmep-bar", "15") == "fail"
     assert verdict() == "open"

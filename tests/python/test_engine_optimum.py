@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -97,6 +99,31 @@ def test_two_limits_and_the_one_that_bites():
     best = find_optimum(CYLINDER, POINT, limits={"p_max_bar": 95.0, "t_max_k": 2500.0})
     assert best.active_limits == ("p_max_bar",)
     assert {limit.name: limit.upper for limit in best.limits} == {"p_max_bar": 95.0, "t_max_k": 2500.0}
+
+
+def test_a_limit_that_nothing_reaches_is_a_finding() -> None:
+    far = find_optimum("puma_single", limits={"p_max_bar": 95.0, "p_max_cad": 95.0})
+    assert far.active_limits == ("p_max_bar",)
+    (found,) = far.findings
+    assert (found.code, found.names) == ("idle_limit", ("p_max_cad",))
+    assert "not reached for soc_cad in [-30, 10]" in found.text
+    assert pickle.loads(pickle.dumps(far)).findings == far.findings
+    assert json.loads(json.dumps(far.to_dict()))["findings"][0]["code"] == "idle_limit"
+
+
+@pytest.mark.parametrize(
+    ("guess", "meant"),
+    [
+        ("pmax", "did you mean 'p_max_bar'?"),
+        ("p_max", "did you mean 'p_max_bar'?"),
+        ("dpmax", "did you mean 'dp_max_bar_per_cad'?"),
+        ("imep", "did you mean 'imep_closed_bar' or 'imep_gross_bar'?"),
+    ],
+)
+def test_a_limit_of_another_name_is_led_to_what_can_be_one(guess: str, meant: str) -> None:
+    with pytest.raises(ParameterError) as refused:
+        find_optimum("puma_single", limits={guess: 95.0})
+    assert str(refused.value).endswith(meant)
 
 
 def test_unreachable_limits_say_how_near_they_come():

@@ -13,8 +13,10 @@ from mgdd.cli.options import (
     add_command,
     add_engine,
     add_files,
+    assumed_geometry,
     check_pegging,
     engine_of,
+    point_given,
     readers_of,
     refuse_idle,
 )
@@ -92,14 +94,16 @@ def _analyze(args: argparse.Namespace) -> None:
     cylinder, point, preset = engine_of(args)
     check_pegging(args)
     _check_analysis(args)
-    refuse_idle(args, "fuel_mg", "burn", "burn_duration_cad", "ignition", why="an analysis takes no burn: leave it out")
+    refuse_idle(args, "burn", "burn_duration_cad", "ignition", why="an analysis takes no burn: leave it out")
     given = _ANALYSIS.given(args) | _BRAKE.given(args) | PEGGING.given(args)
     if args.gamma is not None:
         if args.analysis_gamma is not None:
             raise ParameterError("--analysis-gamma and --gamma contradict each other: give one")
         given["gamma"] = "cylinder"
-    if args.intake_pressure_kpa is not None:
-        given.setdefault("inlet_pressure_kpa", args.intake_pressure_kpa)
+    known, assumed = point_given(args), assumed_geometry(args)
+    if "intake_pressure_kpa" in known:
+        given.setdefault("inlet_pressure_kpa", known["intake_pressure_kpa"])
+    given["fuel_mg"] = fuel_mg = known.get("fuel_mg")
     engine = (cylinder, point, preset)
     step = args.progress.expect(len(args.files))
     payloads: list[dict[str, Any]] = []
@@ -116,7 +120,10 @@ def _analyze(args: argparse.Namespace) -> None:
             if several and not record:  # the threshold is for the records among the files
                 own = {name: value for name, value in given.items() if name != "knock_threshold_bar"}
             result, payload, text = _one(args, trace, engine, own, traces=not record)
-            checked = trust(trace, cylinder, point=point, **_CHECKED.given(args)) if args.report else None
+            checked = None
+            if args.report:
+                own_checks = {"assumed": assumed, "fuel_mg": fuel_mg, **_CHECKED.given(args)}
+                checked = trust(trace, cylinder, point=point, **own_checks)
         except DataError as error:  # one that is refused does not stop the others
             if not several and args.report is None:
                 raise
@@ -132,7 +139,7 @@ def _analyze(args: argparse.Namespace) -> None:
             sections.append(record_section(checked, result, traces))
             verdicts.append(_verdict(checked))
     if args.report:
-        _write_report(args.report, sections, verdicts, preset)
+        _write_report(args.report, sections, verdicts, f"{'assumed: ' if assumed else ''}{preset.name}", cylinder)
         texts.append(f"Report: {args.report}")
     whole = {"files": payloads} if several else payloads[0]
     if args.report:
@@ -188,12 +195,11 @@ def _drawn(trace: xr.Dataset, cylinder: Cylinder, point: OperatingPoint, given: 
 def _verdict(report: Trust) -> str:
     """Name the worst of a file's checks."""
     worst = ", ".join(check.name for check in report.checks if check.verdict == report.verdict)
-    return f"{report.file}: {report.verdict}" + ("" if report.verdict == "pass" else f" ({worst})")
+    return report.title + (f" ({worst})" if report.verdict in ("doubt", "fail") else "")
 
 
-def _write_report(file: str, sections: list[Section], verdicts: list[str], preset: Preset) -> None:
+def _write_report(file: str, sections: list[Section], verdicts: list[str], engine: str, c: Cylinder) -> None:
     """Write the page: what the checks came to first, then one section per file."""
-    c = preset.cylinder
     geometry = f"{c.bore_mm:g} x {c.stroke_mm:g} mm, compression ratio {c.compression_ratio:g}"
     write_page(
         file,
@@ -201,7 +207,7 @@ def _write_report(file: str, sections: list[Section], verdicts: list[str], prese
         sections,
         verdict=verdicts,
         made_by="mgdd engine analyze",
-        facts={"Engine": f"{preset.name}, {geometry}"},
+        facts={"Engine": f"{engine}, {geometry}"},
     )
     wrote(file)
 

@@ -8,7 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import PEGGING, add_command, add_engine, add_files, check_pegging, engine_of, readers_of
+from mgdd.cli.options import (
+    GEOMETRY,
+    PEGGING,
+    add_command,
+    add_engine,
+    add_files,
+    assumed_geometry,
+    check_pegging,
+    engine_of,
+    point_given,
+    readers_of,
+)
 from mgdd.cli.output import check_output, emit
 from mgdd.engine import Trust, trust
 from mgdd.engine.trust import Check
@@ -40,22 +51,30 @@ def add_check(verbs: Any) -> None:
 def _check(args: argparse.Namespace) -> None:
     check_output(args, ".json")
     check_pegging(args)
-    cylinder, point, _ = engine_of(args)
-    given = PEGGING.given(args) | _STATED.given(args)
-    if args.fuel_mg is not None:
-        given["fuel_mg"] = args.fuel_mg
+    cylinder, point, preset = engine_of(args)
+    given = PEGGING.given(args) | _STATED.given(args) | {"fuel_mg": point_given(args).get("fuel_mg")}
+    assumed = assumed_geometry(args)
 
     def report(file: str, read: Callable[[], xr.Dataset]) -> Trust:
         try:
-            return trust(read(), cylinder, point=point, **given)
+            return trust(read(), cylinder, point=point, assumed=assumed, **given)
         except DataError as error:
             return Trust(Path(file).name, (Check("file", "fail", str(error)),))
 
     reports = [report(file, read) for file, read in readers_of(args).items()]
     payload = {
+        "preset": preset.name,
+        "assumed": assumed,
+        "engine": {name: getattr(cylinder, name) for name in GEOMETRY},
         "files": [
-            {"file": each.file, "verdict": each.verdict, "checks": [vars(check) for check in each.checks]}
+            {
+                "file": each.file,
+                "verdict": each.verdict,
+                "checks_made": each.made,
+                "checks": [vars(check) for check in each.checks],
+                "warnings": [] if each.analysis is None else each.analysis.attrs["warnings"].splitlines(),
+            }
             for each in reports
-        ]
+        ],
     }
     emit(args, payload, text="\n\n".join(each.summary() for each in reports))

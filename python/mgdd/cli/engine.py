@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
@@ -20,6 +21,7 @@ from mgdd.cli.options import (
     check_pegging,
     engine_of,
     number_pairs,
+    point_given,
     refuse_idle,
     traces_of,
 )
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add"]
 
+_LOG = logging.getLogger(__name__)
 _TIMING = Options(simulate, "soc_cad")
 _SEARCH = Options(find_optimum, "objective", "bounds_cad")
 _NO = Options(
@@ -144,10 +147,9 @@ def _traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
 def _known(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
     """Give pegging, and the fuel heat where the fuel was said, as arguments of `fit_cylinder` and `best_timing`."""
     check_pegging(args)
-    return {
-        **PEGGING.given(args),
-        "fuel_heat_j": None if args.fuel_mg is None else args.fuel_mg * cylinder.lower_heating_value_mj_per_kg,
-    }
+    fuel_mg = point_given(args).get("fuel_mg")
+    heat = None if fuel_mg is None else fuel_mg * cylinder.lower_heating_value_mj_per_kg
+    return {**PEGGING.given(args), "fuel_heat_j": heat}
 
 
 def _calibrate(args: argparse.Namespace) -> None:
@@ -216,10 +218,14 @@ def _optimum(args: argparse.Namespace) -> None:
         "limits": limits,
     }
     payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
+    payload["findings"] = [str(finding) for finding in best.findings]
+    for finding in best.findings:
+        _LOG.warning("%s", finding)
     payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
     payload["soi_cad"] = reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])
     sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
-    emit(args, payload, traces=sweep)
+    held = ", ".join(best.active_limits) or "no limit"
+    emit(args, payload, text=lines({**payload, "held_by": held}), traces=sweep)
 
 
 def _optimum_of_files(

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CYLINDER_CHOICES",
+    "GEOMETRY",
     "PEGGING",
     "READING",
     "SCHEME",
@@ -36,10 +37,12 @@ __all__ = [
     "add_files",
     "add_group",
     "assignments",
+    "assumed_geometry",
     "check_pegging",
     "encoder_of",
     "engine_of",
     "number_pairs",
+    "point_given",
     "readers_of",
     "refuse_idle",
     "require_positive",
@@ -49,7 +52,7 @@ __all__ = [
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
-_GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
+GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 SCHEME = Options(simulate, "integrator", "step_cad")
 PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
 _COLUMNS = Options(read_pressure, "pressure_column", "angle_column")
@@ -181,20 +184,9 @@ def encoder_of(args: argparse.Namespace) -> dict[str, Any]:
     return {"encoder": Encoder(**given)} if given else {}
 
 
-def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
-    """Make cylinder and point from a preset and the options over it."""
-    preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
-    given = assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
-    point = {name: value for name, value in given.items() if name in _POINT}
-    cylinder = {name: value for name, value in given.items() if name not in _POINT}
-    taken = [f"{name} = {getattr(preset.cylinder, name):g}" for name in _GEOMETRY if name not in cylinder]
-    if args.preset is None and getattr(args, "files", None) and taken:
-        _LOG.warning("no --preset: the traces are read with %s of %s", ", ".join(taken), preset.name)
-    for option, field in CYLINDER_CHOICES.items():
-        if getattr(args, option) is not None:
-            if field in cylinder:
-                raise ParameterError(f"{as_option(option)} and --set {field} contradict each other: give one")
-            cylinder[field] = getattr(args, option)
+def point_given(args: argparse.Namespace) -> dict[str, float]:
+    """Give the numbers of the point that were given, by an option or by --set, which mean the same."""
+    point = {name: value for name, value in _set(args).items() if name in _POINT}
     for field in _POINT:
         if getattr(args, field) is not None:
             if field in point:
@@ -204,7 +196,34 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Prese
         if point.get("fuel_mg"):
             raise ParameterError(f"--motored and --fuel-mg {point['fuel_mg']:g} contradict each other: give one")
         point["fuel_mg"] = 0.0
-    return preset.cylinder.replace(**cylinder), preset.point.replace(**point), preset
+    return point
+
+
+def assumed_geometry(args: argparse.Namespace) -> str:
+    """Say what of the geometry nobody gave and a default preset fills in; empty where it was given."""
+    if args.preset is not None:
+        return ""
+    given, own = _set(args), presets.load(_DEFAULT_PRESET, kind="engine").cylinder
+    taken = [f"{name} = {getattr(own, name):g}" for name in GEOMETRY if name not in given]
+    return f"{', '.join(taken)} of {_DEFAULT_PRESET}" if taken else ""
+
+
+def _set(args: argparse.Namespace) -> dict[str, Any]:
+    return assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
+
+
+def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Preset]:
+    """Make cylinder and point from a preset and the options over it."""
+    preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
+    cylinder = {name: value for name, value in _set(args).items() if name not in _POINT}
+    if getattr(args, "files", None) and (assumed := assumed_geometry(args)):
+        _LOG.warning("no engine is given: the traces are read with %s; give --preset or --set", assumed)
+    for option, field in CYLINDER_CHOICES.items():
+        if getattr(args, option) is not None:
+            if field in cylinder:
+                raise ParameterError(f"{as_option(option)} and --set {field} contradict each other: give one")
+            cylinder[field] = getattr(args, option)
+    return preset.cylinder.replace(**cylinder), preset.point.replace(**point_given(args)), preset
 
 
 def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
@@ -222,8 +241,7 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], Any]]:
     for file in args.files:
         existing_file(file)
     rows = conditions_of(args.files, args.conditions)
-    speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
-
+    speed = point_given(args).get("speed_rpm")
     encoder = encoder_of(args)
     cycles = getattr(args, "chunk_cycles", None)
 

@@ -12,14 +12,16 @@ from mgdd._arguments import require_plain
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError, hinted
-from mgdd.optimize.optimum import Optimum, limits_of
+from mgdd.optimize.optimum import Optimum, idle_limits, limits_of
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
+from mgdd.results.units import unit_of
 
 __all__ = ["find_optimum"]
 
 OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
 _SCAN_CAD = 0.5
 _SECANT_CAD = 3.0
+_PLACE = unit_of("soc_cad")  # where something lies is not a load on the engine
 _WINDOW_CAD: tuple[float, float] = _core.engine.timing_window_cad
 DEFAULT_CAD = (-30.0, 10.0)
 
@@ -124,6 +126,9 @@ def find_optimum(
         at_bound=soc in (low, high),
         bounds={"soc_cad": (low, high)},
         curvature=_curvature(indicators, objective, soc, cylinder),
+        findings=idle_limits(
+            caps, {name: float(columns[name].max()) for name in caps}, f"for soc_cad in [{low:g}, {high:g}]"
+        ),
     )
 
 
@@ -198,7 +203,7 @@ def check_request(objective: str, limits: Iterable[str], also: Iterable[str] = (
     for name in limits:
         if name not in known:
             refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}"
-            raise ParameterError(hinted(refused, name, known))
+            raise ParameterError(hinted(refused, name, [other for other in known if unit_of(other) != _PLACE]))
 
 
 def _check(point: OperatingPoint, low: float, high: float) -> None:

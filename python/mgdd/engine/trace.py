@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
@@ -13,7 +13,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace_cycles import COLUMNS, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.pressure import as_trace
-from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of
+from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of, stated
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ def analyze(
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
         Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
-        ``ivc_temperature_k`` or the intake temperature + 40 K.
+        ``ivc_temperature_k`` or the intake temperature + 40 K. Numbers by name are of this record: their ``fuel_mg``
+        and ``intake_pressure_kpa`` judge the trace as the keywords do. A preset or an OperatingPoint may be of another
+        load: its fuel judges nothing, its intake pressure a factor of 3.
     pegging : {"none", "inlet", "two_point", "least_squares"}
         ``none`` takes the trace as absolute. ``inlet`` sets the mean within ±5 CAD of intake bottom dead centre to
         ``inlet_pressure_kpa``; the other two fit compression with ``pegging_exponent``.
@@ -161,7 +163,9 @@ def analyze(
     9.4
     14.9
     """
-    cylinder, point = cylinder_of(cylinder), point_of(point)
+    cylinder, said = cylinder_of(cylinder), point
+    point = point_of(point)
+    fuel_mg = stated("fuel_mg", fuel_mg, said)
     if isinstance(trace, Iterator):
         trace, chunks = _first_of(trace, traces=traces)
     else:
@@ -169,14 +173,17 @@ def analyze(
         chunks = iter([trace])
     doubted: list[str] = []  # by who read it, and logged there
     simulated = "motored_pressure_bar" in trace.variables
-    if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
-        raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake pressure")
+    whole = None if isinstance(said, Mapping) else point  # what a mapping leaves out is a default, not this record's
+    if inlet_pressure_kpa is None:
+        inlet_pressure_kpa = stated("intake_pressure_kpa", None, said)
+    if pegging == "inlet" and inlet_pressure_kpa is None and whole is None:
+        raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake_pressure_kpa")
     if fractions not in ("net", "gross", "rassweiler_withrow"):
         raise ParameterError.of("fractions", fractions, "net, gross or rassweiler_withrow")
     own = conditions(trace, point)
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
-    stated = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
+    intake = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
     options = {
         "pegging": pegging,
         "pegging_exponent": pegging_exponent,
@@ -192,8 +199,8 @@ def analyze(
         "smoothing": _smoothing(smoothing, simulated),
         "smoothing_width_cad": smoothing_width_cad,
         "smoothing_cutoff_hz": smoothing_cutoff_hz,
-        "intake_pressure_kpa": stated if stated is not None or point is None else point.intake_pressure_kpa,
-        "intake_factor": _POINT_FACTOR if stated is None else _STATED_FACTOR,
+        "intake_pressure_kpa": intake if intake is not None or whole is None else whole.intake_pressure_kpa,
+        "intake_factor": _POINT_FACTOR if intake is None else _STATED_FACTOR,
         "bmep_bar": _bmep(trace, cylinder, bmep_bar, brake_torque_nm, n_cylinders),
         "fuel_heat_j": _fuel_heat(trace, cylinder, fuel_mg),
         "knock_low_hz": knock_band_hz[0],
@@ -324,8 +331,8 @@ def _bmep(
 def _fuel_heat(trace: xr.Dataset, cylinder: Cylinder, fuel_mg: float | None) -> float | None:
     """Heat [J] of the fuel that is stated for this trace; mg times MJ/kg are J."""
     fuel = _number(trace, "fuel_mg", fuel_mg)
-    if fuel_mg is not None and not (fuel_mg > 0.0 and math.isfinite(fuel_mg)):
-        raise ParameterError.of("fuel_mg", fuel_mg, "> 0 mg per cycle")
+    if fuel_mg is not None and not 0.0 <= fuel_mg < math.inf:
+        raise ParameterError.of("fuel_mg", fuel_mg, ">= 0 mg per cycle, 0 of a motored record")
     return fuel * cylinder.lower_heating_value_mj_per_kg if fuel else None
 
 

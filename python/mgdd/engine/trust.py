@@ -13,7 +13,7 @@ from mgdd.engine.trace import analyze
 from mgdd.engine.trace_cycles import CYCLE
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.pressure import as_trace
-from mgdd.presets.meant import cylinder_of, point_of
+from mgdd.presets.meant import cylinder_of, point_of, stated
 from mgdd.results.describe import Row
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.result import Result
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Check", "Trust", "trust"]
 
-Verdict = Literal["pass", "open", "doubt", "fail"]
-_WORST: tuple[Verdict, ...] = ("pass", "open", "doubt", "fail")
+Verdict = Literal["no fault found", "open", "doubt", "fail"]
+_WORST: tuple[Verdict, ...] = ("no fault found", "open", "doubt", "fail")
 # Kinds of doubts of `analyze` by the check that they belong to, in the order of a look at a file.
 _CHECKS: dict[str, tuple[str, ...]] = {
     "file": ("reading", "coverage"),
@@ -66,6 +66,7 @@ _REMEDIES = {
     "odd_level": "peg every cycle; look at the charge amplifier and the connectors",
     "drift": "peg every cycle; warm the sensor up, and let the amplifier settle",
 }
+ENGINE = "engine"  # the check that is there only where the geometry is nobody's
 _ONE = "one cycle: nothing to compare it with"
 
 
@@ -91,7 +92,8 @@ class Trust(Result):
     file : str
         Its name.
     checks : tuple of Check
-        ``pass``, ``open`` (not decided by what the file holds), ``doubt``, or ``fail``: the figures cannot be right.
+        ``no fault found``, ``open`` (not decided by what the file holds), ``doubt``, or ``fail``: the figures cannot be
+        right.
     analysis : xarray.Dataset, optional
         What `analyze` found; None where it refused the file.
 
@@ -101,7 +103,9 @@ class Trust(Result):
     >>> from mgdd.engine import trust
     >>> report = trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144", bmep_bar=12.5)
     >>> report["work and heat"].verdict, report["gas exchange"].text
-    ('pass', 'the record has no 720 degrees')
+    ('no fault found', 'the record has no 720 degrees')
+    >>> report.summary().splitlines()[0]
+    'pressure_a50_bar: no fault found, 8 of 12 checks made'
     """
 
     file: str
@@ -110,9 +114,15 @@ class Trust(Result):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict, ``open`` ones left out where anything passes."""
+        """The worst verdict; ``open`` where no check was made, or where nobody gave the engine."""
         worst = max((check.verdict for check in self.checks), key=_WORST.index)
-        return "pass" if worst == "open" else worst
+        decided = self.made and all(check.name != ENGINE for check in self.checks)
+        return "no fault found" if worst == "open" and decided else worst
+
+    @property
+    def made(self) -> int:
+        """How many of the checks were decided."""
+        return sum(check.verdict != "open" for check in self.checks)
 
     def __getitem__(self, name: str) -> Check:
         """Return a check by name."""
@@ -130,8 +140,14 @@ class Trust(Result):
         check = ("check", np.array([each.name for each in self.checks]), "-", "check")
         return labelled_dataset({"check": check, **variables}, attrs={"file": self.file, "verdict": self.verdict})
 
+    @property
+    def title(self) -> str:
+        """File, verdict, and how many checks were made where none found a fault."""
+        made = f", {self.made} of {len(self.checks)} checks made" if self.verdict in ("no fault found", "open") else ""
+        return f"{self.file}: {self.verdict}{made}"
+
     def _title(self) -> str:
-        return f"{self.file}: {self.verdict}"
+        return self.title
 
     def _rows(self) -> list[Row]:
         return [Row(check.name, str(check)) for check in self.checks]
@@ -160,6 +176,7 @@ def trust(
     brake_torque_nm: float | None = None,
     n_cylinders: int = 1,
     fuel_mg: float | None = None,
+    assumed: str = "",
 ) -> Trust:
     """Check a pressure file before its figures are believed.
 
@@ -175,6 +192,9 @@ def trust(
         As of `analyze`.
     bmep_bar, brake_torque_nm, n_cylinders, fuel_mg
         As of `analyze`: without them nothing judges the gain of the amplifier.
+    assumed : str
+        What of the geometry is a guess of the caller's, in words: then the check ``engine`` is open, and the verdict is
+        never more than that.
 
     Returns
     -------
@@ -200,7 +220,7 @@ def trust(
     >>> from mgdd.engine import trust
     >>> sound = datasets.read("hd_diesel_128x144")[1]
     >>> trust(sound, "hd_diesel_128x144").verdict
-    'pass'
+    'no fault found'
     >>> clipped = sound.assign(pressure_bar=sound["pressure_bar"].clip(max=100.0))
     >>> trust(clipped, "hd_diesel_128x144")["samples"].verdict
     'fail'
@@ -228,13 +248,18 @@ def trust(
     said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
     said = [(kind, text) for kind, text in said if not (kind == "reading" and "crank angle slips" in text)]
     said += record_doubts(made, found, cylinder_of(cylinder), point_of(point))
+    fuel_mg = stated("fuel_mg", fuel_mg, point)
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
-    stated = [key for key, value in judged.items() if value is not None or _stated(made, key)]
-    skipped = _skipped(made, found, stated)
-    return Trust(name, tuple(_check(check, kinds, said, skipped) for check, kinds in _CHECKS.items()), found)
+    known = [key for key, value in judged.items() if value or _known(made, key)]
+    skipped = _skipped(made, found, known)
+    checks = [_check(check, kinds, said, skipped) for check, kinds in _CHECKS.items()]
+    if assumed:
+        text = f"no engine is given: read with {assumed}"
+        checks.insert(0, Check(ENGINE, "open", text, "give bore, stroke, rod, compression ratio, IVC and EVO"))
+    return Trust(name, tuple(checks), found)
 
 
-def _stated(trace: xr.Dataset, name: str) -> bool:
+def _known(trace: xr.Dataset, name: str) -> bool:
     return name in trace.attrs and not math.isnan(float(trace.attrs[name]))
 
 
@@ -244,7 +269,7 @@ def _check(
     """Put all that was said of one check together; the mean of the cycles repeats what single ones say."""
     own = [(kind, text) for kind, text in said if kind in kinds]
     if not own:
-        return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "pass")
+        return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "no fault found")
     verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in own) else "doubt"
     remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in own if kind in _REMEDIES)
     first: dict[str, str] = {}
@@ -253,7 +278,7 @@ def _check(
     return Check(name, verdict, "; ".join(first.values()), "; ".join(remedies))
 
 
-def _skipped(trace: xr.Dataset, found: xr.Dataset, stated: list[str]) -> dict[str, tuple[str, str]]:
+def _skipped(trace: xr.Dataset, found: xr.Dataset, known: list[str]) -> dict[str, tuple[str, str]]:
     """Name the checks that these data cannot decide, and what would."""
     out = {}
     cycles = trace.sizes.get(CYCLE, 1)
@@ -265,7 +290,7 @@ def _skipped(trace: xr.Dataset, found: xr.Dataset, stated: list[str]) -> dict[st
             "a fired trace hardly shows an error",
             "mgdd.identify.estimate_tdc scans it; a motored record shows it",
         )
-    if not stated and not motored:
+    if not known and not motored:
         out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
     if not np.isfinite(found["imep_net_bar"]).all():
         out["gas exchange"] = ("the record has no 720 degrees", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -14,7 +15,7 @@ from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import MapTask, cell_at
 from mgdd.maps.sweep_columns import SweepColumns, sweep_columns
 from mgdd.maps.windows import Parts, between, feasible_parts, range_around
-from mgdd.optimize.optimum import limits_of
+from mgdd.optimize.optimum import idle_limits, limits_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["optimize_map"]
+
+_LOG = logging.getLogger(__name__)
 
 EDGE = "end_of_sweep"
 _SHOWN = 6
@@ -123,6 +126,11 @@ def optimize_map(
     known = np.isfinite(gain)
     for name in caps:
         known &= np.isfinite(data.columns[name])
+    if known.any():
+        for finding in idle_limits(
+            caps, {name: float(data.columns[name][known].max()) for name in caps}, "in the sweep"
+        ):
+            _LOG.warning("%s", finding)
     excess = np.stack([np.where(known, -1.0, np.inf), *(data.columns[name] - cap for name, cap in caps.items())])
     excess = np.where(known, excess, np.inf)
     parts = feasible_parts(excess)

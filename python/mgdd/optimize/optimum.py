@@ -11,10 +11,11 @@ from typing import Any
 
 from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError
+from mgdd.results.finding import Finding
 from mgdd.results.labels import to_jsonable
 from mgdd.results.result import NumbersResult
 
-__all__ = ["Optimum", "limit_names_of", "limits_of"]
+__all__ = ["Optimum", "idle_limits", "limit_names_of", "limits_of"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -46,6 +47,8 @@ class Optimum(NumbersResult):
         leaves the range.
     free_inputs : mapping of str to float
         The best point without limits, where it was sought.
+    findings : tuple of Finding
+        ``idle_limit``: a limit that nothing in the searched range reaches.
 
     Examples
     --------
@@ -69,6 +72,7 @@ class Optimum(NumbersResult):
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     curvature: float = math.nan
     free_inputs: Mapping[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("inputs", "values", "bounds", "free_inputs"):
@@ -102,8 +106,23 @@ class Optimum(NumbersResult):
         """
         out = {name: getattr(self, name) for name in self.__dataclass_fields__}
         out["limits"] = {limit.name: limit.upper for limit in self.limits}
+        out["findings"] = [vars(finding) for finding in self.findings]
         plain: dict[str, Any] = to_jsonable({k: dict(v) if isinstance(v, Mapping) else v for k, v in out.items()})
         return plain
+
+
+def idle_limits(caps: Mapping[str, float], highest: Mapping[str, float], where: str) -> tuple[Finding, ...]:
+    """Find the limits that nothing reaches: they hold nothing back, perhaps because another quantity was meant."""
+    return tuple(
+        Finding(
+            "idle_limit",
+            (name,),
+            f"the limit {name} <= {cap:g} is not reached {where}: at most {highest[name]:.4g}",
+            "look whether this is the quantity, and its unit, that you mean",
+        )
+        for name, cap in caps.items()
+        if highest[name] < cap
+    )
 
 
 def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Limit, ...]:

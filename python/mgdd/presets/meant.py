@@ -20,6 +20,7 @@ __all__ = [
     "cylinder_of",
     "engine_of",
     "point_of",
+    "stated",
     "throttle_model_of",
     "throttle_of",
 ]
@@ -77,6 +78,43 @@ def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoin
     raise ParameterError(f"point = {shown(given)}: must be {bound}", field="point", value=given, bound=bound)
 
 
+def stated(name: str, keyword: float | None, point: Any) -> float | None:
+    """Return what a caller says of this record, by keyword or by name in its point; None where neither does.
+
+    Parameters
+    ----------
+    name : str
+        Of the keyword and of the field.
+    keyword : float, optional
+        The keyword.
+    point : OperatingPoint, Preset, str, path-like, mapping of str to float, optional
+        Numbers by name are said of this record; a preset or an OperatingPoint has every field, perhaps of another load.
+
+    Returns
+    -------
+    float or None
+        The number.
+
+    Raises
+    ------
+    ParameterError
+        Both, with different numbers.
+
+    Examples
+    --------
+    >>> from mgdd.presets.meant import stated
+    >>> stated("fuel_mg", None, {"fuel_mg": 60.0})
+    60.0
+    """
+    named = point.get(name) if isinstance(point, Mapping) else None
+    if named is None or keyword is None or float(keyword) == float(named):
+        return keyword if named is None else float(named)
+    raise ParameterError(
+        f"{name} = {keyword:g} and point['{name}'] = {named:g} contradict each other: give one",
+        field=name, value=keyword, bound=f"{named:g}, as the point says",
+    )  # fmt: skip
+
+
 def engine_of(
     cylinder: Any, point: Any = None, *, argument: str = "cylinder", **fields: float | None
 ) -> tuple[Cylinder, OperatingPoint]:
@@ -102,7 +140,7 @@ def engine_of(
     Raises
     ------
     ParameterError
-        Anything else, or an unknown number.
+        Anything else, an unknown number, or two values of one.
     TypeError
         A cylinder without a point.
 
@@ -115,6 +153,8 @@ def engine_of(
     meant = _loaded(cylinder, "engine")
     own, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
     changes = {name: value for name, value in fields.items() if value is not None}
+    for name, value in changes.items():
+        stated(name, value, point)
     point = point_of(point, nominal)
     if point is None and not changes and not isinstance(meant, Preset):
         raise TypeError(

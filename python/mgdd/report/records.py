@@ -50,12 +50,12 @@ def record_section(report: Trust, figures: xr.Dataset | None, traces: xr.Dataset
     Section
         Checks as a list, and of an analysed file text, table and figures.
     """
-    passed = [check.name for check in report.checks if check.verdict == "pass"]
-    rest = sorted((check for check in report.checks if check.verdict != "pass"), key=_urgency)
+    passed = [check.name for check in report.checks if check.verdict == "no fault found"]
+    rest = sorted((check for check in report.checks if check.verdict != "no fault found"), key=_urgency)
     items = [f"{check.name}: {check}" for check in rest]
     if passed:
-        items.append(f"pass: {', '.join(passed)}")
-    title = f"{report.file}: {report.verdict}"
+        items.append(f"no fault found: {', '.join(passed)}")
+    title = report.title
     if figures is None:
         return Section(title=title, items=tuple(items))
     drawn_from = figures if traces is None else traces

@@ -68,7 +68,7 @@ def fit_cylinder(
         open. Left out, a burn starts at the earliest at the injection or spark of its trace, and gamma stays in 1.15
         to 1.45 (linear law at 300 K: 1.28 to 1.45).
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
-        Conditions that a trace does not carry.
+        Conditions that a trace does not carry; a ``fuel_mg`` by name is the known fuel of such a trace.
     start_values : sequence of mapping, optional
         Start values of the per-trace parameters; from the heat release of the trace if left out.
     pegging, pegging_exponent, inlet_pressure_kpa

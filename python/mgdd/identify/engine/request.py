@@ -17,7 +17,7 @@ from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.pressure import one_cycle
 from mgdd.optimize.fit_options import FitOptions
-from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of
+from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of, stated
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -74,12 +74,13 @@ class Request:
         """Check the arguments of `fit_cylinder` against each other."""
         if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
             raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
-        cylinder, point = cylinder_of(cylinder), point_of(point)
+        cylinder, fuel_mg = cylinder_of(cylinder), stated("fuel_mg", None, point) or None
+        point = point_of(point)
         given = [one_cycle(trace) for trace in traces]
         if not given:
             raise DataError("no traces: a calibration needs at least one")
         chosen = None if free is None else (free,) if isinstance(free, str) else tuple(free)
-        heats = _known_heats(given, cylinder, fuel_heat_j, chosen)
+        heats = _known_heats(given, cylinder, fuel_heat_j, fuel_mg, chosen)
         noisy = any(_scatter_of_start(trace, cylinder) > _NOISY_START for trace in given)
         default = (*default_free(cylinder), *(("start_pressure_bar",) if noisy else ()))
         known = _all_known(heats)
@@ -260,13 +261,16 @@ def _known_heats(
     traces: Sequence[xr.Dataset],
     cylinder: Cylinder,
     fuel_heat_j: float | Sequence[float | None] | None,
+    fuel_mg: float | None,
     free: Sequence[str] | None,
 ) -> tuple[float | None, ...]:
-    """Give the known fuel heat of each trace: as given, or from its attribute ``fuel_mg``; all or none."""
+    """Give the known fuel heat of each trace: as given, by its attribute or the stated ``fuel_mg``; all or none."""
+    if fuel_heat_j is not None and fuel_mg is not None:
+        raise ParameterError("fuel_heat_j and point['fuel_mg'] both say the fuel: give one")
     heats: tuple[float | None, ...]
     if fuel_heat_j is None:
         per_mg = cylinder.lower_heating_value_mj_per_kg
-        masses = [trace.attrs.get("fuel_mg") for trace in traces]
+        masses = [trace.attrs.get("fuel_mg", fuel_mg) for trace in traces]
         heats = tuple(None if mass is None else float(mass) * per_mg for mass in masses)
         if free is not None and "fuel_heat_j" in free:
             return (None,) * len(traces)
