@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.engine.motored import motored_tdc
+from mgdd.engine.dead_centre import motored_tdc
 from mgdd.engine.trace import conditions
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.results.labels import ANGLE

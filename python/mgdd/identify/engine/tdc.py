@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import analyze
-from mgdd.engine.motored import MODEL_CAD, motored_tdc
+from mgdd.engine.dead_centre import MODEL_CAD, motored_tdc
 from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.identify.engine.cylinder import fit_request
