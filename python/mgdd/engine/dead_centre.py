@@ -9,12 +9,10 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError
-from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import xarray as xr
     from numpy.typing import NDArray
 
     from mgdd._core.engine import Cylinder, OperatingPoint
@@ -64,16 +62,18 @@ class DegreeCost(NamedTuple):
         share = "" if math.isnan(self.error_percent) else f" ({self.error_percent:.2g} %)"
         return f"1 °CA moves the closed IMEP by {self.error_bar:.2g} bar{share}"
 
+    def of_fired(self) -> str:
+        """Say what a fired trace leaves open."""
+        return f"a fired trace hardly shows an error of TDC, and {self}"
 
-def degree_cost(trace: xr.Dataset, cylinder: Cylinder) -> DegreeCost:
+
+def degree_cost(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder) -> DegreeCost:
     """Give what an error of TDC of one degree costs, of one cycle or of the mean of many: work is linear in pressure.
 
     The samples from IVC to EVO are put on the volumes half a degree earlier and later.
     """
-    angle = trace[ANGLE].to_numpy()
-    bar = np.atleast_2d(trace["pressure_bar"].transpose(..., ANGLE).to_numpy()).mean(axis=0)
-    closed = (angle >= cylinder.ivc_cad) & (angle <= cylinder.evo_cad)
-    angle, bar = angle[closed], bar[closed]
+    closed = (angle_cad >= cylinder.ivc_cad) & (angle_cad <= cylinder.evo_cad)
+    angle, bar = angle_cad[closed], pressure_bar[closed]
 
     def imep(error: float) -> float:
         return float(np.trapezoid(bar, _core.engine.volume_l(cylinder, angle + error)) / cylinder.swept_volume_l)

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["TdcEstimate", "estimate_tdc"]
 
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
-_MODEL_CAD = 0.3  # what another burn law or gamma law moves the least RMSE, seen on simulated and measured traces
+# Gamma of charge and burned gas, at 300 K and its slope; at 3500 K it stays above 1.
+_GAS = {"gamma_linear_300k": (1.36, 1.45), "gamma_linear_slope_per_k": (-1.1e-4, -2.0e-5)}
+_MODEL_CAD = 0.4  # what another burn law, gas and wall move the least RMSE on engines that share no code with the package
 _ENDS = (("low_cad", "lowest"), ("high_cad", "highest"))
 _STEP_CAD = 0.25
 
@@ -204,7 +206,7 @@ def estimate_tdc(
         point=point, start_values=None, step_cad=0.5, integrator="trapezoid", options=None,
     )  # fmt: skip
     kinds = [bool(analyze(t, cylinder, point=point, quiet=True).attrs["motored"]) for t in request.traces]
-    cost = DegreeCost.of_many([degree_cost(trace, cylinder) for trace in request.traces])
+    cost = DegreeCost.of_many([degree_cost(*closed(trace, cylinder), cylinder) for trace in request.traces])
     if all(kinds):
         return _of_motored(request, cost)
     if any(kinds):
@@ -240,10 +242,7 @@ def _of_motored(request: Request, cost: DegreeCost) -> TdcEstimate:
 def _of_fired(
     request: Request, cost: DegreeCost, span_cad: float, progress: Callable[[str], None] | None
 ) -> TdcEstimate:
-    cylinder = request.cylinder
-    if cylinder.gamma_model == "constant":  # that of a real charge falls as it burns: a constant one moves TDC by 1 CAD
-        cylinder = cylinder.replace(gamma_model="linear")
-    request = of_law(request, cylinder, (GAMMA_PARAMETER[cylinder.gamma_model], "wall_heat_scale"))
+    request = _with_gas(request)
     fits: dict[float, CylinderFit] = {}
     count = round(span_cad / _STEP_CAD)
     for step in sorted(range(-count, count + 1), key=abs):
@@ -251,6 +250,7 @@ def _of_fired(
         if progress is not None:
             progress(f"calibrate with {offset:+.2f} CAD taken off")
         fits[offset] = _best_at(request, offset, fits)
+    _smooth(request, fits)
     offsets = np.array(sorted(fits))
     rmse = np.array([100.0 * fits[offset].report.rmse for offset in offsets])
     if not np.isfinite(rmse).any():
@@ -279,6 +279,19 @@ def _of_fired(
     )
 
 
+def _with_gas(request: Request) -> Request:
+    """Free what moves TDC by as much as 1 CAD: wall heat, and gamma with its fall over temperature.
+
+    A constant gamma is made linear: that of a real charge falls as it is heated and burns.
+    """
+    cylinder = request.cylinder
+    if cylinder.gamma_model == "polynomial":
+        return of_law(request, cylinder, (GAMMA_PARAMETER["polynomial"], "wall_heat_scale"))
+    start = {name: min(max(float(getattr(cylinder, name)), low), high) for name, (low, high) in _GAS.items()}
+    made = of_law(request, cylinder.replace(gamma_model="linear", **start), (*_GAS, "wall_heat_scale"))
+    return replace(made, bounds={**_GAS, **made.bounds})
+
+
 def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
     """Fit at one offset, from the heat release and from the neighbour that is fitted: the better of both."""
     moved = request.shifted(angle_cad=-offset)
@@ -289,9 +302,26 @@ def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -
         if not known:
             raise
     if known:
-        near = known[min(known, key=lambda other: abs(other - offset))]
-        found.append(fit_request(replace(moved, cylinder=near.model, start_values=starts_of(near))))
-    return min(found, key=lambda fit: fit.report.rmse if np.isfinite(fit.report.rmse) else np.inf)
+        found.append(_from(known[min(known, key=lambda other: abs(other - offset))], moved))
+    return min(found, key=_rmse)
+
+
+def _from(near: CylinderFit, moved: Request) -> CylinderFit:
+    return fit_request(replace(moved, cylinder=near.model, start_values=starts_of(near)))
+
+
+def _smooth(request: Request, fits: dict[float, CylinderFit]) -> None:
+    """Fit again, outwards from the best, from the inner neighbour: the first fits may stay in another minimum."""
+    offsets = sorted(fits)
+    best = min(range(len(offsets)), key=lambda k: _rmse(fits[offsets[k]]))
+    for way in (range(best - 1, -1, -1), range(best + 1, len(offsets))):
+        for k in way:
+            near, offset = fits[offsets[k - way.step]], offsets[k]
+            fits[offset] = min(fits[offset], _from(near, request.shifted(angle_cad=-offset)), key=_rmse)
+
+
+def _rmse(fit: CylinderFit) -> float:
+    return fit.report.rmse if np.isfinite(fit.report.rmse) else math.inf
 
 
 def _vertex(x: np.ndarray, y: np.ndarray, at: int) -> float:
