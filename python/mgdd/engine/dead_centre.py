@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["DegreeCost", "MotoredTdc", "degree_cost", "motored_tdc", "reaches"]
+__all__ = ["DegreeCost", "MotoredTdc", "degree_cost", "motored_tdc"]
 
 # Distances from TDC that are compared: nearer ones hold the peak alone, farther ones the flows of the valves.
-_FROM_CAD, _TO_CAD, _LEAST_CAD, _ROUNDS = 5.0, 60.0, 65.0, 5
+_FROM_CAD, _TO_CAD, _ROUNDS = 5.0, 60.0, 5
 _PEAK_CAD, _START_CAD = 8.0, 20.0
 # Of the motored gas, which is air: gamma within 0.003 from 400 to 950 K.
 _GAS_J_PER_KGK, _GAMMA_300K, _GAMMA_SLOPE_PER_K = 287.0, 1.40, 9.5e-5
@@ -132,11 +132,6 @@ class _Strokes(NamedTuple):
         return np.column_stack([self.walls[law], -self.degree])
 
 
-def reaches(angle_cad: Array) -> bool:
-    """Whether a closed part holds the strokes that are compared."""
-    return bool(angle_cad.size and angle_cad[0] <= -_LEAST_CAD and angle_cad[-1] >= _LEAST_CAD)
-
-
 def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point: OperatingPoint) -> MotoredTdc:
     """Find TDC by the heat balance of the two strokes of one motored cycle, which reaches 65 degrees to each side.
 
@@ -146,11 +141,6 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
     and Annand, each with a scale of its own. The range holds the spread of the laws, and what the temperatures, the gap
     and the crevice, which nobody states, move.
     """
-    if not reaches(angle_cad):
-        raise DataError(
-            f"the closed part runs from {angle_cad[0]:g} to {angle_cad[-1]:g} °CA aTDC: TDC of a motored trace needs "
-            f"{-_LEAST_CAD:g} to {_LEAST_CAD:g}"
-        )
     distance = np.arange(_FROM_CAD, _TO_CAD, max(float(np.median(np.diff(angle_cad))), 0.1))
     charge_k = _charge_k(angle_cad, pressure_bar, cylinder, point)
 
@@ -172,7 +162,7 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
         strokes(offset, wall_k=_WALL_K).solved(),
     ]
     off = [(each - found).mean(axis=0) for each in moved]
-    noise = _noise(own, found)
+    noise, scatter = _noise(own, found)
     laws = _LAWS_FACTOR * float(found[:, 1].std(ddof=1))
     offset_half = math.hypot(*(each[1] for each in off), noise[1], laws, _REST_CAD)
     scale = float(found[_HOHENBERG, 0])
@@ -180,12 +170,12 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
     low, high = _SOUND_SCALES
     findings = []
     # The highest sound scale holds what temperatures move; the lowest has neither gap nor crevice.
-    if scale - noise[0] > high or scale + off[0][0] + off[1][0] + noise[0] < low:
+    if scale - scatter[0] > high or scale + off[0][0] + off[1][0] + noise[0] < low:
         findings.append(
             f"the two strokes need {scale:.2g} times Hohenberg's wall heat, sound engines {low:g} to {high:g}: suspect "
             "blow-by, compression ratio, speed, thermal shock or a burn; such a record does not show TDC"
         )
-    if loss - math.hypot(offset_half, _NOISE_FACTOR * peak_stderr) > _SOUND_LOSS_CAD:
+    if loss - math.hypot(scatter[1], _NOISE_FACTOR * peak_stderr) > _SOUND_LOSS_CAD:
         findings.append(
             f"the peak stands {loss:.2f} °CA before TDC, in sound engines at most {_SOUND_LOSS_CAD:g}: suspect blow-by "
             "and TDC"
@@ -260,14 +250,19 @@ def _films(cylinder: Cylinder, speed_rpm: float, bar: Array, kelvin: Array, volu
     ]
 
 
-def _noise(strokes: _Strokes, found: Array) -> Array:
-    """Give what noise moves the scale and the angle by Hohenberg's law; what the balance leaves is alike nearby."""
+def _noise(strokes: _Strokes, found: Array) -> tuple[Array, Array]:
+    """Give what may move the scale and the angle by Hohenberg's law: what the balance leaves, and its scatter alone.
+
+    What is left is alike nearby where the balance does not hold, and then counts for less samples.
+    """
     design = strokes.design(_HOHENBERG)
     left = strokes.loss - strokes.gap - strokes.crevice - design @ found[_HOHENBERG]
     square = float(left @ left)
     alike = min(max(float(left[1:] @ left[:-1]) / square, 0.0), _ALIKE)
-    variance = square / (left.size - 2) * (1.0 + alike) / (1.0 - alike)
-    return np.asarray(_NOISE_FACTOR * np.sqrt(variance * np.diag(np.linalg.inv(design.T @ design))))
+    whole = square / (left.size - 2) * (1.0 + alike) / (1.0 - alike)
+    alone = 0.5 * float(np.mean(np.diff(left) ** 2))
+    unit = _NOISE_FACTOR * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    return np.sqrt(whole) * unit, np.sqrt(alone) * unit
 
 
 def _peak_cad(angle: Array, bar: Array) -> tuple[float, float]:

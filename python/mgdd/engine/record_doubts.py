@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.engine.dead_centre import motored_tdc, reaches
+from mgdd.engine.dead_centre import motored_tdc
 from mgdd.engine.trace import conditions
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.results.labels import ANGLE
@@ -44,11 +44,8 @@ def _of_tdc(
         return []
     mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
     closed = (angle >= engine.ivc_cad) & (angle <= engine.evo_cad)
-    if not reaches(angle[closed]):
-        return []
-    return [
-        ("tdc", text) for text in motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point)).doubts()
-    ]
+    doubts = motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point)).doubts()
+    return [("strokes", "; ".join(doubts))] if doubts else []
 
 
 def _columns(trace: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
