@@ -123,7 +123,7 @@ def analyze(
         ``heat_from_cad heat_to_cad heat_gross_j work_closed_j t_max_k trapped_mass_g tdc_offset_cad
         compression_offset_bar`` and those of `Indicating`, NaN where the trace does not reach.
         Burn angles are NaN for a motored trace, ``tdc_offset_cad`` (what its angles are too
-        large by, good to 0.7 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
+        large by, good to 1.4 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
         ``dp_max``, ``mass_source``, ``heat_window`` (``found``, ``given``, ``whole`` or ``no burn found``),
         ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per
         line), ``doubts`` (the kind of each) and ``open``: what a fired trace does not show, an error of TDC, with what

@@ -184,12 +184,13 @@ def estimate_tdc(
 
     Notes
     -----
-    Motored: with d degrees to each side of TDC, ln p(d)/p(-d) is a scale times what wall heat makes of it in the cycle
-    model, and the offset times 2 n d ln V/d phi, by least squares from 5 to 60; on engines with another wall heat and
-    gas that is good to 0.1 CAD (Pipitone et al. 2007 ask for that). Fired: the double
-    Wiebe law with gamma and wall heat fitted at each offset;
-    offsets whose RMSE stays within a quarter of the least are possible, and 0.3 CAD to each side, by which another burn
-    or gamma law moves the least.
+    Motored: from d degrees before to d after TDC, d from 5 to 60, ln p + ∫ gamma d ln V falls by what walls, ring gap
+    and crevice take, and rises by 2 gamma d ln V/d phi for each degree that the angles are too large. The heat follows
+    from the measured pressure by the laws of Woschni, Hohenberg, Eichelberg and Annand, each with a scale that is
+    fitted; the range holds their spread, noise, and what temperatures, gap and crevice, which nobody states, move.
+    Fired: the double Wiebe law with wall heat, gamma and its slope over temperature fitted at each offset; offsets whose
+    RMSE stays within a quarter of the least are possible, and 0.5 CAD to each side, by which another gas and wall move
+    it. ``docs/validation.md`` has both on engines that share no code with the package.
 
     Examples
     --------
