@@ -107,6 +107,13 @@ def test_a_peak_far_before_tdc_is_doubted() -> None:
     assert any("before TDC, in sound engines at most 1.3" in text for text in found.doubts())
 
 
+@pytest.mark.parametrize("level", [-3.0, -0.5, 5.0])
+def test_a_motored_record_of_a_wrong_level_is_judged_all_the_same(level: float) -> None:
+    engine, angle, bar = motored("spark", 0, cycles=2)
+    found = trust(said_of(engine, angle, bar + level), engine.cylinder())
+    assert found.verdict in ("doubt", "fail")
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fired_trace_says_what_a_degree_costs(kind: str) -> None:
     """Against the work of the engine's own volumes, with the angles half a degree to each side."""

@@ -23,7 +23,8 @@ __all__ = ["DegreeCost", "MotoredTdc", "degree_cost", "motored_tdc"]
 
 # Distances from TDC that are compared: nearer ones hold the peak alone, farther ones the flows of the valves.
 _FROM_CAD, _TO_CAD, _ROUNDS = 5.0, 60.0, 5
-_PEAK_CAD, _START_CAD = 8.0, 20.0
+_PEAK_CAD, _START_CAD, _FARTHEST_CAD = 8.0, 20.0, 5.0
+_LEAST_BAR = 0.05  # a level below zero is found elsewhere
 # Of the motored gas, which is air: gamma within 0.003 from 400 to 950 K.
 _GAS_J_PER_KGK, _GAMMA_300K, _GAMMA_SLOPE_PER_K = 287.0, 1.40, 9.5e-5
 # What nobody states, and how far it may be off: the charge at IVC over the intake [K], which no burned gas heats; the
@@ -84,26 +85,24 @@ def degree_cost(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder) -> De
 class MotoredTdc(NamedTuple):
     """What motored strokes say: by how much the angles are too large, and what no sound engine has.
 
-    A half is how far a figure may be off to each side; the wall heat is over Hohenberg's, the loss angle that of the
-    peak before TDC.
+    The half is how far the offset may be off to each side; the wall heat is over Hohenberg's, the loss angle that of
+    the peak before TDC.
     """
 
     offset_cad: float
     offset_half_cad: float
     wall_heat_scale: float
-    wall_heat_half: float
     loss_angle_cad: float
     findings: tuple[str, ...]
 
     @classmethod
     def of_many(cls, found: Sequence[Self]) -> Self:
         """Give what several records of one encoder say: their mean, with twice their scatter."""
-        numbers = np.array([each[:5] for each in found])
-        offset, offset_half, wall, wall_half, loss = map(float, numbers.mean(axis=0))
-        scatter = 2.0 * numbers.std(axis=0)
-        halves = float(np.hypot(offset_half, scatter[0])), float(np.hypot(wall_half, scatter[2]))
+        numbers = np.array([each[:4] for each in found])
+        offset, half, wall, loss = map(float, numbers.mean(axis=0))
+        half = math.hypot(half, 2.0 * float(numbers[:, 0].std()))
         findings = dict.fromkeys(text for each in found for text in each.findings)
-        return cls(offset, halves[0], wall, halves[1], loss, tuple(findings))
+        return cls(offset, half, wall, loss, tuple(findings))
 
     def doubts(self) -> tuple[str, ...]:
         """Say that the angles are outside the range, and what no sound engine has."""
@@ -133,7 +132,7 @@ class _Strokes(NamedTuple):
 
 
 def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point: OperatingPoint) -> MotoredTdc:
-    """Find TDC by the heat balance of the two strokes of one motored cycle, which reaches 65 degrees to each side.
+    """Find TDC by the heat balance of the two strokes of one motored cycle, which reaches 80 degrees to each side.
 
     From d degrees before to d after TDC, ln p + ∫ gamma d ln V falls by what the walls, a gap at the rings and a
     crevice take, and rises by 2 gamma d ln V/d phi for each degree that the angles are too large: near TDC the one is
@@ -141,6 +140,7 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
     and Annand, each with a scale of its own. The range holds the spread of the laws, and what the temperatures, the gap
     and the crevice, which nobody states, move.
     """
+    pressure_bar = np.maximum(pressure_bar, _LEAST_BAR)
     distance = np.arange(_FROM_CAD, _TO_CAD, max(float(np.median(np.diff(angle_cad))), 0.1))
     charge_k = _charge_k(angle_cad, pressure_bar, cylinder, point)
 
@@ -153,6 +153,7 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
     offset = peak
     for _ in range(_ROUNDS):  # the step is linear in a small offset only
         offset += float(strokes(offset).solved()[:, 1].mean())
+        offset = min(max(offset, peak - _FARTHEST_CAD), peak + _FARTHEST_CAD)
     own = strokes(offset)
     found = own.solved()
     moved = [
@@ -180,8 +181,7 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
             f"the peak stands {loss:.2f} °CA before TDC, in sound engines at most {_SOUND_LOSS_CAD:g}: suspect blow-by "
             "and TDC"
         )
-    wall_half = math.hypot(*(each[0] for each in off), noise[0])
-    return MotoredTdc(offset, offset_half, scale, wall_half, loss, tuple(findings))
+    return MotoredTdc(offset, offset_half, scale, loss, tuple(findings))
 
 
 def _charge_k(angle: Array, bar: Array, cylinder: Cylinder, point: OperatingPoint) -> float:
@@ -261,7 +261,7 @@ def _noise(strokes: _Strokes, found: Array) -> tuple[Array, Array]:
     alike = min(max(float(left[1:] @ left[:-1]) / square, 0.0), _ALIKE)
     whole = square / (left.size - 2) * (1.0 + alike) / (1.0 - alike)
     alone = 0.5 * float(np.mean(np.diff(left) ** 2))
-    unit = _NOISE_FACTOR * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    unit = _NOISE_FACTOR * np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
     return np.sqrt(whole) * unit, np.sqrt(alone) * unit
 
 

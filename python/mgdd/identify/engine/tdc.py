@@ -188,9 +188,9 @@ def estimate_tdc(
     and crevice take, and rises by 2 gamma d ln V/d phi for each degree that the angles are too large. The heat follows
     from the measured pressure by the laws of Woschni, Hohenberg, Eichelberg and Annand, each with a scale that is
     fitted; the range holds their spread, noise, and what temperatures, gap and crevice, which nobody states, move.
-    Fired: the double Wiebe law with wall heat, gamma and its slope over temperature fitted at each offset; offsets whose
-    RMSE stays within a quarter of the least are possible, and 0.5 CAD to each side, by which another gas and wall move
-    it. ``docs/validation.md`` has both on engines that share no code with the package.
+    Fired: the double Wiebe law with wall heat, gamma and its slope over temperature fitted at each offset; offsets
+    whose RMSE stays within a quarter of the least are possible, and 0.5 CAD to each side, by which another gas and wall
+    move it. ``docs/validation.md`` has both on engines that share no code with the package.
 
     Examples
     --------
