@@ -254,12 +254,12 @@ CASES = {
     **{f"pegging {x:+.1f} bar, fired": lambda r, x=x: errored(r, LEVEL, level_bar=x) for x in (-0.3, 0.3)},
     **{
         f"TDC {x:+.1f} CAD, motored": lambda r, x=x: errored(r, TDC, motored=True, angle_cad=x)
-        for x in (-3.0, -1.0, -0.2, 0.2, 1.0, 3.0)
+        for x in (-3.0, -1.0, -0.5, 0.5, 1.0, 3.0)
     },
     **{f"TDC {x:+.1f} CAD, fired": lambda r, x=x: errored(r, TDC, angle_cad=x) for x in (-3.0, -1.0, 1.0, 3.0)},
     **{
         f"estimate_tdc {x:+.1f} CAD, motored": lambda r, x=x: calibrated(r, x, motored=True)
-        for x in (-3.0, -1.0, -0.2, 0.0, 0.2, 1.0, 3.0)
+        for x in (-3.0, -1.0, -0.5, 0.0, 0.5, 1.0, 3.0)
     },
     **{f"estimate_tdc {x:+.1f} CAD, fired": lambda r, x=x: calibrated(r, x) for x in (-3.0, -1.0, 0.0, 1.0, 3.0)},
     "trapped mass in kg": lambda r: errored(r, MASS, mass=1e-3),

@@ -109,7 +109,7 @@ FAULTS = {
     "thermal shock": Fault(shocked, "expansion,gas exchange,level", needs="fired"),
     "gain 0.85, fuel and BMEP stated": Fault(gain(0.85), "work and heat,file", needs="fired"),
     "gain 1.25, fuel and BMEP stated": Fault(gain(1.25), "work and heat,file", needs="fired"),
-    **{f"TDC {x:+g}, motored": Fault(shifted(x), TDC, needs="motored") for x in (-3.0, -1.0, -0.2, 0.2, 1.0, 3.0)},
+    **{f"TDC {x:+g}, motored": Fault(shifted(x), TDC, needs="motored") for x in (-3.0, -1.0, -0.5, 0.5, 1.0, 3.0)},
     "TDC -3, fired": Fault(shifted(-3.0), TDC, needs="fired"),
 }
 # Nothing in the pressure alone shows these: an error of TDC of a fired record looks like another burn, and a gain below

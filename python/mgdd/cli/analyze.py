@@ -171,16 +171,19 @@ def _one(
         "gamma": named,
         **{name: result.attrs[name] for name in ("fractions", "smoothing", "heat_window", "mass_source", "motored")},
         "warnings": result.attrs["warnings"].splitlines(),
+        "open": result.attrs["open"].splitlines(),
     }
     text: list[str | Table] = _table(payload) if "cycles" in payload else [lines(payload)]
+    if not args.tdc:
+        text += [f"open: {each}; --tdc scans it, a motored record shows it" for each in payload["open"]]
     if args.tdc:
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
         payload["tdc"] = found.figures
         payload["warnings"] += found.doubts()
         for doubt in found.doubts():
             _LOG.warning("%s: %s", payload["file"], doubt)
-        low, high = payload["tdc"]["low_cad"], payload["tdc"]["high_cad"]
-        text.append(f"TDC offset {payload['tdc']['tdc_offset_cad']:+.2f} °CA, {low:+.2f} to {high:+.2f} possible")
+        place = f"{found.tdc_offset_cad:+.2f} °CA, {found.low_cad:+.2f} to {found.high_cad:+.2f} possible"
+        text.append(f"TDC offset {place}; {found.cost}")
     return result, payload, text
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.engine.motored import motored_tdc
+from mgdd.engine.dead_centre import motored_tdc
 from mgdd.engine.trace import conditions
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.results.labels import ANGLE
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["record_doubts"]
 
-# Error of TDC of a motored record [°CA] that is told from what the model leaves, at most 0.08 of 100 engines.
-_TDC_CAD, _COARSE_CAD = 0.12, 2.5
+_COARSE_CAD = 2.5
 # Level of a cycle [bar]: off the median by more than this and six robust deviations, or drifting from first to last.
 _OFF_BAR, _OFF_SCATTERS, _DRIFT_BAR, _DRIFT_STDERRS = 0.1, 6.0, 0.1, 5.0
 # Over gas exchange: absolute pressures and pumping work that engines have, and the step at intake bottom dead centre.
@@ -45,10 +44,8 @@ def _of_tdc(
         return []
     mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
     closed = (angle >= engine.ivc_cad) & (angle <= engine.evo_cad)
-    tdc = motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point))
-    if abs(tdc.offset_cad) <= _TDC_CAD + 2.0 * tdc.stderr_cad:
-        return []
-    return [("tdc", f"the two strokes have the angles {tdc.offset_cad:+.2f} °CA too large")]
+    doubts = motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point)).doubts()
+    return [("strokes", "; ".join(doubts))] if doubts else []
 
 
 def _columns(trace: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.engine.dead_centre import degree_cost
 from mgdd.engine.trace_cycles import COLUMNS, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.pressure import as_trace
@@ -124,10 +125,11 @@ def analyze(
         ``heat_from_cad heat_to_cad heat_gross_j work_closed_j t_max_k trapped_mass_g tdc_offset_cad
         compression_offset_bar`` and those of `Indicating`, NaN where the trace does not reach.
         Burn angles are NaN for a motored trace, ``tdc_offset_cad`` (what its angles are too
-        large by, good to 0.7 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
+        large by, good to 1.4 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
         ``dp_max``, ``mass_source``, ``heat_window`` (``found``, ``given``, ``whole`` or ``no burn found``),
         ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per
-        line) and ``doubts`` (the kind of each).
+        line), ``doubts`` (the kind of each) and ``open``: what a fired trace does not show, an error of TDC, with what
+        1 °CA of it does to the closed IMEP.
 
         Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand mean,
         deviation, percentiles and COV, ``misfire`` and ``partial_burn`` as `Indicating.record` gives them,
@@ -240,6 +242,7 @@ def analyze(
     return result.assign_attrs(
         warnings="\n".join([*doubted, *result.attrs["warnings"].splitlines()]),
         doubts="\n".join([*("reading" for _ in doubted), *result.attrs["doubts"].splitlines()]),
+        open="" if simulated else result.attrs["open"],  # nobody read its angles
     )
 
 
@@ -287,6 +290,7 @@ def _one(
             "motored": int(raw["motored"]),
             "warnings": "\n".join(raw["warnings"]),
             "doubts": "\n".join(raw["doubts"]),
+            "open": "" if raw["motored"] else degree_cost(raw[ANGLE], raw["pressure_bar"], cylinder).of_fired(),
         },
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.engine.dead_centre import degree_cost
 from mgdd.engine.ringing import ringing, spectrum_of
 from mgdd.errors import DataError
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
@@ -80,6 +81,7 @@ def of_cycles(
             found = spectrum_of(own, pressure, options, point.speed_rpm, keep=traces)
             spectrum = found if spectrum is None else found._replace(total=spectrum.total + found.total)
     raw = raws[0]
+    motored = int(sum(sum(each["motored"]) for each in raws))
     mean = _core.engine.analyze(angle, total[0] / n, cylinder, point, _core.engine.TraceOptions(**options))
     columns: dict[str, tuple[Any, ...]] = {}
     if traces:
@@ -113,9 +115,10 @@ def of_cycles(
             "heat_window": given or ("found" if any(any(each["window_found"]) for each in raws) else "no burn found"),
             "cycles": n,
             "knock_band_hz": (options["knock_low_hz"], options["knock_high_hz"]),
-            "motored": int(sum(sum(each["motored"]) for each in raws)),
+            "motored": motored,
             "warnings": "\n".join(lines),
             "doubts": "\n".join(kinds),
+            "open": "" if motored == n else degree_cost(mean[ANGLE], mean["pressure_bar"], cylinder).of_fired(),
         },
     )
 

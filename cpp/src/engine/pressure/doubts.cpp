@@ -163,9 +163,8 @@ void doubt_dead_centre(TraceAnalysis& a) {
   if (peak < motored_peak_low_cad || peak > motored_peak_high_cad) {
     a.warnings.push_back({"tdc", "the trace is motored but peaks at " + shown(peak) + " °CA aTDC, not at " +
                                      shown(motored_peak_low_cad) + " to " + shown(motored_peak_high_cad) +
-                                     ": suspect a TDC offset; both strokes compared put it at " +
-                                     shown(a.tdc_offset_cad) +
-                                     " °CA; if it was fired, suspect thermal shock of the sensor"});
+                                     ": suspect a TDC offset, which estimate_tdc places; if it was fired, suspect "
+                                     "thermal shock of the sensor"});
   }
 }
 

@@ -95,7 +95,8 @@ class Calibration:
             ]
         if self.unidentifiable():
             out += ["", f"not identifiable: {', '.join(self.unidentifiable())}"]
-        out += ["", f"TDC offset {tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
+        place = f"{tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"
+        out += ["", f"TDC offset {place}; {tdc.cost}"]
         if self.doubts():
             out += ["", "limitations found:", *(f"  - {text}" for text in self.doubts())]
         out += ["", "every burn law on the same traces:"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import analyze
-from mgdd.engine.motored import MODEL_CAD, motored_tdc
+from mgdd.engine.dead_centre import DegreeCost, MotoredTdc, degree_cost, motored_tdc
 from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.identify.engine.cylinder import fit_request
@@ -29,9 +29,12 @@ if TYPE_CHECKING:
 __all__ = ["TdcEstimate", "estimate_tdc"]
 
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
-_MODEL_CAD = 0.3  # what another burn law or gamma law moves the least RMSE, seen on simulated and measured traces
+# Gamma of charge and burned gas, at 300 K and its slope; at 3500 K it stays above 1.
+_GAS = {"gamma_linear_300k": (1.36, 1.45), "gamma_linear_slope_per_k": (-1.1e-4, -2.0e-5)}
+_MODEL_CAD = (
+    0.5  # what another burn law, gas and wall move the least RMSE on engines that share no code with the package
+)
 _ENDS = (("low_cad", "lowest"), ("high_cad", "highest"))
-_PEAK_CAD = 5.0
 _STEP_CAD = 0.25
 
 
@@ -48,8 +51,15 @@ class TdcEstimate(Result):
         Range of offsets that the traces do not separate [°CA].
     method : {"motored strokes", "residual of the calibration"}
         How it was found.
+    imep_closed_bar, imep_error_bar : float
+        Closed IMEP of the traces as they stand, and by how much more it reads with angles that are 1 °CA too large
+        [bar]: the means.
     loss_angle_cad : float
         Motored: by what the peak comes before TDC [°CA]; NaN if fired.
+    wall_heat_scale : float
+        Motored: the wall heat that the strokes need, over that of Hohenberg (1979) [-]; NaN if fired.
+    findings : tuple of str
+        Motored: what no sound engine has, a wall heat outside 0.2 to 2.5 or a peak more than 1.3 °CA before TDC.
     others_cad : tuple of float
         Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
@@ -69,7 +79,11 @@ class TdcEstimate(Result):
     low_cad: float
     high_cad: float
     method: str
+    imep_closed_bar: float
+    imep_error_bar: float
     loss_angle_cad: float = math.nan
+    wall_heat_scale: float = math.nan
+    findings: tuple[str, ...] = ()
     others_cad: tuple[float, ...] = ()
     dataset: xr.Dataset = field(repr=False)
 
@@ -80,9 +94,20 @@ class TdcEstimate(Result):
 
     @property
     def figures(self) -> dict[str, Any]:
-        """The estimate as plain values."""
-        names = ("method", "tdc_offset_cad", "low_cad", "high_cad", "suspect")
-        return {**{name: getattr(self, name) for name in names}, "others_cad": list(self.others_cad)}
+        """The estimate as plain values; what the method does not give is None."""
+        names = ("method", "tdc_offset_cad", "low_cad", "high_cad", "suspect", "imep_closed_bar", "imep_error_bar")
+        motored = {name: getattr(self, name) for name in ("loss_angle_cad", "wall_heat_scale")}
+        return {
+            **{name: getattr(self, name) for name in names},
+            **{name: None if math.isnan(own) else own for name, own in motored.items()},
+            "findings": list(self.findings),
+            "others_cad": list(self.others_cad),
+        }
+
+    @property
+    def cost(self) -> str:
+        """What a degree costs, in words."""
+        return str(DegreeCost(self.imep_closed_bar, self.imep_error_bar))
 
     @property
     def suspect(self) -> bool:
@@ -90,7 +115,7 @@ class TdcEstimate(Result):
         return not self.low_cad <= 0.0 <= self.high_cad
 
     def doubts(self) -> list[str]:
-        """Say in words that the angles are outside the range.
+        """Say in words that the angles are outside the range, and what no sound engine has.
 
         Returns
         -------
@@ -98,7 +123,7 @@ class TdcEstimate(Result):
             Empty where they are inside.
         """
         if not self.suspect:
-            return []
+            return list(self.findings)
         edge = "tdc_offset_cad" in self.dataset and abs(self.tdc_offset_cad) >= abs(
             float(self.dataset["tdc_offset_cad"][0])
         )
@@ -107,8 +132,9 @@ class TdcEstimate(Result):
             if edge
             else f"{self.low_cad:+.2f} to {self.high_cad:+.2f} possible"
         )
-        said = f"the {self.method} has the angles {self.tdc_offset_cad:+.2f} °CA too large ({how}): suspect TDC"
-        return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off"]
+        shown = f"{self.tdc_offset_cad:+.2f} °CA too large ({how}; {self.cost})"
+        said = f"the {self.method} has the angles {shown}: suspect TDC"
+        return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off", *self.findings]
 
     def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.calibration import tdc_scan
@@ -158,12 +184,13 @@ def estimate_tdc(
 
     Notes
     -----
-    Motored: with d degrees to each side of TDC, ln p(d)/p(-d) is a scale times what wall heat makes of it in the cycle
-    model, and the offset times 2 n d ln V/d phi, by least squares from 5 to 60; on engines with another wall heat and
-    gas that is good to 0.1 CAD (Pipitone et al. 2007 ask for that). Fired: the double
-    Wiebe law with gamma and wall heat fitted at each offset;
-    offsets whose RMSE stays within a quarter of the least are possible, and 0.3 CAD to each side, by which another burn
-    or gamma law moves the least.
+    Motored: from d degrees before to d after TDC, d from 5 to 60, ln p + ∫ gamma d ln V falls by what walls, ring gap
+    and crevice take, and rises by 2 gamma d ln V/d phi for each degree that the angles are too large. The heat follows
+    from the measured pressure by the laws of Woschni, Hohenberg, Eichelberg and Annand, each with a scale that is
+    fitted; the range holds their spread, noise, and what temperatures, gap and crevice, which nobody states, move.
+    Fired: the double Wiebe law with wall heat, gamma and its slope over temperature fitted at each offset; offsets
+    whose RMSE stays within a quarter of the least are possible, and 0.5 CAD to each side, by which another gas and wall
+    move it. ``docs/validation.md`` has both on engines that share no code with the package.
 
     Examples
     --------
@@ -182,49 +209,43 @@ def estimate_tdc(
         point=point, start_values=None, step_cad=0.5, integrator="trapezoid", options=None,
     )  # fmt: skip
     kinds = [bool(analyze(t, cylinder, point=point, quiet=True).attrs["motored"]) for t in request.traces]
+    cost = DegreeCost.of_many([degree_cost(*closed(trace, cylinder), cylinder) for trace in request.traces])
     if all(kinds):
-        return _of_motored(request)
+        return _of_motored(request, cost)
     if any(kinds):
         names = ", ".join(label for label, motored in zip(request.labels, kinds, strict=True) if motored)
         raise DataError(f"motored and fired traces together ({names} motored): estimate TDC from one kind")
-    return _of_fired(request, span_cad, progress)
+    return _of_fired(request, cost, span_cad, progress)
 
 
-def _of_motored(request: Request) -> TdcEstimate:
-    offsets, errors, losses = [], [], []
+def _of_motored(request: Request, cost: DegreeCost) -> TdcEstimate:
+    strokes = []
     for trace, label in zip(request.traces, request.labels, strict=True):
-        angle, pressure = closed(trace, request.cylinder)
-        peak = _peak_cad(angle, pressure, label)
-        found = motored_tdc(angle, pressure, request.cylinder, conditions(trace, request.point))
-        offsets.append(found.offset_cad)
-        errors.append(found.stderr_cad)
-        losses.append(found.offset_cad - peak)
-    offset = float(np.mean(offsets))
-    wide = MODEL_CAD + 2.0 * max(float(np.mean(errors)), float(np.std(offsets)))
+        try:
+            strokes.append(
+                motored_tdc(*closed(trace, request.cylinder), request.cylinder, conditions(trace, request.point))
+            )
+        except DataError as error:
+            raise error.reworded(f"{label}: {error}") from None
+    found = MotoredTdc.of_many(strokes)
     return TdcEstimate(
-        tdc_offset_cad=offset,
-        low_cad=offset - wide,
-        high_cad=offset + wide,
+        tdc_offset_cad=found.offset_cad,
+        low_cad=found.offset_cad - found.offset_half_cad,
+        high_cad=found.offset_cad + found.offset_half_cad,
         method="motored strokes",
-        loss_angle_cad=float(np.mean(losses)),
+        imep_closed_bar=cost.imep_bar,
+        imep_error_bar=cost.error_bar,
+        loss_angle_cad=found.loss_angle_cad,
+        wall_heat_scale=found.wall_heat_scale,
+        findings=found.findings,
         dataset=labelled_dataset({}),
     )
 
 
-def _peak_cad(angle: np.ndarray, pressure: np.ndarray, label: str) -> float:
-    at = float(angle[int(np.argmax(pressure))])
-    near = np.abs(angle - at) <= _PEAK_CAD
-    if near.sum() < 5 or at - angle[0] < _PEAK_CAD or angle[-1] - at < _PEAK_CAD:
-        raise DataError(f"{label}: the peak at {at:g} °CA aTDC has too few samples within {_PEAK_CAD:g} CAD around it")
-    bend, slope, _ = np.polyfit(angle[near] - at, pressure[near], 2)
-    return at - float(slope / (2.0 * bend))
-
-
-def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None] | None) -> TdcEstimate:
-    cylinder = request.cylinder
-    if cylinder.gamma_model == "constant":  # that of a real charge falls as it burns: a constant one moves TDC by 1 CAD
-        cylinder = cylinder.replace(gamma_model="linear")
-    request = of_law(request, cylinder, (GAMMA_PARAMETER[cylinder.gamma_model], "wall_heat_scale"))
+def _of_fired(
+    request: Request, cost: DegreeCost, span_cad: float, progress: Callable[[str], None] | None
+) -> TdcEstimate:
+    request = _with_gas(request)
     fits: dict[float, CylinderFit] = {}
     count = round(span_cad / _STEP_CAD)
     for step in sorted(range(-count, count + 1), key=abs):
@@ -232,6 +253,7 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
         if progress is not None:
             progress(f"calibrate with {offset:+.2f} CAD taken off")
         fits[offset] = _best_at(request, offset, fits)
+    _smooth(request, fits)
     offsets = np.array(sorted(fits))
     rmse = np.array([100.0 * fits[offset].report.rmse for offset in offsets])
     if not np.isfinite(rmse).any():
@@ -248,6 +270,8 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
         low_cad=float(inside.min()) - _MODEL_CAD,
         high_cad=float(inside.max()) + _MODEL_CAD,
         method="residual of the calibration",
+        imep_closed_bar=cost.imep_bar,
+        imep_error_bar=cost.error_bar,
         others_cad=tuple(float(offsets[k]) for k in minima if k != best),
         dataset=labelled_dataset(
             {
@@ -256,6 +280,19 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
             }
         ),
     )
+
+
+def _with_gas(request: Request) -> Request:
+    """Free what moves TDC by as much as 1 CAD: wall heat, and gamma with its fall over temperature.
+
+    A constant gamma is made linear: that of a real charge falls as it is heated and burns.
+    """
+    cylinder = request.cylinder
+    if cylinder.gamma_model == "polynomial":
+        return of_law(request, cylinder, (GAMMA_PARAMETER["polynomial"], "wall_heat_scale"))
+    start = {name: min(max(float(getattr(cylinder, name)), low), high) for name, (low, high) in _GAS.items()}
+    made = of_law(request, cylinder.replace(gamma_model="linear", **start), (*_GAS, "wall_heat_scale"))
+    return replace(made, bounds={**_GAS, **made.bounds})
 
 
 def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
@@ -268,9 +305,26 @@ def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -
         if not known:
             raise
     if known:
-        near = known[min(known, key=lambda other: abs(other - offset))]
-        found.append(fit_request(replace(moved, cylinder=near.model, start_values=starts_of(near))))
-    return min(found, key=lambda fit: fit.report.rmse if np.isfinite(fit.report.rmse) else np.inf)
+        found.append(_from(known[min(known, key=lambda other: abs(other - offset))], moved))
+    return min(found, key=_rmse)
+
+
+def _from(near: CylinderFit, moved: Request) -> CylinderFit:
+    return fit_request(replace(moved, cylinder=near.model, start_values=starts_of(near)))
+
+
+def _smooth(request: Request, fits: dict[float, CylinderFit]) -> None:
+    """Fit again, outwards from the best, from the inner neighbour: the first fits may stay in another minimum."""
+    offsets = sorted(fits)
+    best = min(range(len(offsets)), key=lambda k: _rmse(fits[offsets[k]]))
+    for way in (range(best - 1, -1, -1), range(best + 1, len(offsets))):
+        for k in way:
+            near, offset = fits[offsets[k - way.step]], offsets[k]
+            fits[offset] = min(fits[offset], _from(near, request.shifted(angle_cad=-offset)), key=_rmse)
+
+
+def _rmse(fit: CylinderFit) -> float:
+    return fit.report.rmse if np.isfinite(fit.report.rmse) else math.inf
 
 
 def _vertex(x: np.ndarray, y: np.ndarray, at: int) -> float:

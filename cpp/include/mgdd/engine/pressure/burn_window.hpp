@@ -34,7 +34,7 @@ BurnWindow find_burn(const std::vector<double>& angle_cad, const std::vector<dou
 /// to (and the walls take from) p V^n, the second 2 n times the error of top dead centre.
 struct Symmetry {
   double burn_step = undefined<double>();       ///< [-]; NaN where the trace does not reach 80 CAD on both sides
-  double tdc_offset_cad = undefined<double>();  ///< what the angles are too large by; good to 0.7 CAD, motored only
+  double tdc_offset_cad = undefined<double>();  ///< what the angles are too large by; good to 1.4 CAD, motored only
 };
 Symmetry compare_strokes(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
                          const Geometry<double>& geometry);

@@ -39,7 +39,7 @@ struct TraceAnalysis : CycleFigures {
   double work_closed_j = undefined<double>();
   double t_max_k = undefined<double>();
   double trapped_mass_g = undefined<double>();
-  double tdc_offset_cad = undefined<double>();          ///< motored: what the angles are too large by, good to 0.7 CAD
+  double tdc_offset_cad = undefined<double>();          ///< motored: what the angles are too large by, good to 1.4 CAD
   double compression_offset_bar = undefined<double>();  ///< what p + offset = C V^-n would still add to the trace
   bool motored = false;                                 ///< expansion runs on the compression line: no burn
   bool window_found = false;                            ///< the window is from the trace, not from the options
