@@ -18,12 +18,15 @@ from typing import Any, Literal
 
 from mgdd._arguments import shown
 from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.io.read_limits import ReadLimits
 
-__all__ = ["Stamp", "decoded", "existing_file", "parsed", "read_plain_text", "write_whole", "write_whole_text"]
+__all__ = ["Stamp", "bytes_of", "decoded", "existing_file", "parsed", "read_plain_text", "write_whole", "write_whole_text"]
 
 # Letters of more than one byte as UTF-8 has them; in older encodings they would be pairs as "Ã¤" or "Â°".
 _UTF8 = re.compile(rb"[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3}")
+_SPECIAL = {stat.S_ISFIFO: "a pipe", stat.S_ISCHR: "a device", stat.S_ISBLK: "a device", stat.S_ISSOCK: "a socket"}
 _DEEPEST = 64  # levels
+_UNSIZED = 1 << 24  # bytes of a file without a size, as those of /proc are
 _WIDEST = 64  # bits of a whole number, with or without a sign
 
 
@@ -35,7 +38,7 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     FileNotFoundError
         No such file; the message names the one of its folder whose name is nearest.
     mgdd.errors.ParameterError
-        A folder, or a path that cannot be looked up: too long, with a NUL, or behind a folder that must not be entered.
+        A folder, a pipe or a device, which may have no end; or a path that cannot be looked up: too long, with a NUL, or behind a folder that must not be entered.
 
     Examples
     --------
@@ -67,6 +70,9 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     else:
         if stat.S_ISDIR(mode):
             raise ParameterError.of("path", str(file), "a file, and this is a folder: name a file in it")
+        if not stat.S_ISREG(mode):
+            what = next((name for is_one, name in _SPECIAL.items() if is_one(mode)), "no plain file")
+            raise ParameterError.of("path", str(file), f"a plain file, and this is {what}: write its content to one")
         return file
     near = ""
     with contextlib.suppress(OSError):  # no such folder either, or one that must not be listed
@@ -119,7 +125,25 @@ class Stamp:
 def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) -> str:
     """Read a text file that `existing_file` finds and `decoded` takes."""
     file = existing_file(path)
-    return decoded(file.read_bytes(), str(file), only_utf8=only_utf8)
+    return decoded(bytes_of(file), str(file), only_utf8=only_utf8)
+
+
+def bytes_of(file: Path) -> bytes:
+    """Read a file as far as its size says, in memory that this machine has.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        More bytes than half of the memory, or, as files of a running system do, more than its size says.
+    """
+    limits = ReadLimits.of(file)
+    limits.require_free(limits.size)
+    most = max(limits.size, _UNSIZED)
+    with file.open("rb") as stream:
+        content = stream.read(most + 1)
+    if len(content) > most:
+        raise DataError(f"{file}: gives more than the {limits.size} bytes of its size: copy it to a plain file first")
+    return content
 
 
 def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) -> str:
