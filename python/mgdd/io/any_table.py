@@ -17,7 +17,7 @@ from mgdd.io.array_files import of_hdf5, of_matlab, of_netcdf, of_numpy, of_parq
 from mgdd.io.array_table import ArrayTable, Columns, naming_damage
 from mgdd.io.bounded_reader import open_bounded
 from mgdd.io.extras import import_extra
-from mgdd.io.files import Stamp, existing_file, read_plain_text
+from mgdd.io.files import Stamp, bytes_of, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
 from mgdd.io.table import Table, parse_number, read_table, spells_units, text_table
 from mgdd.io.text_rows import TextRows
@@ -165,16 +165,19 @@ def _is_xlsx(file: Path) -> bool:
 def _sheet_text(file: Path) -> tuple[str, str]:
     """Give the sheet with the most numbers as a text with tabs, with its lines of names, and what to call it."""
     openpyxl = import_extra("openpyxl", "formats", "an XLSX file")
-    book = openpyxl.load_workbook(io.BytesIO(file.read_bytes()), read_only=True, data_only=True)
-    sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
+    book = openpyxl.load_workbook(io.BytesIO(bytes_of(file)), read_only=True, data_only=True)
+    sheets = {}
+    for sheet in book.worksheets:
+        sheet.reset_dimensions()  # what it says of its size would be filled with empty cells
+        sheets[sheet.title] = [row for row in sheet.iter_rows(values_only=True) if row]
     held = {title: sum(isinstance(cell, int | float) for row in rows for cell in row) for title, rows in sheets.items()}
     title = max(held, key=lambda each: held[each], default="")
     if not held.get(title):
         raise DataError(f"{file}: no sheet has a number in it")
-    rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheets[title]]
-    width = max(1 + k for row in rows for k, cell in enumerate(row) if cell)
-    rows = [row[:width] for row in rows if any(row)]
-    holds = [any(k < len(row) and parse_number(row[k]) is not None for row in rows) for k in range(width)]
+    filled = [{k: _as_text(cell) for k, cell in enumerate(row) if cell not in (None, "")} for row in sheets[title]]
+    columns = sorted(set().union(*filled))  # a stray cell far to the right is the next one
+    rows = [[row.get(k, "") for k in columns] for row in filled if row]
+    holds = [any(parse_number(cell) is not None for cell in cells) for cells in zip(*rows, strict=True)]
     text = "\n".join("\t".join(_filled(row, holds)) for row in rows)
     return f"{file}, sheet {title!r}", text
 

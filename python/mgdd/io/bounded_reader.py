@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, printable
 from mgdd.io.array_table import Column, Columns, damaged
 from mgdd.io.read_limits import ReadLimits
 
@@ -32,7 +32,7 @@ __all__ = ["open_bounded"]
 
 _KEPT = 2  # processes that wait for a file, for callers with several threads
 # Of waiting beside computing, as for a disk or for other programs; where computing cannot be limited, this stands alone.
-_WAITING = 10.0
+_WAITING = 4.0
 _TOO_LONG, _NO_MEMORY = -24, -9  # SIGXCPU, and SIGKILL as the system sends it that has no memory left
 _START = "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from mgdd.io.reading_process import serve; serve()"
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # each would take address space
@@ -42,11 +42,16 @@ class _LostError(Exception):
     """A process that ended instead of an answer."""
 
 
+def _module_path() -> list[str]:
+    """Give where modules are looked for, mgdd itself first; the folder that is current by chance is none of it."""
+    return [str(Path(__file__).parents[2]), *(os.path.abspath(each) for each in sys.path if each)]
+
+
 class _Process:
     """A process that reads, and its pipes."""
 
     def __init__(self) -> None:
-        self.path = list(sys.path)
+        self.path = _module_path()
         self._late, self._lock = False, threading.Lock()
         self._process = subprocess.Popen(
             [sys.executable, "-c", _START, json.dumps(self.path)],
@@ -153,7 +158,7 @@ class _Kept:
                 found = self._idle.pop() if self._idle else None
             if found is None:
                 return _Process()
-            if found.path == sys.path and found.alive():
+            if found.path == _module_path() and found.alive():
                 return found
             found.end()
 
@@ -195,7 +200,7 @@ class _File:
         if "ended" in said:
             raise _ended(said["ended"], self._limits)
         for note in said["warnings"]:
-            warnings.warn(note, UserWarning, stacklevel=2)
+            warnings.warn(printable(note), UserWarning, stacklevel=2)
         match said.get("error"):
             case "memory":
                 raise self._limits.too_much_memory()
@@ -245,7 +250,7 @@ def open_bounded(file: Path, form: str) -> Iterator[Columns | tuple[str, str]]:
     ImportError
         Its library is not installed.
     """
-    limits = ReadLimits.of(file)
+    limits = ReadLimits.of(file, form)
     process = _kept.take()
     kept = False
     try:
