@@ -50,12 +50,20 @@ _LONG_QUOTE = re.compile(rf"'[^'\n]{{{_LONGEST_VALUE + 1},}}'|\"[^\"\n]{{{_LONGE
 # What moves the cursor, colours, rings or turns the direction of a text; tabs and ends of lines are left.
 _ACTING = {
     code: f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
-    for code in (*range(9), *range(11, 32), *range(127, 160), 0x200E, 0x200F, *range(0x2028, 0x202F), *range(0x2066, 0x206A))
+    for code in (
+        *range(9),
+        *range(11, 32),
+        *range(127, 160),
+        0x200E,
+        0x200F,
+        *range(0x2028, 0x202F),
+        *range(0x2066, 0x206A),
+    )
 }
 
 
 def printable(text: str) -> str:
-    """Write out what a terminal would obey, as the escapes of a name in a file.
+    r"""Write out what a terminal would obey, as the escapes of a name in a file.
 
     Parameters
     ----------
@@ -70,8 +78,8 @@ def printable(text: str) -> str:
     Examples
     --------
     >>> from mgdd.errors import printable
-    >>> print(printable("torque \\x1b[2J"))
-    torque \\x1b[2J
+    >>> print(printable("torque \x1b[2J"))
+    torque \x1b[2J
     """
     return text.translate(_ACTING)
 

@@ -91,7 +91,11 @@ def _run(argv: Sequence[str] | None) -> int:
         fail(args, error, text)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as error:
-        rest = "the result is printed, what is drawn of it is not whole" if vars(args).get("emitted") else "nothing was kept"
+        rest = (
+            "the result is printed, what is drawn of it is not whole"
+            if vars(args).get("emitted")
+            else "nothing was kept"
+        )
         kept = f"interrupted: {error if isinstance(error, Stopped) else rest}"
         print(f"mgdd: {kept}", file=sys.stderr)
         fail(args, error, kept)

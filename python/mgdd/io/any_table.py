@@ -193,5 +193,3 @@ def _filled(row: list[str], holds_numbers: list[bool]) -> list[str]:
 
 def _as_text(cell: Any) -> str:
     return repr(float(cell)) if isinstance(cell, int | float) else str(cell).replace("\t", " ").replace("\n", " ")
-
-

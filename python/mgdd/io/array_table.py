@@ -64,6 +64,7 @@ class Column(NamedTuple):
 
     @property
     def size(self) -> int:
+        """Return the number of samples."""
         return int(self.values.shape[self.along])
 
     def block(self, rows: slice, count: int) -> NDArray[Any]:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["open_bounded"]
 
 _KEPT = 2  # processes that wait for a file, for callers with several threads
-# Of waiting beside computing, as for a disk or for other programs; where computing cannot be limited, this stands alone.
+# Of waiting beside computing, as for a disk or other programs; all there is where computing cannot be limited.
 _WAITING = 4.0
 _TOO_LONG, _NO_MEMORY = -24, -9  # SIGXCPU, and SIGKILL as the system sends it that has no memory left
 _START = "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from mgdd.io.reading_process import serve; serve()"
@@ -44,7 +44,7 @@ class _LostError(Exception):
 
 def _module_path() -> list[str]:
     """Give where modules are looked for, mgdd itself first; the folder that is current by chance is none of it."""
-    return [str(Path(__file__).parents[2]), *(os.path.abspath(each) for each in sys.path if each)]
+    return [str(Path(__file__).parents[2]), *(str(Path(each).absolute()) for each in sys.path if each)]
 
 
 class _Process:
@@ -256,7 +256,8 @@ def open_bounded(file: Path, form: str) -> Iterator[Columns | tuple[str, str]]:
     try:
         source = _File(process, limits)
         said, body = source.ask(
-            do="open", file=str(file), folder=str(Path.cwd()), format=form, memory=limits.memory, seconds=limits.seconds,
+            do="open", file=str(file), folder=str(Path.cwd()), format=form, memory=limits.memory,
+            seconds=limits.seconds,
         )  # fmt: skip
         if "source" in said:
             yield said["source"], body.tobytes().decode("utf-8", "surrogatepass")

@@ -73,8 +73,8 @@ class ReadLimits:
         """Refuse numbers of so many bytes in the file."""
         if claimed > self.believed:
             raise DataError(
-                f"{self.file}: {what} claims {_megabytes(claimed)} MB, and the file has {self.size} bytes: not read; if "
-                f"that is right, set {_MEMORY}={_megabytes(claimed)} in the environment"
+                f"{self.file}: {what} claims {_megabytes(claimed)} MB, and the file has {self.size} bytes: not "
+                f"read; if that is right, set {_MEMORY}={_megabytes(claimed)} in the environment"
             )
 
     def require_free(self, needed: int) -> None:
@@ -82,8 +82,8 @@ class ReadLimits:
         most = _machine()
         if most is not None and needed > most // 2:
             raise DataError(
-                f"{self.file}: {_megabytes(needed)} MB of numbers, and this machine has {_megabytes(most)} MB of memory: "
-                "read fewer columns, or a record of pressure in parts by mgdd.io.pressure_chunks"
+                f"{self.file}: {_megabytes(needed)} MB of numbers, and this machine has {_megabytes(most)} MB: read "
+                "fewer columns, or a record of pressure in parts by mgdd.io.pressure_chunks"
             )
 
     def too_much_memory(self) -> DataError:

@@ -1,4 +1,4 @@
-"""The process that opens binary files for another one: it forks for each file, and what a file does to it ends there."""
+"""The process that opens binary files for another one: it forks for each, and what a file does to it ends there."""
 
 from __future__ import annotations
 
@@ -129,4 +129,3 @@ def answer(
         return {"error": "data", "text": str(error)}, b""
     except Exception as error:  # noqa: BLE001 - of another library: any class
         return {"error": "other", "text": f"{type(error).__name__} {error}".strip()}, b""
-

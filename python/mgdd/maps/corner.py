@@ -51,7 +51,7 @@ def axes_of(
         )
         if turned:
             raise DataError(
-                f"{printable(where)}: the corner {corner!r} says that {down} runs down and {across} across: correct it, or "
+                f"{where}: the corner {corner!r} says that {down} runs down and {across} across: correct it, or "
                 f"leave {argument('rows')} and {argument('columns')} out"
             )
     found = []
@@ -63,8 +63,8 @@ def axes_of(
         if not text and name is None:
             side, example = ("rows", "speed_rpm") if fallback == "y" else ("columns", "fuel_mg")
             warnings.warn(
-                f"{printable(where)}: the corner {corner!r} does not name the axis of the {side}: it is called {fallback}, "
-                f"without a unit; name it with {argument(side, repr(example))}",
+                f"{printable(where)}: the corner {corner!r} does not name the axis of the {side}: it is called "
+                f"{fallback}, without a unit; name it with {argument(side, repr(example))}",
                 UserWarning,
                 stacklevel=2,
             )

@@ -148,7 +148,9 @@ def smooth_map(
         if outside.any():
             notes["extrapolated"] = f"{_named(optimum, outside)}: outside of the hull of the cells with a value"
             warnings.warn(
-                f"{printable(str(optimum.name))}: extrapolated {notes['extrapolated']}: check them", UserWarning, stacklevel=2
+                f"{printable(str(optimum.name))}: extrapolated {notes['extrapolated']}: check them",
+                UserWarning,
+                stacklevel=2,
             )
     return optimum.replaced(
         np.where(missing, np.nan, solved).reshape(optimum.values.shape),
