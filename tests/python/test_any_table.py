@@ -315,7 +315,7 @@ def test_a_damaged_matlab_file_never_ends_the_process(compressed: bool, tmp_path
     at = whole.find(b"\x10\x00\x04\x00warm")
     if at > 0:  # not compressed: a type that no list has, which SciPy's reader takes for an index
         file.write_bytes(whole[:at] + b"\x10\xc3" + whole[at + 2 :])
-        with pytest.raises(DataError, match="Type 49936 does not appear to be char type|its reader ended with SIG"):
+        with pytest.raises(DataError, match=r"Type 49936 does not appear to be char type|its reader ended with SIG"):
             read_any_table(file)
 
 
@@ -470,7 +470,8 @@ def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:
     refused = {file.stem: said for file in files if "no column of numbers" not in (said := _refusal(file))}
     hdf5 = "testhdf5_7.4_GLNX86"
     assert {name for name, said in refused.items() if said} == {
-        "bad_miuint32", "bad_miutf8_array_name", "corrupted_zlib_checksum", "corrupted_zlib_data", "debigged_m4", "malformed1", hdf5,
+        "bad_miuint32", "bad_miutf8_array_name", "corrupted_zlib_checksum", "corrupted_zlib_data",
+        "debigged_m4", "malformed1", hdf5,
     }  # fmt: skip
 
 

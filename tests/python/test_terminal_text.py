@@ -28,9 +28,7 @@ ACTING = "\x1b]0;x\x07\x1b[2J\x00\x9b31m\u202e"
         "time_s,duty,angle_deg{}\n0,0,0\n",
     ],
 )
-@pytest.mark.parametrize(
-    "command", [["engine", "analyze"], ["data", "info"], ["map", "show"], ["throttle", "identify"]]
-)
+@pytest.mark.parametrize("command", ["engine analyze", "data info", "map show", "throttle identify"])
 def test_a_heading_does_not_act(command: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / f"n{ACTING.replace(chr(0), '')}.csv"
     file.write_text(text.format(ACTING.replace("\0", "")), encoding="utf-8")

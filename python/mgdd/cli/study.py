@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> None:
         return
     if args.name not in titles:
         given = "no study named" if args.name is None else f"no study {args.name!r}"
-        raise ParameterError(hinted(f"{given}: must be one of {', '.join(titles)}", args.name or "", titles))
+        raise ParameterError(hinted(f"{given}: must be one of those that --list prints", args.name or "", titles))
     options: dict[str, Any] = {}
     for option, studies in _OPTIONS.items():
         if args.name not in studies:

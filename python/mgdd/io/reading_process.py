@@ -32,32 +32,51 @@ def serve() -> None:
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)
     _tell(answers, {})  # it has begun
-    writing = mmap.mmap(-1, 1)  # shared with what is forked: whether it is within an answer
+    state = mmap.mmap(-1, 2)  # shared with what is forked: within an answer, behind its first file
     while line := asked.readline():
         request = json.loads(line)
         if request["do"] == "close":  # of what has ended already
             _tell(answers, {})
             continue
-        for module in _LIBRARIES.get(request["format"], ()):
-            with contextlib.suppress(ImportError):  # the reader says what is missing
-                importlib.import_module(module)
+        _import_library(request)
         if not hasattr(os, "fork"):
-            _serve_file(request, asked, answers, writing)
+            _serve_file(request, asked, answers, state)
             _tell(answers, {})
             continue
+        state[0] = state[1] = 0
         pid = os.fork()
         if pid == 0:
             status = 1
             try:
-                _limit(request["memory"], request["seconds"])
-                _serve_file(request, asked, answers, writing)
+                _serve_files(request, asked, answers, state)
                 status = 0
             finally:
                 os._exit(status)
         status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-        if status and writing[0]:
+        if status and state[0]:
             os._exit(1)  # with the pipes; nobody can tell where a next answer begins
-        _tell(answers, {"ended": status} if status else {})
+        if status:
+            _tell(answers, {"ended": status, "again": bool(state[1])})
+
+
+def _import_library(request: dict[str, Any]) -> None:
+    for module in _LIBRARIES.get(request["format"], ()):
+        with contextlib.suppress(ImportError):  # the reader says what is missing
+            importlib.import_module(module)
+
+
+def _serve_files(request: dict[str, Any], asked: IO[bytes], answers: IO[bytes], state: mmap.mmap) -> None:
+    """Serve one file after the other, until one is refused: what that has left behind ends with the process."""
+    while True:
+        _import_library(request)
+        _limit(request["memory"], request["seconds"])
+        sound = _serve_file(request, asked, answers, state)
+        _tell(answers, {})
+        line = asked.readline() if sound else b""
+        if not line:
+            return
+        request = json.loads(line)
+        state[1] = 1
 
 
 def _limit(memory: int, seconds: float) -> None:
@@ -70,13 +89,16 @@ def _limit(memory: int, seconds: float) -> None:
             resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
     lower(resource.RLIMIT_CORE, 0)
-    lower(resource.RLIMIT_CPU, math.ceil(seconds))
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    lower(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime + seconds))
     with contextlib.suppress(OSError):  # only Linux says what it holds
         held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         lower(resource.RLIMIT_AS, held + memory)
 
 
-def _serve_file(request: dict[str, Any], asked: IO[bytes], answers: IO[bytes], writing: mmap.mmap) -> None:
+def _serve_file(request: dict[str, Any], asked: IO[bytes], answers: IO[bytes], state: mmap.mmap) -> bool:
+    """Answer what is asked of one file until it is closed, and say whether nothing of it was refused."""
+    sound = True
     with contextlib.ExitStack() as stack:
         arrays: list[Any] = []
         while request["do"] != "close":
@@ -84,10 +106,12 @@ def _serve_file(request: dict[str, Any], asked: IO[bytes], answers: IO[bytes], w
                 warnings.simplefilter("always", UserWarning)
                 said, body = answer(request, stack, arrays)
             notes = [str(each.message) for each in told if each.category is UserWarning]
-            writing[0] = 1
+            sound = sound and "error" not in said
+            state[0] = 1
             _tell(answers, said | {"warnings": notes}, body)
-            writing[0] = 0
+            state[0] = 0
             request = json.loads(asked.readline() or b'{"do": "close"}')
+    return sound
 
 
 def _tell(answers: IO[bytes], said: dict[str, Any], body: bytes | memoryview = b"") -> None:
@@ -106,7 +130,7 @@ def answer(
         if request["do"] == "read":
             index = tuple(slice(*each) if isinstance(each, list) else each for each in request["index"])
             found = np.ascontiguousarray(arrays[request["array"]][index])
-            return {"shape": found.shape, "type": found.dtype.str}, memoryview(found.reshape(-1).view(np.uint8))
+            return {"shape": found.shape, "type": found.dtype.str}, found.reshape(-1).view(np.uint8).data
         os.chdir(request["folder"])
         read = read_format(request["format"], Path(request["file"]), stack)
         if isinstance(read, tuple):
