@@ -417,7 +417,7 @@ def test_blocks_of_mdf_in_a_circle_are_refused(tmp_path: Path) -> None:
     whole = file.read_bytes()
     for at in (group + 24, channels + 24):  # where the next one stands: each is its own
         file.write_bytes(whole[:at] + (at - 24).to_bytes(8, "little") + whole[at + 8 :])
-        with pytest.raises(DataError, match="its blocks name each other in a circle"):
+        with pytest.raises(DataError, match=r"its blocks name each other in a circle|came to no end"):
             read_any_table(file)
 
 

@@ -32,6 +32,7 @@ _STARTS = {
     b"MATLAB 7.3": "HDF5", b"MATLAB": "MATLAB", b"\x89HDF": "HDF5", b"CDF": "netCDF 3", b"\x93NUMPY": "NumPy",
     b"TDSm": "TDMS", b"MDF ": "MDF", b"UnFinMF": "MDF", b"PAR1": "Parquet", b"PK\x03\x04": "XLSX or NPZ",
 }  # fmt: skip
+_SPREAD = 16  # columns of a sheet for each that has a cell
 _PLAIN = ("netCDF 3", "NumPy")  # mapped as they stand on the disk, neither compressed nor sparse
 # Columns may be read from a file that stays open as long as the stack.
 _READERS: dict[str, Callable[[Path, contextlib.ExitStack], Columns]] = {
@@ -175,7 +176,9 @@ def _sheet_text(file: Path) -> tuple[str, str]:
     if not held.get(title):
         raise DataError(f"{file}: no sheet has a number in it")
     filled = [{k: _as_text(cell) for k, cell in enumerate(row) if cell not in (None, "")} for row in sheets[title]]
-    columns = sorted(set().union(*filled))  # a stray cell far to the right is the next one
+    columns = sorted(set().union(*filled))
+    if columns[-1] <= _SPREAD * len(columns):  # else a stray cell far to the right is the next one
+        columns = list(range(columns[-1] + 1))
     rows = [[row.get(k, "") for k in columns] for row in filled if row]
     holds = [any(parse_number(cell) is not None for cell in cells) for cells in zip(*rows, strict=True)]
     text = "\n".join("\t".join(_filled(row, holds)) for row in rows)
