@@ -40,12 +40,50 @@ def __dir__() -> list[str]:
 
 
 # Letters: of a value that a message quotes, and of a whole message. What a file carries may be of any length.
-_LONGEST_VALUE, _LONGEST_MESSAGE = 400, 4000
+_LONGEST_VALUE, _LONGEST_MESSAGE = 120, 399
+_NOTE = 32  # letters of what says how many are left out
 _LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length
 # Letters that are more than chance, and names that are an answer rather than a list.
 _SHORTEST_STEM, _MOST_NAMES = 3, 4
 _LONG_WORD = re.compile(rf"\S{{{_LONGEST_VALUE + 1},}}")
 _LONG_QUOTE = re.compile(rf"'[^'\n]{{{_LONGEST_VALUE + 1},}}'|\"[^\"\n]{{{_LONGEST_VALUE + 1},}}\"")
+
+
+# What moves the cursor, colours, rings or turns the direction of a text; tabs and ends of lines are left.
+_ACTING = {
+    code: f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
+    for code in (
+        *range(9),
+        *range(11, 32),
+        *range(127, 160),
+        0x200E,
+        0x200F,
+        *range(0x2028, 0x202F),
+        *range(0x2066, 0x206A),
+    )
+}
+
+
+def printable(text: str) -> str:
+    r"""Write out what a terminal would obey, as the escapes of a name in a file.
+
+    Parameters
+    ----------
+    text : str
+        Of a file, a person or a library.
+
+    Returns
+    -------
+    str
+        The text with such letters as Python writes them.
+
+    Examples
+    --------
+    >>> from mgdd.errors import printable
+    >>> print(printable("torque \x1b[2J"))
+    torque \x1b[2J
+    """
+    return text.translate(_ACTING)
 
 
 def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
@@ -77,12 +115,11 @@ def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
 
 def _short_message(message: str) -> str:
     """Cut what a message quotes, then the message, so that the field before and the remedy behind stay."""
-    if len(message) <= _LONGEST_VALUE:
-        return message
-    message = _LONG_WORD.sub(lambda found: shortened(found[0]), message)
-    if len(message) > _LONGEST_MESSAGE:
-        message = _LONG_QUOTE.sub(lambda found: shortened(found[0]), message)
-    return shortened(message, _LONGEST_MESSAGE)
+    message = printable(message)
+    for long in (_LONG_WORD, _LONG_QUOTE):
+        if len(message) > _LONGEST_MESSAGE:
+            message = long.sub(lambda found: shortened(found[0], _LONGEST_VALUE - _NOTE), message)
+    return shortened(message, _LONGEST_MESSAGE - _NOTE) if len(message) > _LONGEST_MESSAGE else message
 
 
 class Error(Exception):
@@ -91,7 +128,7 @@ class Error(Exception):
     Parameters
     ----------
     message : str
-        What is wrong and what to do; values in it are cut to 400 letters, the whole to 4000.
+        What is wrong and what to do; what a terminal would obey is written out, the whole is cut to 399 letters.
     field : str, optional
         Name of the field or argument to blame.
     value : object, optional

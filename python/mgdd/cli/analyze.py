@@ -139,7 +139,6 @@ def _analyze(args: argparse.Namespace) -> None:
             sections.append(record_section(checked, result, traces))
             verdicts.append(_verdict(checked))
     if args.report:
-        _write_report(args.report, sections, verdicts, f"{'assumed: ' if assumed else ''}{preset.name}", cylinder)
         texts.append(f"Report: {args.report}")
     whole = {"files": payloads} if several else payloads[0]
     if args.report:
@@ -147,6 +146,9 @@ def _analyze(args: argparse.Namespace) -> None:
     if result is not None and "cycles" in result.attrs:  # a CSV holds the figures of every cycle then
         result = result[[name for name, v in result.data_vars.items() if v.dims == ("cycle",)]]
     emit(args, whole, text=texts if args.report else texts[:-1], traces=result)
+    if args.report:
+        engine_name = f"{'assumed: ' if assumed else ''}{preset.name}"
+        _write_report(args.report, sections, verdicts, engine_name, cylinder)
 
 
 def _one(

@@ -45,7 +45,11 @@ def run(args: argparse.Namespace) -> None:
     step = args.progress.expect(120)
     result, stopped = run_or_part("measured-traces", progress=step)
     step("write the report")
-    page = write_report(result, **_REPORT.given(args))
+    try:
+        page = write_report(result, **_REPORT.given(args))
+    except KeyboardInterrupt:
+        emit(args, result.summary, text=_text(result.summary))
+        raise
     summary, text = {**result.summary, "report": page.as_posix()}, _text(result.summary)
     for key, study, written in (("guided", "guided", _guided_text), ("throttle", "throttle-tracking", _throttle_text)):
         if stopped:

@@ -163,18 +163,17 @@ def _calibrate(args: argparse.Namespace) -> None:
     step("calibrate")
     fit = fit_cylinder(traces, cylinder, free=free, point=point, **known, **scheme)
     found = judge_fit(fit, fuel_heat_j=known["fuel_heat_j"], progress=step)
-    stopped = False
+    with named_options(**{field: option for option, field in CYLINDER_CHOICES.items()}):
+        payload = {"preset": preset.name, **found.to_dict()}
+    emit(args, payload, text=payload["report"])
     if args.report_folder:
         absolute = list(fit.request.traces)
         result, stopped = run_or_part(
             "measured-traces", traces=absolute, cylinder=cylinder, point=point, progress=step, **scheme
         )
         write_report(result, args.report_folder)
-    with named_options(**{field: option for option, field in CYLINDER_CHOICES.items()}):
-        payload = {"preset": preset.name, **found.to_dict()}
-    emit(args, payload, text=payload["report"])
-    if stopped:
-        raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
+        if stopped:
+            raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
     if not fit.report.success:
         raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 

@@ -13,7 +13,7 @@ from mgdd import _core
 from mgdd.cli import completion, data, demo, doctor, engine, maps, preset, rig, study, throttle
 from mgdd.cli.from_library import as_option
 from mgdd.cli.options import Parser, UsageError
-from mgdd.cli.output import Stopped, fail
+from mgdd.cli.output import Stopped, fail, gated_streams
 from mgdd.cli.progress import Progress
 from mgdd.errors import ConvergenceError, Error, arguments_written
 
@@ -57,6 +57,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without °: a question mark, not a traceback
+    with gated_streams():
+        return _run(argv)
+
+
+def _run(argv: Sequence[str] | None) -> int:
     parser = _parser()
     given = sys.argv[1:] if argv is None else list(argv)
     try:
@@ -86,7 +91,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         fail(args, error, text)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as error:
-        kept = f"interrupted: {error if isinstance(error, Stopped) else 'nothing was kept'}"
+        rest = (
+            "the result is printed, what is drawn of it is not whole"
+            if vars(args).get("emitted")
+            else "nothing was kept"
+        )
+        kept = f"interrupted: {error if isinstance(error, Stopped) else rest}"
         print(f"mgdd: {kept}", file=sys.stderr)
         fail(args, error, kept)
         return EXIT_INTERRUPTED

@@ -89,6 +89,6 @@ def emit_map(
     if file is not None:
         write_map(table, file)
         wrote(file)
+    emit(args, {**map_content(table), **more, "file": file}, text=text)
     if args.figure is not None:
         save_figure(drawn(draw, table.to_dataset(), size=_SIZE), args.figure)
-    emit(args, {**map_content(table), **more, "file": file}, text=text)

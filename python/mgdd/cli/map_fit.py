@@ -74,9 +74,9 @@ def _fit(args: argparse.Namespace) -> None:
         file, args.output = args.output, None
     else:
         file = None
+    emit(args, {**_figures(fit, factors), "left_out": left_out, "file": file}, text=fit.summary())
     if args.figure is not None:
         save_figure(_picture(fit, len(factors)), args.figure)
-    emit(args, {**_figures(fit, factors), "left_out": left_out, "file": file}, text=fit.summary())
 
 
 def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:

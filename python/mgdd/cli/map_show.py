@@ -110,8 +110,6 @@ def _diff(args: argparse.Namespace) -> None:
     if file is not None and Path(file).suffix == ".nc":
         write_table(found, file)
         args.output = None
-    if args.figure is not None:
-        save_figure(drawn(map_cells, found, size=(6.6, 4.6), variable="difference"), args.figure)
     axes = {name: found[name].to_numpy() for name in first.axes}
     payload = {
         "name": first.name,
@@ -125,6 +123,8 @@ def _diff(args: argparse.Namespace) -> None:
         "file": file,
     }
     emit(args, payload, text=_differences(args, found, first, second))
+    if args.figure is not None:
+        save_figure(drawn(map_cells, found, size=(6.6, 4.6), variable="difference"), args.figure)
 
 
 def _differences(

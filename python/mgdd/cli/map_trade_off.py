@@ -76,12 +76,12 @@ def _trade_off(args: argparse.Namespace) -> None:
         if args.along not in marked.data_vars:
             raise DataError(f"{args.map}: not a map of {args.along}: choose another --along or another map")
         marked = marked[[args.along, args.right, args.up]].sel(fixed)
-    if args.figure is not None:
-        how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
-        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
     lines = _lines(args, shown, marked, free)
     payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}
     emit(args, payload, text=_text(args, shown, lines, free))
+    if args.figure is not None:
+        how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
+        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
 
 
 def _axes(args: argparse.Namespace, table: xr.Dataset) -> tuple[str, ...]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, printable
 from mgdd.io.files import write_whole, write_whole_text
 from mgdd.io.plain_csv import write_traces
 from mgdd.results.labels import VARIABLES, to_jsonable
@@ -27,15 +29,52 @@ __all__ = [
     "emit",
     "error_of",
     "fail",
+    "gated_streams",
     "lines",
     "save_figure",
     "show",
+    "trusted",
     "wrote",
 ]
 
 
 class Stopped(KeyboardInterrupt):
     """Ctrl-C after which something was kept; the message says what."""
+
+
+class _Gate:
+    """A stream of text to which nothing goes that a terminal would obey."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.trusted = stream
+
+    def write(self, text: str) -> int:
+        """Write a text with such letters written out."""
+        return self.trusted.write(printable(text))
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        """Write texts as `write` does."""
+        for each in lines:
+            self.write(each)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.trusted, name)
+
+
+def trusted(stream: TextIO) -> TextIO:
+    """Give the stream behind the gate, for colours and cursors of our own."""
+    found: TextIO = getattr(stream, "trusted", stream)
+    return found
+
+
+@contextlib.contextmanager
+def gated_streams() -> Iterator[None]:
+    """Put a gate before stdout and stderr: results, errors, warnings, logs and usage have texts of files in them."""
+    with (
+        contextlib.redirect_stdout(cast("TextIO", _Gate(sys.stdout))),
+        contextlib.redirect_stderr(cast("TextIO", _Gate(sys.stderr))),
+    ):
+        yield
 
 
 def check_output(args: argparse.Namespace, *endings: str) -> None:
@@ -90,7 +129,7 @@ def emit(
     if args.json:
         print(_json(plain))
     else:
-        print(show([text] if isinstance(text, str) else text or [lines(plain)]))
+        print(show([text] if isinstance(text, str) else text or [lines(plain)]), file=trusted(sys.stdout))
 
 
 def lines(payload: Mapping[str, Any]) -> str:
@@ -134,8 +173,15 @@ def is_terminal() -> bool:
 def show(blocks: Sequence[str | Table]) -> str:
     """Lay out text and tables: by rich in a terminal, else as plain columns.
 
-    Heads and cells of tables stand as they are; numbers to the right.
+    Heads and cells of tables stand as they are, but for what a terminal would obey; numbers to the right.
     """
+    blocks = [
+        printable(block) if isinstance(block, str)
+        else replace(
+            block, columns=tuple(map(_cell, block.columns)), rows=tuple(tuple(map(_cell, row)) for row in block.rows)
+        )
+        for block in blocks
+    ]  # fmt: skip
     if not is_terminal():
         return "\n".join(block if isinstance(block, str) else _columns(block) for block in blocks)
     from rich.console import Console
@@ -154,6 +200,10 @@ def show(blocks: Sequence[str | Table]) -> str:
                 grid.add_row(*map(_literal, row))
             console.print(grid)
     return captured.get().rstrip("\n")
+
+
+def _cell(text: str) -> str:
+    return printable(text).replace("\n", "\\n")
 
 
 def _literal(text: str) -> str:

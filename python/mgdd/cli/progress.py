@@ -8,6 +8,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from mgdd.cli.output import trusted
+
 if TYPE_CHECKING:
     from typing import TextIO
 
@@ -85,7 +87,7 @@ class Progress:
         # Without redirection: what a command prints on stdout must not turn up on stderr.
         self._bar = progress.Progress(
             progress.SpinnerColumn(), progress.TextColumn("{task.description}"), progress.BarColumn(),
-            progress.TimeElapsedColumn(), console=Console(file=out), transient=True,
+            progress.TimeElapsedColumn(), console=Console(file=trusted(out)), transient=True,
             redirect_stdout=False, redirect_stderr=True,
         )  # fmt: skip
         self._task = self._bar.add_task(self._text, total=None)

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> None:
         return
     if args.name not in titles:
         given = "no study named" if args.name is None else f"no study {args.name!r}"
-        raise ParameterError(hinted(f"{given}: must be one of {', '.join(titles)}", args.name or "", titles))
+        raise ParameterError(hinted(f"{given}: must be one of those that --list prints", args.name or "", titles))
     options: dict[str, Any] = {}
     for option, studies in _OPTIONS.items():
         if args.name not in studies:
@@ -88,14 +88,17 @@ def run(args: argparse.Namespace) -> None:
         args.name, figures=drawn, progress=step, **_STUDY.given(args),
         executor=None if args.workers is None else processes(args.workers), **options,
     )  # fmt: skip
-    paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
-    page = None if args.report is None else write_report(result, args.report, **_PAGE.given(args))
+    files = {} if folder is None else _files(result.figures, folder, f"{args.name}.{args.format}")
     summary: dict[str, Any] = dict(result.summary)
     if folder is not None:
-        summary["figures"] = [path.as_posix() for path in paths]
-    if page is not None:
-        summary["report"] = page.as_posix()
+        summary["figures"] = [path.as_posix() for path in files]
+    if args.report is not None:
+        summary["report"] = (Path(args.report) / "index.html").as_posix()
     emit(args, summary, text=_text(titles[args.name], summary))
+    for path, (caption, figure) in files.items():
+        figure.savefig(path, dpi=120, metadata={"Title": caption})
+    if args.report is not None:
+        write_report(result, args.report, **_PAGE.given(args))
     if stopped:
         raise Stopped(f"{len(summary['rows'])} finished rows are printed")
 
@@ -110,14 +113,13 @@ def run_or_part(name: str, **options: Any) -> tuple[StudyResult, bool]:
         return stop.partial, True
 
 
-def _write(figures: Mapping[str, Figure], folder: Path, ending: str) -> list[Path]:
-    paths = []
+def _files(figures: Mapping[str, Figure], folder: Path, ending: str) -> dict[Path, tuple[str, Figure]]:
+    files = {}
     stem, _, suffix = ending.rpartition(".")
     for number, (caption, figure) in enumerate(figures.items(), start=1):
         slug = "-".join(re.findall(r"[a-z0-9]+", caption.lower())[:6])
-        paths.append(folder / f"{stem}-{number}-{slug}.{suffix}")
-        figure.savefig(paths[-1], dpi=120, metadata={"Title": caption})
-    return paths
+        files[folder / f"{stem}-{number}-{slug}.{suffix}"] = caption, figure
+    return files
 
 
 def _text(title: str, summary: Mapping[str, Any]) -> list[str | Table]:

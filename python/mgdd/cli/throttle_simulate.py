@@ -71,6 +71,6 @@ def _simulate(args: argparse.Namespace) -> None:
         "step_s": _RUN.of(args)["step_s"],
         "parameters": throttle.to_dict(),
     }
+    emit(args, payload, traces=run)
     if args.figure is not None:
         save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
-    emit(args, payload, traces=run)

@@ -117,9 +117,9 @@ def _track(args: argparse.Namespace) -> None:
         "step_us_p999": p999,
         "warnings": list(doubts),
     }
+    emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
     if args.figure is not None:
         save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
-    emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
 
 
 def _tune(args: argparse.Namespace) -> None:

@@ -12,7 +12,7 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.dead_centre import degree_cost
 from mgdd.engine.trace_cycles import COLUMNS, is_of_cycles, of_cycles
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, printable
 from mgdd.io.pressure import as_trace
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of, stated
 from mgdd.results.labels import ANGLE, labelled_dataset
@@ -236,7 +236,7 @@ def analyze(
             raise
         raise error.reworded(f"{error}; the torque was taken as that of its cylinders: see n_cylinders") from None
     for warning in () if quiet else result.attrs["warnings"].splitlines():
-        _LOG.warning("%s: %s", attrs["file"], warning)
+        _LOG.warning("%s", printable(f"{attrs['file']}: {warning}"))
     if not is_of_cycles(trace):
         doubted = str(trace.attrs.get("warnings", "")).splitlines()
     return result.assign_attrs(

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 from mgdd.errors import DataError
 from mgdd.io.array_files import of_hdf5, of_matlab, of_netcdf, of_numpy, of_parquet
 from mgdd.io.array_table import ArrayTable, Columns, naming_damage
+from mgdd.io.bounded_reader import open_bounded
 from mgdd.io.extras import import_extra
-from mgdd.io.files import Stamp, existing_file, read_plain_text
+from mgdd.io.files import Stamp, bytes_of, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
 from mgdd.io.table import Table, parse_number, read_table, spells_units, text_table
 from mgdd.io.text_rows import TextRows
@@ -24,13 +25,20 @@ from mgdd.io.text_rows import TextRows
 if TYPE_CHECKING:
     import os
 
-__all__ = ["cells_as_text", "format_of", "open_parts", "open_table", "read_any_table"]
+__all__ = ["cells_as_text", "format_of", "open_parts", "open_table", "read_any_table", "read_format"]
 
 _HEAD = 128  # bytes that tell a format
-
-
+_STARTS = {
+    b"MATLAB 7.3": "HDF5", b"MATLAB": "MATLAB", b"\x89HDF": "HDF5", b"CDF": "netCDF 3", b"\x93NUMPY": "NumPy",
+    b"TDSm": "TDMS", b"MDF ": "MDF", b"UnFinMF": "MDF", b"PAR1": "Parquet", b"PK\x03\x04": "XLSX or NPZ",
+}  # fmt: skip
+_SPREAD = 16  # columns of a sheet for each that has a cell
+_PLAIN = ("netCDF 3", "NumPy")  # mapped as they stand on the disk, neither compressed nor sparse
 # Columns may be read from a file that stays open as long as the stack.
-_Reader = Callable[[Path, contextlib.ExitStack], "Table | Columns"]
+_READERS: dict[str, Callable[[Path, contextlib.ExitStack], Columns]] = {
+    "HDF5": of_hdf5, "MATLAB": of_matlab, "netCDF 3": of_netcdf, "NumPy": of_numpy, "TDMS": of_tdms, "MDF": of_mdf,
+    "Parquet": of_parquet, "XLSX or NPZ": of_numpy,
+}  # fmt: skip
 
 
 def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> Table:
@@ -68,16 +76,15 @@ def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None
 def open_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> Iterator[Table]:
     """Open a file as `read_any_table` reads it: columns of a binary one are read where they are asked for."""
     file = existing_file(path)
-    with file.open("rb") as stream:
-        reader = _reader_of(stream.read(_HEAD), file)
-    if reader is None:
+    form = _form_of(file)
+    if form is None:
         yield read_table(path, delimiter=delimiter, decimal=decimal)
         return
     with contextlib.ExitStack() as stack:
         stamp = Stamp.of(file)
         with naming_damage(file):
-            found = reader(file, stack)
-            table = found if isinstance(found, Table) else _table_of(file, stamp, found)
+            found = _opened(form, file, stack)
+            table = _table_of(file, stamp, found) if isinstance(found, list) else text_table(*found, delimiter="\t")
         yield table
 
 
@@ -90,11 +97,10 @@ def open_parts(
     The rows of a text that are asked for begin at or behind those asked for before.
     """
     file = existing_file(path)
-    with file.open("rb") as stream:
-        text = _reader_of(stream.read(_HEAD), file) is None
-        if text:
+    if _form_of(file) is None:
+        with file.open("rb") as stream:
             yield TextRows(file, stream, delimiter=delimiter, decimal=decimal).part
-            return
+        return
     with open_table(file) as table:
         yield table.part
 
@@ -109,10 +115,8 @@ def _table_of(file: Path, stamp: Stamp, columns: Columns) -> ArrayTable:
 
 def format_of(path: str | os.PathLike[str]) -> str:
     """Name the format by which `read_any_table` reads a file."""
-    file = existing_file(path)
-    with file.open("rb") as stream:
-        reader = _reader_of(stream.read(_HEAD), file)
-    return "text" if reader is None else _FORMATS[reader]
+    form = _form_of(existing_file(path))
+    return "text" if form is None else "HDF5 (or MATLAB 7.3, netCDF 4)" if form == "HDF5" else form
 
 
 def cells_as_text(path: str | os.PathLike[str]) -> tuple[str, str, bool] | None:
@@ -121,30 +125,37 @@ def cells_as_text(path: str | os.PathLike[str]) -> tuple[str, str, bool] | None:
     None for a file of columns, which `read_any_table` reads.
     """
     file = existing_file(path)
-    with file.open("rb") as stream:
-        reader = _reader_of(stream.read(_HEAD), file)
-    if reader is None:
+    form = _form_of(file)
+    if form is None:
         return str(file), read_plain_text(file), False
-    with naming_damage(file):
-        if reader is _of_zip and _is_xlsx(file):
-            return *_sheet_text(file), True
+    with naming_damage(file), contextlib.ExitStack() as stack:
+        if form == "XLSX or NPZ" and _is_xlsx(file):
+            found = _opened(form, file, stack)
+            if isinstance(found, tuple):
+                return *found, True
     return None
 
 
-def _reader_of(head: bytes, file: Path) -> _Reader | None:
-    starts: dict[bytes, _Reader] = {
-        b"MATLAB 7.3": of_hdf5, b"MATLAB": of_matlab, b"\x89HDF": of_hdf5, b"CDF": of_netcdf,
-        b"\x93NUMPY": of_numpy, b"TDSm": of_tdms, b"MDF ": of_mdf, b"UnFinMF": of_mdf, b"PAR1": of_parquet,
-        b"PK\x03\x04": _of_zip,
-    }  # fmt: skip
-    found = next((reader for start, reader in starts.items() if head.startswith(start)), None)
+def _form_of(file: Path) -> str | None:
+    """Name the format of a binary file by how it begins; None for a text."""
+    with file.open("rb") as stream:
+        head = stream.read(_HEAD)
+    found = next((form for start, form in _STARTS.items() if head.startswith(start)), None)
     if found is None and file.suffix.lower() == ".mat":
-        return of_matlab  # of version 4, which has no mark
+        return "MATLAB"  # of version 4, which has no mark
     return found
 
 
-def _of_zip(file: Path, stack: contextlib.ExitStack) -> Table | Columns:
-    return _of_xlsx(file) if _is_xlsx(file) else of_numpy(file, stack)
+def _opened(form: str, file: Path, stack: contextlib.ExitStack) -> Columns | tuple[str, str]:
+    """Open a file as `read_format` does, in a process with limits where it may claim more than it has."""
+    return read_format(form, file, stack) if form in _PLAIN else stack.enter_context(open_bounded(file, form))
+
+
+def read_format(form: str, file: Path, stack: contextlib.ExitStack) -> Columns | tuple[str, str]:
+    """Open a binary file until the stack closes it: its columns, or what to call its sheet and that as a text."""
+    if form == "XLSX or NPZ" and _is_xlsx(file):
+        return _sheet_text(file)
+    return _READERS[form](file, stack)
 
 
 def _is_xlsx(file: Path) -> bool:
@@ -152,24 +163,24 @@ def _is_xlsx(file: Path) -> bool:
         return "[Content_Types].xml" in archive.namelist()
 
 
-def _of_xlsx(file: Path) -> Table:
-    source, text = _sheet_text(file)
-    return text_table(source, text, delimiter="\t")
-
-
 def _sheet_text(file: Path) -> tuple[str, str]:
     """Give the sheet with the most numbers as a text with tabs, with its lines of names, and what to call it."""
     openpyxl = import_extra("openpyxl", "formats", "an XLSX file")
-    book = openpyxl.load_workbook(io.BytesIO(file.read_bytes()), read_only=True, data_only=True)
-    sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
+    book = openpyxl.load_workbook(io.BytesIO(bytes_of(file)), read_only=True, data_only=True)
+    sheets = {}
+    for sheet in book.worksheets:
+        sheet.reset_dimensions()  # what it says of its size would be filled with empty cells
+        sheets[sheet.title] = [row for row in sheet.iter_rows(values_only=True) if row]
     held = {title: sum(isinstance(cell, int | float) for row in rows for cell in row) for title, rows in sheets.items()}
     title = max(held, key=lambda each: held[each], default="")
     if not held.get(title):
         raise DataError(f"{file}: no sheet has a number in it")
-    rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheets[title]]
-    width = max(1 + k for row in rows for k, cell in enumerate(row) if cell)
-    rows = [row[:width] for row in rows if any(row)]
-    holds = [any(k < len(row) and parse_number(row[k]) is not None for row in rows) for k in range(width)]
+    filled = [{k: _as_text(cell) for k, cell in enumerate(row) if cell not in (None, "")} for row in sheets[title]]
+    columns = sorted(set().union(*filled))
+    if columns[-1] <= _SPREAD * len(columns):  # else a stray cell far to the right is the next one
+        columns = list(range(columns[-1] + 1))
+    rows = [[row.get(k, "") for k in columns] for row in filled if row]
+    holds = [any(parse_number(cell) is not None for cell in cells) for cells in zip(*rows, strict=True)]
     text = "\n".join("\t".join(_filled(row, holds)) for row in rows)
     return f"{file}, sheet {title!r}", text
 
@@ -185,9 +196,3 @@ def _filled(row: list[str], holds_numbers: list[bool]) -> list[str]:
 
 def _as_text(cell: Any) -> str:
     return repr(float(cell)) if isinstance(cell, int | float) else str(cell).replace("\t", " ").replace("\n", " ")
-
-
-_FORMATS: dict[_Reader, str] = {
-    of_hdf5: "HDF5 (or MATLAB 7.3, netCDF 4)", of_matlab: "MATLAB", of_netcdf: "netCDF 3", of_numpy: "NumPy",
-    of_tdms: "TDMS", of_mdf: "MDF", of_parquet: "Parquet", _of_zip: "XLSX or NPZ",
-}  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +13,6 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.array_table import Columns, Named, Reversed, columns_of
 from mgdd.io.extras import import_extra
-from mgdd.io.hdf5_heaps import check_heaps, check_trees
-from mgdd.io.matlab_tags import check_tags
 from mgdd.io.watched_file import WatchedFile
 from mgdd.results.labels import ANGLE
 
@@ -29,9 +26,10 @@ def of_matlab(file: Path, _: contextlib.ExitStack) -> Columns:
     """Read the variables of MATLAB 4 to 7, whole."""
     from scipy.io import loadmat
 
-    check_tags(file.read_bytes(), str(file))
     try:
         content = loadmat(file, squeeze_me=True, struct_as_record=False)
+    except MemoryError:
+        raise
     except Exception as error:
         raise DataError(f"{file}: not a MATLAB file: {error}: save it with save(..., '-v7') or as CSV") from error
     return columns_of(
@@ -49,7 +47,6 @@ def _of_struct(name: str, value: Any) -> Iterator[Named]:
 def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the data sets of an HDF5 file, as MATLAB 7.3 and netCDF 4 write one too, until the stack closes it."""
     h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
-    check_trees(file)
     content = stack.enter_context(h5py.File(file, "r"))
     matlab = any("MATLAB_class" in item.attrs for item in content.values())
     found: list[tuple[str, Any]] = []
@@ -60,12 +57,15 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
 
     content.visititems(visit)
     for name, item in found:
+        if item.external or item.is_virtual:
+            raise DataError(
+                f"{file}: the numbers of data set {name!r} stand in other files: those are not read; copy them into "
+                "one, as h5repack does"
+            )
         needed, held = item.size * item.id.get_type().get_size(), item.id.get_storage_size()
         if item.id.get_offset() is not None and held < needed:  # the library would give whatever is in memory
             raise ValueError(f"data set {name!r} has {held} of {needed} bytes")
     kinds = [_kinds_of_units(h5py, item) for _, item in found]
-    if any(kind.is_variable_str() for own in kinds for kind in own.values()):
-        check_heaps(file, itertools.chain.from_iterable(_places_of(item) for _, item in found))
     return columns_of(
         Named(name, Reversed(item) if matlab else item, next(filter(None, (_text(item.attrs[key]) for key in own)), ""))
         for (name, item), own in zip(found, kinds, strict=True)
@@ -83,16 +83,6 @@ def _text(value: Any) -> str:
         return ""
     text = np.ravel(value)[0]
     return text.decode() if isinstance(text, bytes) else str(text)
-
-
-def _places_of(item: Any) -> list[tuple[int, int]]:
-    """Say where in the file the numbers of a data set stand: first bytes, and how many."""
-    found: list[tuple[int, int]] = []
-    if item.chunks:
-        item.id.chunk_iter(lambda chunk: found.append((chunk.byte_offset, chunk.size)))
-    elif (start := item.id.get_offset()) is not None:
-        found.append((start, item.id.get_storage_size()))
-    return found
 
 
 def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,6 +15,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.io.files import Stamp
+from mgdd.io.read_limits import ReadLimits
 from mgdd.io.table import Table
 
 if TYPE_CHECKING:
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ArrayTable", "Columns", "Named", "Reversed", "Samples", "columns_of", "naming_damage"]
+__all__ = ["ArrayTable", "Column", "Columns", "Named", "Reversed", "Samples", "columns_of", "damaged", "naming_damage"]
 
 
 class Named(NamedTuple):
@@ -52,7 +55,7 @@ class Reversed:
         return np.asarray(self._values[index[::-1]]).T
 
 
-class _Column(NamedTuple):
+class Column(NamedTuple):
     """One column of an array: the axis of its samples, and what stands for the other axes."""
 
     values: Any
@@ -62,6 +65,7 @@ class _Column(NamedTuple):
 
     @property
     def size(self) -> int:
+        """Return the number of samples."""
         return int(self.values.shape[self.along])
 
     def block(self, rows: slice, count: int) -> NDArray[Any]:
@@ -75,7 +79,7 @@ class _Column(NamedTuple):
         return found.T if self.along < self.across else found
 
 
-Columns = list[tuple[str, str, _Column]]  # name, unit, column
+Columns = list[tuple[str, str, Column]]  # name, unit, column
 
 
 def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
@@ -89,13 +93,13 @@ def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
     columns: Columns = []
     for name, unit, values, axes in found:
         if len(axes) == 1:
-            columns.append((name, unit, _Column(values, axes[0])))
+            columns.append((name, unit, Column(values, axes[0])))
             continue
         rows, width = (values.shape[k] for k in axes)
         turned = rows not in lengths and (width in lengths or width > rows)
         down, across = axes[::-1] if turned else axes
         for k in range(values.shape[across]):
-            columns.append((f"{name} {k + 1}".strip(), unit, _Column(values, down, across, k)))
+            columns.append((f"{name} {k + 1}".strip(), unit, Column(values, down, across, k)))
     return columns
 
 
@@ -103,7 +107,7 @@ def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
 class ArrayTable(Table):
     """Columns of a binary file; those of several rasters differ in length, also where few `window` rows are read."""
 
-    columns: tuple[_Column, ...]
+    columns: tuple[Column, ...]
     stamp: Stamp | None = None
     window: tuple[int, int | None] = (0, None)
 
@@ -117,7 +121,7 @@ class ArrayTable(Table):
         """Return the number of rows of the first column in the window."""
         return self._rows_of(self.columns[0])
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Return the number of rows that each column has in the file."""
         return tuple(column.size for column in self.columns)
@@ -128,7 +132,9 @@ class ArrayTable(Table):
         if len({column.size for column in columns}) > 1:
             sizes = ", ".join(f"{self.called(index)} has {self.columns[index].size}" for index in indices)
             raise DataError(f"{self.source}: columns of different rasters, {sizes}: name columns of one")
-        out = np.empty((len(columns), self._rows_of(columns[0]) if columns else 0))
+        rows = self._rows_of(columns[0]) if columns else 0
+        self._require_room(sum(rows * column.values.dtype.itemsize for column in columns), 8 * rows * len(columns))
+        out = np.empty((len(columns), rows))
         # Columns that stand side by side are read in one go: a file is read by rows.
         runs = itertools.groupby(enumerate(columns), lambda each: (id(each[1].values), each[1].number - each[0]))
         for _, run in runs:
@@ -145,16 +151,26 @@ class ArrayTable(Table):
 
     def loaded(self) -> ArrayTable:
         """Return the table with all of its arrays in memory."""
+        arrays = {id(column.values): column.values for column in self.columns}
+        claimed = sum(math.prod(each.shape) * each.dtype.itemsize for each in arrays.values())
+        self._require_room(claimed, claimed)
         with self._reading():
             held = {
-                id(each): _complete(np.asarray(each[(slice(None),) * len(each.shape)]), each.shape)
-                for each in {id(column.values): column.values for column in self.columns}.values()
+                key: _complete(np.asarray(each[(slice(None),) * len(each.shape)]), each.shape)
+                for key, each in arrays.items()
             }
         columns = tuple(each._replace(values=held[id(each.values)]) for each in self.columns)
         return replace(self, columns=columns, stamp=None)
 
-    def _rows_of(self, column: _Column) -> int:
+    def _rows_of(self, column: Column) -> int:
         return len(range(*slice(*self.window).indices(column.size)))
+
+    def _require_room(self, claimed: int, needed: int) -> None:
+        """Refuse bytes that are more than the size of the file lets believe, or than this machine has room for."""
+        if self.stamp is not None:
+            limits = ReadLimits.of(self.stamp.file)
+            limits.require(claimed, "what is asked of it")
+            limits.require_free(needed)
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[None]:
@@ -183,4 +199,9 @@ def naming_damage(file: Path) -> Iterator[None]:
         raise
     except Exception as error:  # of another library: any class
         text = f"{type(error).__name__} {error}".strip()
-        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error
+        raise damaged(file, text) from error
+
+
+def damaged(file: Path, text: str) -> DataError:
+    """Make the error of a file of which a library says what is wrong."""
+    return DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again")

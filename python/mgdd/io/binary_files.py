@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import DataError
 from mgdd.io.extras import import_extra
-from mgdd.io.files import existing_file, write_whole
+from mgdd.io.files import bytes_of, existing_file, write_whole
 
 if TYPE_CHECKING:
     import os
@@ -44,7 +44,7 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
     import xarray as xr
 
     file = existing_file(path)
-    content = file.read_bytes()
+    content = bytes_of(file)
     if content.startswith(_HDF5):
         raise DataError(
             f"{file}: netCDF 4 (HDF5), only the classic format is read: convert it, nccopy -k classic OLD.nc NEW.nc, "

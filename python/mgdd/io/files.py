@@ -18,11 +18,24 @@ from typing import Any, Literal
 
 from mgdd._arguments import shown
 from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.io.read_limits import ReadLimits
 
-__all__ = ["Stamp", "decoded", "existing_file", "parsed", "read_plain_text", "write_whole", "write_whole_text"]
+__all__ = [
+    "Stamp",
+    "bytes_of",
+    "decoded",
+    "existing_file",
+    "parsed",
+    "read_plain_text",
+    "write_whole",
+    "write_whole_text",
+]
 
 # Letters of more than one byte as UTF-8 has them; in older encodings they would be pairs as "Ã¤" or "Â°".
 _UTF8 = re.compile(rb"[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3}")
+_SPECIAL = {stat.S_ISFIFO: "a pipe", stat.S_ISCHR: "a device", stat.S_ISBLK: "a device", stat.S_ISSOCK: "a socket"}
+_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_BLOCK = 1 << 20  # bytes that are looked at before a whole file is in memory
 _DEEPEST = 64  # levels
 _WIDEST = 64  # bits of a whole number, with or without a sign
 
@@ -35,7 +48,8 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     FileNotFoundError
         No such file; the message names the one of its folder whose name is nearest.
     mgdd.errors.ParameterError
-        A folder, or a path that cannot be looked up: too long, with a NUL, or behind a folder that must not be entered.
+        A folder, a pipe or a device, which may have no end; or a path that cannot be looked up: too long, with a NUL,
+        or behind a folder that must not be entered.
 
     Examples
     --------
@@ -58,20 +72,41 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
         raise ParameterError(f"path = {shown(path)}: must be {bound}", field="path", value=path, bound=bound)
     file = Path(path)
     try:
-        mode = file.stat().st_mode
+        status = file.stat()
     except (FileNotFoundError, NotADirectoryError):
         pass
     except (OSError, ValueError) as error:  # ValueError: what cannot be handed to the system at all
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise ParameterError.of("path", str(file), f"one that can be looked up ({why}): give another") from error
     else:
+        mode = status.st_mode
         if stat.S_ISDIR(mode):
             raise ParameterError.of("path", str(file), "a file, and this is a folder: name a file in it")
+        if not stat.S_ISREG(mode):
+            what = next((name for is_one, name in _SPECIAL.items() if is_one(mode)), "no plain file")
+            raise ParameterError.of("path", str(file), f"a plain file, and this is {what}: write its content to one")
+        if not status.st_size and _gives_bytes(file):
+            what = "a plain file, and this one of the running system has no size: copy it to one"
+            raise ParameterError.of("path", str(file), what)
         return file
     near = ""
     with contextlib.suppress(OSError):  # no such folder either, or one that must not be listed
         near = did_you_mean(file.name, (other.name for other in file.parent.iterdir()))
     raise FileNotFoundError(errno.ENOENT, f"no such file: {near or 'check the path'}", str(file))
+
+
+def _gives_bytes(file: Path) -> bool:
+    """Whether a file gives bytes beyond its size, or would do so later, as those of /proc do."""
+    try:
+        number = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    except OSError:
+        return False  # who reads it says why
+    try:
+        return bool(os.read(number, 1))
+    except OSError:
+        return True
+    finally:
+        os.close(number)
 
 
 @dataclass(frozen=True)
@@ -119,7 +154,30 @@ class Stamp:
 def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) -> str:
     """Read a text file that `existing_file` finds and `decoded` takes."""
     file = existing_file(path)
-    return decoded(file.read_bytes(), str(file), only_utf8=only_utf8)
+    with file.open("rb") as stream:
+        # A file with holes, as any binary one, is none of text: seen before it is in memory.
+        if not stream.read(2).startswith(_UTF16):
+            while block := stream.read(_BLOCK):
+                if b"\0" in block:
+                    raise _binary(str(file))
+    return decoded(bytes_of(file), str(file), only_utf8=only_utf8)
+
+
+def bytes_of(file: Path) -> bytes:
+    """Read a file as far as its size says, in memory that this machine has.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        More bytes than half of the memory, or than its size says.
+    """
+    limits = ReadLimits.of(file)
+    limits.require_free(limits.size)
+    with file.open("rb") as stream:
+        content = stream.read(limits.size + 1)
+    if len(content) > limits.size:
+        raise DataError(f"{file}: gives more than the {limits.size} bytes of its size: read it once it is complete")
+    return content
 
 
 def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) -> str:
@@ -157,7 +215,7 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) 
         at = raw.count(b"\n", 0, error.start) + line
         return DataError(f"{origin}, line {at}: {said}")
 
-    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+    if raw.startswith(_UTF16):
         if only_utf8:
             raise DataError(f"{origin}: not a UTF-8 text file but UTF-16: save it as UTF-8")
         try:
@@ -165,7 +223,7 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) 
         except UnicodeDecodeError as error:
             raise DataError(f"{origin}: damaged UTF-16 at byte {error.start}: write it again, as UTF-8") from error
     if b"\0" in raw:
-        raise DataError(f"{origin}: this is a binary file: export it as text in UTF-8")
+        raise _binary(origin)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -178,6 +236,10 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) 
     except UnicodeDecodeError as error:
         byte = f"{raw[error.start]:#x}"
         raise refused(error, f"byte {byte} is neither UTF-8 nor Windows-1252: save it as UTF-8") from error
+
+
+def _binary(origin: str) -> DataError:
+    return DataError(f"{origin}: this is a binary file: export it as text in UTF-8")
 
 
 def parsed(

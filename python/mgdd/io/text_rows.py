@@ -13,6 +13,7 @@ from mgdd.io.table import TextTable, check_text_options, content_of, require_wid
 __all__ = ["TextRows"]
 
 _BLOCK = 1 << 20  # bytes; names and what stands above them must be within
+_LONGEST_LINE = 1 << 24  # bytes, of a text without ends of lines
 
 
 class TextRows:
@@ -77,8 +78,8 @@ class TextRows:
         raw = self._stream.read(_BLOCK)
         if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and self._line == 1:
             raw += self._stream.read()  # an end of a line is of two bytes there
-        elif raw:
-            raw += self._stream.readline()
+        elif raw and b"\0" not in raw:  # of a binary file the end of a line may be far
+            raw += self._stream.readline(_LONGEST_LINE)
         self._stamp.require_same()
         text = decoded(raw, str(self._stamp.file), line=self._line)
         self._line += len(text.splitlines())

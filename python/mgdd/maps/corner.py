@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 
-from mgdd.errors import DataError, argument
+from mgdd.errors import DataError, argument, printable
 from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, without_brackets
 from mgdd.results.units import attribute_units
 
@@ -63,8 +63,8 @@ def axes_of(
         if not text and name is None:
             side, example = ("rows", "speed_rpm") if fallback == "y" else ("columns", "fuel_mg")
             warnings.warn(
-                f"{where}: the corner {corner!r} does not name the axis of the {side}: it is called {fallback}, "
-                f"without a unit; name it with {argument(side, repr(example))}",
+                f"{printable(where)}: the corner {corner!r} does not name the axis of the {side}: it is called "
+                f"{fallback}, without a unit; name it with {argument(side, repr(example))}",
                 UserWarning,
                 stacklevel=2,
             )

@@ -12,7 +12,7 @@ import numpy as np
 
 from mgdd.errors import DataError, Error, argument
 from mgdd.io.column_names import check_choice
-from mgdd.io.files import decoded, existing_file, write_whole_text
+from mgdd.io.files import bytes_of, decoded, existing_file, write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cdfx import cdfx_blocks, cdfx_text, is_xml
 from mgdd.maps.cells import can_be_name, spoken_name
@@ -172,7 +172,7 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     no such file: check the path
     """
     file = existing_file(path)
-    raw = file.read_bytes()
+    raw = bytes_of(file)
     if is_xml(raw):
         blocks, skipped = cdfx_blocks(raw, str(file))
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mgdd.errors import ConvergenceError, DataError, ParameterError, argument, did_you_mean
+from mgdd.errors import ConvergenceError, DataError, ParameterError, argument, did_you_mean, printable
 from mgdd.io.extras import import_extra
 from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cells import cell_at
@@ -148,7 +148,9 @@ def smooth_map(
         if outside.any():
             notes["extrapolated"] = f"{_named(optimum, outside)}: outside of the hull of the cells with a value"
             warnings.warn(
-                f"{optimum.name}: extrapolated {notes['extrapolated']}: check them", UserWarning, stacklevel=2
+                f"{printable(str(optimum.name))}: extrapolated {notes['extrapolated']}: check them",
+                UserWarning,
+                stacklevel=2,
             )
     return optimum.replaced(
         np.where(missing, np.nan, solved).reshape(optimum.values.shape),

@@ -70,11 +70,10 @@ def write_report(
     'index.html'
     """
     folder = Path(folder)
-    page = _page(result, interactive=interactive)
     text = json.dumps(to_jsonable(result.summary), indent=2, ensure_ascii=False, allow_nan=False)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    (folder / "index.html").write_text(page, encoding="utf-8")
+    (folder / "index.html").write_text(_page(result, interactive=interactive), encoding="utf-8")
     return folder / "index.html"
 
 

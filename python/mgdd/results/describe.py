@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from mgdd import _core
+from mgdd.errors import printable
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
 
@@ -74,7 +75,7 @@ def as_text(title: str, rows: Iterable[Row]) -> str:
         if len(lines) > most:
             kept = sum(line.count(", ") + line.endswith(",") for line in flow[: most - 1])
             lines = [*lines[: most - 1], f"  … and {len(cells) - kept} more"]
-    return "\n".join([head, *lines])
+    return printable("\n".join([head, *lines]))
 
 
 def as_html(title: str, rows: Iterable[Row], picture: str = "") -> str:

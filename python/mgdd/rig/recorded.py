@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd._core import rig as core
-from mgdd.errors import DataError
+from mgdd.errors import DataError, printable
 from mgdd.io.files import existing_file, parsed
 from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.results.result import Result, merged
@@ -209,7 +209,9 @@ def readable_record(path: str | os.PathLike[str]) -> RecordedRun:
 def _warn_of_rest(path: str | os.PathLike[str], ignored_bytes: int) -> None:
     if ignored_bytes:
         said = "are not readable and left out: mgdd.rig.repair_record looks behind them"
-        warnings.warn(f"{os.fspath(path)}: {ignored_bytes} bytes at its end {said}", UserWarning, stacklevel=3)
+        warnings.warn(
+            f"{printable(os.fspath(path))}: {ignored_bytes} bytes at its end {said}", UserWarning, stacklevel=3
+        )
 
 
 def stamped_frames(path: Path) -> Iterator[tuple[float, core.Frame]]:

@@ -179,12 +179,19 @@ class Parts:
 
         `draw` makes the figures of the dataset by caption; the summary has at least ``seeds`` and ``rows``.
         """
-        figures = {} if draw is None else draw(dataset)
+        figures: Mapping[str, Figure] = {}
+        undrawn = False
+        try:
+            figures = {} if draw is None else draw(dataset)
+        except KeyboardInterrupt:
+            undrawn = True
         plain = to_jsonable({"study": name, **summary, "interrupted": self.interrupted})
         result = StudyResult(name=name, dataset=dataset, figures=figures, summary=Figures(plain))
         workers = _workers.get()
         stop: Interrupted | WorkerLostError | None = None if workers is None else workers.lost
-        if stop is None and self.interrupted:
+        if undrawn:
+            stop = Interrupted(f"interrupted while it drew: all {len(plain['rows'])} rows are in .partial")
+        elif stop is None and self.interrupted:
             stop = Interrupted(f"interrupted: {len(plain['rows'])} finished rows are in .partial")
         return hand_over(result, stop)
 

@@ -13,7 +13,7 @@ from typing import Any
 from mgdd._core.rig import SignalLayout
 from mgdd.errors import DataError, did_you_mean
 from mgdd.io.extras import import_extra
-from mgdd.io.files import decoded, existing_file
+from mgdd.io.files import bytes_of, decoded, existing_file
 
 __all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
 
@@ -87,7 +87,7 @@ class DbcFile:
         """Read a file strictly; DataError where it is not a DBC, or its signals overlap or leave their message."""
         cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
-        content = file.read_bytes()
+        content = bytes_of(file)
         text = decoded(content, str(file))
         _require_bounded(file, text)
         try:
