@@ -14,7 +14,7 @@ from mgdd.errors import ConvergenceError, Interrupted, hand_over
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
-from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
+from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming, undetermined
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.presets.meant import CylinderLike, PointLike
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["best_timing", "doubts_of", "headline_of"]
 
-_MARGIN_CAD = 5.0  # the search reaches this far beyond the fitted timing
+_MARGIN_CAD = 15.0  # the search reaches this far beyond the fitted timing
 
 
 def best_timing(
@@ -60,7 +60,7 @@ def best_timing(
     limits : mapping of str to float, or sequence of Limit, optional
         Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
-        Searched range of SOC, as in `mgdd.engine.find_optimum`; by default it reaches 5 °CA beyond the fitted timing.
+        Searched range of SOC, as in `mgdd.engine.find_optimum`; by default it reaches 15 °CA beyond the fitted timing.
     progress : callable, optional
         Called with a short text after each fit.
 
@@ -95,9 +95,10 @@ def best_timing(
         step_cad=step_cad, integrator=integrator, options=None,
         pegging=pegging, pegging_exponent=pegging_exponent, inlet_pressure_kpa=inlet_pressure_kpa,
     )  # fmt: skip
+    family = family or ModelFamily()
     stop: Interrupted | None = None
     try:
-        fitted = fit_family(request, family or ModelFamily(), progress)
+        fitted = fit_family(request, family, progress)
     except Interrupted as error:
         if error.partial is None:
             raise
@@ -110,7 +111,9 @@ def best_timing(
         tuple(_answer(member, at, objective, kept, bounds_cad, scheme) for member in members)
         for at in range(len(request.traces))
     ]
-    return hand_over([_over_family(label, own) for label, own in zip(request.labels, answers, strict=True)], stop)
+    misfit = family.misfit_cad
+    rows = [_over_family(label, own, misfit) for label, own in zip(request.labels, answers, strict=True)]
+    return hand_over(rows, stop)
 
 
 def _answer(
@@ -174,18 +177,24 @@ def _best_of(found: Optimum | None, base: float, fitted: float, prefix: str) -> 
     return {prefix + name: value for name, value in values.items()}
 
 
-def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
+def _over_family(file: str, answers: tuple[MemberTiming, ...], misfit_cad: float) -> BestTiming:
     kept = [answer for answer in answers if answer.plausible]
 
     def span(name: str) -> tuple[float, float]:
-        values = [float(getattr(answer, name)) for answer in kept]
-        return (min(values), max(values)) if values else (math.nan, math.nan)
+        values = [float(getattr(answer, name)) for answer in kept] or [math.nan]
+        wider = misfit_cad if name.endswith("_cad") else 0.0
+        return min(values) - wider, max(values) + wider
 
-    return BestTiming(
-        file=file,
-        members=answers,
-        **{name: span(name) for name in RANGED},
-    )
+    ranges = {name: span(name) for name in RANGED}
+    for prefix in ("", "free_"):
+        if undetermined(
+            ranges[f"{prefix}shift_cad"]
+        ):  # then the measured timing may be the best, and nothing is gained
+            ranges[f"{prefix}gain_percent"] = (
+                min(0.0, ranges[f"{prefix}gain_percent"][0]),
+                ranges[f"{prefix}gain_percent"][1],
+            )
+    return BestTiming(file=file, members=answers, **ranges)
 
 
 def headline_of(rows: Sequence[BestTiming]) -> Member:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +16,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["RANGED", "BestTiming", "MemberTiming"]
+__all__ = ["RANGED", "BestTiming", "MemberTiming", "undetermined"]
 
 RANGED = (
     "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
     "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",
 )  # fmt: skip
+
+
+def undetermined(shift_cad: Sequence[float]) -> bool:
+    """Say whether a range of moves leaves open if earlier or later is better."""
+    return shift_cad[0] <= 0.0 <= shift_cad[1]
 
 
 def _label(name: str) -> Label:
@@ -94,7 +100,8 @@ class MemberTiming:
         dict
             Names to values.
         """
-        model = {name: getattr(self.member, name) for name in ("law", "gamma_model", "gamma", "wall_heat_scale")}
+        names = ("law", "gamma_model", "gamma", "wall_heat_model", "wall_heat_scale")
+        model = {name: getattr(self.member, name) for name in names}
         own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
         return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
 
@@ -110,7 +117,8 @@ class BestTiming(Result):
     members : tuple of MemberTiming
         Every member's answer, in the order of the family.
     soc_cad, ca50_cad, shift_cad, gain_percent : tuple of float
-        Lowest and highest answer of the plausible members, as in `MemberTiming`; NaN without any.
+        Lowest and highest answer of the plausible members, as in `MemberTiming`; angles with the ``misfit_cad`` of the
+        family on both sides, gains from 0 where the range of moves spans it. NaN without any.
     free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
         The same without the limit of the load's own p_max.
 
