@@ -170,8 +170,10 @@ def _search(load: Load) -> tuple[float, float]:
 
 
 def _best_of(found: Optimum | None, base: float, fitted: float, prefix: str) -> dict[str, float]:
+    # Over a cycle without work no gain is a share of it.
+    per_base = 100.0 / base if base > 0.0 else math.nan
     soc, half, gain = (
-        (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], 100.0 * (found.value / base - 1.0))
+        (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], per_base * (found.value - base))
     )
     values = {"soc_cad": soc, "ca50_cad": half, "shift_cad": soc - fitted, "gain_percent": gain}
     return {prefix + name: value for name, value in values.items()}

@@ -1,4 +1,4 @@
-"""A family of cycle models on the same traces: burn law x gamma x wall-heat law x wall heat, each judged by what is plausible."""
+"""A family of cycle models on the same traces: laws of burn, gamma and wall heat, each judged by what is plausible."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ class ModelFamily(Plausibility):
     authors (Heywood 1988, section 12.4), so the prior is 1 ± 0.25; laws of burn and gamma that are equally right leave
     residuals that differ by about a quarter.
 
-    The scales 1.0 and 1.5 are not centred on the textbook: gas that goes into crevices and past the rings moves the best
-    timing as half of Woschni's wall heat more does. Of 60 simulated engines with such leaks, fitted with their own
-    wall-heat law and scale, the model's best timing was 1.7 (diesel) and 2.4 °CA (spark) early, with a standard
-    deviation of 0.7 to 1.0, which is `misfit_cad`. The laws matter as much: the early end comes from Hohenberg and
-    Eichelberg at 1.0, the late one from Woschni at 1.5.
+    The scales 1.0 and 1.5 are not centred on the textbook: gas that goes into crevices and past the rings moves the
+    best timing as 0.3 to 0.5 of Woschni's wall heat more does. Of 60 simulated engines with such leaks, fitted with
+    their own wall-heat law and scale, the model's best timing was 1.7 (diesel) and 2.4 °CA (spark) early, with a
+    standard deviation of 0.7 to 1.0, which is ``misfit_cad``. The laws matter as much: the early end comes from
+    Hohenberg and Eichelberg at 1.0, the late one from Woschni at 1.5.
 
     Examples
     --------

@@ -68,7 +68,7 @@ class Plausibility:
             yield Finding(
                 "implausible_efficiency",
                 (load.file,),
-                f"closed efficiency {efficiency:.2f} above {self.efficiency_limit:g}",
+                f"closed efficiency {efficiency:.3f} above {self.efficiency_limit:g}",
             )
         low, high = self.fuel_balance
         if known_heat_j is not None and not low <= load.fuel_heat_j / known_heat_j <= high:
