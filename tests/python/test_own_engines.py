@@ -17,7 +17,7 @@ DOUBTS = {"implausible_wall_heat", "implausible_efficiency", "implausible_gamma"
 
 
 def own(number: int) -> tuple[Engine, xr.Dataset, OperatingPoint, float]:
-    """Give an engine of either kind and any law, its mean cycle, what its bench states, and the heat that burned [J]."""
+    """Give an engine of either kind and any law, its mean cycle, what its bench states, the heat that burned [J]."""
     random = np.random.default_rng(1000 + number)
     engine = draw(random, ("diesel", "spark")[number % 2], LAWS[number // 2 % 4])
     measured = record(random, engine, 20, step=1.0)

@@ -89,8 +89,8 @@ def _text(summary: Any) -> list[str | Table]:
         Table(columns=columns, rows=tuple(rows)),
         (
             f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible ones,\n"
-            f"angles with {ModelFamily().misfit_cad:g} °CA on both sides for what all of them lack; wall heat and\n"
-            "gamma cannot be separated here.\n"
+            f"angles with {ModelFamily().misfit_cad:g} °CA on both sides for what all of them lack; gains are the models'.\n"
+            "Wall heat and gamma cannot be separated here, so one best timing would be false precision.\n"
             'Positive moves are later. "open": the range spans zero, so no direction is determined.'
         ),
     ]
@@ -153,7 +153,7 @@ def _span(best: Any, name: str, digits: int) -> str:
     low, high = best[name]
     own = best["best"][name]
     if name.endswith("gain_percent") and undetermined(best[name.replace("gain_percent", "shift_cad")]):
-        return f"at most {high:z.{digits}f}"
+        return f"open ({low:z.{digits}f} to {high:z.{digits}f})"
     if name.endswith("shift_cad") and undetermined((low, high)):
         return f"open ({low:+z.{digits}f} to {high:+z.{digits}f})"
     if name.endswith("shift_cad"):

@@ -259,7 +259,7 @@ def _optimum_of_files(
             if direction == "not determined" and name.endswith("shift_cad"):
                 return f"no direction is determined ({low:z.2f} to {high:z.2f})"
             if direction == "not determined" and name.endswith("gain_percent"):
-                return f"at most {high:z.2f}"
+                return f"open ({low:z.2f} to {high:z.2f})"
             return f"{getattr(best, name):z.2f} ({low:z.2f} to {high:z.2f})"
 
         parts.append(

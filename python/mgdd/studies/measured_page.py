@@ -76,7 +76,7 @@ _TIMING_TEXT = (
     "cannot be separated. What to set is 'move by': later than measured if positive; 'open' where the range spans "
     "zero, so that no direction is determined. CA50 is that of the modelled burn, some tenths later than that of the "
     "net heat below. Own p_max is the highest measured sample, or the model's where that is higher at the measured "
-    "timing. Gains are in closed-cycle work over the measured timing."
+    "timing. Gains are those of the models, in closed-cycle work over the measured timing."
 )
 _HEADLINE_TEXT = (
     "Headline: {law}. It has the least distance from the best fit and from the textbook wall heat (1 ± 0.25) of the "
@@ -171,9 +171,11 @@ def _timing(rows: Sequence[Mapping[str, Any]]) -> Table:
             return "not known"
         prefix = "free_" if name.startswith("free_") else ""
         is_open = undetermined(row[f"{prefix}shift_cad"])
-        if is_open and name.endswith("gain_percent"):
-            return f"at most {as_number(row[name][1], f'z.{digits}f')}"
-        first = "open" if is_open and name.endswith("shift_cad") else as_number(row["best"][name], f"z.{digits}f")
+        first = (
+            "open"
+            if is_open and name.endswith(("shift_cad", "gain_percent"))
+            else as_number(row["best"][name], f"z.{digits}f")
+        )
         return f"{first} ({_span(row[name], digits)})"
 
     body = ((row["file"], *(cell(row, name, digits) for name, (_, digits) in _TIMING.items())) for row in rows)

@@ -82,11 +82,13 @@ def best_timing(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import ModelFamily, best_timing
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)])  # wall heat 0.5, 1.0 and 1.5
+    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
     >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
-    >>> [(member.member.wall_heat_scale, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
-    [(0.5, 4), (1.0, 7), (1.5, 10)]
+    >>> [(member.member.wall_heat_model, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
+    [('woschni', 7), ('hohenberg', 4)]
+    >>> rows[0].free_direction
+    'not determined'
     """
     kept = {limit.name: limit.upper - limit.margin for limit in limits_of(limits)}
     check_request(objective, kept)

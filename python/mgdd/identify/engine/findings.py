@@ -114,12 +114,15 @@ def _implausible(fit: CylinderFit, request: Request) -> Iterator[Finding]:
             text=f"{found.text}: it makes up for another error of the model, and fuel heat and burn do so with it",
             remedy="state the fuel, hold wall_heat_scale and free gamma, or ask best_timing",
         )
+    of_loads: dict[str, list[Finding]] = {}
     for load, known in zip(fit.loads, request.known_heat_j, strict=True):
         for found in _PLAUSIBLE.of_load(load, known):
-            if found.code != "imep_error":
-                yield replace(
-                    found, text=f"{load.file}: {found.text}", remedy="suspect gamma, TDC, pegging or the fuel"
-                )
+            of_loads.setdefault(found.code, []).append(replace(found, text=f"{load.file} {found.text}"))
+    for code, together in of_loads.items():
+        if code != "imep_error":
+            files = tuple(name for found in together for name in found.names)
+            text = "; ".join(found.text for found in together[:3]) + (" and others" if len(together) > 3 else "")
+            yield Finding(code, files, text, "suspect gamma, TDC, pegging or the fuel")
 
 
 def _work(fit: CylinderFit) -> Iterator[Finding]:

@@ -137,7 +137,7 @@ class BestTiming(Result):
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
     >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
     >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
-    ([5, 8], 8)
+    ([1, 9], 8)
     """
 
     file: str
