@@ -89,8 +89,8 @@ def _text(summary: Any) -> list[str | Table]:
         Table(columns=columns, rows=tuple(rows)),
         (
             f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible ones,\n"
-            f"angles with {ModelFamily().misfit_cad:g} °CA on both sides for what all of them lack; gains are the models'.\n"
-            "Wall heat and gamma cannot be separated here, so one best timing would be false precision.\n"
+            f"angles with {ModelFamily().misfit_cad:g} °CA on both sides for what all of them lack; gains are\n"
+            "those of the models. Wall heat and gamma cannot be separated here.\n"
             'Positive moves are later. "open": the range spans zero, so no direction is determined.'
         ),
     ]
