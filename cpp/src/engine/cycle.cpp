@@ -12,6 +12,7 @@
 #include "mgdd/engine/cycle_indicators.hpp"
 #include "mgdd/engine/gas.hpp"
 #include "mgdd/engine/wall_heat.hpp"
+#include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::engine {
 
@@ -78,7 +79,8 @@ T CycleModel<T>::volume_before(std::size_t k) const noexcept {
 // trapezoid (p0 + p1)/2 dV; euler p0 dV; tan2018_lagged p0 (V0 - V_before), as printed in Tan 2018, eqs 2-11 to 2-15;
 // split: half the heat at V0, adiabatic to V1, half the heat at V1 (Strang 1968).
 template <class T>
-typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& gamma, std::size_t k) const noexcept {
+MGDD_INLINE typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& gamma,
+                                                                                 std::size_t k) const noexcept {
   using std::pow;
   const T& v0 = volume_[k];
   const T& v1 = volume_[k + 1];
