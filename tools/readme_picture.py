@@ -47,20 +47,22 @@ def draw_trace(ax: Axes, heat: xr.Dataset, load: Load) -> None:
 
 
 def draw_timing(ax: Axes, row: BestTiming) -> None:
-    """Closed-cycle efficiency over the angle of half burned, for plausible models of three wall heats."""
+    """Closed-cycle efficiency over the angle of half burned, for plausible models of several wall heats."""
     like = [m for m in row.members if m.plausible and m.member.fitted == "gamma" and m.member.gamma_model == "linear"]
-    for answer, (dash, colour) in zip(like, (("--", BLUE), ("-", BLACK), ("-.", GREY)), strict=True):
+    styles = [(dash, colour) for colour in (BLACK, BLUE, GREY) for dash in ("-", "--")]
+    for answer, (dash, colour) in zip(like, styles, strict=False):
         load = answer.member.fit.loads[LOAD]
         sweep = timing_sweep(load.cylinder, load.point, soc_cad=np.arange(-15.0, 10.5, 0.5))
         efficiency = 100.0 * sweep["work_closed_j"] / load.fuel_heat_j
-        name = f"wall heat {answer.member.wall_heat_scale:g}, RMSE {answer.rmse_percent:.2f} %"
+        wall = answer.member.wall_heat_model.capitalize()
+        name = f"{wall} {answer.member.wall_heat_scale:g}, RMSE {answer.rmse_percent:.2f} %"
         ax.plot(sweep["ca50_cad"], efficiency, dash, color=colour, label=name)
         at = float(np.interp(answer.free_ca50_cad, sweep["ca50_cad"], efficiency))
         ax.plot(answer.free_ca50_cad, at, "o", color=colour, markersize=6)
     low, high = row.free_ca50_cad
-    ax.axvspan(low, high, color=ORANGE, alpha=0.2, linewidth=0, label=f"plausible: {low:.1f} to {high:.1f}")
+    ax.axvspan(low, high, color=ORANGE, alpha=0.2, linewidth=0, label=f"range: {low:.1f} to {high:.1f}")
     ax.set(xlabel="half burned, CA50 [°CA aTDC]", ylabel="efficiency, closed cycle [%]", xlim=(-4, 20))
-    ax.legend(loc="lower center", frameon=False, fontsize=8.0)
+    ax.legend(loc="lower center", frameon=False, fontsize=7.0)
     ax.set_title("Best timing: equally good models disagree", loc="left")
 
 

@@ -64,6 +64,7 @@ BENCHMARK_CAPTURE(cycle, euler, Variant{.integrator = Integrator::euler});
 BENCHMARK_CAPTURE(cycle, gamma_linear, Variant{.gamma = GammaModel::linear});
 BENCHMARK_CAPTURE(cycle, gamma_polynomial, Variant{.gamma = GammaModel::polynomial});
 BENCHMARK_CAPTURE(cycle, hohenberg, Variant{.wall = WallHeatModel::hohenberg});
+BENCHMARK_CAPTURE(cycle, eichelberg, Variant{.wall = WallHeatModel::eichelberg});
 BENCHMARK_CAPTURE(dual_cycle, triangle, Variant{});
 BENCHMARK_CAPTURE(dual_cycle, wiebe_gamma_linear, Variant{.burn = BurnShape::wiebe, .gamma = GammaModel::linear});
 

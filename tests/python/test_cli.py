@@ -191,7 +191,8 @@ def test_optimum_of_files_is_a_range(files: tuple[list[str], str], capsys: pytes
     kept = [member for member in row["members"] if member["plausible"]]
     assert len(kept) >= 2
     assert row["best"] in kept
-    assert row["free_ca50_cad"] == [min(m["free_ca50_cad"] for m in kept), max(m["free_ca50_cad"] for m in kept)]
+    answers = [m["free_ca50_cad"] for m in kept]
+    assert row["free_ca50_cad"] == pytest.approx([min(answers) - 1.0, max(answers) + 1.0])
     assert row["free_gain_percent"][0] > 0.3  # its own peak pressure holds the full load back
     assert row["best"]["free_p_max_bar"] > row["best"]["p_max_limit_bar"]
 

@@ -137,7 +137,7 @@ def test_the_fuel_energy_is_released_exactly(soc, duration, shape, m):
     fuel=st.floats(0.0, 45.0),
     integrator=st.sampled_from(INTEGRATORS),
     gamma=st.sampled_from(("constant", "linear", "polynomial")),
-    wall=st.sampled_from(("woschni", "hohenberg")),
+    wall=st.sampled_from(("woschni", "hohenberg", "eichelberg")),
     scale=st.floats(0.0, 1.5),
 )
 @settings(max_examples=150)

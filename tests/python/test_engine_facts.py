@@ -108,7 +108,7 @@ def test_woschni_constants_of_all_unit_systems():
     assert _core.engine.woschni_coefficient(0.01298, 0.086, 80e5, 1700.0, w) == pytest.approx(h, rel=5e-4)
 
 
-@pytest.mark.parametrize("model", ["woschni", "hohenberg"])
+@pytest.mark.parametrize("model", ["woschni", "hohenberg", "eichelberg"])
 def test_wall_heat_is_the_printed_formula(model):
     cylinder = Cylinder(wall_heat_model=model, wall_heat_scale=0.7)
     cycle = simulate(cylinder, FIXED)
@@ -119,6 +119,8 @@ def test_wall_heat_is_the_printed_formula(model):
     velocity = 2.28 * 4.3 + 3.24e-3 * cylinder.swept_volume_l * t[0] / (1.5 * volume[0]) * burning
     if model == "woschni":
         film = 0.7 * 129.8 * 0.086**-0.2 * p**0.8 * t**-0.55 * velocity**0.8
+    elif model == "eichelberg":
+        film = 0.7 * 2.43 * np.cbrt(4.3) * np.sqrt(p * t)
     else:
         film = 0.7 * 130.0 * (volume * 1e-3) ** -0.06 * p**0.8 * t**-0.4 * (4.3 + 1.4) ** 0.8
     loss = film * _core.engine.wall_area_m2(cylinder, angle) * (t - 450.0) / (6.0 * 1500.0)

@@ -18,7 +18,7 @@ POINT = OperatingPoint(burn_duration_cad=33.3, trapped_mass_g=0.78)
 INPUTS = tuple(_core.engine.differentiable_inputs())
 SHAPES = ("triangle", "wiebe", "double_wiebe")
 GAMMAS = ("constant", "linear", "polynomial")
-WALLS = ("woschni", "hohenberg")
+WALLS = ("woschni", "hohenberg", "eichelberg")
 
 
 def with_input(cylinder, point, soc, name, value):

@@ -28,7 +28,7 @@ def moved(cycle, *, angle=0.0, pressure=0.0):
     speed=st.floats(800.0, 4000.0),
     scale=st.floats(0.0, 1.2),
     shape=st.sampled_from(("triangle", "wiebe", "double_wiebe")),
-    wall=st.sampled_from(("woschni", "hohenberg")),
+    wall=st.sampled_from(("woschni", "hohenberg", "eichelberg")),
 )
 @settings(max_examples=60)
 def test_analysis_inverts_the_simulation(soc, fuel, speed, scale, shape, wall):

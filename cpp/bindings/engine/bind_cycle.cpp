@@ -175,6 +175,8 @@ void bind_cycle(py::module_& m) {
         arg("pressure_bar"), arg("temperature_k"), arg("gas_velocity_m_per_s"), "Film coefficient [W/(m2 K)].");
   m.def("hohenberg_coefficient", over<&hohenberg_coefficient<double>>(), arg("c1_bar_m3"), arg("volume_m3"),
         arg("pressure_bar"), arg("temperature_k"), arg("piston_speed_m_per_s"), "Film coefficient [W/(m2 K)].");
+  m.def("eichelberg_coefficient", over<&eichelberg_coefficient<double>>(), arg("c1_bar"), arg("pressure_bar"),
+        arg("temperature_k"), arg("piston_speed_m_per_s"), "Film coefficient [W/(m2 K)].");
 }
 
 }  // namespace mgdd::bindings

@@ -12,6 +12,7 @@
 #include "mgdd/engine/cycle_indicators.hpp"
 #include "mgdd/engine/gas.hpp"
 #include "mgdd/engine/wall_heat.hpp"
+#include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::engine {
 
@@ -78,7 +79,8 @@ T CycleModel<T>::volume_before(std::size_t k) const noexcept {
 // trapezoid (p0 + p1)/2 dV; euler p0 dV; tan2018_lagged p0 (V0 - V_before), as printed in Tan 2018, eqs 2-11 to 2-15;
 // split: half the heat at V0, adiabatic to V1, half the heat at V1 (Strang 1968).
 template <class T>
-typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& gamma, std::size_t k) const noexcept {
+MGDD_INLINE typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& gamma,
+                                                                                 std::size_t k) const noexcept {
   using std::pow;
   const T& v0 = volume_[k];
   const T& v1 = volume_[k + 1];
@@ -126,16 +128,14 @@ std::size_t CycleModel<T>::fill_heat_release(const Charge<T>& charge, const T& s
 template <class T>
 void CycleModel<T>::run(const Charge<T>& charge, const T& soc_cad, CycleWorkspace<T>& work) const noexcept {
   const std::size_t burning = fill_heat_release(charge, soc_cad, work);
-  const bool woschni = cylinder_.wall_heat.wall_heat_model == WallHeatModel::woschni;
-  if (cylinder_.gas.gamma_model == GammaModel::constant) {
-    woschni ? integrate<true, true>(charge, burning, work) : integrate<true, false>(charge, burning, work);
-  } else {
-    woschni ? integrate<false, true>(charge, burning, work) : integrate<false, false>(charge, burning, work);
-  }
+  with_wall_heat(cylinder_.wall_heat.wall_heat_model, [&]<WallHeatModel model>() {
+    cylinder_.gas.gamma_model == GammaModel::constant ? integrate<true, model>(charge, burning, work)
+                                                      : integrate<false, model>(charge, burning, work);
+  });
 }
 
 template <class T>
-template <bool ConstantGamma, bool Woschni>
+template <bool ConstantGamma, WallHeatModel Model>
 void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning,
                               CycleWorkspace<T>& work) const noexcept {
   const std::size_t n = angles_.size();
@@ -146,7 +146,7 @@ void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning
   for (std::size_t k = 0; k + 1 < n; ++k) {
     const T temperature = pressure * volume_[k] * per_gas;
     const T lead = wall.lead_j(temperature, wall_term_[k]);
-    const auto film = wall.template film<Woschni>(pressure, motored_ratio_[k], k >= first_burning);
+    const auto film = wall.template film<Model>(pressure, motored_ratio_[k], k >= first_burning);
     const T loss = film.times(lead);
     work.heat_loss_j[k] = loss;
     if constexpr (ConstantGamma) {
@@ -175,14 +175,14 @@ template <class T>
 void CycleModel<T>::wall_heat(const Charge<T>& charge, std::span<const T> pressure_pa, double burning_from_cad,
                               std::span<T> loss_j) const noexcept {
   const WallHeat<T> wall(cylinder_.wall_heat, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
-  for (std::size_t k = 0; k + 1 < angles_.size(); ++k) {
-    const T& p = pressure_pa[k];
-    const T temperature = p * volume_[k] / charge.gas_j_per_k;
-    const bool burning = angles_[k] >= burning_from_cad;
-    loss_j[k] = cylinder_.wall_heat.wall_heat_model == WallHeatModel::woschni
-                    ? wall.template step_j<true>(p, temperature, wall_term_[k], motored_ratio_[k], burning)
-                    : wall.template step_j<false>(p, temperature, wall_term_[k], motored_ratio_[k], burning);
-  }
+  with_wall_heat(cylinder_.wall_heat.wall_heat_model, [&]<WallHeatModel model>() {
+    for (std::size_t k = 0; k + 1 < angles_.size(); ++k) {
+      const T& p = pressure_pa[k];
+      const T temperature = p * volume_[k] / charge.gas_j_per_k;
+      const bool burning = angles_[k] >= burning_from_cad;
+      loss_j[k] = wall.template step_j<model>(p, temperature, wall_term_[k], motored_ratio_[k], burning);
+    }
+  });
 }
 
 template <class T>

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'ThermalNoModel', 'TraceOptions', 'analyze', 'analyze_cycles', 'at_even_angles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'encoder_angle', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'thermal_no', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['Cylinder', 'Indicating', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'ThermalNoModel', 'TraceOptions', 'analyze', 'analyze_cycles', 'at_even_angles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'eichelberg_coefficient', 'encoder_angle', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'thermal_no', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
@@ -911,6 +911,10 @@ def convergence(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Suppo
 def differentiable_inputs() -> list[str]:
     """
     Names that `sensitivities` takes.
+    """
+def eichelberg_coefficient(c1_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    """
+    Film coefficient [W/(m2 K)].
     """
 def encoder_angle(time_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], signal: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], index: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, teeth: typing.SupportsInt | typing.SupportsIndex = 360, missing_teeth: typing.SupportsInt | typing.SupportsIndex = 0, falling: bool = False, level: typing.SupportsFloat | typing.SupportsIndex | None = None) -> dict:
     """

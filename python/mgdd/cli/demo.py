@@ -9,6 +9,8 @@ from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.cli.study import run_or_part
+from mgdd.identify import ModelFamily
+from mgdd.identify.engine.timing_records import undetermined
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.report import write_report
 from mgdd.studies.sections import Table
@@ -90,9 +92,10 @@ def _text(summary: Any) -> list[str | Table]:
         ),
         Table(columns=columns, rows=tuple(rows)),
         (
-            f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible ones;\n"
-            "wall heat and gamma stand in for each other here, so one best timing would be false precision.\n"
-            "Positive moves are later."
+            f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible ones,\n"
+            f"angles with {ModelFamily().misfit_cad:g} °CA on both sides for what all of them lack; gains are\n"
+            "those of the models. Wall heat and gamma cannot be separated here.\n"
+            'Positive moves are later. "open": the range spans zero, so no direction is determined.'
         ),
     ]
 
@@ -153,6 +156,10 @@ def _span(best: Any, name: str, digits: int) -> str:
         return "not known: no plausible model"
     low, high = best[name]
     own = best["best"][name]
+    if name.endswith("gain_percent") and undetermined(best[name.replace("gain_percent", "shift_cad")]):
+        return f"open ({low:z.{digits}f} to {high:z.{digits}f})"
+    if name.endswith("shift_cad") and undetermined((low, high)):
+        return f"open ({low:+z.{digits}f} to {high:+z.{digits}f})"
     if name.endswith("shift_cad"):
         return f"{own:+z.{digits}f} ({low:+z.{digits}f} to {high:+z.{digits}f})"
     return f"{own:z.{digits}f} ({low:z.{digits}f} to {high:z.{digits}f})"

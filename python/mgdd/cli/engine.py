@@ -32,7 +32,7 @@ from mgdd.cli.sweep import add_sweep
 from mgdd.engine import ThermalNo, find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
 from mgdd.errors import ConvergenceError
-from mgdd.identify import best_timing, estimate_tdc, fit_cylinder
+from mgdd.identify import ModelFamily, best_timing, estimate_tdc, fit_cylinder
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
 from mgdd.identify.engine.calibration import TDC_SPAN_CAD, judge_fit
 from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
@@ -260,6 +260,11 @@ def _optimum_of_files(
 
         def told(name: str, best: MemberTiming = best, row: BestTiming = row) -> str:
             low, high = getattr(row, name)
+            direction = row.free_direction if name.startswith("free_") else row.direction
+            if direction == "not determined" and name.endswith("shift_cad"):
+                return f"no direction is determined ({low:z.2f} to {high:z.2f})"
+            if direction == "not determined" and name.endswith("gain_percent"):
+                return f"open ({low:z.2f} to {high:z.2f})"
             return f"{getattr(best, name):z.2f} ({low:z.2f} to {high:z.2f})"
 
         parts.append(
@@ -268,7 +273,10 @@ def _optimum_of_files(
             + f"\n {kept}\n"
             + lines({f"free_{name}": told(f"free_{name}") for name in _RANGED})
         )
-    parts.append("In brackets: the range over the plausible models of the family; --json lists every one.")
+    parts.append(
+        f"In brackets: the range over the plausible models of the family, angles with {ModelFamily().misfit_cad:g} °CA "
+        "on both sides for what all of them lack; --json lists every one."
+    )
     parts += ["limitations found:\n" + "\n".join(f"  - {text}" for text in warnings)] if warnings else []
     payload = {"preset": preset, "law": main.name, "traces": [row.to_dict() for row in rows], "warnings": warnings}
     emit(args, payload, text="\n\n".join(parts))

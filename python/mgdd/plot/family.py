@@ -30,14 +30,15 @@ def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes
     ----------
     timing : xarray.Dataset or BestTiming
         ``free_ca50_cad``, ``fitted_ca50_cad`` [°CA aTDC] and ``plausible`` over ``member`` of one load of
-        `mgdd.identify.best_timing`; attribute ``best`` names the best member.
+        `mgdd.identify.best_timing`; attribute ``best`` names the best member,
+        ``free_ca50_low_cad`` and ``free_ca50_high_cad`` are the ends of the range.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Filled: plausible; open: not; ringed: the best; band: range of the plausible ones; dashed: burn as measured.
+        Filled: plausible; open: not; ringed: the best; band: the range; dashed: burn as measured.
 
     Raises
     ------
@@ -63,7 +64,8 @@ def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes
     rows, chosen = np.arange(len(names)), timing.attrs.get("best")
     best, kept = timing["free_ca50_cad"].to_numpy(), timing["plausible"].to_numpy().astype(bool)
     if chosen:
-        low, high = float(best[kept].min()), float(best[kept].max())
+        ends = ("free_ca50_low_cad", best[kept].min()), ("free_ca50_high_cad", best[kept].max())
+        low, high = (float(timing.attrs.get(name, end)) for name, end in ends)
         ax.axvspan(low, high, color=ORANGE, alpha=0.15, linewidth=0, label=minus(f"plausible: {low:.1f} to {high:.1f}"))
         at = names.index(chosen)
         measured = float(timing["fitted_ca50_cad"][at])

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import plot
 from mgdd.engine import timing_sweep
+from mgdd.identify.engine.family import ModelFamily
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import Load
+from mgdd.identify.engine.timing_records import undetermined
 from mgdd.plot.calibration import wall_heat_profile
 from mgdd.plot.family import family_strips
 from mgdd.plot.style import drawn
@@ -69,10 +71,12 @@ _MEMBERS = {
 }
 _TIMING_TEXT = (
     "{kept} of {n} models are plausible for at least one load. Each cell: the answer of the headline model, then the "
-    "range over all plausible ones. Where the range is wide, these traces do not determine the best timing: wall heat "
-    "and gamma stand in for each other. What to set is 'move by': later than measured if positive. CA50 is that of the "
-    "modelled burn, some tenths later than that of the net heat below. Own p_max is the highest measured sample, or "
-    "the model's where that is higher at the measured timing. Gains are in closed-cycle work over the measured timing."
+    "range over all plausible ones, angles with {misfit:g} °CA on both sides for crevices, blow-by and gas properties "
+    "that no model has. Where the range is wide, these traces do not determine the best timing: wall heat and gamma "
+    "cannot be separated. What to set is 'move by': later than measured if positive; 'open' where the range spans "
+    "zero, so that no direction is determined. CA50 is that of the modelled burn, some tenths later than that of the "
+    "net heat below. Own p_max is the highest measured sample, or the model's where that is higher at the measured "
+    "timing. Gains are those of the models, in closed-cycle work over the measured timing."
 )
 _HEADLINE_TEXT = (
     "Headline: {law}. It has the least distance from the best fit and from the textbook wall heat (1 ± 0.25) of the "
@@ -80,8 +84,9 @@ _HEADLINE_TEXT = (
 )
 _MEMBERS_TEXT = (
     "Every model is fitted to all loads together, the burn bounded by the injection. Plausible: wall heat 0.3 to 1.5 "
-    "of the textbook law, closed IMEP within 2 %, RMSE at most twice the least, no burn before the injection, a fit "
-    "that converged, and wall heat and gamma of the other loads serve the one left out."
+    "of the textbook law, closed efficiency at most 0.55, heat 0.86 to 1.04 of a stated fuel, closed IMEP within 2 %, "
+    "RMSE at most twice the least (of which less than 0.2 % counts as 0.2), no burn before the injection, a fit that "
+    "converged, and wall heat and gamma of the other loads serve the one left out."
 )
 _LAWS_TEXT = (
     "Pressure error over the closed cycle, error of the closed IMEP, fitted burn start against injection, and the "
@@ -123,7 +128,10 @@ def _limitations(s: Mapping[str, Any]) -> list[str]:
     out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(told))]
     for row in s["traces"]:
         out += [f"{row['file']}: {text}." for text in row["warnings"]]
-    out.append("Standard errors take the residual as white noise; it is model error, so true uncertainties are larger.")
+    out.append(
+        "Standard errors of the wall heat take the residual as white noise; it is model error, so the true ones are "
+        "larger."
+    )
     errors = [abs(row["best"]["p_max_model_error_bar"]) for row in s["best_timing"] if row["best"]] or [0.0]
     out.append(
         f"At the measured timing the headline's p_max is wrong by up to {max(errors):.1f} bar: gains of a tenth of a "
@@ -145,7 +153,7 @@ def _headline(s: Mapping[str, Any]) -> tuple[str, ...]:
                 f"nearest is {s['law']}; what it fails stands below. Suspect geometry, TDC, pegging, speed or mass."
             ),
         )
-    return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=kept, n=n)
+    return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=kept, n=n, misfit=ModelFamily().misfit_cad)
 
 
 def _table(first: Sequence[str], columns: Mapping[str, tuple[str, Any]], rest: Sequence[str], body: Any) -> Table:
@@ -161,7 +169,14 @@ def _timing(rows: Sequence[Mapping[str, Any]]) -> Table:
     def cell(row: Mapping[str, Any], name: str, digits: int) -> str:
         if row["best"] is None:
             return "not known"
-        return f"{as_number(row['best'][name], f'z.{digits}f')} ({_span(row[name], digits)})"
+        prefix = "free_" if name.startswith("free_") else ""
+        is_open = undetermined(row[f"{prefix}shift_cad"])
+        first = (
+            "open"
+            if is_open and name.endswith(("shift_cad", "gain_percent"))
+            else as_number(row["best"][name], f"z.{digits}f")
+        )
+        return f"{first} ({_span(row[name], digits)})"
 
     body = ((row["file"], *(cell(row, name, digits) for name, (_, digits) in _TIMING.items())) for row in rows)
     return _table(["trace"], _TIMING, [], body)

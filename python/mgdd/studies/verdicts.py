@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from mgdd.identify.engine.timing_records import undetermined
+
 __all__ = ["verdict_of"]
 
 _CYCLES = "cycles to within 1 °CA of the optimum"
@@ -169,13 +171,21 @@ def _moves(row: Mapping[str, Any]) -> str:
     best = row["best"]
     if best is None:
         return f"{row['file']}: no plausible model, so no best timing."
-    kept = f"range {_span(row['shift_cad'])} °CA"
-    free = f"gain {best['free_gain_percent']:.2f} %, range {_span(row['free_shift_cad'])} °CA"
-    if abs(best["shift_cad"] - best["free_shift_cad"]) < 0.05:
-        return f"{row['file']}: {_move(best['free_shift_cad'])}, {free}; its own p_max kept, {kept}."
+    kept, free = (_part(row, prefix) for prefix in ("", "free_"))
+    same = abs(best["shift_cad"] - best["free_shift_cad"]) < 0.05
+    if same and undetermined(row["shift_cad"]) == undetermined(row["free_shift_cad"]):
+        return f"{row['file']}: {free}; its own p_max kept, range {_span(row['shift_cad'])} °CA."
+    return f"{row['file']}: {kept}, its own p_max kept; without that limit {free}."
+
+
+def _part(row: Mapping[str, Any], prefix: str) -> str:
+    """Say the move of one question; a range that spans zero says none."""
+    best, ends = row["best"], row[f"{prefix}shift_cad"]
+    if undetermined(ends):
+        return f"no direction is determined, range {_span(ends)} °CA"
+    to = f" to a p_max of {best['free_p_max_bar']:.0f} bar" if prefix else ""
     return (
-        f"{row['file']}: {_move(best['shift_cad'])}, gain {best['gain_percent']:.2f} %, {kept}, its own p_max kept; "
-        f"without that limit {_move(best['free_shift_cad'])} to a p_max of {best['free_p_max_bar']:.0f} bar, {free}."
+        f"{_move(best[f'{prefix}shift_cad'])}{to}, gain {best[f'{prefix}gain_percent']:.2f} %, range {_span(ends)} °CA"
     )
 
 

@@ -93,7 +93,7 @@ const std::vector<std::string> mixed_names{"speed_rpm", "fuel_mg",        "intak
 TEST(Batch, LanesGiveTheCyclesOneByOneForEveryLaw) {
   Table table(mixed_names, mixed_points(53, 1));  // not a multiple of the lanes
   for (const BurnShape shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
       for (const Integrator scheme :
            {Integrator::trapezoid, Integrator::split, Integrator::tan2018_lagged, Integrator::euler}) {
         table.cases.cylinder.burn.burn_shape = shape;
@@ -122,7 +122,7 @@ TEST(Batch, SharedPointsGiveTheCyclesOneByOneToAMillionth) {
   }
   Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
   for (const BurnShape shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
       for (const double scale : {0.0, 0.5, 3.0}) {
         table.cases.cylinder.burn.burn_shape = shape;
         table.cases.cylinder.wall_heat.wall_heat_model = wall;
@@ -262,7 +262,7 @@ TEST(Batch, DerivativesInLanesAreThoseOfOneCycle) {
   Table table(mixed_names, mixed_points(19, 8));
   const std::vector<IndicatorMember> members = all_members();
   for (const BurnShape shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
       table.cases.cylinder.burn.burn_shape = shape;
       table.cases.cylinder.wall_heat.wall_heat_model = wall;
       Columns found(along.size() * members.size(), std::vector<double>(table.cases.size()));

@@ -20,7 +20,7 @@ constexpr Integrator integrators[] = {Integrator::trapezoid, Integrator::split, 
                                       Integrator::euler};
 constexpr BurnShape shapes[] = {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe};
 constexpr GammaModel gammas[] = {GammaModel::constant, GammaModel::linear, GammaModel::polynomial};
-constexpr WallHeatModel walls[] = {WallHeatModel::woschni, WallHeatModel::hohenberg};
+constexpr WallHeatModel walls[] = {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg};
 
 double sum(const std::vector<double>& column) {
   double total = 0.0;

@@ -102,7 +102,7 @@ TEST(EngineCylinder, NamesGoBothWays) {
   for (const char* name : {"constant", "linear", "polynomial"}) {
     EXPECT_EQ(name_of(parse_name<GammaModel>("gamma_model", name)), name);
   }
-  for (const char* name : {"woschni", "hohenberg"}) {
+  for (const char* name : {"woschni", "hohenberg", "eichelberg"}) {
     EXPECT_EQ(name_of(parse_name<WallHeatModel>("wall_heat_model", name)), name);
   }
   for (const char* name : {"watson", "wolfer", "hardenberg_hase", "polynomial"}) {

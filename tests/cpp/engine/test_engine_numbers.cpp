@@ -79,7 +79,9 @@ TEST(EngineNumbers, NamesOfTheOptions) {
       {{GammaModel::constant, "constant"}, {GammaModel::linear, "linear"}, {GammaModel::polynomial, "polynomial"}});
   test::expect_names<BurnShape>(
       {{BurnShape::triangle, "triangle"}, {BurnShape::wiebe, "wiebe"}, {BurnShape::double_wiebe, "double_wiebe"}});
-  test::expect_names<WallHeatModel>({{WallHeatModel::woschni, "woschni"}, {WallHeatModel::hohenberg, "hohenberg"}});
+  test::expect_names<WallHeatModel>({{WallHeatModel::woschni, "woschni"},
+                                     {WallHeatModel::hohenberg, "hohenberg"},
+                                     {WallHeatModel::eichelberg, "eichelberg"}});
   test::expect_names<IgnitionModel>({{IgnitionModel::watson, "watson"},
                                      {IgnitionModel::wolfer, "wolfer"},
                                      {IgnitionModel::hardenberg_hase, "hardenberg_hase"},

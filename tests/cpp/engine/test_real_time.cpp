@@ -49,7 +49,7 @@ TEST(EngineRealTime, NothingIsAllocatedInAnyVariant) {
   for (const auto integrator :
        {Integrator::trapezoid, Integrator::split, Integrator::tan2018_lagged, Integrator::euler}) {
     for (const auto gamma : {GammaModel::constant, GammaModel::linear, GammaModel::polynomial}) {
-      for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+      for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
         for (const auto burn : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
           for (const double fuel : {0.0, 20.0}) {
             EngineCase c;
@@ -66,7 +66,7 @@ TEST(EngineRealTime, NothingIsAllocatedInAnyVariant) {
       }
     }
   }
-  EXPECT_EQ(variants, 144);
+  EXPECT_EQ(variants, 216);
 }
 
 TEST(EngineRealTime, TheCounterSeesAnAllocation) {

@@ -77,7 +77,7 @@ void compare(const EngineCase& c, const std::string& what) {
 TEST(EngineSensitivity, AgreesWithDifferencesForEveryInputAndLaw) {
   for (const auto shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
     for (const auto gamma : {GammaModel::constant, GammaModel::linear, GammaModel::polynomial}) {
-      for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+      for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
         EngineCase c = smooth();
         c.cylinder.burn.burn_shape = shape;
         c.cylinder.gas.gamma_model = gamma;

@@ -72,8 +72,22 @@ TEST(EngineWallHeat, StepEqualsThePrintedHohenbergFormula) {
   }
 }
 
+// In MPa as printed; the heat of a step needs no power of the pressure.
+TEST(EngineWallHeat, StepEqualsThePrintedEichelbergFormula) {
+  const Cycle cycle = run(EngineCase("wall_heat_model=eichelberg wall_heat_scale=1"));
+  const Geometry<double>& g = cycle.model.geometry();
+  for (std::size_t k = 0; k + 1 < cycle.work.pressure_pa.size(); ++k) {
+    const double angle = cycle.model.angles_cad()[k], volume = g.volume_m3(angle);
+    const double mega = cycle.work.pressure_pa[k] / 1e6, temperature = cycle.temperature_k(angle);
+    const double h = 7.67 * std::cbrt(4.3) * std::sqrt(mega * temperature);
+    EXPECT_NEAR(eichelberg_coefficient(2.43, 10.0 * mega, temperature, 4.3) / h, 1.0, 2e-3);
+    const double loss = h * g.wall_area_m2(volume) * (temperature - 450.0) / (6.0 * 1500.0);
+    EXPECT_NEAR(cycle.work.heat_loss_j[k], loss, 2e-3 * std::abs(loss));
+  }
+}
+
 TEST(EngineWallHeat, LossOfAGivenTraceIsTheCyclesOwn) {
-  for (const char* model : {"wall_heat_model=woschni", "wall_heat_model=hohenberg"}) {
+  for (const char* model : {"wall_heat_model=woschni", "wall_heat_model=hohenberg", "wall_heat_model=eichelberg"}) {
     const Cycle c = run(EngineCase(model));
     std::vector<double> loss(c.work.pressure_pa.size());
     c.model.wall_heat(c.charge, std::span<const double>(c.work.pressure_pa), -6.0, std::span<double>(loss));

@@ -122,7 +122,7 @@ class CycleModel {
   T step_gamma(std::size_t k, const CycleWorkspace<T>& work) const noexcept;
   T volume_before(std::size_t k) const noexcept;
   std::size_t fill_heat_release(const Charge<T>& charge, const T& soc_cad, CycleWorkspace<T>& work) const noexcept;
-  template <bool ConstantGamma, bool Woschni>
+  template <bool ConstantGamma, WallHeatModel Model>
   void integrate(const Charge<T>& charge, std::size_t first_burning, CycleWorkspace<T>& work) const noexcept;
 
   BasicCylinder<T> cylinder_;

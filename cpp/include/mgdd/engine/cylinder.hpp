@@ -19,7 +19,7 @@ namespace mgdd::engine {
 
 enum class GammaModel { constant, linear, polynomial };
 enum class BurnShape { triangle, wiebe, double_wiebe };
-enum class WallHeatModel { woschni, hohenberg };
+enum class WallHeatModel { woschni, hohenberg, eichelberg };
 enum class IgnitionModel { watson, wolfer, hardenberg_hase, polynomial };
 enum class Integrator { trapezoid, split, tan2018_lagged, euler };
 
@@ -57,8 +57,9 @@ struct GasParameters {
 
 template <class T>
 struct WallHeatParameters {
-  T wall_heat_scale{0.5};          ///< [-] C1 / 129.8 (Woschni, bar and m) or the factor on 130 (Hohenberg)
-  T woschni_c2{2.28};              ///< [-] weight of the mean piston speed (Woschni 1967)
+  T wall_heat_scale{
+      0.5};            ///< [-] C1 over that of the law: 129.8 (Woschni, bar and m), 130 (Hohenberg), 2.43 (Eichelberg)
+  T woschni_c2{2.28};  ///< [-] weight of the mean piston speed (Woschni 1967)
   T woschni_cp_m_per_sk{3.24e-3};  ///< combustion term of the gas velocity (Woschni 1967)
   T wall_temperature_k{450.0};
   WallHeatModel wall_heat_model{WallHeatModel::woschni};

@@ -1,5 +1,6 @@
-// Heat from the gas to the wall: the film coefficients of Woschni 1967 and Hohenberg 1979 [W/(m2 K)], pressure in bar
-// and lengths in m, and the same laws arranged for the step of a cycle, where most powers cancel. noexcept, no heap.
+// Heat from the gas to the wall: the film coefficients of Woschni 1967, Hohenberg 1979 and Eichelberg 1939 [W/(m2 K)],
+// pressure in bar and lengths in m, and the same laws arranged for the step of a cycle, where most powers cancel.
+// noexcept, no heap.
 #pragma once
 
 #include <cmath>
@@ -16,6 +17,8 @@ namespace mgdd::engine {
 inline constexpr double woschni_c1_bar_m = 129.8;
 /// Hohenberg's constant with pressure in bar and volume in m3 (Hohenberg 1979).
 inline constexpr double hohenberg_c1_bar_m3 = 130.0;
+/// Eichelberg's constant with pressure in bar: 7.67 (MPa; Eichelberg 1939) over the root of 10.
+inline constexpr double eichelberg_c1_bar = 2.43;
 
 /// h = C1 B^-0.2 p^0.8 T^-0.55 w^0.8 (Tan 2018, eq. 2-5; Heywood 1988, chapter 12). Woschni 1967 is quoted with -0.53
 /// and the same constant: 15 % more at 1000 K.
@@ -48,6 +51,15 @@ T hohenberg_coefficient(const T& c1_bar_m3, const T& volume_m3, const T& pressur
          pow(piston_speed_m_per_s + 1.4, 0.8);
 }
 
+/// h = C1 Sp^(1/3) p^0.5 T^0.5 (Eichelberg 1939).
+template <class T>
+T eichelberg_coefficient(const T& c1_bar, const T& pressure_bar, const T& temperature_k,
+                         const T& piston_speed_m_per_s) noexcept {
+  using std::pow;
+  using std::sqrt;
+  return c1_bar * pow(piston_speed_m_per_s, 1.0 / 3.0) * sqrt(pressure_bar * temperature_k);
+}
+
 // Both powers stand in the chain from one pressure to the next, where std::pow would be the longest link.
 inline double four_fifths_power(double x) noexcept {
   return fast_power<4, 5>(x);
@@ -67,15 +79,31 @@ Dual<N> two_fifths_power(const Dual<N>& x) noexcept {
   return chain(y, x.value > 0.0 ? 0.4 * y / x.value : 0.0, x);
 }
 
+/// Calls `with.operator()<model>()`, so that the loop of a cycle has no branch for the law.
+template <class With>
+void with_wall_heat(WallHeatModel model, const With& with) noexcept {
+  switch (model) {
+    case WallHeatModel::woschni:
+      return with.template operator()<WallHeatModel::woschni>();
+    case WallHeatModel::hohenberg:
+      return with.template operator()<WallHeatModel::hohenberg>();
+    case WallHeatModel::eichelberg:
+      break;
+  }
+  with.template operator()<WallHeatModel::eichelberg>();
+}
+
 /// Wall heat of one cycle. With T = p V/(N R), Woschni's p^0.8 T^-0.55 is p^0.25 V^-0.55 (N R)^0.55 and Hohenberg's
-/// p^0.8 T^-0.4 is p^0.4 V^-0.4 (N R)^0.4, so that the volume goes to a table and two square roots replace two powers.
+/// p^0.8 T^-0.4 is p^0.4 V^-0.4 (N R)^0.4, so that the volume goes to a table and two square roots replace two powers;
+/// Eichelberg's p^0.5 T^0.5 is p V^0.5 (N R)^-0.5, which needs no power at all.
 template <class T>
 class WallHeat {
  public:
-  /// Volume part of h A dt for a step of `step_cad`: area times V^-0.55 (Woschni) or V^-0.46 (Hohenberg).
+  /// Volume part of h A dt for a step of `step_cad`: area times V^-0.55 (Woschni), V^-0.46 (Hohenberg) or V^0.5.
   static T volume_term(WallHeatModel model, const Geometry<T>& g, const T& volume_m3, double step_cad) noexcept {
     using std::pow;
-    return g.wall_area_m2(volume_m3) * pow(volume_m3, model == WallHeatModel::woschni ? -0.55 : -0.46) * step_cad;
+    const double exponent = model == WallHeatModel::woschni ? -0.55 : model == WallHeatModel::hohenberg ? -0.46 : 0.5;
+    return g.wall_area_m2(volume_m3) * pow(volume_m3, exponent) * step_cad;
   }
 
   /// What the cylinder alone fixes of the scale.
@@ -84,7 +112,8 @@ class WallHeat {
     const double bar = std::pow(units::pa_per_bar, -0.8);
     if (c.wall_heat_model == WallHeatModel::woschni)
       return c.wall_heat_scale * woschni_c1_bar_m * bar * pow(g.bore_m, -0.2);
-    return c.wall_heat_scale * hohenberg_c1_bar_m3 * bar;
+    if (c.wall_heat_model == WallHeatModel::hohenberg) return c.wall_heat_scale * hohenberg_c1_bar_m3 * bar;
+    return c.wall_heat_scale * eichelberg_c1_bar / std::sqrt(units::pa_per_bar);
   }
 
   /// `ref_pressure_pa` is p(IVC); `gas_j_per_k` is N R.
@@ -104,14 +133,16 @@ class WallHeat {
       burning_ = burning_per_pa_ * ref_pressure_pa;
       still_power_ = four_fifths_power(still_);
       scale_ = lead * pow(gas_j_per_k, 0.55) * per_cad;
-    } else {
+    } else if (c.wall_heat_model == WallHeatModel::hohenberg) {
       scale_ = lead * pow(gas_j_per_k, 0.4) * per_cad * four_fifths_power(piston_speed + 1.4);
+    } else {
+      scale_ = lead * pow(gas_j_per_k, -0.5) * per_cad * pow(piston_speed, 1.0 / 3.0);
     }
   }
 
   /// The numbers of the law, for code that carries many cycles: the heat of a step is scale volume_term
   /// (T - wall_k) film; the film of Woschni is p^0.25 still_power, or p^0.25 w^0.8 while w = (still - burning
-  /// motored_ratio) + burning_per_pa p exceeds still; that of Hohenberg p^0.4.
+  /// motored_ratio) + burning_per_pa p exceeds still; that of Hohenberg p^0.4, of Eichelberg p.
   struct Constants {
     T scale, wall_k, still, burning, burning_per_pa, still_power;
   };
@@ -122,13 +153,13 @@ class WallHeat {
     return scale_ * volume_term * (temperature_k - wall_k_);
   }
 
-  /// p^0.25 w^0.8 (Woschni) or p^0.4 (Hohenberg), as factors in the order in which they become known: the next pressure
-  /// waits for the last one only.
-  template <bool Woschni>
+  /// p^0.25 w^0.8 (Woschni), p^0.4 (Hohenberg) or p (Eichelberg), as factors in the order in which they become known:
+  /// the next pressure waits for the last one only.
+  template <WallHeatModel Model>
   struct Film {
-    T early, late;  // Hohenberg has only the late one
+    T early, late;  // only Woschni has the early one
     T times(const T& factor) const noexcept {
-      if constexpr (Woschni) {
+      if constexpr (Model == WallHeatModel::woschni) {
         return factor * early * late;
       } else {
         return factor * late;
@@ -137,10 +168,10 @@ class WallHeat {
   };
 
   /// `motored_ratio` is p_mot / p_ref.
-  template <bool Woschni>
-  Film<Woschni> film(const T& pressure_pa, const T& motored_ratio, bool burning) const noexcept {
+  template <WallHeatModel Model>
+  Film<Model> film(const T& pressure_pa, const T& motored_ratio, bool burning) const noexcept {
     using std::sqrt;
-    if constexpr (Woschni) {
+    if constexpr (Model == WallHeatModel::woschni) {
       const T root = sqrt(sqrt(pressure_pa));
       if (burning) {
         // still + Cp Vs T_ref/(p_ref V_ref) (p - p_mot), the part without p first: it does not wait for the pressure.
@@ -148,16 +179,18 @@ class WallHeat {
         if (velocity > still_) return {root, four_fifths_power(velocity)};
       }
       return {still_power_, root};
-    } else {
+    } else if constexpr (Model == WallHeatModel::hohenberg) {
       return {{}, two_fifths_power(pressure_pa)};
+    } else {
+      return {{}, pressure_pa};
     }
   }
 
   /// Heat lost in one step [J], positive from gas to wall.
-  template <bool Woschni>
+  template <WallHeatModel Model>
   T step_j(const T& pressure_pa, const T& temperature_k, const T& volume_term, const T& motored_ratio,
            bool burning) const noexcept {
-    return film<Woschni>(pressure_pa, motored_ratio, burning).times(lead_j(temperature_k, volume_term));
+    return film<Model>(pressure_pa, motored_ratio, burning).times(lead_j(temperature_k, volume_term));
   }
 
  private:

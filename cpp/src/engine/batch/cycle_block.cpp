@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mgdd/engine/wall_heat.hpp"
+
 namespace mgdd::engine {
 namespace {
 
@@ -55,7 +57,7 @@ MGDD_INLINE void keep_peak(Lane<double>& best, Lane<double>& best_at, std::size_
 }
 
 // One loop for each stage of a step: sixteen lanes at a time keep the processor busy while each waits for its roots.
-template <bool woschni, bool burning, Heat heat, bool stopping = false, bool peaks = true, class T>
+template <WallHeatModel wall, bool burning, Heat heat, bool stopping = false, bool peaks = true, class T>
 MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, CycleBlock<T>& b,
                        Lane<T>* trace) noexcept {
   alignas(64) Lane<double> root{}, fifth{};
@@ -67,9 +69,11 @@ MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, C
     const auto at = static_cast<double>(k);
     const double next_at = at + 1.0;
 
-    for (std::size_t l = 0; l < lanes; ++l)
-      root.value[l] = std::sqrt(b.pressure.value[l]);
-    if constexpr (woschni) {
+    if constexpr (wall != WallHeatModel::eichelberg) {
+      for (std::size_t l = 0; l < lanes; ++l)
+        root.value[l] = std::sqrt(b.pressure.value[l]);
+    }
+    if constexpr (wall == WallHeatModel::woschni) {
       for (std::size_t l = 0; l < lanes; ++l) {
         if constexpr (burning) {
           const T w = (b.still.get(l) - b.burning.get(l) * ratio) + b.per_pa.get(l) * b.pressure.get(l);
@@ -82,7 +86,7 @@ MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, C
         for (std::size_t l = 0; l < lanes; ++l)
           fifth.value[l] = inverse_fifth_root_first(velocity.value[l], fifth.value[l]);
       }
-    } else {
+    } else if constexpr (wall == WallHeatModel::hohenberg) {
       for (std::size_t l = 0; l < lanes; ++l)
         fifth.value[l] = inverse_fifth_root_first(root.value[l], inverse_fifth_root_guess(root.value[l]));
     }
@@ -95,7 +99,9 @@ MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, C
     }
     for (std::size_t l = 0; l < lanes; ++l) {
       const T p = b.pressure.get(l);
-      if constexpr (!woschni) {
+      if constexpr (wall == WallHeatModel::eichelberg) {
+        film.set(l, p);
+      } else if constexpr (wall == WallHeatModel::hohenberg) {
         film.set(l, with_power(four_fifths_last(root.value[l], fifth.value[l]), 0.4, p));
       } else {
         const T still_power = b.still_power.get(l), fourth = with_power(root.value[l], 0.25, p);
@@ -150,56 +156,54 @@ MGDD_INLINE bool walls_cool(const CycleTables& t, std::size_t at, const CycleBlo
 }
 
 // The bodies work on a local copy, so that nothing else can point to it.
-template <bool woschni, Heat heat, class T>
+template <WallHeatModel wall, Heat heat, class T>
 MGDD_INLINE void run(const CycleTables& t, HeatWindow window, CycleBlock<T>& block, Lane<T>* trace) noexcept {
   CycleBlock<T> b = block;
-  steps<woschni, false, Heat::none>(t, 0, window.from, b, trace);
+  steps<wall, false, Heat::none>(t, 0, window.from, b, trace);
   begin_heat<heat>(t, window.from, b);
-  steps<woschni, true, heat>(t, window.from, window.to, b, trace);
+  steps<wall, true, heat>(t, window.from, window.to, b, trace);
   // In expansion without heat release no peak follows, unless a wall that is hotter than the gas still heats it.
   const std::size_t last = t.n - 1, falling = larger_index(window.to, t.falling_from);
-  steps<woschni, true, Heat::none>(t, window.to, falling, b, trace);
+  steps<wall, true, Heat::none>(t, window.to, falling, b, trace);
   if (walls_cool(t, falling, b)) {
-    steps<woschni, true, Heat::none, false, false>(t, falling, last, b, trace);
+    steps<wall, true, Heat::none, false, false>(t, falling, last, b, trace);
   } else {
-    steps<woschni, true, Heat::none>(t, falling, last, b, trace);
+    steps<wall, true, Heat::none>(t, falling, last, b, trace);
   }
   block = b;
 }
 
-template <bool woschni, Heat heat>
+template <WallHeatModel wall, Heat heat>
 MGDD_INLINE void run_window(const CycleTables& t, HeatWindow window, CycleBlock<double>& block,
                             Lane<double>* trace) noexcept {
   CycleBlock<double> b = block;
   begin_heat<heat>(t, window.from, b);
-  steps<woschni, true, heat, true>(t, window.from, window.to, b, trace);
+  steps<wall, true, heat, true>(t, window.from, window.to, b, trace);
   block = b;
 }
 
-template <bool woschni>
+template <WallHeatModel wall>
 MGDD_INLINE void run_tail(const CycleTables& t, std::size_t from, CycleBlock<double>& block,
                           Lane<double>* trace) noexcept {
   CycleBlock<double> b = block;
-  steps<woschni, true, Heat::none, false, false>(t, from, t.n - 1, b, trace);
+  steps<wall, true, Heat::none, false, false>(t, from, t.n - 1, b, trace);
   block = b;
 }
 
-/// Calls `with.operator()<woschni, heat>()` for the laws.
+/// Calls `with.operator()<wall, heat>()` for the laws.
 template <class With>
-void choose(BurnShape shape, WallHeatModel wall, const With& with) noexcept {
-  const auto of_shape = [&]<bool woschni>() {
+void choose(BurnShape shape, WallHeatModel model, const With& with) noexcept {
+  with_wall_heat(model, [&]<WallHeatModel wall>() {
     switch (shape) {
       case BurnShape::triangle:
-        return with.template operator()<woschni, Heat::triangle>();
+        return with.template operator()<wall, Heat::triangle>();
       case BurnShape::wiebe:
-        return with.template operator()<woschni, Heat::wiebe>();
+        return with.template operator()<wall, Heat::wiebe>();
       case BurnShape::double_wiebe:
         break;
     }
-    with.template operator()<woschni, Heat::double_wiebe>();
-  };
-  if (wall == WallHeatModel::woschni) return of_shape.template operator()<true>();
-  of_shape.template operator()<false>();
+    with.template operator()<wall, Heat::double_wiebe>();
+  });
 }
 
 }  // namespace
@@ -230,11 +234,11 @@ template struct CycleBlock<double>;
 template struct CycleBlock<Dual<1>>;
 
 template <class T>
-void integrate(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window, CycleBlock<T>& block,
+void integrate(const CycleTables& tables, BurnShape shape, WallHeatModel model, HeatWindow window, CycleBlock<T>& block,
                Lane<T>* trace, InstructionSet set) noexcept {
   trace[0] = block.pressure;
-  choose(shape, wall, [&]<bool woschni, Heat heat>() {
-    dispatch(set, [&]() MGDD_INLINE_LAMBDA { run<woschni, heat>(tables, window, block, trace); });
+  choose(shape, model, [&]<WallHeatModel wall, Heat heat>() {
+    dispatch(set, [&]() MGDD_INLINE_LAMBDA { run<wall, heat>(tables, window, block, trace); });
   });
 }
 template void integrate(const CycleTables&, BurnShape, WallHeatModel, HeatWindow, CycleBlock<double>&, Lane<double>*,
@@ -242,21 +246,20 @@ template void integrate(const CycleTables&, BurnShape, WallHeatModel, HeatWindow
 template void integrate(const CycleTables&, BurnShape, WallHeatModel, HeatWindow, CycleBlock<Dual<1>>&, Lane<Dual<1>>*,
                         InstructionSet) noexcept;
 
-void integrate_window(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window,
+void integrate_window(const CycleTables& tables, BurnShape shape, WallHeatModel model, HeatWindow window,
                       CycleBlock<double>& block, Lane<double>* trace, InstructionSet set) noexcept {
   trace[window.from] = block.pressure;
-  choose(shape, wall, [&]<bool woschni, Heat heat>() {
-    dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_window<woschni, heat>(tables, window, block, trace); });
+  choose(shape, model, [&]<WallHeatModel wall, Heat heat>() {
+    dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_window<wall, heat>(tables, window, block, trace); });
   });
 }
 
-void integrate_tail(const CycleTables& tables, WallHeatModel wall, std::size_t from, CycleBlock<double>& block,
+void integrate_tail(const CycleTables& tables, WallHeatModel model, std::size_t from, CycleBlock<double>& block,
                     Lane<double>* trace, InstructionSet set) noexcept {
   trace[from] = block.pressure;
-  if (wall == WallHeatModel::woschni) {
-    return dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_tail<true>(tables, from, block, trace); });
-  }
-  dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_tail<false>(tables, from, block, trace); });
+  with_wall_heat(model, [&]<WallHeatModel wall>() {
+    dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_tail<wall>(tables, from, block, trace); });
+  });
 }
 
 }  // namespace mgdd::engine

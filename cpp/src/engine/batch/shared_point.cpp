@@ -25,7 +25,7 @@ void SharedPoint::prepare(const CycleTables& tables, const CycleBlock<double>& b
                           InstructionSet set) {
   n_ = tables.n;
   tail_from_ = tables.falling_from;
-  run_motored(tables, block, wall == WallHeatModel::woschni);
+  run_motored(tables, block, wall);
   has_tail_ = false;
   double ratio = lowest_ratio;
   for (int i = 0; i < growths && !has_tail_; ++i, ratio *= ratio_growth) {
@@ -35,7 +35,7 @@ void SharedPoint::prepare(const CycleTables& tables, const CycleBlock<double>& b
 }
 
 // The same operations in the same order as a lane of a block, whose bits it must give.
-void SharedPoint::run_motored(const CycleTables& t, const CycleBlock<double>& block, bool woschni) {
+void SharedPoint::run_motored(const CycleTables& t, const CycleBlock<double>& block, WallHeatModel wall) {
   const std::size_t last = std::min(t.first_after(timing_upper_cad), t.n - 1);
   motored_.resize(last + 1);
   const double p0 = block.pressure.value[0];
@@ -43,8 +43,9 @@ void SharedPoint::run_motored(const CycleTables& t, const CycleBlock<double>& bl
   motored_[0] = s;
   for (std::size_t k = 0; k < last; ++k) {
     const double p = s.pressure, v0 = t.volume_m3[k], v1 = t.volume_m3[k + 1];
-    double film = std::sqrt(p);
-    film = woschni ? std::sqrt(film) * block.still_power.value[0] : lane_four_fifths(film);
+    double film = p;  // Eichelberg's
+    if (wall == WallHeatModel::woschni) film = std::sqrt(std::sqrt(p)) * block.still_power.value[0];
+    if (wall == WallHeatModel::hohenberg) film = lane_four_fifths(std::sqrt(p));
     const double loss =
         block.scale.value[0] * t.wall_term[k] * (p * v0 * block.per_gas.value[0] - block.wall_k.value[0]) * film;
     s.pressure = t.keep[k] * p - t.gain[k] * loss;

@@ -43,7 +43,7 @@ class SharedPoint {
 
  private:
   static constexpr std::size_t n_nodes = block_lanes;
-  void run_motored(const CycleTables& t, const CycleBlock<double>& block, bool woschni);
+  void run_motored(const CycleTables& t, const CycleBlock<double>& block, WallHeatModel wall);
   bool run_tail(const CycleTables& t, const CycleBlock<double>& block, double lowest_pa, WallHeatModel wall,
                 InstructionSet set);
   void prepare_row(std::size_t k) noexcept;

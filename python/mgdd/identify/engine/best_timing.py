@@ -14,7 +14,7 @@ from mgdd.errors import ConvergenceError, Interrupted, hand_over
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
-from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
+from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming, undetermined
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.presets.meant import CylinderLike, PointLike
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["best_timing", "doubts_of", "headline_of"]
 
-_MARGIN_CAD = 5.0  # the search reaches this far beyond the fitted timing
+_MARGIN_CAD = 15.0  # the search reaches this far beyond the fitted timing
 
 
 def best_timing(
@@ -60,7 +60,7 @@ def best_timing(
     limits : mapping of str to float, or sequence of Limit, optional
         Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
-        Searched range of SOC, as in `mgdd.engine.find_optimum`; by default it reaches 5 °CA beyond the fitted timing.
+        Searched range of SOC, as in `mgdd.engine.find_optimum`; by default it reaches 15 °CA beyond the fitted timing.
     progress : callable, optional
         Called with a short text after each fit.
 
@@ -82,11 +82,13 @@ def best_timing(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import ModelFamily, best_timing
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)])  # wall heat 0.5, 1.0 and 1.5
+    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
     >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
-    >>> [(member.member.wall_heat_scale, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
-    [(0.5, 4), (1.0, 7), (1.5, 10)]
+    >>> [(member.member.wall_heat_model, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
+    [('woschni', 7), ('hohenberg', 4)]
+    >>> rows[0].free_direction
+    'not determined'
     """
     kept = {limit.name: limit.upper - limit.margin for limit in limits_of(limits)}
     check_request(objective, kept)
@@ -95,9 +97,10 @@ def best_timing(
         step_cad=step_cad, integrator=integrator, options=None,
         pegging=pegging, pegging_exponent=pegging_exponent, inlet_pressure_kpa=inlet_pressure_kpa,
     )  # fmt: skip
+    family = family or ModelFamily()
     stop: Interrupted | None = None
     try:
-        fitted = fit_family(request, family or ModelFamily(), progress)
+        fitted = fit_family(request, family, progress)
     except Interrupted as error:
         if error.partial is None:
             raise
@@ -110,7 +113,9 @@ def best_timing(
         tuple(_answer(member, at, objective, kept, bounds_cad, scheme) for member in members)
         for at in range(len(request.traces))
     ]
-    return hand_over([_over_family(label, own) for label, own in zip(request.labels, answers, strict=True)], stop)
+    misfit = family.misfit_cad
+    rows = [_over_family(label, own, misfit) for label, own in zip(request.labels, answers, strict=True)]
+    return hand_over(rows, stop)
 
 
 def _answer(
@@ -167,25 +172,33 @@ def _search(load: Load) -> tuple[float, float]:
 
 
 def _best_of(found: Optimum | None, base: float, fitted: float, prefix: str) -> dict[str, float]:
+    # Over a cycle without work no gain is a share of it.
+    per_base = 100.0 / base if base > 0.0 else math.nan
     soc, half, gain = (
-        (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], 100.0 * (found.value / base - 1.0))
+        (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], per_base * (found.value - base))
     )
     values = {"soc_cad": soc, "ca50_cad": half, "shift_cad": soc - fitted, "gain_percent": gain}
     return {prefix + name: value for name, value in values.items()}
 
 
-def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
+def _over_family(file: str, answers: tuple[MemberTiming, ...], misfit_cad: float) -> BestTiming:
     kept = [answer for answer in answers if answer.plausible]
 
     def span(name: str) -> tuple[float, float]:
-        values = [float(getattr(answer, name)) for answer in kept]
-        return (min(values), max(values)) if values else (math.nan, math.nan)
+        values = [float(getattr(answer, name)) for answer in kept] or [math.nan]
+        wider = misfit_cad if name.endswith("_cad") else 0.0
+        return min(values) - wider, max(values) + wider
 
-    return BestTiming(
-        file=file,
-        members=answers,
-        **{name: span(name) for name in RANGED},
-    )
+    ranges = {name: span(name) for name in RANGED}
+    for prefix in ("", "free_"):
+        if undetermined(
+            ranges[f"{prefix}shift_cad"]
+        ):  # then the measured timing may be the best, and nothing is gained
+            ranges[f"{prefix}gain_percent"] = (
+                min(0.0, ranges[f"{prefix}gain_percent"][0]),
+                ranges[f"{prefix}gain_percent"][1],
+            )
+    return BestTiming(file=file, members=answers, **ranges)
 
 
 def headline_of(rows: Sequence[BestTiming]) -> Member:

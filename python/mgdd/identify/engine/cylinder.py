@@ -14,6 +14,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace import conditions
 from mgdd.errors import hand_over, or_partial
 from mgdd.identify.engine.findings import findings_of
+from mgdd.identify.engine.model_error import with_model_error
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed
 from mgdd.optimize.fit_options import FitOptions, fit_options
@@ -125,11 +126,11 @@ def fit_cylinder(
         pegging_exponent=pegging_exponent,
         inlet_pressure_kpa=inlet_pressure_kpa,
     )
-    return fit_request(request)
+    return fit_request(request, model_error=True)
 
 
-def fit_request(request: Request) -> CylinderFit:
-    """Run a calibration that has been checked."""
+def fit_request(request: Request, *, model_error: bool = False) -> CylinderFit:
+    """Run a calibration that has been checked; `model_error` fits three or four times more, from the result."""
     cylinder, point, labels = request.cylinder, request.point, request.labels
     measured = request.measured()
     burns = request.starts(measured)
@@ -151,6 +152,8 @@ def fit_request(request: Request) -> CylinderFit:
         for fitted, trace, label in zip(core.loads, request.traces, labels, strict=True)
     )
     report = FitReport.from_core(core.report)
+    if model_error and stop is None:
+        report = with_model_error(report, request, core)
     fit = CylinderFit(
         report=report,
         model=core.cylinder,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mgdd._core.engine import OperatingPoint
 from mgdd.engine import analyze
+from mgdd.identify.engine.plausible import Plausibility
 from mgdd.identify.engine.request import Request, earliest_burn_cad
 from mgdd.results.finding import Finding
 
@@ -18,8 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["findings_of"]
 
-# An IMEP error beyond this share makes efficiency and timing doubtful, whatever the pressure RMSE says.
-_IMEP_LIMIT_PERCENT = 3.0
+_PLAUSIBLE = Plausibility()
 _RMSE_LIMIT_PERCENT = 2.0
 
 
@@ -31,6 +32,7 @@ def findings_of(fit: CylinderFit, request: Request) -> tuple[Finding, ...]:
         *_not_converged(fit),
         *_early(fit, request),
         *_work(fit),
+        *_implausible(fit, request),
         *(
             Finding("unidentifiable", (name,), f"{name} is not identifiable from these traces")
             for name in fit.report.unidentifiable
@@ -104,9 +106,28 @@ def _early(fit: CylinderFit, request: Request) -> Iterator[Finding]:
         )
 
 
+def _implausible(fit: CylinderFit, request: Request) -> Iterator[Finding]:
+    """Give what the model cannot be; the error of the work has a finding of its own, over all traces."""
+    for found in _PLAUSIBLE.of_model(fit.model):
+        yield replace(
+            found,
+            text=f"{found.text}: it makes up for another error of the model, and fuel heat and burn do so with it",
+            remedy="state the fuel, hold wall_heat_scale and free gamma, or ask best_timing",
+        )
+    of_loads: dict[str, list[Finding]] = {}
+    for load, known in zip(fit.loads, request.known_heat_j, strict=True):
+        for found in _PLAUSIBLE.of_load(load, known):
+            of_loads.setdefault(found.code, []).append(replace(found, text=f"{load.file} {found.text}"))
+    for code, together in of_loads.items():
+        if code != "imep_error":
+            files = tuple(name for found in together for name in found.names)
+            text = "; ".join(found.text for found in together[:3]) + (" and others" if len(together) > 3 else "")
+            yield Finding(code, files, text, "suspect gamma, TDC, pegging or the fuel")
+
+
 def _work(fit: CylinderFit) -> Iterator[Finding]:
     errors = [load.imep_closed_error_percent for load in fit.loads]
-    if max(map(abs, errors)) <= _IMEP_LIMIT_PERCENT:
+    if max(map(abs, errors)) <= _PLAUSIBLE.imep_percent:
         return
     if max(errors) < 0.0 or min(errors) > 0.0:
         low, high = (f"{size:.1f}" for size in (min(map(abs, errors)), max(map(abs, errors))))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_request
+from mgdd.identify.engine.model_error import WIDTHS
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
 from mgdd.results.labels import labelled_dataset
@@ -21,14 +21,12 @@ from mgdd.results.result import Result
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["WIDTHS", "WallHeatProfile", "wall_heat_profile"]
+__all__ = ["WallHeatProfile", "wall_heat_profile"]
 
 NAME = "wall_heat_scale"
 UPPER = float(_core.identify.wall_heat_scale_upper)
 _RISE = 1.10  # a scale counts as possible while the refitted RMSE stays within 10 % of the best
 _WIDTH = 0.20  # and as identified when that range stays within 20 % of the best scale
-# How far gamma, pressure and angle of a usual bench may be off, where nobody has said better.
-WIDTHS: Mapping[str, float] = MappingProxyType({"gamma": 0.03, "pegging_bar": 0.1, "tdc_cad": 0.3})
 _NAMES = {"gamma": "gamma", "pegging_bar": "pegging", "tdc_cad": "TDC"}
 _UNITS = {"gamma": "", "pegging_bar": " bar", "tdc_cad": " CAD"}
 _CORRELATION = float(_core.identify.correlation_limit)

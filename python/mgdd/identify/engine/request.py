@@ -102,11 +102,13 @@ class Request:
             options=options,
         )
 
-    def measured(self) -> list[_core.identify.MeasuredCycle]:
-        """Give the closed parts as the core takes them."""
+    def measured(self, *, late_cad: float = 0.0, more_bar: float = 0.0) -> list[_core.identify.MeasuredCycle]:
+        """Give the closed parts as the core takes them, or as they would be that much later and higher."""
         out = []
         for trace, label in zip(self.traces, self.labels, strict=True):
             angle, pressure = closed(trace, self.cylinder)
+            if late_cad or more_bar:
+                pressure = np.interp(angle - late_cad, angle, pressure) + more_bar
             own = conditions(trace, self.point)
             out.append(
                 _core.identify.MeasuredCycle(label=label, crank_angle_cad=angle, pressure_bar=pressure, point=own)

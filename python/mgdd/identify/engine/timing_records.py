@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +17,23 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["RANGED", "BestTiming", "MemberTiming"]
+__all__ = ["RANGED", "BestTiming", "MemberTiming", "undetermined"]
 
 RANGED = (
     "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
     "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",
 )  # fmt: skip
+
+
+def undetermined(shift_cad: Sequence[float]) -> bool:
+    """Say whether a range of moves leaves open if earlier or later is better."""
+    return shift_cad[0] <= 0.0 <= shift_cad[1]
+
+
+def _direction(shift_cad: tuple[float, float]) -> str:
+    if not math.isfinite(shift_cad[0]) or undetermined(shift_cad):
+        return "not determined"
+    return "later" if shift_cad[0] > 0.0 else "earlier"
 
 
 def _label(name: str) -> Label:
@@ -49,7 +62,7 @@ class MemberTiming:
         Gross efficiency at the measured timing [-].
     soc_cad, ca50_cad, shift_cad, gain_percent : float
         Best timing with the load's own p_max kept [°CA aTDC], how far that is from the measured one [°CA, positive =
-        later], and its gain over it [%].
+        later], and its gain over it [%]; NaN where that does no work.
     free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : float
         The same without that limit. All are NaN for a member that is not plausible and has no timing within the limits.
     free_p_max_bar : float
@@ -94,7 +107,8 @@ class MemberTiming:
         dict
             Names to values.
         """
-        model = {name: getattr(self.member, name) for name in ("law", "gamma_model", "gamma", "wall_heat_scale")}
+        names = ("law", "gamma_model", "gamma", "wall_heat_model", "wall_heat_scale")
+        model = {name: getattr(self.member, name) for name in names}
         own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
         return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
 
@@ -110,7 +124,8 @@ class BestTiming(Result):
     members : tuple of MemberTiming
         Every member's answer, in the order of the family.
     soc_cad, ca50_cad, shift_cad, gain_percent : tuple of float
-        Lowest and highest answer of the plausible members, as in `MemberTiming`; NaN without any.
+        Lowest and highest answer of the plausible members, as in `MemberTiming`; angles with the ``misfit_cad`` of the
+        family on both sides, gains from 0 where the range of moves spans it. NaN without any.
     free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
         The same without the limit of the load's own p_max.
 
@@ -122,7 +137,7 @@ class BestTiming(Result):
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
     >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
     >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
-    ([5, 8], 8)
+    ([1, 9], 8)
     """
 
     file: str
@@ -153,6 +168,16 @@ class BestTiming(Result):
         return min(self.plausible, key=lambda answer: answer.member.score)
 
     @property
+    def direction(self) -> str:
+        """Where the best timing with the load's own p_max kept lies: ``earlier``, ``later`` or ``not determined``."""
+        return _direction(self.shift_cad)
+
+    @property
+    def free_direction(self) -> str:
+        """The same without that limit."""
+        return _direction(self.free_shift_cad)
+
+    @property
     def dataset(self) -> xr.Dataset:
         """Every member's answer over ``member``; attributes name the trace and the best member."""
         rows = [member.to_dict() for member in self.members]
@@ -160,10 +185,12 @@ class BestTiming(Result):
         columns = {name: ("member", [row[name] for row in rows], *_label(name)) for name in names}
         members = ("member", [row["name"] for row in rows], "-", "member of the family")
         best = self.best.member.name if self.plausible else ""
-        return labelled_dataset({"member": members, **columns}, attrs={"file": self.file, "best": best})
+        low, high = self.free_ca50_cad
+        attrs = {"file": self.file, "best": best, "free_ca50_low_cad": low, "free_ca50_high_cad": high}
+        return labelled_dataset({"member": members, **columns}, attrs=attrs)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give file, ranges, best member and all members as plain values.
+        """Give file, ranges, directions, best member and all members as plain values.
 
         Returns
         -------
@@ -173,6 +200,8 @@ class BestTiming(Result):
         return {
             "file": self.file,
             **{name: list(getattr(self, name)) for name in RANGED},
+            "direction": self.direction,
+            "free_direction": self.free_direction,
             "best": self.best.to_dict() if self.plausible else None,
             "members": [member.to_dict() for member in self.members],
         }

@@ -67,16 +67,16 @@ struct HeatWindow {
 
 /// Runs all lanes, which have begun, from IVC to EVO. `trace` gets the pressures, one row for each sample.
 template <class T>
-void integrate(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window, CycleBlock<T>& block,
+void integrate(const CycleTables& tables, BurnShape shape, WallHeatModel model, HeatWindow window, CycleBlock<T>& block,
                Lane<T>* trace, InstructionSet set) noexcept;
 
 /// Runs all lanes over the steps [window.from, window.to) only, from the pressures and sums that stand in the block;
 /// work and loss of a lane count before its `stop`.
-void integrate_window(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window,
+void integrate_window(const CycleTables& tables, BurnShape shape, WallHeatModel model, HeatWindow window,
                       CycleBlock<double>& block, Lane<double>* trace, InstructionSet set) noexcept;
 
 /// Runs all lanes without heat release from `from` to EVO, with the combustion term of the wall heat.
-void integrate_tail(const CycleTables& tables, WallHeatModel wall, std::size_t from, CycleBlock<double>& block,
+void integrate_tail(const CycleTables& tables, WallHeatModel model, std::size_t from, CycleBlock<double>& block,
                     Lane<double>* trace, InstructionSet set) noexcept;
 
 extern template struct CycleBlock<double>;
