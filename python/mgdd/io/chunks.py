@@ -182,7 +182,7 @@ class _Plan(NamedTuple):
             if not table.height:
                 break
             parts.append(table.matrix(wanted))
-            lines.append(np.array(table.lines or (), np.int64))
+            lines.append(np.empty(0, np.int64) if table.lines is None else table.lines)
         values = np.concatenate(parts, axis=1)
         degrees: NDArray[Any] = np.arange(values.shape[1]) * (self.how.angle_step_deg or 0.0)
         if not self.angle.made:
