@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ArrayTable", "Columns", "Named", "Reversed", "Samples", "columns_of", "naming_damage"]
+__all__ = ["ArrayTable", "Columns", "Named", "Reversed", "Samples", "columns_of", "marked", "naming_damage"]
 
 
 class Named(NamedTuple):
@@ -50,6 +50,17 @@ class Reversed:
 
     def __getitem__(self, index: tuple[Any, ...]) -> Any:
         return np.asarray(self._values[index[::-1]]).T
+
+
+def marked(values: NDArray[Any], missing: NDArray[np.bool_] | None) -> NDArray[Any]:
+    """Return samples with NaN in place of those that a file marks as missing or invalid, whatever it stores there."""
+    if missing is None or not np.any(missing):
+        return values
+    if values.dtype.kind not in "fiub":
+        return values  # no column of numbers
+    made = values.astype(np.float64)
+    made[np.asarray(missing, np.bool_)] = np.nan
+    return made
 
 
 class _Column(NamedTuple):

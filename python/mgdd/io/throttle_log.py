@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._arguments import as_floats
 from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.io.any_table import open_table
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
@@ -189,7 +190,7 @@ def read_throttle_log(
 
 def _column(key: str, values: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
-        column = np.array(values, dtype=np.float64)
+        column: NDArray[np.float64] = as_floats(values)
     except (TypeError, ValueError) as error:
         raise DataError(f"{name}, column {key!r}: must be numbers") from error
     if column.ndim != 1:
