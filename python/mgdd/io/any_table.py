@@ -7,25 +7,34 @@ from __future__ import annotations
 
 import contextlib
 import io
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import DataError
+import numpy as np
+
+from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.array_files import of_hdf5, of_matlab, of_netcdf, of_numpy, of_parquet
-from mgdd.io.array_table import ArrayTable, Columns, naming_damage
+from mgdd.io.array_table import ArrayTable, Columns, Named, columns_of, naming_damage
+from mgdd.io.column_names import heading
 from mgdd.io.extras import import_extra
 from mgdd.io.files import Stamp, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
-from mgdd.io.table import Table, parse_number, read_table, spells_units, text_table
+from mgdd.io.table import Table, TextTable, parse_number, read_table, text_table
 from mgdd.io.text_rows import TextRows
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import os
 
-__all__ = ["cells_as_text", "format_of", "open_parts", "open_table", "read_any_table"]
+    from numpy.typing import NDArray
 
+__all__ = ["TEXT", "cells_as_text", "format_of", "open_parts", "open_table", "read_any_table"]
+
+# Arguments that say how the cells of a text or a sheet become columns.
+TEXT = ("delimiter", "decimal", "sheet", "cycle_per_row")
 _HEAD = 128  # bytes that tell a format
 
 
@@ -33,11 +42,19 @@ _HEAD = 128  # bytes that tell a format
 _Reader = Callable[[Path, contextlib.ExitStack], "Table | Columns"]
 
 
-def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> Table:
+def read_any_table(
+    path: str | os.PathLike[str],
+    *,
+    delimiter: str | None = None,
+    decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
+) -> Table:
     """Read the columns of a file by its content, whatever its name.
 
     Text (also with a preamble, as of LabVIEW or INCA), MATLAB 4 to 7.3, HDF5 and netCDF, TDMS, MDF 3 and 4, Parquet,
-    NPY and NPZ, XLSX. ``delimiter`` and ``decimal`` are those of `read_table`, for text.
+    NPY and NPZ, XLSX. ``delimiter`` and ``decimal`` are those of `read_table`, for text; ``sheet`` names one of a
+    workbook, else it is the one with the most numbers; ``cycle_per_row`` makes a column of each row.
 
     Raises
     ------
@@ -60,30 +77,44 @@ def read_any_table(path: str | os.PathLike[str], *, delimiter: str | None = None
     >>> table.header, table.numbers(0).tolist()
     (('time_s', 'duty'), [0.0, 1.0, 2.0])
     """
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return table.loaded()
 
 
 @contextlib.contextmanager
-def open_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> Iterator[Table]:
+def open_table(
+    path: str | os.PathLike[str],
+    *,
+    delimiter: str | None = None,
+    decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
+) -> Iterator[Table]:
     """Open a file as `read_any_table` reads it: columns of a binary one are read where they are asked for."""
     file = existing_file(path)
     with file.open("rb") as stream:
         reader = _reader_of(stream.read(_HEAD), file)
-    if reader is None:
-        yield read_table(path, delimiter=delimiter, decimal=decimal)
-        return
     with contextlib.ExitStack() as stack:
         stamp = Stamp.of(file)
-        with naming_damage(file):
-            found = reader(file, stack)
-            table = found if isinstance(found, Table) else _table_of(file, stamp, found)
-        yield table
+        if reader is None:
+            table: Table = read_table(path, delimiter=delimiter, decimal=decimal)
+        else:
+            with naming_damage(file):
+                found = _of_xlsx(file, sheet) if reader is _of_zip and _is_xlsx(file) else reader(file, stack)
+                table = found if isinstance(found, Table) else _table_of(file, stamp, found)
+        if sheet is not None and (reader is not _of_zip or not isinstance(table, TextTable)):
+            raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
+        yield _of_rows(table) if cycle_per_row else table
 
 
 @contextlib.contextmanager
 def open_parts(
-    path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = "."
+    path: str | os.PathLike[str],
+    *,
+    delimiter: str | None = None,
+    decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
 ) -> Iterator[Callable[[int, int], Table]]:
     """Open a file as `open_table` does, and give what makes a table of some of its rows; text is read as far as asked.
 
@@ -92,11 +123,29 @@ def open_parts(
     file = existing_file(path)
     with file.open("rb") as stream:
         text = _reader_of(stream.read(_HEAD), file) is None
-        if text:
+        if text and sheet is None and not cycle_per_row:
             yield TextRows(file, stream, delimiter=delimiter, decimal=decimal).part
             return
-    with open_table(file) as table:
+    with open_table(file, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         yield table.part
+
+
+def _of_rows(table: Table) -> ArrayTable:
+    """Make a column of each row: the angle in the first, a cycle in each other, with a name in front of them or not."""
+    if not isinstance(table, TextTable):
+        raise DataError(f"{table.source}: a matrix is turned as it needs to be: leave {argument('cycle_per_row')} out")
+    cells = [row[0] for row in table.part(0, 1).cells]
+    named = bool(cells) and parse_number(cells[0], table.decimal) is None
+    rows = table.matrix(range(int(named), table.width)).T
+    names: tuple[str, ...] | None = None
+    if named:
+        first = cells[0] if heading(cells[0]).quantity in ("angle", "time") else ANGLE
+        names = (first, *(row[0] for row in table.part(1, table.height).cells))
+    return ArrayTable(table.source, names, None, tuple(column for *_, column in columns_of(map(_unnamed, rows))))
+
+
+def _unnamed(row: NDArray[np.float64]) -> Named:
+    return Named("", row)
 
 
 def _table_of(file: Path, stamp: Stamp, columns: Columns) -> ArrayTable:
@@ -115,7 +164,7 @@ def format_of(path: str | os.PathLike[str]) -> str:
     return "text" if reader is None else _FORMATS[reader]
 
 
-def cells_as_text(path: str | os.PathLike[str]) -> tuple[str, str, bool] | None:
+def cells_as_text(path: str | os.PathLike[str], sheet: str | None = None) -> tuple[str, str, bool] | None:
     """Give a text file, or the sheet of an XLSX file as a text with tabs, what to call it, and whether it is a sheet.
 
     None for a file of columns, which `read_any_table` reads.
@@ -123,12 +172,12 @@ def cells_as_text(path: str | os.PathLike[str]) -> tuple[str, str, bool] | None:
     file = existing_file(path)
     with file.open("rb") as stream:
         reader = _reader_of(stream.read(_HEAD), file)
-    if reader is None:
-        return str(file), read_plain_text(file), False
     with naming_damage(file):
         if reader is _of_zip and _is_xlsx(file):
-            return *_sheet_text(file), True
-    return None
+            return *_sheet_text(file, sheet), True
+    if sheet is not None:
+        raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
+    return None if reader is not None else (str(file), read_plain_text(file), False)
 
 
 def _reader_of(head: bytes, file: Path) -> _Reader | None:
@@ -152,35 +201,51 @@ def _is_xlsx(file: Path) -> bool:
         return "[Content_Types].xml" in archive.namelist()
 
 
-def _of_xlsx(file: Path) -> Table:
-    source, text = _sheet_text(file)
+def _of_xlsx(file: Path, sheet: str | None = None) -> Table:
+    source, text = _sheet_text(file, sheet, without_side_blocks=True)
     return text_table(source, text, delimiter="\t")
 
 
-def _sheet_text(file: Path) -> tuple[str, str]:
-    """Give the sheet with the most numbers as a text with tabs, with its lines of names, and what to call it."""
+def _sheet_text(file: Path, sheet: str | None = None, *, without_side_blocks: bool = False) -> tuple[str, str]:
+    """Give a sheet, or that with the most numbers, as a text with tabs and its lines of names; and what to call it."""
     openpyxl = import_extra("openpyxl", "formats", "an XLSX file")
     book = openpyxl.load_workbook(io.BytesIO(file.read_bytes()), read_only=True, data_only=True)
-    sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
-    held = {title: sum(isinstance(cell, int | float) for row in rows for cell in row) for title, rows in sheets.items()}
+    sheets = {each.title: list(each.iter_rows(values_only=True)) for each in book.worksheets}
+    if sheet is not None and sheet not in sheets:
+        near = did_you_mean(sheet, sheets) or f"it has {', '.join(map(repr, sheets))}"
+        raise DataError(f"{file}: {argument('sheet', repr(sheet))}: no such sheet: {near}")
+    held = {
+        title: sum(isinstance(cell, int | float) for row in rows for cell in row)
+        for title, rows in sheets.items()
+        if sheet in (None, title)
+    }
     title = max(held, key=lambda each: held[each], default="")
     if not held.get(title):
         raise DataError(f"{file}: no sheet has a number in it")
+    source = f"{file}, sheet {title!r}"
     rows = [["" if cell is None else _as_text(cell) for cell in row] for row in sheets[title]]
     width = max(1 + k for row in rows for k, cell in enumerate(row) if cell)
-    rows = [row[:width] for row in rows if any(row)]
-    holds = [any(k < len(row) and parse_number(row[k]) is not None for row in rows) for k in range(width)]
-    text = "\n".join("\t".join(_filled(row, holds)) for row in rows)
-    return f"{file}, sheet {title!r}", text
+    rows = [[*row[:width], *[""] * (width - len(row))] for row in rows]
+    if without_side_blocks:
+        rows = _main_block(rows, source, openpyxl.utils.get_column_letter)
+    return source, "\n".join("\t".join(row) for row in rows)
 
 
-def _filled(row: list[str], holds_numbers: list[bool]) -> list[str]:
-    """Mark empty cells, as a tab at an end of the line would be lost; not those beside a remark, which is short."""
-    cells = [cell for cell in row if cell]
-    if 2 * len(cells) <= len(holds_numbers) and parse_number(cells[0]) is None and not spells_units(cells):
-        return cells
-    data = any(parse_number(cell) is not None for cell in row)
-    return [cell or ("nan" if data and number else "-") for cell, number in zip(row, holds_numbers, strict=False)]
+def _main_block(rows: list[list[str]], source: str, letter: Callable[[int], str]) -> list[list[str]]:
+    """Leave out what stands beside the columns of a record: columns at either end with few cells, as notes have."""
+    filled = np.array([sum(1 for row in rows if row[k]) for k in range(len(rows[0]))])
+    whole = np.flatnonzero(2 * filled >= filled.max())
+    first, last = int(whole[0]), int(whole[-1]) + 1
+    aside = [k for k in (*range(first), *range(last, filled.size)) if filled[k]]
+    if not any(parse_number(row[k]) is not None for row in rows for k in aside):
+        return rows
+    names = ", ".join(letter(k + 1) for k in aside)
+    warnings.warn(
+        f"{source}: column(s) {names} left out: less than half as long as the others, notes beside them",
+        UserWarning,
+        stacklevel=2,
+    )
+    return [row[first:last] for row in rows]
 
 
 def _as_text(cell: Any) -> str:

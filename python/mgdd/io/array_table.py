@@ -190,7 +190,7 @@ def naming_damage(file: Path) -> Iterator[None]:
     """Turn what a library raises of a file into a DataError that names it."""
     try:
         yield
-    except (ImportError, DataError):
+    except (ImportError, DataError, UserWarning):
         raise
     except Exception as error:  # of another library: any class
         text = f"{type(error).__name__} {error}".strip()

@@ -48,6 +48,8 @@ def read(
     encoder: Encoder | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
 ) -> xr.Dataset:
     r"""Read a whole file of a test cell: all its channels, cut into cycles together.
 
@@ -77,8 +79,8 @@ def read(
         For cylinder pressures in volts, as in `read_pressure`.
     encoder
         For records over time beside the signal of an encoder, as in `read_pressure`.
-    delimiter, decimal
-        Of text, as in `read_pressure`.
+    delimiter, decimal, sheet, cycle_per_row
+        Of text and of workbooks, as in `read_pressure`.
 
     Returns
     -------
@@ -128,7 +130,7 @@ def read(
         offset_bar=offset_bar,
         encoder=encoder,
     )
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return bench_record(table, layout_of(table, how), channels, name=Path(path).name)
 
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from mgdd.errors import DataError
 
 __all__ = [
-    "TIME_UNITS", "Heading", "bare_unit", "check_choice", "heading", "last_number", "spelled_unit", "stated_unit", "stem",
-    "unit_text", "without_brackets",
+    "TIME_UNITS", "Heading", "bare_unit", "check_choice", "heading", "last_number", "spelled_unit", "stated_unit",
+    "stem", "unit_text", "without_brackets",
 ]  # fmt: skip
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}

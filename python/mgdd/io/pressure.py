@@ -120,6 +120,8 @@ def read_pressure(
     encoder: Encoder | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
 ) -> xr.Dataset:
     r"""Read the measured pressure of one cylinder, one cycle or many, from a file.
 
@@ -173,6 +175,11 @@ def read_pressure(
         Column separator; None detects it.
     decimal : {".", ","}
         Decimal mark.
+    sheet : str, optional
+        Of a workbook the sheet; None takes the one with the most numbers.
+    cycle_per_row : bool
+        Text or a sheet has a row per cycle: the first row are the angles, or all are cycles with `angle_step_deg`; what
+        stands in front of the numbers are names.
 
     Returns
     -------
@@ -217,7 +224,7 @@ def read_pressure(
         offset_bar=offset_bar,
         encoder=encoder,
     )
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return _dataset(cycles_of(table, how), Path(path).name)
 
 

@@ -92,7 +92,7 @@ class Rows:
                 named = ~empty[:start] & (counts[:start] == counts[start])
                 if not empty[start:].all() or named.any():
                     break
-                places += step * empty
+                np.add(places, step * empty, out=places)
         return Rows(self.raw, begin, end, self.line)
 
     def cell_counts(self, mark: str | None) -> NDArray[np.int64]:

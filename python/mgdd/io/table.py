@@ -38,6 +38,7 @@ __all__ = [
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _NARROW = 4  # columns
+_SHOWN = 12  # names of columns in a message
 _ROWS = 4  # of one width, one below the other, are data
 _HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
 _RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh
@@ -138,8 +139,8 @@ class Table(ABC):
                 )
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"
-                names = ", ".join(map(repr, self.header))
-                near = did_you_mean(column, self.header) if what == "no column" else ""
+                names = ", ".join(map(repr, self.header[:_SHOWN])) + (", ..." if len(self.header) > _SHOWN else "")
+                near = did_you_mean(column, self.header) if what == "no column" else "give its number, from 0;"
                 raise DataError(f"{self.source}: {what} {column!r}: {near}{' ' if near else ''}the header has {names}")
             column = self.header.index(column)
         if isinstance(column, bool) or not 0 <= column < self.width:
@@ -277,7 +278,7 @@ def text_table(
     start = _first_row(content, delimiter, decimal) if units_row else 1  # tables of ours have one line of names
     shown = content[min(start, len(content) - 1) if units_row else 0][1]
     mark = delimiter if delimiter is not None else _detect(shown, decimal)
-    if mark == "\t":
+    if mark == "\t" and delimiter is None:
         content = content.without_outer_tabs(start)
     above, body = list(content.part(0, start)), content.part(start)
     heads = [cells_of(row, mark) for _, row in above]
@@ -336,22 +337,26 @@ def _first_row(content: Rows, delimiter: str | None, decimal: str) -> int:
     def mark_of(text: str) -> str | None:
         return delimiter if delimiter is not None else _detect(text, decimal)
 
+    def said(text: str, mark: str | None) -> tuple[str, ...]:
+        cells = cells_of(text, mark)  # without the empty ones that a spreadsheet adds
+        return cells[: max((k + 1 for k, cell in enumerate(cells) if cell), default=1)]
+
     last_head: int | None = None
     for at, (_, text) in enumerate(content):
         mark = mark_of(text)
-        cells = cells_of(text, mark)
+        cells = said(text, mark)
         if _is_head(cells):
             continue
         if _like_number(cells[0]) or (not cells[0] and all(_like_number(cell) for cell in cells if cell)):
             return at  # one of another width is refused by its line
         if last_head is None:
             later = ((k, content[k][1]) for k in range(len(content) - 1, at, -1))
-            last_head = next((k for k, row in later if _is_head(cells_of(row, mark_of(row)))), at)
+            last_head = next((k for k, row in later if _is_head(said(row, mark_of(row)))), at)
         if at >= last_head:
             return at
-        above = cells_of(content[at - 1][1], mark) if at else ()
+        above = said(content[at - 1][1], mark) if at else ()
         named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
-        below = [cells_of(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
+        below = [said(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
         if named and all(len(one) == len(cells) and one[0] != _HEADER_ENDS for one in below):
             return at
     return len(content)
@@ -425,7 +430,7 @@ def _is_head(cells: tuple[str, ...]) -> bool:
     if not any(_like_number(cell) for cell in cells):
         return True
     counted = [int(cell) for cell in cells[1:] if _COUNT.fullmatch(cell)]
-    others = [cell for cell in cells[1:] if not _COUNT.fullmatch(cell)]
+    others = [cell for cell in cells[1:] if cell and not _COUNT.fullmatch(cell)]
     counts_up = all(b - a == 1 for a, b in itertools.pairwise(counted)) and (not counted or not others)
     return not _like_number(cells[0]) and counts_up and all(parse_number(cell) is None for cell in others)
 

@@ -104,6 +104,7 @@ def read_throttle_log(
     step_s: float | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
+    sheet: str | None = None,
 ) -> xr.Dataset:
     r"""Read one throttle log from a text file or a MATLAB file (version 5 to 7).
 
@@ -135,6 +136,8 @@ def read_throttle_log(
         Column separator of a text file; None detects it.
     decimal : {".", ","}
         Decimal mark of a text file.
+    sheet : str, optional
+        Of a workbook the sheet; None takes the one with the most numbers.
 
     Returns
     -------
@@ -172,7 +175,7 @@ def read_throttle_log(
     if not 0.0 < travel_deg <= 95.0:
         raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
     wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
-    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal)
+    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
     scales = {"time_s": 0.001 if units["time_s"] == "ms" else 1.0, "duty": 0.01 if units["duty"] == "%" else 1.0}
     scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(units["angle_deg"], 1.0)
     columns = {key: values * scales.get(key, 1.0) for key, values in columns.items()}
@@ -205,11 +208,12 @@ def _read(
     *,
     delimiter: str | None,
     decimal: str,
+    sheet: str | None,
 ) -> tuple[dict[str, NDArray[np.float64]], Place, dict[str, str]]:
     called: dict[str, str] = {}
     units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet) as table:
         for key, column in wanted.items():
             chosen = key if column is None and key in (table.header or ()) else column
             if chosen is not None:
