@@ -134,13 +134,14 @@ def _of_rows(table: Table) -> ArrayTable:
     """Make a column of each row: the angle in the first, a cycle in each other, with a name in front of them or not."""
     if not isinstance(table, TextTable):
         raise DataError(f"{table.source}: a matrix is turned as it needs to be: leave {argument('cycle_per_row')} out")
-    cells = [row[0] for row in table.part(0, 1).cells]
+    cells = [row[0] for row in table.cells]
     named = bool(cells) and parse_number(cells[0], table.decimal) is None
     rows = table.matrix(range(int(named), table.width)).T
     names: tuple[str, ...] | None = None
     if named:
         first = cells[0] if heading(cells[0]).quantity in ("angle", "time") else ANGLE
-        names = (first, *(row[0] for row in table.part(1, table.height).cells))
+        alike = len({heading(name).series for name in cells[1:]}) == 1  # other names say nothing of the cycles
+        names = (first, *(name if alike else "" for name in cells[1:]))
     return ArrayTable(table.source, names, None, tuple(column for *_, column in columns_of(map(_unnamed, rows))))
 
 

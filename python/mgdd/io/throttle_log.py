@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd._arguments import as_floats
-from mgdd.errors import DataError, ParameterError, ShapeError, argument
+from mgdd.errors import DataError, ParameterError, ShapeError, argument, taken
 from mgdd.io.any_table import open_table
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
 from mgdd.io.table import Place, Table
-from mgdd.io.throttle_checks import check_even, check_samples, check_signals
+from mgdd.io.throttle_checks import check_even, check_samples, check_signals, in_arrays, without_gaps
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def throttle_log(
     Returns
     -------
     xarray.Dataset
-        ``duty`` and ``angle_deg`` over ``time_s``.
+        ``duty`` and ``angle_deg`` over ``time_s``; ``attrs["warnings"]`` says what was left out: of a log with gaps in
+        its time the longest part without one is kept.
 
     Raises
     ------
@@ -84,7 +85,8 @@ def throttle_log(
     """
     given = {"time_s": time_s, "duty": duty, "angle_deg": angle_deg, "current_a": current_a, "supply_v": supply_v}
     columns = {key: _column(key, values, name) for key, values in given.items() if values is not None}
-    return _checked(columns, Place(name), step_s=step_s, name=name)
+    with taken(("step_s",), in_arrays):
+        return _checked(columns, Place(name), step_s=step_s, name=name)
 
 
 def read_throttle_log(
@@ -142,7 +144,8 @@ def read_throttle_log(
     Returns
     -------
     xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name.
+        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name,
+        ``attrs["warnings"]`` what was left out, as in `throttle_log`.
 
     Raises
     ------
@@ -275,6 +278,7 @@ def _checked(
             raise ShapeError(
                 f"{place.source}: {key} has {values.size} samples, time {size}: columns must be equally long"
             )
+    columns, place, note = without_gaps(columns, place)
     check_samples(columns, place)
     if step_s is None:
         check_even(columns["time_s"], place)
@@ -289,7 +293,7 @@ def _checked(
         travel_deg=travel_deg,
     )
     variables = {key: ("time_s", values) for key, values in columns.items()}
-    return labelled_dataset(variables, attrs={"file": name})
+    return labelled_dataset(variables, attrs={"file": name, "warnings": note})
 
 
 def _resampled(
