@@ -6,6 +6,7 @@ import contextlib
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -128,7 +129,7 @@ class ArrayTable(Table):
         """Return the number of rows of the first column in the window."""
         return self._rows_of(self.columns[0])
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Return the number of rows that each column has in the file."""
         return tuple(column.size for column in self.columns)

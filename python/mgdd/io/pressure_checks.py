@@ -165,7 +165,7 @@ def check_trace(
     unit: str = "bar",
     angle_unit: str = "deg",
     source: str = "trace",
-    rows: Sequence[int] | None = None,
+    rows: Sequence[int] | NDArray[np.int64] | None = None,
     unit_of_file: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Check a pressure trace and return it in °CA aTDC and bar; the caller's arrays stay as they are.

@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import tempfile
 import warnings
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -31,15 +32,15 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
+    names = Counter(channel.name for channel in channels)
     found: list[Named] = []
     for channel in channels:
         count = len(channel)
-        alone = sum(other.name == channel.name for other in channels) == 1
-        name = channel.name if alone else f"{channel.group_name}.{channel.name}"
+        name = channel.name if names[channel.name] == 1 else f"{channel.group_name}.{channel.name}"
         clock = _clock(channel.properties)
         if clock and count and not any(each.values.shape == (count,) and each.unit == "s" for each in found):
             time = Samples(count, np.float64, partial(_ticks, *clock))
-            plain = not found and all(other.name != "time" for other in channels)
+            plain = not found and "time" not in names
             found.append(Named("time" if plain else f"time ({name})", time, "s"))
         unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
         found.append(Named(name, Samples(count, channel.dtype, partial(_sliced, channel)), str(unit)))
@@ -53,7 +54,7 @@ def _clock(properties: Mapping[str, Any]) -> tuple[float, float] | None:
     return (start, step) if np.isfinite(start) and np.isfinite(step) and step > 0.0 else None
 
 
-def _ticks(start_s: float, step_s: float, start: int, stop: int) -> NDArray[np.float64]:
+def _ticks(start_s: float, step_s: float, start: int, stop: int) -> NDArray[Any]:
     return start_s + step_s * np.arange(start, stop)
 
 

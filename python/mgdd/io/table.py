@@ -99,7 +99,7 @@ class Table(ABC):
     def height(self) -> int:
         """Return the number of rows."""
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Return the number of rows of each column."""
         return (self.height,) * self.width
