@@ -31,7 +31,7 @@ PYBIND11_MODULE(_core, m) {
   bind_errors(m);
   static_cast<void>(mgdd::wanted_instruction_set());  // refuses a wrong MGDD_INSTRUCTION_SET here, by name
   const std::vector<Room> rooms{
-      {"math", "Look-up tables.", {&bind_lookup_table}},
+      {"math", "Look-up tables, and rows of numbers in a text.", {&bind_lookup_table, &bind_number_rows}},
       {"optimize",
        "Fits, seekers and learners.",
        {&bind_least_squares, &bind_limits, &bind_seekers, &bind_direct_seekers, &bind_learning}},

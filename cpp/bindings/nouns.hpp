@@ -6,6 +6,7 @@
 namespace mgdd::bindings {
 
 void bind_lookup_table(pybind11::module_& m);
+void bind_number_rows(pybind11::module_& m);
 void bind_least_squares(pybind11::module_& m);
 void bind_limits(pybind11::module_& m);
 void bind_seekers(pybind11::module_& m);

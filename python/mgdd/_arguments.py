@@ -242,6 +242,16 @@ def _is_numbers(value: Any) -> bool:
     return True
 
 
+def as_floats(values: Any) -> Any:
+    """Return a new array of float64; what a masked array marks as missing is NaN, not what stands below the mask."""
+    import numpy as np
+
+    made = np.array(values, dtype=np.float64)
+    if isinstance(values, np.ma.MaskedArray):
+        made[np.ma.getmaskarray(values)] = np.nan
+    return made
+
+
 def _is_sequence(value: Any) -> bool:
     return not isinstance(value, str | bytes) and hasattr(value, "__len__") and hasattr(value, "__getitem__")
 

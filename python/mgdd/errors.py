@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Self, TypeVar
@@ -349,14 +349,33 @@ def hinted(message: str, name: str, known: Iterable[str]) -> str:
 
 
 _written: ContextVar[Callable[[str, str | None], str] | None] = ContextVar("written", default=None)
+_door: ContextVar[tuple[Collection[str], Callable[[str, str | None], str]] | None] = ContextVar("door", default=None)
 
 
 def argument(name: str, text: str | None = None) -> str:
-    """Write an argument as the reader of a message would give it: ``step_s=0.001`` in Python, or as an option."""
-    write = _written.get()
+    """Write an argument as the reader of a message would give it: ``step_s=0.001`` in Python, or as an option.
+
+    Where the function that was called does not take it, what stands for it there: see `taken`.
+    """
+    write, door = _written.get(), _door.get()
+    if door is not None and name not in door[0]:
+        return door[1](name, text)
     if write is not None:
         return write(name, text)
     return name if text is None else f"{name}={text}"
+
+
+@contextmanager
+def taken(names: Collection[str], instead: Callable[[str, str | None], str]) -> Iterator[None]:
+    """Let `argument` write, of names that the function called does not take, ``instead(name, text)``.
+
+    The outermost function counts: it is the one that the reader of a message called.
+    """
+    token = _door.set(_door.get() or (names, instead))
+    try:
+        yield
+    finally:
+        _door.reset(token)
 
 
 @contextmanager

@@ -235,7 +235,8 @@ def test_what_stands_above_the_rows(above: str, header: Any, units: Any, tmp_pat
     table = read_any_table(tmp_path / "t.csv")
     assert (table.header, table.units) == (header, units)
     np.testing.assert_allclose(table.numbers(1), CYCLES[0], atol=1e-6)
-    assert len(table.lines or ()) == len(ANGLE)
+    assert table.lines is not None
+    assert len(table.lines) == len(ANGLE)
 
 
 def test_labview_text(tmp_path: Path) -> None:

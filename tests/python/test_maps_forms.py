@@ -52,14 +52,14 @@ CORNERS = [
     ("rpm v / mg >", {}, ("rpm", "rpm"), ("mg", "mg")),
     ("mg > / rpm v", {}, ("rpm", "rpm"), ("mg", "mg")),
     ("mg → Drehzahl [1/min] ↓", {}, ("Drehzahl", "rpm"), ("mg", "mg")),
-    ("n/m", {"rows": "n"}, ("y", "not given"), ("x", "not given")),
-    ("n/M", {"columns": "M"}, ("y", "not given"), ("M", "not given")),
+    ("n/m", {"rows": "n"}, ("n", "not given"), ("m", "not given")),
+    ("n/M", {"columns": "M"}, ("n", "not given"), ("M", "not given")),
     ("n/M", {"rows": "speed_rpm", "columns": "fuel_mg"}, ("speed_rpm", "rpm"), ("fuel_mg", "mg")),
-    ("n/M", {"columns": "n"}, ("M", "not given"), ("x", "not given")),  # the words say so, whatever stands below
+    ("n/M", {"columns": "n"}, ("M", "not given"), ("n", "not given")),  # the words say so, whatever stands below
     ("fuel [mg] / speed [rpm]", {"rows": "speed"}, ("speed", "rpm"), ("fuel", "mg")),
     ("fuel [mg] / speed [rpm]", {"columns": "fuel_mg"}, ("speed", "rpm"), ("fuel_mg", "mg")),
     ("fuel [mg] / speed [rpm]", {"rows": "speed_rpm"}, ("speed_rpm", "rpm"), ("fuel", "mg")),
-    ("n [1/min] / m [mg/Hub]", {"rows": "n"}, ("y", "rpm"), ("x", "mg/Hub")),
+    ("n [1/min] / m [mg/Hub]", {"rows": "n"}, ("n", "rpm"), ("m", "mg/Hub")),
     ("", {"rows": "speed_rpm", "columns": "fuel_mg"}, ("speed_rpm", "rpm"), ("fuel_mg", "mg")),
 ]  # fmt: skip
 
@@ -144,7 +144,7 @@ def test_title_units_and_remarks_of_a_grid(tmp_path: Path) -> None:
     assert (found.name, found.unit, found.provenance["remarks"]) == ("BSFC", "g/kWh", "Engine B7")
     text = grid(r"n\m").replace("\n", "\n[1/min];mm;mm;mm;mm;mm\n", 1)
     below = read(text, tmp_path, name="lift_mm")
-    assert [below.labels[name].units for name in ("lift_mm", "y", "x")] == ["mm", "rpm", "not given"]
+    assert [below.labels[name].units for name in ("lift_mm", "n", "m")] == ["mm", "rpm", "not given"]
     with pytest.raises(DataError, match="line 2: unit 'mm' of lift_s: its name or label says 's'"):
         read(text, tmp_path, name="lift_s")
     with pytest.raises(DataError, match="line 2: units 'cm', 'mm': the values have one"):
@@ -162,6 +162,30 @@ def test_empty_cells_are_named_and_can_be_filled(tmp_path: Path) -> None:
     assert found.cells["source"][1].tolist() == ["given", "given", "unattainable", "unattainable", "given"]
     filled = smooth_map(found, fill=True, tolerance=0)
     np.testing.assert_allclose(filled.values, plane, atol=1e-4)
+
+
+def test_the_last_row_of_a_grid_may_not_be_cut_off(tmp_path: Path) -> None:
+    whole = grid(r"rpm\mg")
+    *rows, last = whole.rstrip("\n").split("\n")
+    breakpoint_alone = last.partition(";")[0]
+    for cut in (breakpoint_alone, f"{breakpoint_alone};"):
+        with pytest.raises(DataError, match=f"line {len(rows) + 1}: .* may be cut off here"):
+            read("\n".join([*rows, cut]), tmp_path)
+    empty = read("\n".join([*rows, breakpoint_alone + ";" * len(FUEL)]), tmp_path)
+    assert set(empty.cells["source"][-1]) == {"unattainable"}
+    own = "value,soc_cad,°CA aTDC\nrows,speed_rpm,rpm\ncolumns,fuel_mg,mg\ntable,value\n,6,10\n900,-1,-2\n1400"
+    with pytest.raises(DataError, match=r"line 7: .* may be cut off here"):
+        read(own, tmp_path)
+
+
+@pytest.mark.parametrize("axis", ["n", "s", "m", "N", "load_a", "row_k", "pos_l"])
+def test_a_letter_that_ends_a_name_is_no_unit(axis: str, tmp_path: Path) -> None:
+    made = read(f"{axis};load;val\n" + "".join(f"{i};{j};{i + j}\n" for i in (1, 2) for j in (1, 2)), tmp_path)
+    assert made.axes.keys() == {axis, "load"}
+    assert made.labels[axis].units == "not given"
+    given = CalibrationMap({axis: [1.0, 2.0]}, [3.0, 4.0], name="gain", labels={axis: ("-", "of its own")})
+    assert given.labels[axis].units == "-"
+    assert CalibrationMap({"coil_current_a": [1.0, 2.0]}, [3.0, 4.0], name="gain").labels["coil_current_a"].units == "A"
 
 
 BAD = [
@@ -305,7 +329,7 @@ def test_a_point_without_a_value_is_a_cell_to_fill(tmp_path: Path) -> None:
     assert found.cells["source"].tolist() == [["given", "unattainable"], ["given", "given"]]
     assert [found.labels[name].units for name in ("speed", "fuel", "soc")] == ["rpm", "mg", "°CA"]
     scattered = "n,m,x\n" + "".join(f"{900 + 0.1 * k},{6 + 0.01 * k},{k}\n" for k in range(80))
-    with pytest.raises(DataError, match=r"80 points with 80 values of y x 80 values of .* are no grid: fit them"):
+    with pytest.raises(DataError, match=r"80 points with 80 values of n x 80 values of .* are no grid: fit them"):
         read(scattered.replace("m", "q_mg", 1), tmp_path)
 
 

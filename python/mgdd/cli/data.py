@@ -17,7 +17,7 @@ from mgdd.cli.output import check_output, emit, wrote
 from mgdd.datasets.files import FILES, LICENCES, place
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read, read_pressure
-from mgdd.io.any_table import format_of, read_any_table
+from mgdd.io.any_table import TEXT, format_of, read_any_table
 from mgdd.io.bench_file import bench_record
 from mgdd.io.binary_files import write_netcdf, write_parquet
 from mgdd.io.channels import layout_of
@@ -87,7 +87,7 @@ def _info(args: argparse.Namespace) -> None:
     options = {name: default_of(read, name) for name in (*_OWN.options, *_SPEED.options, *READING.options)} | _given(
         args
     )
-    channels, text = options.pop("channels"), {name: options.pop(name) for name in ("delimiter", "decimal")}
+    channels, text = options.pop("channels"), {name: options.pop(name) for name in TEXT}
     table = read_any_table(args.file, **text)
     bench, doubts = None, list[str]()
     taken: dict[tuple[int, ...], str] = {}

@@ -35,7 +35,7 @@ _LOG = logging.getLogger(__name__)
 
 CSV = Options(read_points, "delimiter", "decimal")
 MAP_ENDINGS = (".csv", ".json", ".nc", ".dcm", ".cdfx")
-READING = Options(read_map, "name", "decimal", "rows", "columns")
+READING = Options(read_map, "name", "decimal", "rows", "columns", "sheet")
 FORMS = "a map of any form: .csv, .json, .nc, .dcm, .cdfx, a grid or points of a spreadsheet or program"
 _SIZE = (6.6, 4.6)
 

@@ -58,7 +58,7 @@ PEGGING = Options(analyze, "pegging", "pegging_exponent", "inlet_pressure_kpa")
 _COLUMNS = Options(read_pressure, "pressure_column", "angle_column")
 READING = Options(
     read_pressure, "pressure_unit", "gain_bar_per_v", "offset_bar", "tdc_offset_cad", "angle_unit", "firing_tdc_deg",
-    "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter",
+    "before_tdc", "angle_step_deg", "angle_start_deg", "decimal", "delimiter", "sheet", "cycle_per_row",
 )  # fmt: skip
 _ENCODER = Options(
     Encoder, column="encoder", teeth="encoder_teeth", missing_teeth="encoder_missing_teeth",

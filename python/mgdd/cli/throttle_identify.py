@@ -11,9 +11,8 @@ from mgdd import identify
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
-from mgdd.cli.throttle_parameters import LOG
+from mgdd.cli.throttle_parameters import LOG, log_in
 from mgdd.errors import ConvergenceError
-from mgdd.io import read_throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import figures_of
 
@@ -77,8 +76,8 @@ def _counts(text: str) -> list[int]:
 def _identify(args: argparse.Namespace) -> None:
     check_output(args, ".toml", ".json")
     check_figure(args.figure)
-    log = read_throttle_log(args.file, **LOG.given(args))
-    test = None if args.test is None else read_throttle_log(args.test, **LOG.given(args))
+    log = log_in(args, args.file)
+    test = None if args.test is None else log_in(args, args.test)
     options = FitOptions(**_SEARCH.given(args))
     given = _MODEL.given(args) | _FIT.given(args)
     fit = identify.identify_throttle(log, test=test, delay_samples=args.delay_samples, options=options, **given)
@@ -114,7 +113,7 @@ def _validate(args: argparse.Namespace) -> None:
     check_output(args)
     check_figure(args.figure)
     model = identify.load_throttle_model(args.fit)
-    validation = identify.validate_throttle(model, read_throttle_log(args.file, **LOG.given(args)))
+    validation = identify.validate_throttle(model, log_in(args, args.file))
     emit(args, validation.to_dict(), text=validation.summary())
     if args.figure:
         _draw(validation, args.figure, None)

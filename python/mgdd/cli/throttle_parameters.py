@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mgdd import presets
 from mgdd.cli.from_library import Options
@@ -14,14 +15,26 @@ from mgdd.io import read_throttle_log
 from mgdd.presets.preset import Preset
 from mgdd.throttle import Throttle
 
-__all__ = ["LOG", "add_preset", "add_throttle", "changes_of", "known_only", "preset_of", "throttle_of"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["LOG", "add_preset", "add_throttle", "changes_of", "known_only", "log_in", "preset_of", "throttle_of"]
 
 LOG = Options(
     read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
-    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal",
+    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal", "sheet",
 )  # fmt: skip
 
 _DEFAULT_PRESET = "P1"
+_LOG = logging.getLogger(__name__)
+
+
+def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
+    """Read a log as the options of `LOG` say, and say what was left out of it."""
+    log = read_throttle_log(file, **LOG.given(args))
+    for warning in log.attrs["warnings"].splitlines():
+        _LOG.warning("%s: %s", file, warning)
+    return log
 
 
 def add_preset(group: Any, option: str) -> None:

@@ -67,7 +67,7 @@ def read_map_table(path: str | os.PathLike[str], decimal: str) -> tuple[xr.Datas
         cells[name].ravel()[places] = found[name]
     sources = np.full(math.prod(shape), "", dtype=object)
     if "source" in names:
-        sources[places] = [row[table.index("source")] for row in table.rows]
+        sources[places] = [row[table.index("source")] for row in table.cells]
     dataset = labelled_dataset(
         {
             **{name: (name, own, unit_of(name), name) for name, own in entries.items()},
@@ -139,7 +139,7 @@ def _places(
     index = tuple(np.searchsorted(own, found[name]) for name, own in entries.items())
     places = np.ravel_multi_index(index, shape)
     first: dict[int, int] = {}
-    for line, place in zip(table.lines, places.tolist(), strict=True):
+    for line, place in zip(table.lines.tolist(), places.tolist(), strict=True):
         if place in first:
             where = _cell(entries, place)
             raise DataError(f"{table.source}, line {line}: {where} stands in line {first[place]} already: remove one")

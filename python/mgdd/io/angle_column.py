@@ -11,6 +11,7 @@ from mgdd.errors import DataError, argument
 from mgdd.io.column_names import TIME_UNITS, Heading, heading
 from mgdd.io.cycle_phase import CYCLE_DEG, repetition
 from mgdd.io.encoder import Turning, turning_of
+from mgdd.io.pressure_checks import MIN_SAMPLES
 from mgdd.io.reading import ANGLE_UNITS, Reading
 from mgdd.io.table import Table
 from mgdd.io.wrong_channel import no_angle
@@ -26,6 +27,11 @@ _CORRECTED = 0.01
 
 def headings(table: Table) -> list[Heading]:
     """Read header and units row of a table, column by column."""
+    if table.lines is not None and table.height < MIN_SAMPLES <= table.width:
+        raise DataError(
+            f"{table.source}: {table.height} rows of {table.width} cells: too few samples; if each row is a cycle, "
+            f"pass {argument('cycle_per_row', 'True')}"
+        )
     names = table.header or ("",) * table.width
     return [
         heading(name, table.unit(index), where=f"{table.source}, {table.called(index)}")

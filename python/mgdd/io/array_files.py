@@ -13,6 +13,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.array_table import Columns, Named, Reversed, columns_of
 from mgdd.io.extras import import_extra
+from mgdd.io.netcdf_marks import MARKS, Decoded
 from mgdd.io.watched_file import WatchedFile
 from mgdd.results.labels import ANGLE
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["of_hdf5", "of_matlab", "of_netcdf", "of_numpy", "of_parquet"]
+
+_LONGEST_MARK = 128  # bytes of an attribute that marks values, sixteen numbers
 
 
 def of_matlab(file: Path, _: contextlib.ExitStack) -> Columns:
@@ -66,10 +69,27 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
         if item.id.get_offset() is not None and held < needed:  # the library would give whatever is in memory
             raise ValueError(f"data set {name!r} has {held} of {needed} bytes")
     kinds = [_kinds_of_units(h5py, item) for _, item in found]
+    netcdf = "_NCProperties" in content.attrs
+    decoded = [Decoded(item, _marks_of(h5py, item), unwritten=netcdf) for _, item in found]
+    units = [
+        next(filter(None, (_text(item.attrs[key]) for key in own)), "")
+        for (_, item), own in zip(found, kinds, strict=True)
+    ]
     return columns_of(
-        Named(name, Reversed(item) if matlab else item, next(filter(None, (_text(item.attrs[key]) for key in own)), ""))
-        for (name, item), own in zip(found, kinds, strict=True)
+        Named(name, Reversed(values) if matlab else values, unit)
+        for (name, _), values, unit in zip(found, decoded, units, strict=True)
     )
+
+
+def _marks_of(h5py: Any, item: Any) -> dict[str, Any]:
+    """Give the attributes that say which numbers are missing; as with units, only those of a type that reads safely."""
+    numeric, found = (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID), {}
+    for key in MARKS:
+        if key in item.attrs:
+            own = item.attrs.get_id(key)
+            if isinstance(own.get_type(), numeric) and own.get_storage_size() <= _LONGEST_MARK:
+                found[key] = item.attrs[key]
+    return found
 
 
 def _kinds_of_units(h5py: Any, item: Any) -> dict[str, Any]:
@@ -93,12 +113,14 @@ def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     # First so: by its path SciPy makes room for whatever length stands in the head.
     with file.open("rb") as stream, netcdf_file(WatchedFile(stream), mmap=True):
         pass
-    dataset = stack.enter_context(xr.open_dataset(file, engine="scipy"))
+    raw: dict[str, Any] = {"mask_and_scale": False, "decode_times": False}
+    dataset = stack.enter_context(xr.open_dataset(file, engine="scipy", **raw))
     found = []
     for name in sorted(dataset.variables, key=lambda each: each != ANGLE):  # the angle first, as in a text
         variable = dataset[name].variable
+        values = Decoded(variable, variable.attrs, unwritten=True)
         turned = variable.dims[-1:] == (ANGLE,)
-        found.append(Named(str(name), Reversed(variable) if turned else variable, str(variable.attrs.get("units", ""))))
+        found.append(Named(str(name), Reversed(values) if turned else values, str(variable.attrs.get("units", ""))))
     return columns_of(found, along=dataset.sizes.get(ANGLE))
 
 

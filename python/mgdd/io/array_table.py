@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["ArrayTable", "Column", "Columns", "Named", "Reversed", "Samples", "columns_of", "damaged", "naming_damage"]
+__all__ = [
+    "ArrayTable", "Column", "Columns", "Named", "Reversed", "Samples", "columns_of", "damaged", "marked",
+    "naming_damage",
+]  # fmt: skip
 
 
 class Named(NamedTuple):
@@ -53,6 +56,17 @@ class Reversed:
 
     def __getitem__(self, index: tuple[Any, ...]) -> Any:
         return np.asarray(self._values[index[::-1]]).T
+
+
+def marked(values: NDArray[Any], missing: NDArray[np.bool_] | None) -> NDArray[Any]:
+    """Return samples with NaN in place of those that a file marks as missing or invalid, whatever it stores there."""
+    if missing is None or not np.any(missing):
+        return values
+    if values.dtype.kind not in "fiub":
+        return values  # no column of numbers
+    made = values.astype(np.float64)
+    made[np.asarray(missing, np.bool_)] = np.nan
+    return made
 
 
 class Column(NamedTuple):
@@ -195,7 +209,7 @@ def naming_damage(file: Path) -> Iterator[None]:
     """Turn what a library raises of a file into a DataError that names it."""
     try:
         yield
-    except (ImportError, DataError):
+    except (ImportError, DataError, UserWarning):
         raise
     except Exception as error:  # of another library: any class
         text = f"{type(error).__name__} {error}".strip()

@@ -48,6 +48,8 @@ def read(
     encoder: Encoder | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
 ) -> xr.Dataset:
     r"""Read a whole file of a test cell: all its channels, cut into cycles together.
 
@@ -77,8 +79,8 @@ def read(
         For cylinder pressures in volts, as in `read_pressure`.
     encoder
         For records over time beside the signal of an encoder, as in `read_pressure`.
-    delimiter, decimal
-        Of text, as in `read_pressure`.
+    delimiter, decimal, sheet, cycle_per_row
+        Of text and of workbooks, as in `read_pressure`.
 
     Returns
     -------
@@ -128,13 +130,14 @@ def read(
         offset_bar=offset_bar,
         encoder=encoder,
     )
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return bench_record(table, layout_of(table, how), channels, name=Path(path).name)
 
 
 def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *, name: str) -> xr.Dataset:
     """Cut and label what a layout of a table says."""
     kept = kept_channels(table, layout, channels)
+    wanted = {channel.name for channel in kept}
     cylinders = [channel for channel in layout.channels if channel.kind == "pressure"]
     fast = [channel for channel in kept if channel.kind == "fast"]
     pressures = [pressure_of(table, layout.heads, [*each.columns], layout.how, layout.angle) for each in cylinders]
@@ -151,7 +154,7 @@ def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *
         variables[CYCLE] = cycle_count(count)
     for channel, array in zip([*cylinders, *fast], cut, strict=True):
         whole = count > 1 and len(array) > 1
-        if channel in kept:
+        if channel.name in wanted:
             variables[channel.name] = _labelled(channel, ((CYCLE, ANGLE), array) if whole else ((ANGLE,), array[0]))
     notes = [note for pressure in pressures for note in pressure.notes if note not in record.notes]
     notes += _add_slow(table, layout, kept, variables, sources)
@@ -160,8 +163,8 @@ def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *
         notes.append(f"the file gives no unit of {columns_shown(bare)}: their numbers stand as they are")
     made = labelled_dataset(variables, attrs=record_attrs(record._replace(notes=record.notes + notes), name))
     sources |= {channel.name: channel.source for channel in kept}
-    for variable in made.variables:
-        made[variable].attrs["source"] = sources[str(variable)]
+    for name_of, variable in made.variables.items():  # made[name] would look at every other variable each time
+        variable.attrs["source"] = sources[str(name_of)]
     return made
 
 

@@ -243,8 +243,10 @@ class _Array:
 
 
 @contextlib.contextmanager
-def open_bounded(file: Path, form: str) -> Iterator[Columns | tuple[str, str]]:
+def open_bounded(file: Path, form: str, **how: Any) -> Iterator[Columns | tuple[str, str]]:
     """Open a binary file of a format in a process with limits: its columns, or what to call its text and the text.
+
+    `how` are keywords of `mgdd.io.any_table.read_format`.
 
     Raises
     ------
@@ -260,7 +262,7 @@ def open_bounded(file: Path, form: str) -> Iterator[Columns | tuple[str, str]]:
         source = _File(process, limits)
         said, body = source.ask(
             do="open", file=str(file), folder=str(Path.cwd()), format=form, memory=limits.memory,
-            seconds=limits.seconds,
+            seconds=limits.seconds, how=how,
         )  # fmt: skip
         if "source" in said:
             yield said["source"], body.tobytes().decode("utf-8", "surrogatepass")

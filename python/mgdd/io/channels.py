@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -78,13 +79,15 @@ def layout_of(table: Table, how: Reading) -> Layout:
     groups = _pressures(table, heads, how, angle, fast)
     taken = {i for group in groups for i in group}
     channels = _named_pressures(table, heads, groups)
+    used = {ANGLE, CYCLE, *(channel.name for channel in channels)}
     for group in _series(table, heads, [i for i in fast if i not in taken], groups[0]):
-        channels.append(_channel(table, heads, group, "fast", channels))
+        channels.append(_channel(table, heads, group, "fast", used))
+    quick, clocks = set(fast), set(times)
     for i in numeric:
-        if i in fast or i in angle.columns or i in times or _numbers_cycles(table, heads[i], i):
+        if i in quick or i in angle.columns or i in clocks or _numbers_cycles(table, heads[i], i):
             continue
         clock = _clock(table, heads, times, i)
-        channels.append(_channel(table, heads, (i,), "other" if clock is None else "slow", channels, clock))
+        channels.append(_channel(table, heads, (i,), "other" if clock is None else "slow", used, clock))
     source = f"{argument('angle_step_deg', f'{how.angle_step_deg:g}')}" if angle.column is None else ""
     return Layout(heads, angle, channels, how, source or table.called(angle.column or 0))
 
@@ -224,9 +227,10 @@ def _channel(
     heads: Sequence[Heading],
     columns: tuple[int, ...],
     kind: Kind,
-    others: Sequence[Channel],
+    used: set[str],
     time: int | None = None,
 ) -> Channel:
+    """Name a channel as none in `used` is, and add its name there."""
     index = columns[0]
     header = heads[index].name
     said = stated_unit(header, table.unit(index))
@@ -234,16 +238,18 @@ def _channel(
     words = stem(header) if len(columns) > 1 else without_brackets(header)
     name = re.sub(r"\W+", "_", words).strip("_") or f"column_{index}"
     name = f"c_{name}" if name[0].isdigit() else name
-    used = {ANGLE, CYCLE, *(other.name for other in others)}
     known = VARIABLES[name].units if name in VARIABLES else units
     reserved = name in used or re.fullmatch(r"time_\d+_s", name)
     if reserved or attribute_units(known or "-") != attribute_units(units or "-"):
         name = f"{name}_of_file"
-    return Channel(_unused(name, used), columns, kind, units, _source(table, columns), time)
+    name = _unused(name, used)
+    used.add(name)
+    return Channel(name, columns, kind, units, _source(table, columns), time)
 
 
 def _unused(name: str, used: set[str]) -> str:
-    return next(each for each in (name, *(f"{name}_{k}" for k in range(2, 3 + len(used)))) if each not in used)
+    tried = itertools.chain([name], (f"{name}_{k}" for k in itertools.count(2)))
+    return next(each for each in tried if each not in used)
 
 
 def _source(table: Table, columns: Sequence[int]) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.angle_column import Angle, angle_of, headings
-from mgdd.io.any_table import open_parts
+from mgdd.io.any_table import TEXT, open_parts
 from mgdd.io.column_names import Heading
 from mgdd.io.cycle_phase import phase_warnings
 from mgdd.io.cycles import SAME_ANGLE, several_cycles
@@ -89,7 +89,7 @@ def pressure_chunks(path: str | os.PathLike[str], *, cycles: int = 200, **option
     given = inspect.signature(read_pressure).bind(path, **options)
     given.apply_defaults()
     how = Reading(**{each.name: given.arguments[each.name] for each in fields(Reading)})
-    text = {name: given.arguments[name] for name in ("delimiter", "decimal")}
+    text = {name: given.arguments[name] for name in TEXT}
     return _chunks(existing_file(path), int(cycles), how, text, options)
 
 
@@ -182,7 +182,7 @@ class _Plan(NamedTuple):
             if not table.height:
                 break
             parts.append(table.matrix(wanted))
-            lines.append(np.array(table.lines or (), np.int64))
+            lines.append(np.empty(0, np.int64) if table.lines is None else table.lines)
         values = np.concatenate(parts, axis=1)
         degrees: NDArray[Any] = np.arange(values.shape[1]) * (self.how.angle_step_deg or 0.0)
         if not self.angle.made:

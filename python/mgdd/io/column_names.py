@@ -9,19 +9,19 @@ from typing import NamedTuple
 from mgdd.errors import DataError
 
 __all__ = [
-    "TIME_UNITS", "Heading", "check_choice", "heading", "last_number", "spelled_unit", "stated_unit", "stem",
-    "unit_text", "without_brackets",
+    "TIME_UNITS", "Heading", "bare_unit", "check_choice", "heading", "last_number", "spelled_unit", "stated_unit",
+    "stem", "unit_text", "without_brackets",
 ]  # fmt: skip
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 # Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
 _SPELLINGS = {
-    "bar": "bar, bara, bar abs, barg, dan/cm2",
-    "kPa": "kpa, kpaa, kpa abs, kn/m2, kn/m²",
+    "bar": "bar, dan/cm2",
+    "kPa": "kpa, kn/m2, kn/m²",
     "mbar": "mbar, hpa",
     "Pa": "pa, n/m2, n/m²",
     "MPa": "mpa, n/mm2, n/mm²",
-    "psi": "psi, psia, psig, lbf/in2, lbf/in²",
+    "psi": "psi, lbf/in2, lbf/in²",
     "kgf/cm2": "kgf/cm2, kgf/cm², kp/cm2, kp/cm², kg/cm2, kg/cm²",
     "atm": "atm",
     "torr": "torr, mmhg",
@@ -62,7 +62,15 @@ _REMARKS = set(
     "abs absolute rel relative gauge mean avg average median min max raw filt filtered smoothed corrected pegged "
     "cyl cylinder zyl zylinder cycle firing fired motored measured model sim plate wanted actual soll ist".split()
 )
-_GAUGE = re.compile(r"(?<![a-z])(barg|psig|gauge)(?![a-z])", re.IGNORECASE)
+# What stands behind a unit of pressure: absolute, or above the atmosphere.
+_PRESSURE_UNIT = r"(?<![a-zA-Z])(m?bar|psi|[kmh]?pa)"
+_ABSOLUTE = re.compile(rf"{_PRESSURE_UNIT}[ _]?(?:\((?:a|abs|absolute?)\)|abs|absolute?|a)(?![a-zA-Z])", re.IGNORECASE)
+_GAUGE = re.compile(
+    rf"{_PRESSURE_UNIT}[ _]?(?:\((?:g|gauge|rel|relative?|ü)\)|gauge|rel|relative?|g|ü)(?![a-zA-Z])", re.IGNORECASE
+)
+_SAYS_GAUGE = re.compile(r"(?<![a-zA-Z])gauge(?![a-zA-Z])", re.IGNORECASE)
+# Words that a letter numbers.
+_PLACES = frozenset("p ch chan channel kanal input analog sensor probe cyl cylinder zyl zylinder port bank".split())
 _CYLINDER = re.compile(r"(?:(?:cyl\w*?|zyl\w*?)[\s_.\-#]*|^pressure_(?=\d+_bar))(\d+)")  # the last is our own
 
 
@@ -86,7 +94,10 @@ class Heading(NamedTuple):
 
 def heading(name: str, units_row: str | None = None, *, where: str = "column") -> Heading:
     """Read one column's name and its cell in the units row; two units that differ are refused."""
-    in_name, in_row = _unit_of(name), _known(units_row or "")
+    said, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
+    name, name_gauge = _without_reference(name)
+    units_row, row_gauge = _without_reference(units_row or "")
+    in_name, in_row = _known(_unit_word(name, lone=not units_row) or ""), _known(units_row)
     if in_name and in_row and in_name != in_row:
         raise DataError(
             f"{where}: the header says {in_name} and the units row {units_row!r}: correct the one that is wrong"
@@ -98,18 +109,33 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
     if quantity is None or (quantity == "pressure" and found == "other"):
         quantity = found or quantity
     cylinder = _CYLINDER.search(name.lower())
-    units = [units_row or "", *_SQUARE.findall(name)]
+    units = [units_row, *_SQUARE.findall(name)]
+    letter = in_name == "other" and not in_row and len(_unit_word(name) or "") == 1 and not _BRACKETS.search(name)
     return Heading(
-        name=name,
+        name=said,
         unit=None if unit == "other" else unit,
         quantity=quantity,
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
-        gauge=bool(_GAUGE.search(f"{name} {units_row}")),
+        gauge=gauge or name_gauge or row_gauge,
         other=next((text.strip() for text in units if _known(text) == "other"), None),
         strange=_first_strange(units),
-        unclear=_first_strange(_maybe_units(name)),
+        unclear=_first_strange(_maybe_units(name)) or (_unit_word(name) if letter else None),
     )
+
+
+def bare_unit(cell: str) -> str:
+    """Return a cell of a units row without the brackets around it; those of bar(a) belong to it."""
+    text = cell.strip()
+    while len(text) > 1 and text[0] + text[-1] in ("[]", "()", "{}"):
+        text = text[1:-1].strip()
+    return text
+
+
+def _without_reference(text: str) -> tuple[str, bool]:
+    """Leave out what says what a pressure is above, as in bar(a), and return whether that is the atmosphere."""
+    text, gauges = _GAUGE.subn(r"\1", text)
+    return _ABSOLUTE.sub(r"\1", text), gauges > 0
 
 
 def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool]:
@@ -144,7 +170,7 @@ def _ratio(name: str) -> str | None:
 
 def spelled_unit(text: str) -> str | None:
     """Return the unit that a text spells, None where it is none that is known."""
-    return _UNITS.get(text.strip().lower())
+    return _UNITS.get(_without_reference(text)[0].strip().lower())
 
 
 def _known(text: str) -> str | None:
@@ -164,12 +190,11 @@ def stated_unit(name: str, units_row: str | None = None) -> str | None:
     return said or _unit_word(name)
 
 
-def _unit_of(name: str) -> str | None:
-    return _known(_unit_word(name) or "")
+def _unit_word(name: str, *, lone: bool = True) -> str | None:
+    """Return the unit in brackets, or the last word where it is one; a running number may follow it.
 
-
-def _unit_word(name: str) -> str | None:
-    """Return the unit in brackets, or the last word where it is one; a running number may follow it."""
+    A lone letter is one where `lone`: with a row of units below, Channel A is a name.
+    """
     for text in reversed(_BRACKETS.findall(name)):
         if _known(text) is not None:
             return str(text)
@@ -177,7 +202,9 @@ def _unit_word(name: str) -> str | None:
         return ratio
     own = [part for part in name.split(".") if not part.strip().isdecimal()]  # behind those of its structs and groups
     words = [word for word in re.split(r"[\s_/,;\-]+", own[-1].strip() if own else "") if word and not word.isdecimal()]
-    if not words or (len(words[-1]) == 1 and (len(words) == 1 or (words[-1] != "V" and words[0].lower() == "p"))):
+    if not words:
+        return None
+    if len(words[-1]) == 1 and (not lone or len(words) == 1 or (words[-1] != "V" and words[0].lower() in _PLACES)):
         return None  # a lone letter is a name, and p_a is a cylinder rather than an ampere
     return words[-1] if _known(words[-1]) is not None else None
 

@@ -242,7 +242,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
         known = ", ".join(map(repr, ("file", *_BOUNDS)))
         raise DataError(f"{table.source}: unknown or repeated column in {header}: known are {known}, once each")
     conditions: dict[str, dict[str, float]] = {}
-    for line, row in zip(table.lines, table.rows, strict=True):
+    for line, row in zip(table.lines.tolist(), table.cells, strict=True):
         cells = dict(zip(header, row, strict=True))
         name = cells.pop("file")
         if not name or name in conditions:

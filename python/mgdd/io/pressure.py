@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
+from mgdd.errors import DataError, taken
 from mgdd.io.any_table import open_table
-from mgdd.io.column_names import Heading, heading
-from mgdd.io.pressure_checks import pair
+from mgdd.io.column_names import TIME_UNITS, Heading, heading
+from mgdd.io.pressure_checks import PRESSURE_UNITS, pair, to_bar
 from mgdd.io.pressure_file import checked, cycles_of, odd_shape
 from mgdd.io.reading import Reading
 from mgdd.results.labels import ANGLE, labelled_dataset
@@ -91,15 +91,37 @@ def pressure_trace(
     if hasattr(pressure_bar, "columns") and hasattr(pressure_bar, "to_numpy"):  # a DataFrame: a column per cycle
         pressure_bar = pressure_bar.to_numpy().T
     given, values = pair(crank_angle_cad, pressure_bar)
-    record = checked(
-        given,
-        np.atleast_2d(values),
-        firing_tdc_deg=firing_tdc_deg,
-        before_tdc=before_tdc,
-        tdc_offset_cad=tdc_offset_cad,
-        source=name,
-    )
+    with taken(("firing_tdc_deg", "before_tdc", "tdc_offset_cad"), _in_arrays):
+        record = checked(
+            given,
+            np.atleast_2d(values),
+            firing_tdc_deg=firing_tdc_deg,
+            before_tdc=before_tdc,
+            tdc_offset_cad=tdc_offset_cad,
+            source=name,
+        )
     return _dataset(record, name)
+
+
+def _in_arrays(name: str, text: str | None) -> str:
+    """Write what stands for an argument of `read_pressure` where arrays are given."""
+    value = (text or "").strip("'")
+    if name == "pressure_unit" and value in PRESSURE_UNITS:
+        return f"pressure_bar * {to_bar(np.ones(1), value)[0]:.9g}"
+    if name == "angle_unit" and value == "rad":
+        return "numpy.rad2deg(crank_angle_cad)"
+    if name == "angle_unit" and value in TIME_UNITS:
+        return f"6 * rpm * time{f' / {TIME_UNITS[value]:g}' if value != 's' else ''}"
+    if name == "speed_rpm":
+        return "the speed"
+    if name == "pressure_column":
+        return "as one array of (cycle, angle)"
+    return f"mgdd.io.pressure_trace(..., {name}={text or '...'})"
+
+
+def _in_file(name: str, text: str | None) -> str:
+    """Write an argument of `read_pressure` where only its path was given."""
+    return f"mgdd.io.read_pressure(..., {name}={text or '...'})"
 
 
 def read_pressure(
@@ -120,6 +142,8 @@ def read_pressure(
     encoder: Encoder | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
+    sheet: str | None = None,
+    cycle_per_row: bool = False,
 ) -> xr.Dataset:
     r"""Read the measured pressure of one cylinder, one cycle or many, from a file.
 
@@ -173,6 +197,11 @@ def read_pressure(
         Column separator; None detects it.
     decimal : {".", ","}
         Decimal mark.
+    sheet : str, optional
+        Of a workbook the sheet; None takes the one with the most numbers.
+    cycle_per_row : bool
+        Text or a sheet has a row per cycle: the first row are the angles, or all are cycles with `angle_step_deg`; what
+        stands in front of the numbers are names.
 
     Returns
     -------
@@ -217,7 +246,7 @@ def read_pressure(
         offset_bar=offset_bar,
         encoder=encoder,
     )
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return _dataset(cycles_of(table, how), Path(path).name)
 
 
@@ -262,8 +291,7 @@ def one_cycle(trace: Any) -> xr.Dataset:
     if CYCLE in made[_PRESSURE].dims:
         raise DataError(
             f"{made.attrs.get('file', 'trace')}: {made.sizes[CYCLE]} cycles, and one is needed: give their mean, "
-            f"trace.mean('cycle', keep_attrs=True), --mean-cycle on the command line, or one column, "
-            f"{argument('pressure_column', '')}"
+            "trace.mean('cycle', keep_attrs=True), --mean-cycle on the command line, or one, trace.isel(cycle=0)"
         )
     return made
 
@@ -295,7 +323,13 @@ def as_trace(trace: Any) -> xr.Dataset:
         Another form, a missing column, and all of `check_trace`.
     """
     if isinstance(trace, str | os.PathLike):
-        return read_pressure(trace)
+        with taken((), _in_file):
+            return read_pressure(trace)
+    with taken((), _in_arrays):
+        return _in_memory(trace)
+
+
+def _in_memory(trace: Any) -> xr.Dataset:
     dims = getattr(trace, "dims", None)
     if dims is not None and hasattr(trace, "variables"):  # a Dataset
         over = trace[_PRESSURE].dims if _PRESSURE in trace.variables else ()

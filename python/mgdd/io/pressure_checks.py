@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._arguments import as_floats
 from mgdd.errors import DataError, ShapeError, argument
 from mgdd.io.column_names import check_choice
 from mgdd.io.table import Place
@@ -56,8 +57,7 @@ TDC_SHARE = 0.15
 
 def pair(angle: ArrayLike, pressure: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return new float64 arrays: the angle, and the pressure over it or (cycle, angle); or raise ShapeError."""
-    first = np.array(angle, dtype=np.float64)
-    second = np.array(pressure, dtype=np.float64)
+    first, second = as_floats(angle), as_floats(pressure)
     if (
         first.ndim != 1
         or second.ndim not in (1, 2)
@@ -165,7 +165,7 @@ def check_trace(
     unit: str = "bar",
     angle_unit: str = "deg",
     source: str = "trace",
-    rows: Sequence[int] | None = None,
+    rows: Sequence[int] | NDArray[np.int64] | None = None,
     unit_of_file: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Check a pressure trace and return it in °CA aTDC and bar; the caller's arrays stay as they are.

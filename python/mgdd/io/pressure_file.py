@@ -172,7 +172,7 @@ def checked(
     before_tdc: bool,
     tdc_offset_cad: float = 0.0,
     source: str,
-    rows: Sequence[int] | None = None,
+    rows: Sequence[int] | NDArray[np.int64] | None = None,
     level: bool = True,
     unit_of_file: bool = False,
     over_time: bool = False,

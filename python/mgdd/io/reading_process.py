@@ -132,7 +132,7 @@ def answer(
             found = np.ascontiguousarray(arrays[request["array"]][index])
             return {"shape": found.shape, "type": found.dtype.str}, found.reshape(-1).view(np.uint8).data
         os.chdir(request["folder"])
-        read = read_format(request["format"], Path(request["file"]), stack)
+        read = read_format(request["format"], Path(request["file"]), stack, **request["how"])
         if isinstance(read, tuple):
             source, text = read
             return {"source": source}, text.encode("utf-8", "surrogatepass")

@@ -6,14 +6,15 @@ import contextlib
 import shutil
 import tempfile
 import warnings
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.io.array_table import Columns, Named, Samples, columns_of
+from mgdd.io.array_table import Columns, Named, Samples, columns_of, marked
 from mgdd.io.extras import import_extra
 from mgdd.io.watched_file import WatchedFile
 
@@ -31,19 +32,30 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
+    names = Counter(channel.name for channel in channels)
     found: list[Named] = []
     for channel in channels:
         count = len(channel)
-        alone = sum(other.name == channel.name for other in channels) == 1
-        name = channel.name if alone else f"{channel.group_name}.{channel.name}"
-        timed = "wf_increment" in channel.properties and count
-        if timed and not any(each.values.shape == (count,) and each.unit == "s" for each in found):
-            time = Samples(count, np.float64, partial(_part_of, channel.time_track))
-            plain = not found and all(other.name != "time" for other in channels)
+        name = channel.name if names[channel.name] == 1 else f"{channel.group_name}.{channel.name}"
+        clock = _clock(channel.properties)
+        if clock and count and not any(each.values.shape == (count,) and each.unit == "s" for each in found):
+            time = Samples(count, np.float64, partial(_ticks, *clock))
+            plain = not found and "time" not in names
             found.append(Named("time" if plain else f"time ({name})", time, "s"))
         unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
         found.append(Named(name, Samples(count, channel.dtype, partial(_sliced, channel)), str(unit)))
     return columns_of(found)
+
+
+def _clock(properties: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Give start and step of a channel's time [s]; None where its properties tell no time, as a step of 0 does."""
+    given = (properties.get("wf_start_offset", 0.0), properties.get("wf_increment"))
+    start, step = (float(each) if isinstance(each, int | float | np.number) else np.nan for each in given)
+    return (start, step) if np.isfinite(start) and np.isfinite(step) and step > 0.0 else None
+
+
+def _ticks(start_s: float, step_s: float, start: int, stop: int) -> NDArray[Any]:
+    return start_s + step_s * np.arange(start, stop)
 
 
 def _part_of(whole: Callable[[], NDArray[Any]], start: int, stop: int) -> NDArray[Any]:
@@ -79,8 +91,8 @@ def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
                 unit = str(content.get_channel_unit(group=number, index=k))
                 found.append(Named(channel.name, Samples(count, first.dtype, read), unit))
             else:
-                whole = content.select([(None, number, k)])[0]
-                found.append(Named(whole.name, whole.samples, whole.unit))
+                whole = content.select([(None, number, k)], validate=False)[0]
+                found.append(Named(whole.name, marked(whole.samples, get(k, bits=True)), whole.unit))
     return columns_of(found)
 
 
@@ -112,9 +124,10 @@ def _has_time(found: list[Named], count: int, master: Callable[[int, int], NDArr
     return bool(times) and any(np.array_equal(each[(slice(None),)], master(0, count)) for each in times)
 
 
-def _samples(content: Any, group: int, index: int, **part: int) -> NDArray[Any]:
-    values, _ = content.get(group=group, index=index, samples_only=True, ignore_invalidation_bits=True, **part)
-    found: NDArray[Any] = values
+def _samples(content: Any, group: int, index: int, *, bits: bool = False, **part: int) -> NDArray[Any]:
+    """Return the samples of a channel, or the bits that mark some as invalid; asammdf itself leaves those out."""
+    values, invalid = content.get(group=group, index=index, samples_only=True, ignore_invalidation_bits=True, **part)
+    found: NDArray[Any] = invalid if bits else values if values.dtype.names else marked(values, invalid)
     return found
 
 

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument, did_you_mean
-from mgdd.io.column_names import spelled_unit
+from mgdd.io.column_names import bare_unit, spelled_unit
 from mgdd.io.files import existing_file, read_plain_text
+from mgdd.io.row_text import Rows, cells_of, parse_number
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ __all__ = [
     "Table",
     "TextTable",
     "check_text_options",
-    "content_of",
     "parse_number",
     "read_table",
     "require_width",
@@ -38,6 +38,7 @@ __all__ = [
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _NARROW = 4  # columns
+_SHOWN = 12  # names of columns in a message
 _ROWS = 4  # of one width, one below the other, are data
 _HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
 _RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh
@@ -49,7 +50,7 @@ class Place:
     """How a message calls a sample and a column of a source: by line of a file, or by index."""
 
     source: str
-    rows: Sequence[int] | None = None
+    rows: Sequence[int] | NDArray[np.int64] | None = None
     columns: Mapping[str, str] | None = None
 
     def row(self, index: int) -> str:
@@ -72,8 +73,7 @@ class Place:
 
     def only(self, kept: NDArray[np.intp]) -> Place:
         """Return the place of some of the samples, in this order."""
-        rows = None if self.rows is None else [self.rows[i] for i in kept.tolist()]
-        return Place(self.source, rows, self.columns)
+        return replace(self, rows=None if self.rows is None else np.asarray(self.rows)[kept])
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Table(ABC):
     units: tuple[str, ...] | None
 
     @property
-    def lines(self) -> tuple[int, ...] | None:
+    def lines(self) -> NDArray[np.int64] | None:
         """Return the line (from 1) of each row; None where a file has no lines."""
         return None
 
@@ -99,7 +99,7 @@ class Table(ABC):
     def height(self) -> int:
         """Return the number of rows."""
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Return the number of rows of each column."""
         return (self.height,) * self.width
@@ -139,8 +139,8 @@ class Table(ABC):
                 )
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"
-                names = ", ".join(map(repr, self.header))
-                near = did_you_mean(column, self.header) if what == "no column" else ""
+                names = ", ".join(map(repr, self.header[:_SHOWN])) + (", ..." if len(self.header) > _SHOWN else "")
+                near = did_you_mean(column, self.header) if what == "no column" else "give its number, from 0;"
                 raise DataError(f"{self.source}: {what} {column!r}: {near}{' ' if near else ''}the header has {names}")
             column = self.header.index(column)
         if isinstance(column, bool) or not 0 <= column < self.width:
@@ -151,7 +151,7 @@ class Table(ABC):
         """Return what the units row says of a column, without brackets."""
         if self.units is None or index >= len(self.units):
             return None
-        return self.units[index].strip("[]() ")
+        return bare_unit(self.units[index])
 
     def require_units_of_names(self, *texts: str) -> None:
         """Refuse a units row that contradicts the names, which say the units; columns of `texts` have none."""
@@ -175,84 +175,65 @@ class TextTable(Table):
 
     decimal: str
     mark: str | None
-    texts: tuple[str, ...]
-    numbered: tuple[int, ...]
+    rows: Rows
 
     @property
-    def lines(self) -> tuple[int, ...]:
+    def lines(self) -> NDArray[np.int64]:
         """Return the line (from 1) of each row."""
-        return self.numbered
+        return self.rows.line
 
     @property
     def height(self) -> int:
         """Return the number of rows."""
-        return len(self.texts)
+        return len(self.rows)
 
     def part(self, start: int, stop: int) -> TextTable:
         """Return the table of some rows."""
-        return replace(self, texts=self.texts[start:stop], numbered=self.numbered[start:stop])
+        return replace(self, rows=self.rows.part(start, stop))
 
     @cached_property
-    def rows(self) -> tuple[tuple[str, ...], ...]:
+    def cells(self) -> tuple[tuple[str, ...], ...]:
         """Return the cells as text."""
-        return tuple(_cells(text, self.mark) for text in self.texts)
+        return tuple(cells_of(text, self.mark) for _, text in self.rows)
 
     def first_row(self) -> tuple[str, ...] | None:
         """Return the cells of the first row below the header as text."""
-        return _cells(self.texts[0], self.mark) if self.texts else None
+        return cells_of(self.rows[0][1], self.mark) if self.height else None
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Return the number of columns, which every row has."""
-        return len(_cells(self.texts[0], self.mark)) if self.texts else len(self.header or ())
+        return len(self.first_row() or self.header or ())
 
     def numeric(self, indices: Sequence[int]) -> list[int]:
         """Return the columns in which any cell holds a number."""
-        if not indices or self._fast(indices) is not None:
-            return list(indices)
-        return [i for i in indices if any(parse_number(row[i], self.decimal) is not None for row in self.rows)]
+        self._read(indices)
+        return [i for i in indices if i in self._known or self._holds_number(i)]
 
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns as the rows of an array, or name the first bad cell."""
-        fast = self._fast(indices)
-        return np.stack([self._slow(index) for index in indices]) if fast is None else fast
+        self._read(indices)
+        return np.stack([self._known[index] if index in self._known else self._slow(index) for index in indices])
 
     @cached_property
     def _known(self) -> dict[int, NDArray[np.float64]]:
-        """Columns that were parsed already."""
+        """Columns that were read already and hold nothing but finite numbers."""
         return {}
 
-    def _fast(self, indices: Sequence[int]) -> NDArray[np.float64] | None:
-        """Return columns without looking at single cells; None where one needs the judgement of `_slow`."""
-        lacking = [index for index in indices if index not in self._known]
+    def _read(self, indices: Sequence[int]) -> None:
+        # To find a row's cells costs as much as a few numbers: of a narrow table all columns are read in one go.
+        wanted = range(self.width) if self.width <= _NARROW and not self._known else indices
+        lacking = sorted(set(wanted) - self._known.keys())
         if lacking:
-            # To split a line costs more than a few numbers: of a narrow table all columns are parsed in one go.
-            every = range(self.width) if self.width <= _NARROW and not self._known else lacking
-            taken, values = next(
-                ((each, found) for each in (every, lacking) if (found := self._parsed(each)) is not None), ((), ())
-            )
-            self._known.update(zip(taken, values, strict=True))
-        if any(index not in self._known for index in indices):
-            return None
-        found = np.stack([self._known[index] for index in indices])
-        return found if np.isfinite(found).all() else None
+            values, plain = self.rows.numbers(lacking, self.mark, self.decimal)
+            self._known.update((index, values[k]) for k, index in enumerate(lacking) if plain[k])
 
-    def _parsed(self, indices: Sequence[int]) -> NDArray[np.float64] | None:
-        texts = self.texts
-        if self.mark is not None and len(self.mark) != 1:
-            return None
-        if self.decimal == ",":
-            if any("." in text for text in texts):
-                return None
-            texts = tuple(text.replace(",", ".") for text in texts)
-        try:
-            return np.loadtxt(texts, delimiter=self.mark, usecols=indices, comments=None, ndmin=2).T
-        except ValueError:
-            return None
+    def _holds_number(self, index: int) -> bool:
+        return any(parse_number(row[index], self.decimal) is not None for row in self.cells)
 
     def _slow(self, index: int) -> NDArray[np.float64]:
-        values = np.empty(len(self.texts))
-        for position, (line, row) in enumerate(zip(self.lines, self.rows, strict=True)):
+        values = np.empty(self.height)
+        for position, (line, row) in enumerate(zip(self.lines.tolist(), self.cells, strict=True)):
             where = f"{self.source}, line {line}, {self.called(index)}"
             if index >= len(row) or not row[index]:
                 raise DataError(f"{where}: the cell is empty: fill it or remove the row")
@@ -291,62 +272,58 @@ def text_table(
     source: str, text: str, *, delimiter: str | None = None, decimal: str = ".", units_row: bool = True
 ) -> TextTable:
     """Take a text for a table, as `read_table` does; messages call it by its source."""
-    content = content_of(text)
-    if not content:
+    content = Rows.of(text)
+    if not len(content):
         raise DataError(f"{source}: the file is empty: rows of numbers are needed")
     start = _first_row(content, delimiter, decimal) if units_row else 1  # tables of ours have one line of names
     shown = content[min(start, len(content) - 1) if units_row else 0][1]
     mark = delimiter if delimiter is not None else _detect(shown, decimal)
-    heads = [_cells(row, mark) for _, row in content[:start]]
-    body = content[start:]
-    if not body and units_row:
+    if mark == "\t" and delimiter is None:
+        content = content.without_outer_tabs(start)
+    above, body = list(content.part(0, start)), content.part(start)
+    heads = [cells_of(row, mark) for _, row in above]
+    if not len(body) and units_row:
         raise DataError(f"{source}: no numeric rows below the header: rows of numbers are needed")
-    width = _width(body[0][1], mark) if body else len(heads[0])
-    require_width(source, body, mark, width, body[0][0] if body else 0)
-    _check_commas(source, content[:start], heads, body, mark)
+    width = int(body.part(0, 1).cell_counts(mark)[0]) if len(body) else len(heads[0])
+    require_width(source, body, mark, width, body[0][0] if len(body) else 0)
+    _check_commas(source, above, heads, body, mark)
+    heads = _units_filled(source, content, heads, mark, width)
     header, units = _names_and_units(heads, width)
-    lines, texts = zip(*body, strict=True) if body else ((), ())
-    return TextTable(source, header, units, decimal, mark, texts, lines)
+    return TextTable(source, header, units, decimal, mark, body)
 
 
-def content_of(text: str, line: int = 1) -> list[tuple[int, str]]:
-    """Return the lines of a text that begins at a line: number and text, without empty ones and remarks."""
-    return [
-        (number, row.strip())
-        for number, row in enumerate(text.splitlines(), start=line)
-        if row.strip() and not row.lstrip().startswith("#")
-    ]
-
-
-def require_width(source: str, body: Sequence[tuple[int, str]], mark: str | None, width: int, first: int) -> None:
+def require_width(source: str, body: Rows, mark: str | None, width: int, first: int) -> None:
     """Refuse a row that has not as many cells as the row of line `first`."""
-    for number, row in body:
-        if _width(row, mark) != width:
-            cut = number == body[-1][0] and _width(row, mark) < width
-            raise DataError(
-                f"{source}, line {number}: {_width(row, mark)} cell(s) where line {first} has {width}: "
-                f"every row needs the same columns{'; the file is cut off there: remove its last line' if cut else ''}"
-            )
+    counts = body.cell_counts(mark)
+    odd = np.flatnonzero(counts != width)
+    if odd.size:
+        at = int(odd[0])
+        cut = at == len(body) - 1 and counts[at] < width
+        remedy = "; the file is cut off there: remove its last line" if cut else ", or start it with # to leave it out"
+        raise DataError(
+            f"{source}, line {body.line[at]}: {counts[at]} cell(s) where line {first} has {width}: "
+            f"every row needs the same columns{remedy}"
+        )
 
 
 def _check_commas(
     source: str,
     lines: Sequence[tuple[int, str]],
     heads: Sequence[tuple[str, ...]],
-    body: Sequence[tuple[int, str]],
+    body: Rows,
     mark: str | None,
 ) -> None:
     """Refuse commas that are decimal marks beside blanks, or separate cells as well: twice as many cells as names."""
-    first = body[0][1] if mark == "," and body else "."
+    first = body[0][1] if mark == "," and len(body) else "."
     whole = [cell for cell in first.split(",") if len(cell.split()) > 1]
     if whole and re.fullmatch(r'[\d\s",eE+-]+', first):
         raise DataError(
             f"{source}, line {body[0][0]}: {whole[0]!r} between commas: they are decimal marks and blanks separate "
             f"the columns: pass {argument('decimal', repr(','))}"
         )
-    if mark != "," or not heads or not body or len(heads[-1]) < 2:
+    if mark != "," or not heads or not len(body) or len(heads[-1]) < 2:
         return
-    names, cells = len(heads[-1]), _cells(body[0][1], mark)
+    names, cells = len(heads[-1]), cells_of(body[0][1], mark)
     if len(cells) == 2 * names and all(cell.isdecimal() for cell in cells[1::2]):
         raise DataError(
             f"{source}, line {lines[-1][0]}: {names} columns, and the rows have {len(cells)} cells: commas are "
@@ -354,28 +331,32 @@ def _check_commas(
         )
 
 
-def _first_row(content: Sequence[tuple[int, str]], delimiter: str | None, decimal: str) -> int:
+def _first_row(content: Rows, delimiter: str | None, decimal: str) -> int:
     """Return where the rows of numbers begin: names, units, remarks and the lines of a preamble stand above them."""
 
     def mark_of(text: str) -> str | None:
         return delimiter if delimiter is not None else _detect(text, decimal)
 
+    def said(text: str, mark: str | None) -> tuple[str, ...]:
+        cells = cells_of(text, mark)  # without the empty ones that a spreadsheet adds
+        return cells[: max((k + 1 for k, cell in enumerate(cells) if cell), default=1)]
+
     last_head: int | None = None
     for at, (_, text) in enumerate(content):
         mark = mark_of(text)
-        cells = _cells(text, mark)
+        cells = said(text, mark)
         if _is_head(cells):
             continue
         if _like_number(cells[0]) or (not cells[0] and all(_like_number(cell) for cell in cells if cell)):
             return at  # one of another width is refused by its line
         if last_head is None:
             later = ((k, content[k][1]) for k in range(len(content) - 1, at, -1))
-            last_head = next((k for k, row in later if _is_head(_cells(row, mark_of(row)))), at)
+            last_head = next((k for k, row in later if _is_head(said(row, mark_of(row)))), at)
         if at >= last_head:
             return at
-        above = _cells(content[at - 1][1], mark) if at else ()
+        above = said(content[at - 1][1], mark) if at else ()
         named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
-        below = [_cells(row, mark) for _, row in content[at + 1 : at + _ROWS]]
+        below = [said(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
         if named and all(len(one) == len(cells) and one[0] != _HEADER_ENDS for one in below):
             return at
     return len(content)
@@ -388,30 +369,60 @@ def _names_and_units(
     whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
     wide = [cells for cells in whole if len(cells) == width or (len(cells) > width and cells[0] == "X_Value")]
     aligned = [cells[len(cells) - width :] for cells in wide]
-    if len(aligned) == 2 and aligned[0].count("-") > aligned[1].count("-") and not spells_units(aligned[1]):
-        return aligned[1], None  # below a remark of a sheet, made as wide
-    if len(heads) <= 2 and (len(aligned) == len(heads) or len(heads) == 1):
-        return next(iter(aligned), None), heads[1] if len(heads) == 2 else None
-    rows = [at for at, cells in enumerate(aligned) if at and spells_units(cells)]
+    # A remark that a spreadsheet made as wide has empty cells instead of names.
+    named = [row for row in aligned if 2 * sum(map(bool, row)) > width or spells_units(row)] or aligned[-1:]
+    rows = [at for at, cells in enumerate(named) if at and spells_units(cells)]
     if rows:
-        return aligned[rows[-1] - 1], aligned[rows[-1]]
-    return (aligned[-1] if aligned else None), None
+        return named[rows[-1] - 1], named[rows[-1]]
+    if len(heads) == len(named) == 2:
+        return named[0], named[1]
+    return (named[-1] if named else None), None
+
+
+def _units_filled(
+    source: str, content: Rows, heads: Sequence[tuple[str, ...]], mark: str | None, width: int
+) -> list[tuple[str, ...]]:
+    """Give a row of units below the names an empty cell for each column without one, also where blanks separate."""
+    made = list(heads)
+    for at in range(1, len(heads)):
+        cells = heads[at]
+        if not (len(heads[at - 1]) == width > len(cells) and spells_units(cells)):
+            continue
+        found = (
+            (*cells, *("",) * (width - len(cells)))
+            if mark is not None
+            else _below(content.whole_line(at - 1), content.whole_line(at), width)
+        )
+        if found is None:
+            raise DataError(
+                f"{source}, line {content.line[at]}: {len(cells)} units below {width} names, and blanks do not tell "
+                "which column has none: write - for its unit"
+            )
+        made[at] = found
+    return made
+
+
+def _below(names: str, units: str, width: int) -> tuple[str, ...] | None:
+    """Give the unit below each name where one blank separates cells, or where columns are aligned at one side."""
+    cells = units.split(" ")
+    if len(cells) == len(names.split(" ")) == width:
+        return tuple(cells)
+    places = [(word.start(), word.end()) for word in re.finditer(r"\S+", names)]
+    out = [""] * width
+    for word in re.finditer(r"\S+", units):
+        own = [at for at, (start, end) in enumerate(places) if word.start() == start or word.end() == end]
+        if len(own) != 1:
+            return None
+        out[own[0]] = word[0]
+    return tuple(out)
 
 
 def spells_units(cells: Sequence[str]) -> bool:
     """Return whether a row holds units, and nothing else that is not empty."""
-    texts = [cell.strip("[](){} ") for cell in cells]
+    texts = [bare_unit(cell) for cell in cells]
     known = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
     bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
     return (bool(known) and all(known)) or (bool(bracketed) and all(bracketed))
-
-
-def _cells(text: str, mark: str | None) -> tuple[str, ...]:
-    return tuple(cell.strip().strip('"').strip() for cell in text.split(mark))
-
-
-def _width(text: str, mark: str | None) -> int:
-    return len(text.split()) if mark is None else text.count(mark) + 1
 
 
 def _is_head(cells: tuple[str, ...]) -> bool:
@@ -419,7 +430,7 @@ def _is_head(cells: tuple[str, ...]) -> bool:
     if not any(_like_number(cell) for cell in cells):
         return True
     counted = [int(cell) for cell in cells[1:] if _COUNT.fullmatch(cell)]
-    others = [cell for cell in cells[1:] if not _COUNT.fullmatch(cell)]
+    others = [cell for cell in cells[1:] if cell and not _COUNT.fullmatch(cell)]
     counts_up = all(b - a == 1 for a, b in itertools.pairwise(counted)) and (not counted or not others)
     return not _like_number(cells[0]) and counts_up and all(parse_number(cell) is None for cell in others)
 
@@ -436,13 +447,3 @@ def _detect(line: str, decimal: str) -> str | None:
         if mark in line and mark != decimal:
             return mark
     return None
-
-
-def parse_number(cell: str, decimal: str = ".") -> float | None:
-    """Return the number in a cell, or None when it holds none."""
-    if "_" in cell or (decimal == "," and "." in cell):
-        return None
-    try:
-        return float(cell.replace(",", ".") if decimal == "," else cell)
-    except ValueError:
-        return None

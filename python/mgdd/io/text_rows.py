@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import IO
 
 from mgdd.io.files import Stamp, decoded
-from mgdd.io.table import TextTable, check_text_options, content_of, require_width, text_table
+from mgdd.io.row_text import Rows
+from mgdd.io.table import TextTable, check_text_options, require_width, text_table
 
 __all__ = ["TextRows"]
 
@@ -37,8 +38,8 @@ class TextRows:
     ...     _ = file.write_text("time_s,duty" + "".join(f"\n{k},{k}e-1" for k in range(9)))
     ...     with file.open("rb") as stream:
     ...         table = TextRows(file, stream).part(3, 5)
-    >>> table.header, table.lines, table.numbers(1).tolist()
-    (('time_s', 'duty'), (5, 6), [0.3, 0.4])
+    >>> table.header, table.lines.tolist(), table.numbers(1).tolist()
+    (('time_s', 'duty'), [5, 6], [0.3, 0.4])
     """
 
     def __init__(self, file: Path, stream: IO[bytes], *, delimiter: str | None = None, decimal: str = ".") -> None:
@@ -46,31 +47,31 @@ class TextRows:
         self._stream, self._stamp, self._line = stream, Stamp.of(file), 1
         stream.seek(0)
         self._head = text_table(str(file), self._block(), delimiter=delimiter, decimal=decimal)
-        self._lines, self._texts = list(self._head.numbered), list(self._head.texts)
-        self._first, self._start = self._lines[0], 0
-        self._head = replace(self._head, texts=self._head.texts[:1], numbered=self._head.numbered[:1])
+        self._rows, self._first, self._start = self._head.rows, int(self._head.lines[0]), 0
+        self._head = self._head.part(0, 1)
 
     def part(self, start: int, stop: int) -> TextTable:
         """Return the table of some rows; they begin at or behind those asked for before."""
         if start < self._start:
             raise IndexError(f"row {start}: rows before {self._start} were left behind")
-        self._drop(start)
-        while self._start + len(self._lines) < stop:
+        blocks = [self._drop(self._rows, start)]
+        while self._start + sum(map(len, blocks)) < stop:
             line = self._line
             if not (text := self._block()):
                 break
-            body = content_of(text, line)
+            body = Rows.of(text, line)
+            if self._head.mark == "\t" and len(body) and body.part(0, 1).cell_counts("\t")[0] > self._head.width:
+                body = body.without_outer_tabs(0)
             require_width(self._head.source, body, self._head.mark, self._head.width, self._first)
-            self._lines += [number for number, _ in body]
-            self._texts += [row for _, row in body]
-            self._drop(start)
-        own = slice(0, stop - start)
-        return replace(self._head, texts=tuple(self._texts[own]), numbered=tuple(self._lines[own]))
+            blocks.append(self._drop(body, start))
+        self._rows = Rows.joined(blocks)
+        return replace(self._head, rows=self._rows.part(0, stop - start))
 
-    def _drop(self, start: int) -> None:
-        count = min(max(start - self._start, 0), len(self._lines))
+    def _drop(self, rows: Rows, start: int) -> Rows:
+        """Leave out the rows before `start`, of which the first of these is the one at `self._start`."""
+        count = min(max(start - self._start, 0), len(rows))
         self._start += count
-        del self._lines[:count], self._texts[:count]
+        return rows.part(count)
 
     def _block(self) -> str:
         """Read on to an end of a line; nothing at the end of the file."""
@@ -82,5 +83,5 @@ class TextRows:
             raw += self._stream.readline(_LONGEST_LINE)
         self._stamp.require_same()
         text = decoded(raw, str(self._stamp.file), line=self._line)
-        self._line += len(text.splitlines())
+        self._line += Rows.of(text).line_count
         return text

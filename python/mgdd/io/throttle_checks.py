@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
+from mgdd.errors import DataError, argument, taken
 from mgdd.io.table import Place
 from mgdd.results.labels import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["check_even", "check_samples", "check_sides", "check_signals", "check_throttle_log"]
+__all__ = [
+    "check_even", "check_samples", "check_sides", "check_signals", "check_throttle_log", "in_arrays", "without_gaps",
+]  # fmt: skip
 
 MIN_SAMPLES = 50
 _INFINITE = 1e100  # of differences and products something is left below it
@@ -64,10 +67,57 @@ def check_throttle_log(log: xr.Dataset) -> xr.Dataset:
     check_labels(signals)
     place = _place_of(log)
     columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
-    check_samples(columns, place)
-    check_even(columns["time_s"], place)
-    check_signals(columns["duty"], columns["angle_deg"], place=place)
+    with taken((), in_arrays):
+        check_samples(columns, place)
+        check_even(columns["time_s"], place)
+        check_signals(columns["duty"], columns["angle_deg"], place=place)
     return log
+
+
+def in_arrays(name: str, text: str | None) -> str:
+    """Write what stands for an argument of `mgdd.io.read_throttle_log` where arrays are given."""
+    value = (text or "").strip("'")
+    units = {
+        ("time_unit", "ms"): "time_s / 1000", ("time_unit", "s"): "time_s in seconds", ("duty_unit", "%"): "duty / 100",
+        ("angle_unit", "rad"): "numpy.rad2deg(angle_deg)", ("angle_unit", "%"): "angle_deg * travel_deg / 100",
+    }  # fmt: skip
+    columns = {"time": "time_s", "angle": "angle_deg", "current": "current_a", "supply": "supply_v", "duty": "duty"}
+    ends = {"start_s": "the samples from", "stop_s": "the samples up to"}
+    if name in ends:
+        return f"{ends[name]} {value or 'a time'}{' s' if value else ''}"
+    if name == "step_s":
+        return f"mgdd.io.throttle_log(..., step_s={value})"
+    return units.get((name, value)) or columns.get(name) or f"mgdd.io.read_throttle_log(..., {name}={text or '...'})"
+
+
+def without_gaps(
+    columns: dict[str, NDArray[np.float64]], place: Place
+) -> tuple[dict[str, NDArray[np.float64]], Place, str]:
+    """Keep the longest part of a log between gaps of its time, and say so; `check_samples` refuses what stays short.
+
+    A model runs on from sample to sample: over a gap it would take samples for neighbours that are none.
+    """
+    time = columns["time_s"]
+    if time.size < MIN_SAMPLES or not (np.isfinite(time).all() and np.all(np.diff(time) > 0.0)):
+        return columns, place, ""
+    gaps, usual = _gaps(time)
+    edges = [0, *gaps, time.size]
+    first, end = max(itertools.pairwise(edges), key=lambda part: part[1] - part[0])
+    short = end - first < MIN_SAMPLES or time[end - 1] - time[first] < MIN_DURATION_S
+    if not gaps or short or not STEP_S[0] <= usual <= STEP_S[1]:
+        return columns, place, ""
+    note = (
+        f"{len(gaps)} gap(s) in the time, the first from {time[gaps[0] - 1]:.6g} to {time[gaps[0]]:.6g} s: kept are "
+        f"the {end - first} samples from {time[first]:.6g} to {time[end - 1]:.6g} s, the longest part without one, of "
+        f"{time.size}"
+    )
+    return {name: values[first:end] for name, values in columns.items()}, place.only(np.arange(first, end)), note
+
+
+def _gaps(time: NDArray[np.float64]) -> tuple[list[int], float]:
+    """Give the samples behind a gap, and the usual step."""
+    wide, usual = wide_steps(time)
+    return [k for k in wide if _shifts(time, k - 1, usual)], usual
 
 
 def _place_of(log: xr.Dataset) -> Place:
@@ -113,7 +163,7 @@ def _check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> Non
             raise DataError(f"{place.cell(at, 'time_s')}: time {here:g} s is repeated: {remedy}")
         remedy = "sort the rows by time; if a second record starts here, give one record per file"
         raise DataError(f"{place.cell(at, 'time_s')}: time falls from {before:g} to {here:g} s: {remedy}")
-    wide, usual = wide_steps(time)
+    gaps, usual = _gaps(time)
     if not STEP_S[0] <= usual <= STEP_S[1]:
         milliseconds = usual > STEP_S[1]
         unit = argument("time_unit", "'ms'" if milliseconds else "'s'")
@@ -122,9 +172,8 @@ def _check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> Non
             f"{place.source}, {column}: the usual step is {usual:g} s; a throttle needs {STEP_S[0]:g} to "
             f"{STEP_S[1]:g} s: this looks like {looks}"
         )
-    gap = next((k for k in wide if _shifts(time, k - 1, usual)), None)
-    if gap is not None:
-        at = gap
+    if gaps:
+        at = gaps[0]
         missing = round(step[at - 1] / usual) - 1
         raise DataError(
             f"{place.cell(at, 'time_s')}: gap from {time[at - 1]:.6g} to {time[at]:.6g} s where the usual step is "

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, ShapeError, argument
+from mgdd._arguments import as_floats
+from mgdd.errors import DataError, ParameterError, ShapeError, argument, taken
 from mgdd.io.any_table import open_table
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
 from mgdd.io.table import Place, Table
-from mgdd.io.throttle_checks import check_even, check_samples, check_signals
+from mgdd.io.throttle_checks import check_even, check_samples, check_signals, in_arrays, without_gaps
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def throttle_log(
     Returns
     -------
     xarray.Dataset
-        ``duty`` and ``angle_deg`` over ``time_s``.
+        ``duty`` and ``angle_deg`` over ``time_s``; ``attrs["warnings"]`` says what was left out: of a log with gaps in
+        its time the longest part without one is kept.
 
     Raises
     ------
@@ -83,7 +85,8 @@ def throttle_log(
     """
     given = {"time_s": time_s, "duty": duty, "angle_deg": angle_deg, "current_a": current_a, "supply_v": supply_v}
     columns = {key: _column(key, values, name) for key, values in given.items() if values is not None}
-    return _checked(columns, Place(name), step_s=step_s, name=name)
+    with taken(("step_s",), in_arrays):
+        return _checked(columns, Place(name), step_s=step_s, name=name)
 
 
 def read_throttle_log(
@@ -103,6 +106,7 @@ def read_throttle_log(
     step_s: float | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
+    sheet: str | None = None,
 ) -> xr.Dataset:
     r"""Read one throttle log from a text file or a MATLAB file (version 5 to 7).
 
@@ -134,11 +138,14 @@ def read_throttle_log(
         Column separator of a text file; None detects it.
     decimal : {".", ","}
         Decimal mark of a text file.
+    sheet : str, optional
+        Of a workbook the sheet; None takes the one with the most numbers.
 
     Returns
     -------
     xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name.
+        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name,
+        ``attrs["warnings"]`` what was left out, as in `throttle_log`.
 
     Raises
     ------
@@ -171,7 +178,7 @@ def read_throttle_log(
     if not 0.0 < travel_deg <= 95.0:
         raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
     wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
-    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal)
+    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
     scales = {"time_s": 0.001 if units["time_s"] == "ms" else 1.0, "duty": 0.01 if units["duty"] == "%" else 1.0}
     scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(units["angle_deg"], 1.0)
     columns = {key: values * scales.get(key, 1.0) for key, values in columns.items()}
@@ -189,7 +196,7 @@ def read_throttle_log(
 
 def _column(key: str, values: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
-        column = np.array(values, dtype=np.float64)
+        column: NDArray[np.float64] = as_floats(values)
     except (TypeError, ValueError) as error:
         raise DataError(f"{name}, column {key!r}: must be numbers") from error
     if column.ndim != 1:
@@ -204,11 +211,12 @@ def _read(
     *,
     delimiter: str | None,
     decimal: str,
+    sheet: str | None,
 ) -> tuple[dict[str, NDArray[np.float64]], Place, dict[str, str]]:
     called: dict[str, str] = {}
     units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
-    with open_table(path, delimiter=delimiter, decimal=decimal) as table:
+    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet) as table:
         for key, column in wanted.items():
             chosen = key if column is None and key in (table.header or ()) else column
             if chosen is not None:
@@ -270,6 +278,7 @@ def _checked(
             raise ShapeError(
                 f"{place.source}: {key} has {values.size} samples, time {size}: columns must be equally long"
             )
+    columns, place, note = without_gaps(columns, place)
     check_samples(columns, place)
     if step_s is None:
         check_even(columns["time_s"], place)
@@ -284,7 +293,7 @@ def _checked(
         travel_deg=travel_deg,
     )
     variables = {key: ("time_s", values) for key, values in columns.items()}
-    return labelled_dataset(variables, attrs={"file": name})
+    return labelled_dataset(variables, attrs={"file": name, "warnings": note})
 
 
 def _resampled(

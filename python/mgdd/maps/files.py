@@ -118,6 +118,7 @@ def read_map(
     decimal: str = ".",
     rows: str | None = None,
     columns: str | None = None,
+    sheet: str | None = None,
 ) -> CalibrationMap:
     r"""Read a map of any form by the content of the file, whatever its name.
 
@@ -136,6 +137,8 @@ def read_map(
         first axis; as the file says if left out.
     columns : str, optional
         The same of the axis that runs across, the second one.
+    sheet : str, optional
+        Of a workbook the sheet; None takes the one with the most numbers.
 
     Returns
     -------
@@ -189,7 +192,9 @@ def read_map(
         if form == "labels":
             return _of_labels(file, name)
         if form == "":
-            return _of_any(file, name=name, decimal=decimal, rows=rows, columns=columns)
+            return _of_any(file, name=name, decimal=decimal, rows=rows, columns=columns, sheet=sheet)
+        if sheet is not None:
+            raise ParameterError(f"{file}: no workbook: leave {argument('sheet')} out")
         if data is not None:
             return CalibrationMap.from_dataset(data, name)
         text = read_plain_text(file, only_utf8=form == "json")
@@ -241,14 +246,16 @@ def _of_labels(file: Path, name: str | None) -> CalibrationMap:
     return maps[wanted]
 
 
-def _of_any(file: Path, *, name: str | None, decimal: str, rows: str | None, columns: str | None) -> CalibrationMap:
+def _of_any(
+    file: Path, *, name: str | None, decimal: str, rows: str | None, columns: str | None, sheet: str | None
+) -> CalibrationMap:
     """Read a grid or a table of points."""
-    found = cells_as_text(file)
+    found = cells_as_text(file, sheet)
     if found is None:
         return map_of_points(read_any_table(file), name=name, rows=rows, columns=columns)
     source, text, is_sheet = found
     mark = "." if is_sheet else decimal  # the numbers of a sheet have no mark of their own
-    grid = map_of_grid(text, source, name=name, decimal=mark, rows=rows, columns=columns)
+    grid = map_of_grid(text, source, name=name, decimal=mark, rows=rows, columns=columns, whole=is_sheet)
     if grid is not None:
         return grid
     table = text_table(source, text, delimiter="\t" if is_sheet else None, decimal=mark)

@@ -83,7 +83,10 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
     grids: dict[str, Any] = {}
     axes: dict[str, NDArray[np.float64]] = {}
     for name, (number, rows) in blocks.items():
-        own, grids[name] = _read_grid(origin, number, rows, [said[0] for said in names], decimal, name in TEXTS)
+        ended = _END in heads or name != next(reversed(blocks))
+        own, grids[name] = _read_grid(
+            origin, number, rows, [said[0] for said in names], decimal, is_text=name in TEXTS, ended=ended
+        )
         axes = axes or own
         for axis, entries in own.items():
             if not np.array_equal(entries, axes[axis]):
@@ -179,7 +182,14 @@ def _parts(
 
 
 def _read_grid(
-    origin: str, number: int, rows: list[tuple[int, list[str]]], axes: list[str], decimal: str, is_text: bool
+    origin: str,
+    number: int,
+    rows: list[tuple[int, list[str]]],
+    axes: list[str],
+    decimal: str,
+    *,
+    is_text: bool,
+    ended: bool,
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[Any]]:
     if len(rows) < len(axes) + 1:
         raise DataError(f"{origin}, line {number}: the table ends after {len(rows)} rows: the file was cut off")
@@ -200,10 +210,13 @@ def _read_grid(
     for line, row in rows:
         found = trimmed(row)
         # A row without any value may end where a spreadsheet ends it; in any other a lost cell would shift the rest.
-        if len(found) - 1 > width or (len(found) > 1 and len(row) - 1 < width):
+        # The last row of a file without an end mark may be one that was cut off.
+        last = not ended and line == rows[-1][0]
+        if len(found) - 1 > width or ((len(found) > 1 or last) and len(row) - 1 < width):
+            cut = "; the file may be cut off here" if last else ""
             raise DataError(
                 f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column; an empty cell "
-                "keeps its separator"
+                f"keeps its separator{cut}"
             )
         full = [*found, *[""] * (width + 1 - len(found))]
         first.append(_read(origin, line, full[0], decimal, axes[0]))

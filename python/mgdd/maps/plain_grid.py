@@ -42,9 +42,9 @@ class _Grid(NamedTuple):
 
 
 def map_of_grid(
-    text: str, origin: str, *, name: str | None, decimal: str, rows: str | None, columns: str | None
+    text: str, origin: str, *, name: str | None, decimal: str, rows: str | None, columns: str | None, whole: bool
 ) -> CalibrationMap | None:
-    """Read the grid in a text, or give None where there is none."""
+    """Read the grid in a text, or give None where there is none; only the rows of a sheet are known to be whole."""
     grids = [found for mark in _MARKS if mark != decimal for found in [_found(text, mark, origin)] if found]
     if not grids:
         return None
@@ -70,9 +70,11 @@ def map_of_grid(
             raise DataError(
                 f"{where}: {found[0][:60]!r} is not a breakpoint of {down.name}: remove the line, or begin it with #"
             )
-        if len(found) - 1 > len(x) or (len(found) > 1 and len(row) - 1 < len(x)):
+        last = at == grid.body[-1][0] and not whole  # it may be cut off
+        if len(found) - 1 > len(x) or ((len(found) > 1 or last) and len(row) - 1 < len(x)):
             raise DataError(
                 f"{where}: {len(row) - 1} values: {len(x)} are needed, one per column; an empty cell keeps its mark"
+                f"{'; the file may be cut off here' if last else ''}"
             )
         y.append(number_in(found[0], decimal, where, down.name))
         if len(y) > 1:

@@ -161,7 +161,7 @@ def _column(table: Table, index: int, *, gap: bool) -> Array:
         return np.array(
             [
                 number_in(row[index], table.decimal, f"{table.source}, line {line}", repr(label), gap=gap)
-                for line, row in zip(table.lines, table.rows, strict=True)
+                for line, row in zip(table.lines.tolist(), table.cells, strict=True)
             ]
         )
     column = np.asarray(table.numbers(index), np.float64)

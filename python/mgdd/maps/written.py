@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from mgdd.io.column_names import spelled_unit
 from mgdd.maps.cells import can_be_name, spoken_name
-from mgdd.results.labels import VARIABLES
-from mgdd.results.units import attribute_units, unit_of
+from mgdd.results.labels import VARIABLES, said_unit
+from mgdd.results.units import attribute_units
 
 __all__ = ["NOT_GIVEN", "Heading", "heading_of", "unit_from", "unit_to", "without_brackets"]
 
@@ -34,13 +34,13 @@ class Heading(NamedTuple):
 def unit_from(written: str, name: str) -> str:
     """Give a unit of a file as mgdd prints it; a name that says the same unit settles how."""
     if not written.strip():
-        return unit_of(name) if unit_of(name) != "-" else NOT_GIVEN
+        return said_unit(name) if said_unit(name) != "-" else NOT_GIVEN
     unit = _UNITS.get(written.strip(), written.strip())
     try:
-        same = attribute_units(unit) == attribute_units(unit_of(name))
+        same = attribute_units(unit) == attribute_units(said_unit(name))
     except ValueError:
         return f"{NOT_GIVEN} ({unit})"
-    return unit_of(name) if same else unit
+    return said_unit(name) if same else unit
 
 
 def unit_to(unit: str) -> str:
@@ -72,10 +72,10 @@ def heading_of(text: str, *, unit: str = "", fallback: str, taken: tuple[str, ..
 
 
 def _can_name(name: str, written: str) -> bool:
-    """Whether a word can be a name: one such as ``n`` would say that it is a force."""
-    if not can_be_name(name) or "_" in name or unit_of(name) == "-":
+    """Whether a word can be a name: one such as ``nm`` would say that it is a torque."""
+    if not can_be_name(name) or "_" in name or said_unit(name) == "-":
         return can_be_name(name)
-    return bool(written) and unit_from(written, name) == unit_of(name)
+    return bool(written) and unit_from(written, name) == said_unit(name)
 
 
 def _name_of_unit(written: str) -> str:
@@ -83,7 +83,7 @@ def _name_of_unit(written: str) -> str:
     unit = _UNITS.get(written, written)
     name = re.sub(r"\W+", "", unit).lower()
     try:
-        says_it = unit_of(name) != "-" and attribute_units(unit_of(name)) == attribute_units(unit)
+        says_it = said_unit(name) != "-" and attribute_units(said_unit(name)) == attribute_units(unit)
     except ValueError:
         return ""
     return name if says_it else ""

@@ -22,7 +22,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["ANGLE", "VARIABLES", "Label", "check_labels", "label_of", "labelled_dataset", "named_label", "to_jsonable"]
+__all__ = [
+    "ANGLE",
+    "VARIABLES",
+    "Label",
+    "check_labels",
+    "label_of",
+    "labelled_dataset",
+    "named_label",
+    "said_unit",
+    "to_jsonable",
+]
 
 ANGLE = "crank_angle_cad"
 
@@ -49,6 +59,15 @@ class Label(NamedTuple):
 
 
 _CAD = "°CA aTDC"
+# Quantities whose unit is a letter.
+_OF_LETTER = {
+    letter: frozenset(words.split())
+    for letter, words in {
+        "a": "current", "v": "voltage supply battery signal", "k": "temperature temp", "l": "volume displacement",
+        "m": "length distance position bore stroke rod", "n": "force", "g": "mass", "h": "time duration inductance",
+        "j": "heat energy work",
+    }.items()
+}  # fmt: skip
 
 _FOLLOWED = {
     "settling_ms": Label("ms", "settling time"),
@@ -269,6 +288,24 @@ def label_of(variable: xr.DataArray | xr.Variable) -> Label:
     Label(units='°CA aTDC', long_name='CA50, angle of 50 % heat released')
     """
     return Label(*printed_units(str(variable.attrs["units"]), str(variable.attrs["long_name"])))
+
+
+def said_unit(name: str) -> str:
+    """Return the unit that a name says for certain, whoever chose it; ``"-"`` for none.
+
+    A letter at the end of a name, but for seconds, is a unit behind a word of its quantity alone.
+
+    Examples
+    --------
+    >>> from mgdd.results.labels import said_unit
+    >>> [said_unit(name) for name in ("current_a", "load_a", "row_k", "gain_per_k", "speed_rpm", "delay_s", "n")]
+    ['A', '-', '-', '1/K', 'rpm', 's', '-']
+    """
+    if name in VARIABLES:
+        return VARIABLES[name].units
+    *words, last = name.lower().split("_")
+    unsure = last in _OF_LETTER and "per" not in words
+    return "-" if unsure and not set(words) & _OF_LETTER[last] else unit_of(name)
 
 
 def named_label(name: str) -> Label:

@@ -118,7 +118,7 @@ def unit_of(name: str) -> str:
     Returns
     -------
     str
-        Its unit, ``"-"`` if the name ends in none.
+        Its unit, ``"-"`` if the name ends in none; a single letter is a name.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def unit_of(name: str) -> str:
     >>> unit_of("spring_above_nm_per_rad"), unit_of("compression_ratio")
     ('N m/rad', '-')
     """
-    whole = f"_{name}"
+    whole = f"_{name}" if len(name) > 1 else name
     return next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from mgdd._arguments import require_plain, shown
+from mgdd._arguments import as_floats, require_plain, shown
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results.labels import VARIABLES, Label, labelled_dataset
 from mgdd.signals.even_grid import even_step
@@ -151,7 +151,7 @@ def columns_of(table: Any, names: Sequence[str], *, what: str = "inputs", least:
             have = ", ".join(map(str, getattr(table, "columns", table)))
             raise DataError(f"{what} have no {name}: needed are {', '.join(names)}; given are {have or 'none'}")
         require_plain(name, table[name])
-        columns.append(np.asarray(table[name], dtype=np.float64))
+        columns.append(as_floats(table[name]))
     shapes = [column.shape for column in columns]
     if columns[0].ndim != 1 or columns[0].size < least or set(shapes) != {shapes[0]}:
         raise ShapeError(f"{', '.join(names)} have shapes {shapes}: must be columns of one length >= {least}")
