@@ -107,6 +107,9 @@ auto over() {
   }(+f);
 }
 
+/// Gives a bound class what it does as an object of Python; nothing to any other type.
+void complete_class(const py::handle& cls);
+
 /// Errors of mgdd in place of pybind11's list of signatures, for every function and class of the module; call it last.
 void make_refusals_readable(const py::module_& m);
 

@@ -154,6 +154,7 @@ void wrap_members(const py::handle& owner) {
   for (const auto& [name, member] : py::dict(owner.attr("__dict__"))) {
     if (py::isinstance<py::type>(member)) {
       if (py::hasattr(member, "__module__") && member.attr("__module__").equal(owner.attr("__name__"))) {
+        complete_class(member);
         wrap_members(member);
       }
     } else if (py::isinstance<py::module_>(member)) {

@@ -205,6 +205,38 @@ def test_arrays_give_the_angle_of_each_sample_and_the_speed_of_each_turn(bench) 
         Encoder(teeth=-1).angle(bench["time [s]"], bench["crank"])
 
 
+@pytest.fixture
+def even_wheel():
+    """Give time, 60 teeth at 1500 rpm, an index, and the same with one pulse that bounces within its pitch."""
+    time = np.arange(40000) * 1e-5
+    pitches = 1500.0 * time
+    part, tooth, turn = pitches % 1.0, np.floor(pitches) % 60, np.floor(pitches / 60.0)
+    index = (tooth == 10) & (part > 0.2) & (part < 0.6)
+    bounces = index & ~((turn == 4) & (part >= 0.32) & (part <= 0.4))
+    return time, 5.0 * (part < 0.5), 5.0 * index, 5.0 * bounces
+
+
+def test_index_that_bounces_has_one_mark(even_wheel) -> None:
+    time, signal, index, bounces = even_wheel
+    clean, twice = (Encoder(teeth=60).angle(time, signal, each) for each in (index, bounces))
+    assert int(clean["lost_marks"]) == int(twice["lost_marks"]) == 0
+    off = twice["crank_angle_deg"] - clean["crank_angle_deg"]
+    assert float(abs(off).max()) < 2.0  # within a pitch of 6 degrees, however the pulse is taken
+
+
+@pytest.mark.parametrize("jump_s", [10.0, 1e9, 1e300])
+@pytest.mark.parametrize("jumps", [1, 3])
+def test_clock_that_jumps_is_refused(even_wheel, jump_s: float, jumps: int) -> None:
+    time, signal, _, _ = even_wheel
+    later = time.copy()
+    for k in range(jumps):
+        later[20000 + 6000 * k :] += jump_s * (1.0 + k * 0.01)
+    if not np.all(np.diff(later) > 0.0):  # beside 1e300 s no sample is apart from the next
+        later = np.concatenate([time[:20000], jump_s * (2.0 + np.arange(20000.0))])
+    with pytest.raises(DataError, match=r"clock has jumped|edges are lost|not one of a wheel"):
+        Encoder(teeth=60).angle(later, signal)
+
+
 def test_the_command_line_reads_an_encoder(bench, tmp_path: Path, capsys) -> None:
     path = saved(bench, tmp_path, "time [s]", "crank", "pcyl [bar]")
     wheel = ["--encoder", "crank", "--encoder-teeth", "60", "--encoder-missing-teeth", "2"]

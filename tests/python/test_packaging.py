@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.resources
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -62,6 +63,18 @@ def test_instruction_set_of_the_environment(name: str) -> None:
         assert "MGDD_INSTRUCTION_SET = 'sse9': must be one of baseline, avx2, avx512f" in run.stderr
     else:
         assert f"MGDD_INSTRUCTION_SET = {name!r}: this processor has {known[-1]} at most" in run.stderr
+
+
+@pytest.mark.skipif(shutil.which("readelf") is None, reason="no readelf")
+@pytest.mark.skipif("libasan" in os.environ.get("LD_PRELOAD", ""), reason="a sanitizer guards instead")
+def test_module_is_guarded() -> None:
+    """Its table of functions is read-only once loaded, and its stack has guards."""
+    command = ["readelf", "--wide", "--segments", "--dynamic", "--dyn-syms", str(_core.__file__)]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "GNU_RELRO" in said
+    assert re.search(r"\(FLAGS\).*BIND_NOW|\(FLAGS_1\).*NOW", said)
+    assert "__stack_chk_fail" in said
+    assert not re.search(r"GNU_STACK.* RWE ", said)
 
 
 @pytest.mark.stubs

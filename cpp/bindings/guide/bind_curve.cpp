@@ -1,9 +1,11 @@
 // Binds include/mgdd/guide: a model's curve over one input, and the seeker that it guides.
+#include <cmath>
 #include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "mgdd/common/error.hpp"
 #include "mgdd/guide/curve_seeking.hpp"
 #include "optimize/seeker_binding.hpp"
 #include "optimize/seeker_settings.hpp"
@@ -50,8 +52,13 @@ Examples
       .def_static("parabola", &Curve::parabola, py::kw_only(), py::arg("curvature"), py::arg("best"), py::arg("reach"),
                   "curvature/2 (x - best)^2 on [best - reach, best + reach]; ParameterError unless curvature < 0.")
       .def(
-          "__call__", [](const Curve& c, const InputArray& x) { return elementwise(c, x); }, py::arg("inputs"),
-          "Value at one input or at many.")
+          "__call__",
+          [](const Curve& c, const InputArray& x) {
+            for (py::ssize_t i = 0; i < x.size(); ++i)
+              if (!std::isfinite(x.data()[i])) throw ParameterError("inputs", x.data()[i], "must be finite");
+            return elementwise(c, x);
+          },
+          py::arg("inputs"), "Value at one input or at many; ParameterError for one that is not finite.")
       .def_property_readonly("lower", &Curve::lower, "First input given.")
       .def_property_readonly("upper", &Curve::upper, "Last input given.")
       .def_property_readonly("best", &Curve::best, "Input of the largest value.")

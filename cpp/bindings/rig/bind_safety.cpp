@@ -145,6 +145,11 @@ Drive(duty=0.0, bridge_open=True, send=True)
     shown["send"] = d.send;
     return representation("Drive", shown);
   });
+  cls.def(py::pickle([](const Drive& d) { return py::make_tuple(1, d.duty, d.bridge_open, d.send); },
+                     [](const py::tuple& state) {
+                       require_pickle_version(state);
+                       return Drive{state[1].cast<double>(), state[2].cast<bool>(), state[3].cast<bool>()};
+                     }));
 }
 
 }  // namespace

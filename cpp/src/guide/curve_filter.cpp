@@ -159,7 +159,7 @@ void CurveFilter::learn(double input, double j) noexcept {
     log_likely[i] = banks_[i].learn(prior_, drops_at(cycles_ - 1, delay_of(i)), j, turn || weight_of(i) > little);
   }
   const auto at = static_cast<std::size_t>(recent_count_++) % recent;
-  recent_at_[at] = static_cast<double>(cycles_ - 1);
+  recent_at_[at] = cycles_ - 1;
   recent_j_[at] = j;
   weigh(log_likely.data());
   mix();
@@ -225,7 +225,7 @@ void CurveFilter::forget(double kept) noexcept {
     banks_[b].fade(kept);
     for (std::int64_t i = recent_count_ - known; i < recent_count_; ++i) {
       const auto at = static_cast<std::size_t>(i) % recent;
-      const auto cycle = static_cast<std::int64_t>(recent_at_[at]);
+      const std::int64_t cycle = recent_at_[at];
       if (cycles_ - cycle <= static_cast<std::int64_t>(recent)) {
         banks_[b].add(prior_, drops_at(cycle, delay_of(b)), recent_j_[at]);
       }

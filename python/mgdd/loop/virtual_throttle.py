@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from mgdd import _core
 from mgdd.errors import ParameterError, RigError
@@ -78,9 +79,20 @@ class VirtualThrottle:
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
+        self._given: dict[str, Any] = {
+            "throttle": self.throttle,
+            "inputs": self._inputs,
+            "sensors": sensors or SensorPair(),
+            "faults": tuple(faults),
+            "start_deg": self.start_deg,
+            "sample_s": sample_s,
+            "step_s": step_s,
+            "bridge": bridge,
+            "seed": seed,
+        }
         self._core = _core.loop.VirtualThrottle(
             throttle=self.throttle,
-            sensors=sensors or SensorPair(),
+            sensors=self._given["sensors"],
             faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
             plant_faults=[fault.to_core() for fault in faults if fault.sensor is None],
             sample_s=sample_s,
@@ -89,6 +101,9 @@ class VirtualThrottle:
             bridge=bridge,
             seed=seed,
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (type(self), self._given, self.state, self._applied)
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -151,3 +166,15 @@ class VirtualThrottle:
             bridge_open=applied["bridge_open"] != 0.0,
         )
         return Measurement(values={name: float(value) for name, value in reading.items()})
+
+
+def _restored(
+    kind: type[VirtualThrottle],
+    given: dict[str, Any],
+    state: dict[str, list[float]],
+    applied: dict[str, float] | None,
+) -> VirtualThrottle:
+    made = kind(**given)
+    made.state = state
+    made._applied = None if applied is None else dict(applied)
+    return made

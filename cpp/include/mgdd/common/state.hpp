@@ -20,13 +20,26 @@ namespace mgdd {
 
 using StateColumns = std::map<std::string, std::vector<double>>;
 
+/// End of a whole number that only counts: exact as a double, more than a run of centuries reaches, and far enough from
+/// the ends of a word for what is added to it or multiplied with it.
+inline constexpr std::int64_t counts_end = std::int64_t{1} << 48;
+
 /// Collects members into columns. Integers below 2^53 and booleans are exact as doubles, a full word as its halves.
 class StateWriter {
  public:
   void operator()(std::string_view name, const double& value) { put(name, {value}); }
   void operator()(std::string_view name, const bool& value) { put(name, {value ? 1.0 : 0.0}); }
-  void operator()(std::string_view name, const std::int64_t& value) { put(name, {static_cast<double>(value)}); }
-  void operator()(std::string_view name, const std::int64_t& value, std::int64_t) { (*this)(name, value); }
+  void operator()(std::string_view name, const std::int64_t& value) = delete;  // say where it ends: StateReader
+  void operator()(std::string_view name, const std::int64_t& value, std::int64_t) {
+    put(name, {static_cast<double>(value)});
+  }
+  void operator()(std::string_view name, const std::int64_t& value, std::int64_t, std::int64_t end) {
+    (*this)(name, value, end);
+  }
+  template <std::size_t N>
+  void operator()(std::string_view name, const std::array<std::int64_t, N>& values, std::int64_t) {
+    put(name, {values.begin(), values.end()});
+  }
   void operator()(std::string_view name, const std::uint64_t& value) {
     put(name, {static_cast<double>(value >> 32), static_cast<double>(value & 0xFFFFFFFFu)});
   }
@@ -64,18 +77,19 @@ class StateReader {
     if (stored != 0.0 && stored != 1.0) refuse(name, "holds " + text(stored) + ": must be 0 or 1");
     value = stored == 1.0;
   }
-  void operator()(std::string_view name, std::int64_t& value) {
-    value = static_cast<std::int64_t>(whole(name, column(name, 1)[0], -0x1p53, 0x1p53));
+  /// A whole number counts or indexes: none is read without its end (`counts_end` for one that only counts).
+  void operator()(std::string_view name, std::int64_t& value) = delete;
+  /// 0 <= value < end.
+  void operator()(std::string_view name, std::int64_t& value, std::int64_t end) { (*this)(name, value, 0, end); }
+  /// begin <= value < end.
+  void operator()(std::string_view name, std::int64_t& value, std::int64_t begin, std::int64_t end) {
+    value = within(name, column(name, 1)[0], begin, end);
   }
-  /// A counter that indexes a table: 0 <= value < end.
-  void operator()(std::string_view name, std::int64_t& value, std::int64_t end) {
-    std::int64_t stored = 0;
-    (*this)(name, stored);
-    if (!(stored >= 0 && stored < end)) {
-      refuse(name,
-             "= " + std::to_string(stored) + ": must lie in [0, " + std::to_string(end) + "), as these settings say");
-    }
-    value = stored;
+  template <std::size_t N>
+  void operator()(std::string_view name, std::array<std::int64_t, N>& values, std::int64_t end) {
+    const std::vector<double>& stored = column(name, N);
+    for (std::size_t i = 0; i < N; ++i)
+      values[i] = within(name, stored[i], 0, end);
   }
   void operator()(std::string_view name, std::uint64_t& value) {
     const std::vector<double>& halves = column(name, 2);
@@ -131,6 +145,14 @@ class StateReader {
       refuse(name, "holds " + text(value) + ": must be a whole number" + (lower < 0.0 ? "" : " >= 0"));
     }
     return value;
+  }
+  static std::int64_t within(std::string_view name, double value, std::int64_t begin, std::int64_t end) {
+    const auto stored = static_cast<std::int64_t>(whole(name, value, -0x1p53, 0x1p53));
+    if (!(stored >= begin && stored < end)) {
+      refuse(name, "= " + std::to_string(stored) + ": must lie in [" + std::to_string(begin) + ", " +
+                       std::to_string(end) + "), as these settings say");
+    }
+    return stored;
   }
   static void copy(const std::vector<double>& from, double* to) {
     for (const double value : from)

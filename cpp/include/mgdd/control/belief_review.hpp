@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/control/filtered_rate.hpp"
 
 namespace mgdd::control {
@@ -47,8 +48,8 @@ class BeliefReview {
 
   template <class Self, class V>
   static void visit(Self& self, V&& v) {
-    v("samples", self.short_.samples);
-    v("long_samples", self.long_.samples);
+    v("samples", self.short_.samples, counts_end);
+    v("long_samples", self.long_.samples, counts_end);
     visit_number(v, "learnt", self.short_.learnt);
     visit_number(v, "certified", self.short_.certified);
     visit_number(v, "long_learnt", self.long_.learnt);

@@ -68,7 +68,7 @@ class BasicGuidedPredictive {
     v("prepared", self.prepared_);
     v("holds", self.holds_);
     v("above_limp_home", self.above_);
-    v("still_samples", self.still_);
+    v("still_samples", self.still_, counts_end);
     visit_number(v, "angle_deg", self.state_.angle_deg);
     visit_number(v, "speed_deg_per_s", self.state_.speed_deg_per_s);
     visit_number(v, "torque", self.state_.torque);
@@ -81,7 +81,7 @@ class BasicGuidedPredictive {
     visit_number(v, "certified_speed_deg_per_s", self.proven_state_.speed_deg_per_s);
     visit_number(v, "certified_torque", self.proven_state_.torque);
     BeliefReview<T>::visit(self.review_, Prefixed<V>{v, "review_"});
-    v("rollbacks", self.rollbacks_);
+    v("rollbacks", self.rollbacks_, counts_end);
     FrictionLearner<T>::visit(self.learner_, Prefixed<V>{v, "slope_"});
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
     visit_sent(self.sent_, v);

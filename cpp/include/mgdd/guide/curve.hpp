@@ -26,9 +26,10 @@ class Curve {
   /// The same with other points; false, and nothing changed, where the constructor would throw.
   bool put(std::span<const double> inputs, std::span<const double> values) noexcept;
 
+  /// NaN at NaN.
   double operator()(double input) const noexcept {
     const double at = (input - first_) * per_step_;
-    if (at <= 0.0) return values_[0] + at * (values_[1] - values_[0]);
+    if (!(at > 0.0)) return values_[0] + at * (values_[1] - values_[0]);
     if (at >= static_cast<double>(nodes - 1)) {
       return values_[nodes - 1] + (at - static_cast<double>(nodes - 1)) * (values_[nodes - 1] - values_[nodes - 2]);
     }

@@ -107,12 +107,12 @@ class CurveBank {
     v("mean", self.mean_);
     v("spread", self.spread_);
     v("usual_spread", self.usual_spread_);
-    v("from", self.from_);
-    v("to", self.to_);
+    v("from", self.from_, std::int64_t{places} + 1);
+    v("to", self.to_, self.from_, std::int64_t{places} + 1);
     v("noise", self.noise_variance_);
     v("scale", self.scale_);
     v("unexplained", self.unexplained_);
-    v("judged", self.judged_);
+    v("judged", self.judged_, counts_end);
   }
 
  private:

@@ -86,12 +86,12 @@ class CurveFilter {
     v("filter_prior_extra", self.prior_extra_);
     v("filter_started", self.started_);
     v("filter_lagged", self.lagged_);
-    v("filter_cycles", self.cycles_);
+    v("filter_cycles", self.cycles_, counts_end);
     for (std::size_t i = 0; i < self.ring_.size(); ++i)
       v("filter_ring" + std::to_string(i), self.ring_[i]);
     v("filter_recent_j", self.recent_j_);
-    v("filter_recent_at", self.recent_at_);
-    v("filter_recent_count", self.recent_count_);
+    v("filter_recent_at", self.recent_at_, counts_end);
+    v("filter_recent_count", self.recent_count_, counts_end);
     v("filter_delays", self.delay_weights_, self.delay_weights_.size());
     v("filter_assumptions", self.assumption_weights_, self.assumption_weights_.size());
     v("filter_leader", self.leader_, static_cast<std::int64_t>(self.delays_));
@@ -139,9 +139,10 @@ class CurveFilter {
   double prior_mean_ = 0.0, prior_extra_ = 0.0;  // precision of the prior beyond that of `prior_sd`; it fades
   bool started_ = false;                         // the lag has an input
   Column lagged_;
-  std::vector<Column> ring_;                             // drops behind the lag, of the last cycles
-  std::int64_t cycles_ = 0;                              // since the start
-  std::array<double, recent> recent_j_{}, recent_at_{};  // readings and their cycles, a ring
+  std::vector<Column> ring_;                      // drops behind the lag, of the last cycles
+  std::int64_t cycles_ = 0;                       // since the start
+  std::array<double, recent> recent_j_{};         // readings, a ring
+  std::array<std::int64_t, recent> recent_at_{};  // their cycles
   std::int64_t recent_count_ = 0;
   std::vector<CurveBank> banks_;  // one per delay, then the other assumptions at the leading delay
   std::vector<double> delay_weights_, assumption_weights_;

@@ -132,19 +132,20 @@ class CurveSeeking {
     v("applied", self.applied_);
     v("upwards", self.upwards_);
     v("sent", self.sent_);
-    v("sent_count", self.sent_count_);
+    v("sent_count", self.sent_count_, counts_end);
     v("held_back", self.held_back_);
-    v("held_count", self.held_count_);
-    v("delay_error", self.delay_error_);
+    v("held_count", self.held_count_, counts_end);
+    v("delay_error", self.delay_error_, -std::int64_t{self.settings_.delay_uncertainty},
+      std::int64_t{self.settings_.delay_uncertainty} + 1);
     v("surprise", self.surprise_);
-    v("doubts", self.doubts_);
-    v("since_doubt", self.since_doubt_);
+    v("doubts", self.doubts_, counts_end);
+    v("since_doubt", self.since_doubt_, counts_end);
     v("doubt_rate", self.doubt_rate_);
     v("repeat_input", self.repeat_input_);
     v("repeat_j", self.repeat_j_);
     v("repeat_known", self.repeat_known_);
     v("repeat_variance", self.repeat_variance_);
-    v("repeats", self.repeats_);
+    v("repeats", self.repeats_, counts_end);
     v("plain_at_work", self.plain_at_work_);
     v("taken_over_at", self.taken_over_at_);
     v("taken_over_scale", self.taken_over_scale_);

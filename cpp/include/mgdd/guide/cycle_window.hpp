@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/guide/calibration_model.hpp"
 
@@ -83,8 +84,8 @@ class CycleWindow {
     v("window_points", self.points_);
     v("window_next", self.next_, static_cast<std::int64_t>(self.imep_bar_.size()));
     v("window_held", self.held_, static_cast<std::int64_t>(self.imep_bar_.size()) + 1);
-    v("window_accepted", self.accepted_);
-    v("window_points_seen", self.points_seen_);
+    v("window_accepted", self.accepted_, counts_end);
+    v("window_points_seen", self.points_seen_, counts_end);
     v("window_steady_left", self.steady_left_, std::int64_t{self.settings_.steady_cycles} + 1);
     v("window_has_point", self.has_point_);
     v("window_point", self.reference_);

@@ -95,8 +95,8 @@ class GuidedEngine {
     visit_point(v, "point.", self.point_);
     visit_point(v, "advised.", self.advised_);
     v("guide_cad", self.guide_cad_);
-    v("refusals", self.refusals_);
-    v("recalibrations", self.recalibrations_);
+    v("refusals", self.refusals_, counts_end);
+    v("recalibrations", self.recalibrations_, counts_end);
     v("owed", self.owed_);
   }
 

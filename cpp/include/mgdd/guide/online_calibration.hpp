@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/guide/calibration_model.hpp"
 #include "mgdd/guide/correlated_step.hpp"
 #include "mgdd/guide/cycle_window.hpp"
@@ -104,13 +105,13 @@ class OnlineCalibration {
     v("usual_power_bar2", self.usual_power_);
     v("soc_power_bar2_per_cad2", self.soc_power_);
     v("anchor", self.anchor_);
-    v("updates", self.updates_);
-    v("settled_updates", self.settled_updates_);
-    v("taken", self.taken_);
-    v("checked", self.checked_);
-    v("points_seen", self.points_seen_);
-    v("jumps", self.jumps_);
-    v("suspects", self.suspects_);
+    v("updates", self.updates_, counts_end);
+    v("settled_updates", self.settled_updates_, counts_end);
+    v("taken", self.taken_, counts_end);
+    v("checked", self.checked_, counts_end);
+    v("points_seen", self.points_seen_, counts_end);
+    v("jumps", self.jumps_, counts_end);
+    v("suspects", self.suspects_, counts_end);
     v("has_mean", self.has_mean_);
     v("has_block", self.has_block_);
     v("last_offer", self.last_offer_, statuses);

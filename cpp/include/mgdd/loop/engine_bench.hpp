@@ -219,7 +219,7 @@ class EngineBench {
   /// Everything a run depends on besides the settings, for `save_state` and `restore_state`: bit for bit.
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    v("cycle", self.cycle_, std::int64_t{1} << 53);
+    v("cycle", self.cycle_, counts_end);
     v("seed", self.seed_);
     for (std::size_t i = 0; i < self.settings_.inputs.size(); ++i)
       v("last_" + std::string(name_of(self.settings_.inputs[i])), self.last_inputs_[i]);

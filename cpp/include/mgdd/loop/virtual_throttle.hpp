@@ -66,7 +66,7 @@ class VirtualThrottle {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    v("samples", self.samples_);
+    v("samples", self.samples_, counts_end);
     v("angle_rad", self.state_.angle_rad);
     v("speed_rad_per_s", self.state_.speed_rad_per_s);
     v("current_a", self.state_.current_a);
@@ -80,8 +80,8 @@ class VirtualThrottle {
     throttle::SensorSampler::visit(self.sensors_, v);
     if (self.settings_.plant_faults.empty()) return;
     auto& r = self.received_;
-    v("caught", self.caught_);
-    v("received_sample", self.received_sample_);
+    v("caught", self.caught_, std::int64_t{1} << self.settings_.plant_faults.size());
+    v("received_sample", self.received_sample_, counts_end);
     v("received_v", r.volts);
     v("received_angle_deg", r.angle_deg);
     v("received_sum_error_v", r.sum_error_v);

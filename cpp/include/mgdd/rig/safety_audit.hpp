@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/state.hpp"
 
 namespace mgdd::rig {
 
@@ -98,7 +99,7 @@ class SafetyAudit {
         columns[c][i] = row[c];
     }
     v("audit_size", size, static_cast<std::int64_t>(capacity) + 1);
-    v("audit_dropped", self.dropped_);
+    v("audit_dropped", self.dropped_, counts_end);
     v("audit_cycle", columns[0]);
     v("audit_from", columns[1]);
     v("audit_to", columns[2]);

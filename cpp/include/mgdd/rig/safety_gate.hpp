@@ -95,7 +95,7 @@ class SafetyGate {
     visit_enum(v, "reason", s.reason);
     visit_enum(v, "cause", s.cause);
     visit_enum(v, "sensor_cause", s.sensor_cause);
-    v("cycle", s.cycle);
+    v("cycle", s.cycle, counts_end);
     v("observed", s.observed);
     v("holding", s.holding);
     v("send", s.send);
@@ -110,8 +110,8 @@ class SafetyGate {
     v("streaks", s.streaks);
     v("healthy_frames", s.healthy);
     v("running", s.running);
-    v("clamped", s.clamped);
-    v("slewed", s.slewed);
+    v("clamped", s.clamped, counts_end);
+    v("slewed", s.slewed, counts_end);
     v("counts", s.counts);
     SafetyAudit::visit(s.audit, v);
   }

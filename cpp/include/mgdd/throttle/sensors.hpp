@@ -14,6 +14,7 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 
 namespace mgdd::throttle {
 
@@ -108,8 +109,8 @@ class SensorSampler {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     auto& s = self.state_;
-    v("sensor_sample", s.sample);
-    v("sensor_failing", s.failing);
+    v("sensor_sample", s.sample, counts_end);
+    v("sensor_failing", s.failing, counts_end);
     v("sensor_fault", s.fault);
     for (std::size_t i = 0; i < s.filtered_v.size(); ++i) {
       const std::string which = i == 0 ? "first" : "second";

@@ -14,8 +14,9 @@ namespace {
 
 using Column = std::vector<double>;
 
-constexpr double hysteresis = 0.3;     // of the distance from the level to the nearer of low and high
-constexpr double together = 1.4;       // pitches of two neighbouring intervals that are one, cut by an extra edge
+constexpr double hysteresis = 0.3;  // of the distance from the level to the nearer of low and high
+constexpr double together = 1.4;    // pitches of two neighbouring intervals that are one, cut by an extra edge
+constexpr double most_pitches = 1e9;
 constexpr std::size_t neighbours = 4;  // intervals on each side that tell the usual one
 
 double share_of(Column values, double share) {
@@ -96,11 +97,11 @@ std::size_t drop_extra(Column& t) {
   return dropped;
 }
 
-// Pitches from the first edge to each.
+// Pitches from the first edge to each. No gap counts as more than `most_pitches`, so that their sum fits a word.
 std::vector<long> count_pitches(const Column& t) {
   std::vector<long> at(t.size(), 0);
   for (std::size_t k = 0; k + 1 < t.size(); ++k)
-    at[k + 1] = at[k] + std::max(1L, std::lround((t[k + 1] - t[k]) / usual_interval(t, k)));
+    at[k + 1] = at[k] + std::max(1L, std::lround(std::min((t[k + 1] - t[k]) / usual_interval(t, k), most_pitches)));
   return at;
 }
 

@@ -19,6 +19,7 @@ using Counts = std::vector<long>;
 
 constexpr double spike_share = 0.02;    // of the samples that a spike may hold and be none of the levels
 constexpr double trusted_share = 0.8;   // of the turns, and of the edges, that must be as the wheel is said to be
+constexpr double longest_step = 0.5;    // of the record between two samples: more is no record of a turning wheel
 constexpr std::size_t turns_ahead = 3;  // that a false mark may hide
 
 // Marks in pitches from the first edge: behind each gap that is as wide as the one of the wheel.
@@ -44,8 +45,10 @@ std::pair<Counts, double> marks_of_index(const Column& index, const Column& t, c
   }
   const double behind = std::atan2(north, east) / (2.0 * std::numbers::pi);
   Counts out;
-  for (const double p : place)
-    out.push_back(std::lround(p - behind));
+  for (const double p : place) {  // an index that bounces has one mark
+    const long mark = std::lround(p - behind);
+    if (out.empty() || mark > out.back()) out.push_back(mark);
+  }
   return {out, behind};
 }
 
@@ -151,6 +154,11 @@ void check(std::span<const double> time, std::span<const double> signal, std::sp
       throw about("time_s", DataError("time_s[" + std::to_string(k) + "] = " + text(time[k]) + " after " +
                                       text(time[k - 1]) + ": times must increase"));
     }
+    if (time[k] - time[k - 1] > longest_step * (time.back() - time.front())) {
+      throw about("time_s", DataError("time_s[" + std::to_string(k) + "] = " + text(time[k]) + " after " +
+                                      text(time[k - 1]) + ", half of the record or more between two samples: the " +
+                                      "clock has jumped; read the record before and behind it by itself"));
+    }
   }
 }
 
@@ -249,10 +257,12 @@ Places by_index(const Column& index, const Column& t, const Counts& at, const En
 // Teeth that the wheel has between two places.
 std::size_t teeth_between(double one, double other, const EncoderOptions& o) {
   const auto turn = static_cast<long>(o.teeth);
-  std::size_t out = 0;
-  const long first = std::lround(one), distance = std::lround(other - one);
-  for (long k = 1; k < distance; ++k)
-    out += ((first + k) % turn + turn) % turn < turn - static_cast<long>(o.missing_teeth) ? 1 : 0;
+  const long first = std::lround(one), between = std::lround(other - one) - 1;
+  if (between <= 0) return 0;
+  const long there = turn - static_cast<long>(o.missing_teeth);
+  std::size_t out = static_cast<std::size_t>(between / turn) * static_cast<std::size_t>(there);
+  for (long k = 1; k <= between % turn; ++k)
+    out += ((first + k) % turn + turn) % turn < there ? 1 : 0;
   return out;
 }
 

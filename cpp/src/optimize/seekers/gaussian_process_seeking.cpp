@@ -269,6 +269,7 @@ void GaussianProcessSeeking::reseed(std::uint64_t seed) noexcept {
     model.reseed(seed);
   for (ProcessModel& model : limited_)
     model.reseed(seed);
+  failing_.reseed(seed);
 }
 
 LimitState GaussianProcessSeeking::limit_state(std::size_t i) const noexcept {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/identify/online/recursive_gradient.hpp"
 #include "mgdd/identify/online/recursive_pw_r.hpp"
 #include "mgdd/identify/online/recursive_window.hpp"
@@ -72,7 +73,7 @@ class WindowUpdate {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     WindowPwR::visit(self.core_, v);
-    v("calls", self.count_);
+    v("calls", self.count_, counts_end);
   }
 
  private:

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 
@@ -68,8 +69,8 @@ class RecursivePwR {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    v("count", self.count_);
-    v("clean_from", self.clean_from_);
+    v("count", self.count_, counts_end);
+    v("clean_from", self.clean_from_, counts_end);
     v("position_deg", self.position_);
     v("duty_sum", self.duty_sum_);
     v("duty_mean", self.duty_mean_);
@@ -82,15 +83,6 @@ class RecursivePwR {
   }
 
  private:
-  template <class V>
-  struct Prefixed {
-    V& v;
-    const char* prefix;
-    template <class Value>
-    void operator()(std::string_view name, Value&& value) {
-      v(prefix + std::string(name), value);
-    }
-  };
   UpdateGate learn() noexcept;
 
   RecursivePwRSettings settings_;

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 
 namespace mgdd::identify {
@@ -48,7 +49,7 @@ class WindowPwR {
     v("duty_sum", self.duty_sum_);
     v("damping", self.damping_);
     v("cost", self.cost_);
-    v("count", self.count_);
+    v("count", self.count_, counts_end);
     for (std::size_t i = 0; i < self.line_.before.size(); ++i)
       v("before_" + std::to_string(i), self.line_.before[i]);
   }

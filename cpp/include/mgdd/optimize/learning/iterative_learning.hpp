@@ -57,7 +57,7 @@ class IterativeLearning {
   /// For `save_state`; restore through `restore`, which also keeps room for the norms to come.
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    v("trial", self.trial_, std::int64_t{1} << 53);
+    v("trial", self.trial_, counts_end);
     v("asked", self.asked_);
     v("frozen", self.frozen_);
     v("best_trial", self.best_trial_, std::max(self.trial_, std::int64_t{1}));

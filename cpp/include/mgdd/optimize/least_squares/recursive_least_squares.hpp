@@ -11,6 +11,7 @@
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/state.hpp"
 
 namespace mgdd::optimize {
 
@@ -91,7 +92,7 @@ class RecursiveLeastSquares {
   static void visit(Self& self, V& v) {
     v("estimate", self.estimate_);
     v("covariance", self.covariance_);
-    v("updates", self.updates_);
+    v("updates", self.updates_, counts_end);
   }
 
  private:

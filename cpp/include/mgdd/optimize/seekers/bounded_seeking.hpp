@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
@@ -68,7 +69,7 @@ class BoundedSeeking : public SeekerCore<BoundedSeekingSettings> {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     SeekerCore::visit_core(self, v);
-    v("seen", self.seen_);
+    v("seen", self.seen_, counts_end);
     v("window", self.window_);
     FirstReadings::visit(self.first_, v);
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 
@@ -51,7 +52,7 @@ class CausingInputs {
 
   template <class Self, class V>
   static void visit(Self& self, V& v, const std::string& name) {
-    v(name + "_cycles", self.cycles_, std::int64_t{1} << 53);
+    v(name + "_cycles", self.cycles_, counts_end);
     v(name + "_ring", self.ring_);
     for (std::size_t i = 0; i < self.sources_.size(); ++i) {
       v(name + std::to_string(i) + "_taken", self.sources_[i].taken, self.sources_[i].count);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/process_model.hpp"
 
 namespace mgdd::optimize {
@@ -33,7 +34,7 @@ class DelayFinder {
 
   template <class Self, class V>
   static void visit(Self& self, V& v, const std::string& name) {
-    v(name + "_cycles", self.cycles_, std::int64_t{1} << 53);
+    v(name + "_cycles", self.cycles_, counts_end);
     v(name + "_applied", self.applied_);
     v(name + "_values", self.values_);
     v(name + "_later", self.later_, self.told_ + self.uncertainty_ + 1);

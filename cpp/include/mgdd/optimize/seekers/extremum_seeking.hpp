@@ -13,6 +13,7 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
@@ -101,8 +102,8 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
     SeekerCore::visit_core(self, v);
     v("gradient", self.gradient_);
     v("phase", self.phase_, self.settings_.dither.period);
-    v("seen", self.seen_);
-    v("held", self.held_);
+    v("seen", self.seen_, counts_end);
+    v("held", self.held_, counts_end);
     v("share", self.share_);
     v("window", self.window_);
     v("mean", self.mean_);
@@ -111,7 +112,7 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
     v("slow", self.slow_);
     v("response", self.response_);
     v("origin", self.origin_);
-    v("limited_cycles", self.limited_cycles_);
+    v("limited_cycles", self.limited_cycles_, counts_end);
     FirstReadings::visit(self.first_, v);
     LastReading::visit(self.last_, v);
   }

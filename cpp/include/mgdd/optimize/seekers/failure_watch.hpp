@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <string>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
 
@@ -49,8 +50,8 @@ class FailureWatch {
     v("failing_differs", self.differs_);
     v("failing_good", self.good_);
     v("failing_worked", self.worked_);
-    v("failing_in_a_row", self.in_a_row_);
-    v("failing_probe", self.probe_);
+    v("failing_in_a_row", self.in_a_row_, counts_end);
+    v("failing_probe", self.probe_, std::int64_t{-1}, 2 * self.sent_.size());
     v("failing_cycles", self.cycles_);
     v("failing_by_chance", self.by_chance_);
     v("failing_side", self.failures_.side);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
@@ -60,14 +61,14 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
     v("lower", self.lower_);
     v("upper", self.upper_);
     v("width", self.width_);
-    v("draws", self.draws_);
-    v("stayed", self.stayed_);
+    v("draws", self.draws_, counts_end);
+    v("stayed", self.stayed_, counts_end);
     v("last_asked", self.last_asked_);
     v("refining", self.refining_);
     v("turn", self.turn_, self.refining_ ? 3 : 2);
     v("sample_input", self.sample_input_);
     v("sample_j", self.sample_j_);
-    v("samples", self.samples_);
+    v("samples", self.samples_, counts_end);
     for (std::size_t p = 0; p < 2; ++p) {
       const std::string name = "point" + std::to_string(p);
       v(name + "_count", self.points_[p].count);

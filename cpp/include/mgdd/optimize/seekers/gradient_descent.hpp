@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
 
@@ -75,8 +76,8 @@ class GradientDescent : public SeekerCore<GradientDescentSettings> {
     v("above", self.above_);
     v("above_missed", self.above_missed_);
     v("stage", self.stage_, 2 * self.estimate_.size());
-    v("iteration", self.iteration_);
-    v("converged_at", self.converged_at_);
+    v("iteration", self.iteration_, counts_end);
+    v("converged_at", self.converged_at_, std::int64_t{-1}, counts_end);
     FirstReadings::visit(self.first_, v);
   }
 

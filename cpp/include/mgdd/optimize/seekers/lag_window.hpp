@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
 
@@ -29,8 +30,8 @@ class LagWindow {
     v(name + "_sensor_variance", self.sensor_variance_);
     v(name + "_quantity_variance", self.quantity_variance_);
     v(name + "_covariance", self.covariance_);
-    v(name + "_count", self.count_);
-    v(name + "_idle", self.idle_);
+    v(name + "_count", self.count_, counts_end);
+    v(name + "_idle", self.idle_, counts_end);
     v(name + "_inputs", self.inputs_);
     v(name + "_held", self.held_);
   }

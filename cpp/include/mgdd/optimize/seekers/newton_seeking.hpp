@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
@@ -88,10 +89,10 @@ class NewtonSeeking : public SeekerCore<NewtonSeekingSettings> {
     v("hessian", self.hessian_);
     v("inverse", self.inverse_);
     v("phase", self.phase_, self.settings_.dither.period);
-    v("seen", self.seen_);
-    v("held", self.held_);
+    v("seen", self.seen_, counts_end);
+    v("held", self.held_, counts_end);
     v("share", self.share_);
-    v("limited_cycles", self.limited_cycles_);
+    v("limited_cycles", self.limited_cycles_, counts_end);
     v("window", self.window_);
     FirstReadings::visit(self.first_, v);
     LastReading::visit(self.last_, v);

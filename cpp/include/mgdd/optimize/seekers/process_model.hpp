@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/process_kernel.hpp"
 
 namespace mgdd::optimize {
@@ -83,7 +84,7 @@ class ProcessModel {
   template <class Self, class V>
   static void visit(Self& self, V& v, const std::string& name) {
     v(name + "_count", self.count_, self.settings_.kept + 1);
-    v(name + "_told", self.told_);
+    v(name + "_told", self.told_, counts_end);
     v(name + "_begun", self.begun_);
     v(name + "_points", self.points_);
     v(name + "_values", self.values_);

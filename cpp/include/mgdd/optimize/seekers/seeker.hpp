@@ -14,6 +14,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/failure_watch.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
@@ -155,8 +156,8 @@ struct Protocol {
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
-    v("cycle", self.cycle);
-    v("misfires", self.misfires);
+    v("cycle", self.cycle, counts_end);
+    v("misfires", self.misfires, counts_end);
     v("asked", self.asked);
     FailureWatch::visit(self.failures, v);
   }

@@ -13,6 +13,7 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/record.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
@@ -116,11 +117,11 @@ class Spsa : public SeekerCore<SpsaSettings> {
     v("hessian_sum", self.hessian_sum_);
     v("missed", self.missed_);
     v("measured", self.measured_);
-    v("iteration", self.iteration_);
-    v("draw", self.draw_);
+    v("iteration", self.iteration_, counts_end);
+    v("draw", self.draw_, counts_end);
     v("stage", self.stage_, self.measurements_per_iteration());
-    v("blocked", self.blocked_);
-    v("watched", self.watched_);
+    v("blocked", self.blocked_, counts_end);
+    v("watched", self.watched_, counts_end);
     v("share", self.share_);
     v("around_j", self.around_j_);
     LocalModel::visit(self.trend_, v, "trend");

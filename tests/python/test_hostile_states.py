@@ -1,0 +1,109 @@
+"""A saved state with numbers that no run can have made is refused, or the run goes on; the process never ends."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import os
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from public_objects import public_objects
+
+HOSTILE = (-1.0, -1e9 - 3, 4e15, 3e5 + 1, 2.0**53, 17.5, -(2.0**53), 1e300)
+WHOLE_S = 300  # of the states of one class in its child process
+
+
+def runs() -> dict[str, Any]:
+    """Give an object of every class that has a state to set."""
+    return {
+        name: thing
+        for name, thing in public_objects().items()
+        if isinstance(found := getattr(type(thing), "state", None), property) and found.fset is not None
+    }
+
+
+def drive(thing: Any, cycles: int = 12) -> None:
+    """Run a seeker, a controller, a plant or a gate for some cycles."""
+    for k in range(cycles):
+        if hasattr(thing, "ask"):
+            asked = np.ravel(thing.ask())
+            thing.tell(-0.025 * float(np.sum((asked - 6.0) ** 2)), misfire=k % 5 == 3)
+        elif hasattr(thing, "apply"):
+            thing.apply(dict.fromkeys(thing.input_names, 0.1))
+            thing.measure()
+        elif hasattr(thing, "command"):
+            thing.observe(good_frames=1, age_s=0.0)
+            thing.command(0.1)
+        elif hasattr(thing, "step"):
+            with contextlib.suppress(TypeError):
+                thing.step(20.0, 10.0 + 0.1 * k)
+                continue
+            thing.step(-6.0)
+
+
+def hostile(state: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Give the state with one column at a time replaced, as told and with an input that was asked."""
+    for key, column in state.items():
+        if 0 < len(column) <= 32:
+            for value in HOSTILE:
+                for asked in (False, True) if "asked" in state else (False,):
+                    yield {**state, key: [value] * len(column), **({"asked": [1.0]} if asked else {})}
+
+
+def survives(make: Any, every: int) -> tuple[int, int, int]:
+    """Try each of so many states in a child process: states tried, how many were taken, and how the child ended."""
+    read, write = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        signal.alarm(WHOLE_S)
+        tried = taken = 0
+        with contextlib.suppress(BaseException):
+            thing = make()
+            with contextlib.suppress(Exception):
+                drive(thing)
+            state = dict(thing.state)
+            for number, changed in enumerate(hostile(state)):
+                if number % every:
+                    continue
+                tried += 1
+                with contextlib.suppress(Exception):
+                    two = make()
+                    two.state = changed
+                    taken += 1
+                    if changed.get("asked") == [1.0] and hasattr(two, "tell"):
+                        two.tell(1.0)
+                    drive(two)
+        os.write(write, f"{tried} {taken}".encode())
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as said:
+        numbers = said.read().split()
+    ended = os.waitpid(pid, 0)[1]
+    return (int(numbers[0]), int(numbers[1]), ended) if numbers else (0, 0, ended)
+
+
+def check(every: int) -> int:
+    ended: dict[str, str] = {}
+    total = 0
+    for name, thing in runs().items():
+        tried, _, how = survives(lambda thing=thing: copy.deepcopy(thing), every)
+        if os.WIFSIGNALED(how) or how:
+            ended[name] = f"signal {os.WTERMSIG(how)}" if os.WIFSIGNALED(how) else f"status {how}"
+        total += tried
+    assert not ended
+    return total
+
+
+def test_impossible_numbers_do_not_end_the_process() -> None:
+    assert len(runs()) > 15
+    assert check(every=23) > 200
+
+
+@pytest.mark.slow
+def test_five_thousand_hostile_states_do_not_end_the_process() -> None:
+    assert check(every=1) > 5000
