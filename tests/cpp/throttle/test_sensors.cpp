@@ -231,4 +231,14 @@ TEST(Sensors, BadSettingsAreNamed) {
   EXPECT_NO_THROW(SensorSampler(SensorPair{}, sample_s, 0, healthy));
 }
 
+// Within 2 mV of the tolerance about half of the samples pass: the fault stands all the same.
+TEST(Sensors, AnOffsetAtTheToleranceIsToldThoughHalfOfTheSamplesPass) {
+  SensorSampler faulty(SensorPair{}, sample_s, 1, first(SensorFaultKind::offset, 0.2, 0.0));
+  SensorSampler smaller(SensorPair{}, sample_s, 1, first(SensorFaultKind::offset, 0.19, 0.0));
+  int k = 0;
+  for (; k < 5000 && !faulty.step(30.0).fault; ++k)
+    ASSERT_FALSE(smaller.step(30.0).fault);
+  EXPECT_LT(k, 2000);
+}
+
 }  // namespace
