@@ -135,7 +135,13 @@ def _node(args: argparse.Namespace) -> None:
             run_node(
                 core, bus, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped), **_NODE.given(args)
             )
-            counts = {"samples": core.samples, "late": core.late, "foreign": core.foreign, "mode": core.gate.mode, "reason": core.gate.reason}
+            counts = {
+                "samples": core.samples,
+                "late": core.late,
+                "foreign": core.foreign,
+                "mode": core.gate.mode,
+                "reason": core.gate.reason,
+            }
             counts |= {"gate": core.gate.counts, **bus.counters}
     finally:
         if log is not None:

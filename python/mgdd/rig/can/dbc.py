@@ -130,7 +130,8 @@ class DbcFile:
             logging.getLogger("cantools").setLevel(logging.ERROR)  # of one identifier twice we speak ourselves
             database = cantools.database.load_string(text, database_format="dbc", strict=False)
         except Exception as error:  # the parser raises what it stumbles over
-            said = str(error) if len(str(error)) <= _MOST_SAID else f"{str(error)[:_MOST_SAID]}…"
+            said = " ".join(str(error).split())
+            said = said if len(said) <= _MOST_SAID else f"{said[:_MOST_SAID]}…"
             raise DataError(
                 f"{file}: cannot be read as a DBC: {said}; correct it there, or map a copy of the file that has only "
                 "the messages you need"
