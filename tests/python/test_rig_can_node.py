@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 
@@ -9,12 +10,12 @@ import pytest
 
 from bus_node import ETB, node, rig_on
 from mgdd._core.rig import Frame
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, RigError
 from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Inbox, Sender
-from mgdd.rig.can.node import node_of
+from mgdd.rig.can.node import node_of, run_node
 from mgdd.rig.can.node_core import NodeCore, node_plant
 
 
@@ -204,11 +205,77 @@ def test_what_came_too_long_ago_is_missing() -> None:
 def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
     running(host)
     good = host.frame(0.5)
-    assert not host.core.take(changed(good, id=0x121))
+    assert not host.core.take(changed(good, id=0x119))
     assert not host.core.take(changed(good, extended=True))
     assert not host.core.take(changed(good, data=good.data[:7]))
     host.wait(0.005)
     assert host.core.gate.mode == "run"
+
+
+def test_a_frame_that_only_the_node_may_send_opens_the_bridge_and_ends_nothing(host: Host) -> None:
+    """Somebody else has one of its identifiers: whatever the frame says, and whatever its length."""
+    for number, identifier in enumerate((0x121, 0x122, 0x123), 1):
+        running(host)
+        stranger = changed(host.frame(0.5), id=identifier, data=bytes(number))
+        assert not host.core.take(stranger, host.now_ns)
+        host.send(0.5)
+        assert host.decided == ("limp", "bus_fault")
+        assert host.core.foreign == number
+        host.send(0.5, 50)
+        assert host.core.gate.mode == "limp"
+    running(host)  # once it has gone, the node can be armed again
+
+
+class DyingBus:
+    """A bus that lets so many calls pass, then fails in one of its ways; what is sent at the end still leaves."""
+
+    name, shared = "dying", True
+
+    def __init__(self, host: Host, failing: str, error: BaseException) -> None:
+        self._host, self._failing, self._error, self.final = host, failing, error, list[Frame]()
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        driven = self._host.core.driven
+        if driven and self._failing == "receive":
+            raise self._error
+        time.sleep(min(timeout_s, 0.001))
+        return changed(self._host.frame(0.5 if driven or self._host.core.gate.mode == "armed" else None),
+                       monotonic_ns=time.monotonic_ns())  # fmt: skip
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:
+        if final:
+            self.final.append(frame)
+        elif self._host.core.driven and self._failing == "send":
+            raise self._error
+
+
+@pytest.mark.parametrize("step", [False, True])
+@pytest.mark.parametrize("failing", ["receive", "send", "log", "nothing"])
+def test_whatever_ends_a_node_the_bridge_is_opened_first(host: Host, step: bool, failing: str) -> None:
+    error = RigError("the bus is gone") if failing != "log" else OSError(28, "No space left on device")
+    bus, core, until = DyingBus(host, failing, error), host.core, time.monotonic() + 20.0
+    rows: list[tuple[str, bool]] = []
+
+    class Log:
+        def write(self, core: NodeCore, _: int) -> None:
+            rows.append((core.gate.mode, core.driven))
+            if failing == "log" and core.driven:
+                raise error
+
+    def keep_on() -> bool:
+        assert time.monotonic() < until
+        return not (failing == "nothing" and core.driven)
+
+    ends = contextlib.nullcontext() if failing == "nothing" else pytest.raises(type(error))
+    with ends:
+        run_node(core, bus, step=step, log=Log(), keep_on=keep_on)  # type: ignore[arg-type]
+    assert host.decided == ("limp", "aborted")
+    assert rows[-1] == ("limp", False)
+    status = ETB.measurements["ETB_Status"]
+    told = [frame for frame in bus.final if frame.id == status.message.frame_id]
+    assert ETB.state is not None
+    assert [ETB.state.name_of(frame.data) for frame in told] == ["limp"]
+    assert math.isclose(status.read_applied(told[0].data)["duty"], 0.0)
 
 
 def test_in_steps_a_command_that_comes_twice_is_one_sample(host: Host) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import socket
 import threading
@@ -315,6 +316,82 @@ def test_the_hub_drops_duplicates_reorders_and_corrupts_as_told() -> None:
     assert got == everything
 
 
+Heard = list[tuple[int, bytes, bool]]
+
+
+def conversation(faults: list[str], sent: list[tuple[int, Frame]]) -> tuple[list[Heard], Any]:
+    """What each of three clients of a hub hears, and the hub; every frame is through before the next one is sent."""
+    with running_hub(faults) as hub, contextlib.ExitStack() as left:
+        clients = [left.enter_context(CanTransport.parse(bus_of(hub))) for _ in range(3)]
+        for count, (sender, one) in enumerate(sent, 1):
+            clients[sender].send(one)
+            until = time.monotonic() + 10.0
+            while hub.counts["frames"] < count:
+                assert time.monotonic() < until
+                time.sleep(0.001)
+        heard: list[Heard] = []
+        for patience_s, client in zip((0.25, 0.05, 0.05), clients, strict=True):
+            heard.append([])
+            while (got := client.receive(patience_s)) is not None:
+                heard[-1].append((got.id, got.data, got.extended))
+    return heard, hub
+
+
+def named(identifier: int, text: str) -> Frame:
+    return Frame(id=identifier, data=text.encode(), extended=identifier > 0x7FF)
+
+
+def said(heard: Heard) -> str:
+    return " ".join(data.decode() for _, data, _ in heard)
+
+
+# Two clients talk, one listens: A and C are of the first one, b and d of the second one, with an identifier of 29 bits.
+TALK = [(0, named(0x120, "A")), (1, named(0x18FF0001, "b")), (0, named(0x122, "C")), (1, named(0x18FF0002, "d"))]
+
+
+@pytest.mark.parametrize(
+    ("fault", "first", "second", "listener", "strikes"),
+    [
+        ("drop:id=0x120", "b d", "C", "b C d", 1),
+        ("drop:id=0x18ff0001", "d", "A C", "A C d", 1),
+        ("duplicate:id=0x120", "b d", "A A C", "A A b C d", 1),
+        ("duplicate", "b b d d", "A A C C", "A A b b C C d d", 4),
+        ("delay:ms=100,id=0x120", "b d", "C A", "b C d A", 1),
+        ("reorder:id=0x120", "b d", "A C", "b A C d", 1),  # behind b, of the other sender, and not back to its own
+        ("reorder:id=0x18ff0001", "b d", "A C", "A C b d", 1),
+        ("reorder", "b d", "A C", "b A d C", 4),
+        ("reorder:id=0x18ff0002", "b", "A C", "A b C", 1),  # nothing follows: it waits for ever
+        ("freeze:client=1", "", "", "b d", 4),
+        ("freeze:client=2", "", "", "A C", 4),
+    ],
+)
+def test_every_client_hears_a_fault_of_the_hub_as_it_is_told(
+    fault: str, first: str, second: str, listener: str, strikes: int
+) -> None:
+    heard, hub = conversation([fault], TALK)
+    assert [said(one) for one in heard] == [first, second, listener]
+    for one in heard:  # with its own identifier, and in full
+        assert all((Frame(id=i, data=d, extended=x) in [frame for _, frame in TALK]) for i, d, x in one)
+    assert hub.counts[fault.partition(":")[0]] == strikes
+
+
+def test_a_corrupt_frame_has_one_other_byte_for_all_who_hear_it() -> None:
+    heard, hub = conversation(["corrupt:id=0x121"], [(0, named(0x121, "payload")), (1, named(0x121, ""))])
+    assert [data for _, data, _ in heard[0]] == [b""]
+    (_, spoilt, _), (_, empty, _) = heard[2]
+    assert [spoilt] == [data for _, data, _ in heard[1]]
+    assert (sum(a != b for a, b in zip(spoilt, b"payload", strict=True)), empty) == (1, b"")
+    assert hub.counts["corrupt"] == 1
+
+
+def test_faults_of_one_frame_add_up() -> None:
+    heard, hub = conversation(["drop:id=0x120", "reorder:id=0x120", "duplicate:id=0x122", "reorder:id=0x122"], TALK)
+    assert [said(one) for one in heard] == ["b d", "C C", "b d C C"]
+    assert {name: hub.counts[name] for name in ("drop", "duplicate", "reorder")} == {
+        "drop": 1, "duplicate": 1, "reorder": 1,
+    }  # fmt: skip
+
+
 def test_the_hub_delays_and_has_a_bit_rate() -> None:
     for faults, settings, least in [(["delay:ms=120"], {}, 0.12), ([], {"bit_rate": 10e3}, 10 * 111 / 10e3)]:
         with running_hub(faults, **settings) as hub, two_on(hub) as (one, other):
@@ -337,8 +414,9 @@ def test_a_bus_that_is_too_slow_loses_frames_and_says_so() -> None:
 def test_the_hub_reports_bus_errors_and_freezes_a_client() -> None:
     with running_hub(["error:class=0x40,id=0x7ff"]) as hub, two_on(hub) as (one, other):
         one.send(frame(1, 0x7FF))
-        with pytest.raises(RigError, match="0x40: bus_off"):
-            other.receive(2.0)
+        for client in (one, other):  # the sender stands on the same wire
+            with pytest.raises(RigError, match="0x40: bus_off"):
+                client.receive(2.0)
     with running_hub(["freeze:client=1"]) as hub, two_on(hub) as (one, two), CanTransport.parse(bus_of(hub)) as three:
         one.send(frame(1))
         two.send(frame(2))

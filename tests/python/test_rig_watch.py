@@ -366,6 +366,56 @@ def test_the_page_is_on_this_machine_alone_and_behind_its_word(page: str) -> Non
             socket.create_connection((address_of_machine, int(address[1])), 5.0).close()
 
 
+def test_a_name_of_somebody_else_that_means_this_machine_gets_nothing(page: str) -> None:
+    """DNS rebinding: the browser takes the page for one of the attacker, and sends his name as its host."""
+    address = re.fullmatch(r"http://127\.0\.0\.1:(\d+)(/[\w-]{20,})", page)
+    assert address is not None
+    port, path = int(address[1]), address[2]
+
+    def answer(host: str | None, what: str) -> int:
+        with socket.create_connection(("127.0.0.1", port), 10.0) as stream:
+            said = "" if host is None else f"Host: {host}\r\n"
+            stream.sendall(f"GET {what} HTTP/1.1\r\n{said}Connection: close\r\n\r\n".encode())
+            return int(stream.recv(64).split()[1])
+
+    for host in ("127.0.0.1", f"127.0.0.1:{port}", f"localhost:{port}", "LOCALHOST", "localhost:5006"):
+        assert answer(host, path) == 200, host
+    for host in (f"evil.example:{port}", "evil.example", f"127.0.0.1.evil.example:{port}", f"localhost.evil:{port}",
+                 "10.0.0.1", f"evil.example:{port}@127.0.0.1", None):  # fmt: skip
+        for what in (path, f"{path}/ws", "/static/js/bokeh.min.js", f"{path}/metadata"):
+            assert answer(host, what) in (400, 403), (host, what)
+
+
+@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="no /proc")
+def test_the_word_stands_in_the_arguments_of_no_process(tmp_path: Path) -> None:
+    pytest.importorskip("bokeh")
+    told, browser = tmp_path / "told", tmp_path / "browser"
+    browser.write_text(f'#!/bin/sh\nprintf "%s" "$*" > "{told}.new"\nmv "{told}.new" "{told}"\n', encoding="utf-8")
+    browser.chmod(0o700)
+    command = [sys.executable, "-m", "mgdd", "rig", "watch", str(small_record(tmp_path / "run.rec"))]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "BROWSER": str(browser)}
+    ) as watching:
+        assert watching.stdout is not None
+        url = watching.stdout.readline().strip()
+        assert becomes(told.exists)
+        word, arguments = url.rpartition("/")[2], told.read_text(encoding="utf-8")
+        assert len(word) > 20
+        assert word not in arguments
+        for process in Path("/proc").glob("[0-9]*/cmdline"):
+            try:
+                assert word.encode() not in process.read_bytes()
+            except OSError:
+                continue
+        way = Path(arguments.removeprefix("file://"))
+        assert f'url={url}"' in way.read_text(encoding="utf-8")
+        assert way.parent.stat().st_mode & 0o077 == 0
+        assert os.getpriority(os.PRIO_PROCESS, watching.pid) > os.getpriority(os.PRIO_PROCESS, 0)
+        watching.send_signal(signal.SIGINT)
+        watching.wait(30.0)
+    assert not way.exists()
+
+
 def _addresses() -> list[str]:
     try:
         return sorted({info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)})

@@ -25,20 +25,19 @@ namespace {
 
 using namespace rig;
 
-// Name, layout, number while driven, number with an open bridge, raw value that says that there is none.
-using SignalArgument =
-    std::tuple<std::string, SignalLayout, double, std::optional<double>, std::optional<std::uint64_t>>;
+// Name, layout, number while driven, number with an open bridge, raw values that say that there is none.
+using SignalArgument = std::tuple<std::string, SignalLayout, double, std::optional<double>, std::vector<std::uint64_t>>;
 using MessageArgument = std::tuple<std::uint32_t, bool, int, std::optional<E2eSettings>, std::vector<SignalArgument>>;
 
 template <class SignalOf>
 MessageOf<SignalOf> message_of(const MessageArgument& given) {
   const auto& [id, extended, size, protection, signals] = given;
   MessageOf<SignalOf> message{.id = id, .extended = extended, .size = size, .protection = protection};
-  for (const auto& [name, layout, fixed, at_rest, missing_raw] : signals) {
+  for (const auto& [name, layout, fixed, at_rest, missing_raws] : signals) {
     if constexpr (std::is_same_v<SignalOf, CommandedSignal>) {
       message.signals.push_back({parse_name<Commanded>("signals", name), layout, fixed, at_rest});
     } else {
-      message.signals.push_back({parse_name<Measured>("signals", name), layout, missing_raw});
+      message.signals.push_back({parse_name<Measured>("signals", name), layout, missing_raws});
     }
   }
   return message;

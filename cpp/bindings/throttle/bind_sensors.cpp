@@ -83,7 +83,7 @@ sum_tolerance_v : float
 low_v, high_v : float
     Range of a healthy sensor [V].
 debounce_s : float
-    A check must fail without a break for so long before the fault counts [s].
+    So long a check must fail before the fault counts [s]; a sample that passes takes back half of one.
 
 Raises
 ------

@@ -49,7 +49,8 @@ void ThrottleSupervisor::raise(Mode mode, Reason reason) noexcept {
 
 bool ThrottleSupervisor::raise_after(Count which, bool failing, double after_s, Mode mode, Reason reason) noexcept {
   double& count = state_.counts[which];
-  count = failing ? count + 1.0 : 0.0;
+  const double most = std::ceil(after_s / settings_.sample_s);
+  count = is_input(which) ? leaky(count, 1.0, failing, most) : failing ? count + 1.0 : 0.0;
   const bool raised = failing && lasted(count, settings_.sample_s, after_s);
   if (raised) raise(mode, reason);
   return raised;
@@ -83,6 +84,7 @@ void ThrottleSupervisor::look_at_angles(const SupervisorInputs& in) noexcept {
   s.trusted = !late;
   if (!arrived || late) raise(Mode::holding, silent);
   if (lasted(s.silence_s / set.sample_s, set.sample_s, set.silence_s)) raise(Mode::limp_home, silent);
+  (void)raise_after(no_angle, !arrived || late, set.silence_s, Mode::limp_home, silent);
   if (!arrived || late) return;
 
   const Domain range = closed(set.plate.closed_deg - set.range_margin_deg, set.plate.open_deg + set.range_margin_deg);

@@ -121,7 +121,9 @@ FrameVerdict FrameCodec::read(const Frame& frame, Measurements& now) noexcept {
     bool angle = false;
     for (const MeasuredSignal& signal : message.signals) {
       const auto at = static_cast<std::size_t>(signal.what);
-      const bool missing = signal.missing_raw && unpack_raw(signal.layout, frame.payload()) == signal.missing_raw;
+      const auto& raws = signal.missing_raws;
+      const bool missing =
+          std::find(raws.begin(), raws.end(), unpack_raw(signal.layout, frame.payload())) != raws.end();
       const std::optional<double> value = unpack(signal.layout, frame.payload());
       const double number = missing ? unknown : value.value_or(unknown);
       if (missing ? at < n_needed : !std::isfinite(number)) return FrameVerdict::bad;

@@ -48,7 +48,7 @@ void SafetyGate::note(SafetyReason reason) noexcept {
 
 void SafetyGate::note_after(Streak which, double growth, bool failing, double most, SafetyReason reason) noexcept {
   double& streak = s_.streaks[which];
-  streak = failing ? streak + growth : 0.0;
+  streak = control::leaky(streak, growth, failing, most);
   if (failing && streak >= most) note(reason);
 }
 
@@ -137,7 +137,9 @@ void SafetyGate::observe(const SafetyFacts& facts) noexcept {
   look_at_motor(cycles);
   if (f.bus >= envelope_.bus_fault_from) note(Reason::bus_fault);
   note_after(unsent, 1.0, !f.sent, envelope_.unsent_cycles, Reason::not_sent);
-  note_after(missed, late, f.missed_deadlines > 0, envelope_.missed_deadlines, Reason::deadlines);
+  double& row = s_.streaks[missed];
+  row = late > 0.0 ? row + late : 0.0;
+  if (row >= envelope_.missed_deadlines) note(Reason::deadlines);
   if (s_.streaks[invalid] >= envelope_.invalid_duties) note(Reason::invalid_duty);
   const bool quiet = s_.cause == Reason::none && f.bad_frames == 0 && !s_.holding && f.sent &&
                      f.missed_deadlines == 0 && s_.sensor_cause == Reason::none;

@@ -44,7 +44,7 @@ SensorSampler::SensorSampler(const SensorPair& pair, double sample_s, std::uint6
   filter_ = pair.lag_s > 0.0 ? -std::expm1(-sample_s / pair.lag_s) : 1.0;
   lsb_v_ = pair.lsb_v();
   highest_v_ = pair.supply_v - lsb_v_;
-  debounce_ = std::max<std::int64_t>(1, std::llround(pair.debounce_s / sample_s));
+  debounce_ = std::max(1.0, std::round(pair.debounce_s / sample_s));
 }
 
 double SensorSampler::faulty(std::size_t which, double volts, double time_s) noexcept {
@@ -87,7 +87,7 @@ SensorReading SensorSampler::step(double angle_deg) noexcept {
   out.range_fault = {!check.in_range[0], !check.in_range[1]};
   out.sum_fault = !check.agree;
   out.angle_deg = pair_.angles_deg(out.volts)[check.usable()];
-  state_.failing = check.healthy() ? 0 : state_.failing + 1;
+  state_.failing = control::leaky(state_.failing, 1.0, !check.healthy(), debounce_);
   state_.fault = state_.fault || state_.failing >= debounce_;
   out.fault = state_.fault;
   ++state_.sample;

@@ -130,13 +130,18 @@ def _node(args: argparse.Namespace) -> None:
     log = None if args.truth is None else TruthLog(args.truth)
     try:
         with noted_signals() as stopped, CanTransport.parse(args.bus) as bus:
-            bus.claim({message.key for message in signal_map.measurements.values()})
             args.progress.close()
             _say(args, f"{signal_map.file.stem} on {bus.name}: ready")
             run_node(
                 core, bus, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped), **_NODE.given(args)
             )
-            counts = {"samples": core.samples, "late": core.late, "mode": core.gate.mode, "reason": core.gate.reason}
+            counts = {
+                "samples": core.samples,
+                "late": core.late,
+                "foreign": core.foreign,
+                "mode": core.gate.mode,
+                "reason": core.gate.reason,
+            }
             counts |= {"gate": core.gate.counts, **bus.counters}
     finally:
         if log is not None:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import webbrowser
+from html import escape
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from mgdd.cli.from_library import Options
@@ -16,6 +20,7 @@ from mgdd.rig import watch
 __all__ = ["add"]
 
 _LAST_PORT = 65_535
+_NICE = 10  # a loop that is late costs more than a picture that is
 _OPTIONS = Options(watch, "port", signal_map="map")
 
 
@@ -34,6 +39,17 @@ def add(verbs: Any) -> None:
     parser.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
 
 
+def _way_to(address: str, folder: Path) -> Path:
+    """Write a page that leads to the address: all users of the machine may read the arguments of a browser."""
+    file = folder / "mgdd.html"  # in a folder of this user alone
+    file.write_text(
+        f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={escape(address)}">'
+        f'<title>mgdd rig watch</title><a href="{escape(address)}">mgdd rig watch</a>\n',
+        encoding="utf-8",
+    )
+    return file
+
+
 def _watch(args: argparse.Namespace) -> None:
     from mgdd.io.extras import import_extra
     from mgdd.rig.can.node import parent_watch
@@ -48,13 +64,17 @@ def _watch(args: argparse.Namespace) -> None:
     args.progress.close()
     source = source_of(args.source, how["signal_map"])
 
-    def ready(address: str) -> None:
-        print(address, file=sys.stderr if args.json else sys.stdout, flush=True)
-        if not args.no_browser:
-            webbrowser.open(address)
+    with TemporaryDirectory(prefix="mgdd-watch-", ignore_cleanup_errors=True) as folder:
 
-    try:
-        serve(source, how["port"], ready, alive=parent_watch())
-    finally:
-        source.close()
+        def ready(address: str) -> None:
+            if hasattr(os, "nice"):
+                os.nice(_NICE)  # now that the simulation has begun: that one shall not yield
+            print(address, file=sys.stderr if args.json else sys.stdout, flush=True)
+            if not args.no_browser:
+                webbrowser.open(_way_to(address, Path(folder)).as_uri())
+
+        try:
+            serve(source, how["port"], ready, alive=parent_watch())
+        finally:
+            source.close()
     emit(args, {"watched": source.name, "said": source.said, "trouble": source.trouble})

@@ -27,8 +27,8 @@ class LoopMessage:
         Of the command: numbers that never change.
     switched : sequence of (SignalLayout, float, float)
         Of the command: a number while the actuator is driven and one with an open bridge, a mode for example.
-    missing : mapping of str to int
-        Of a received message: raw value by signal that marks a missing number. One of the three that a loop
+    missing : mapping of str to sequence of int
+        Of a received message: raw values by signal that mark a missing number. One of the three that a loop
         needs makes its frame a bad one, of another the number is NaN.
     extended : bool
         29-bit identifier.
@@ -53,7 +53,7 @@ class LoopMessage:
     signals: Mapping[str, SignalLayout]
     fixed: Sequence[tuple[SignalLayout, float]] = field(default=())
     switched: Sequence[tuple[SignalLayout, float, float]] = field(default=())
-    missing: Mapping[str, int] = field(default_factory=dict)
+    missing: Mapping[str, Sequence[int]] = field(default_factory=dict)
     extended: bool = False
     size: int = 8
     protection: E2eSettings | None = None
@@ -61,9 +61,9 @@ class LoopMessage:
     def to_core(self) -> tuple[Any, ...]:
         """Give what the core takes."""
         signals: list[tuple[Any, ...]] = [
-            (name, layout, 0.0, None, None if (raw := self.missing.get(name)) is None else raw % 2**64)
+            (name, layout, 0.0, None, [raw % 2**64 for raw in self.missing.get(name, ())])
             for name, layout in self.signals.items()
         ]
-        signals += [("fixed", layout, float(number), None, None) for layout, number in self.fixed]
-        signals += [("fixed", layout, float(driven), float(open_), None) for layout, driven, open_ in self.switched]
+        signals += [("fixed", layout, float(number), None, []) for layout, number in self.fixed]
+        signals += [("fixed", layout, float(driven), float(open_), []) for layout, driven, open_ in self.switched]
         return (self.can_id, self.extended, self.size, self.protection, signals)

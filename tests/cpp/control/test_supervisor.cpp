@@ -147,7 +147,8 @@ TEST(Supervisor, SensorsThatDisagreeAreBothNotUsedAndAGlitchPasses) {
     EXPECT_EQ(s.observe(in).angle_deg, 30.0);
     EXPECT_EQ(s.decide(0.9).duty, s.settings().plate.spring.at(30.0));
   }
-  EXPECT_EQ(hold(s, at(30.0)).mode, Mode::normal);
+  for (int k = 0; k < 38; ++k)  // a glitch is forgotten after twice its time
+    EXPECT_EQ(hold(s, at(30.0)).mode, Mode::normal);
   EXPECT_EQ(opens_after(s, in, Reason::sensor_disagreement), 20);
 }
 
@@ -322,6 +323,33 @@ TEST(Supervisor, EveryBadSettingIsNamedAndEveryNameHasAValue) {
   EXPECT_EQ(names<SupervisorMode>().size(), 4u);
   EXPECT_EQ(names<SupervisorReason>().size(), 14u);
   EXPECT_EQ(names<ReturnTest>().size(), 4u);
+}
+
+// Wrong for 19 ms of every 20: never for 20 ms in a row.
+TEST(Supervisor, AnInputThatLooksWellNowAndThenOpensTheBridge) {
+  SupervisorInputs odd = at(30.0), jumped = at(30.0), lost = at(30.0), late = at(30.0), dark = at(30.0);
+  odd.angle_deg[1] = 40.0;
+  jumped.angle_deg[0] = 140.0;
+  lost.angle_deg = {nan, nan};
+  late.age_s = 0.0035;
+  dark.supply_v = 5.0;
+  SupervisorInputs aimless = at(30.0);
+  aimless.reference_deg = nan;
+  for (const SupervisorInputs& in : {odd, jumped, lost, late, dark, aimless}) {
+    ThrottleSupervisor s(lively());
+    settle(s, 30.0);
+    int k = 0;
+    for (; k < 200 && !s.order().bridge_open; ++k)
+      (void)hold(s, k % 20 == 10 ? at(30.0) : in);
+    EXPECT_GE(k, 20);
+    EXPECT_LT(k, 50) << name_of(s.order().reason);
+  }
+  for (const SupervisorInputs& in : {odd, jumped, lost, late, aimless}) {  // one in four adds up to nothing
+    ThrottleSupervisor s(lively());
+    settle(s, 30.0);
+    for (int k = 0; k < 4000; ++k)
+      ASSERT_FALSE(hold(s, k % 4 == 0 ? in : at(30.0)).bridge_open) << k;
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Safety gate: the duty that leaves, the way through its states, requests, no allocation.
 #include "mgdd/rig/safety_gate.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -117,6 +118,7 @@ TEST(SafetyGate, ADutyThatIsNotFiniteIsAFaultUntilAFiniteOneComes) {
   EXPECT_EQ(cycle(gate, healthy(), nan).duty, 0.125);
   EXPECT_EQ(cycle(gate, healthy(), nan).duty, 0.125);
   EXPECT_EQ(cycle(gate, healthy(), 0.0625).duty, 0.0625);
+  pass(gate, 3);  // a good one takes back half of a bad one
   EXPECT_EQ(leaves_after(gate, healthy(), nan), 3);
 }
 
@@ -243,6 +245,39 @@ TEST(SafetyGate, AllocatesNothing) {
     (void)gate.audit().pop();
   }
   EXPECT_EQ(counter.count(), 0u);
+}
+
+// Good for one cycle of every four or twenty: never failing for `sensor_cycles` in a row where these are as many.
+TEST(SafetyGate, SensorsThatLookWellNowAndThenAreAFault) {
+  SafetyEnvelope e = narrow();
+  e.sensor_cycles = 20.0;
+  SafetyFacts odd = healthy(), outside = healthy(), away = healthy();
+  odd.sensor_v = {1.5, 3.9};
+  outside.sensor_v = {0.0, 3.5};
+  away.angle_deg = 120.0;
+  for (const SafetyFacts& facts : {odd, outside, away}) {
+    for (const int every : {4, 20}) {
+      SafetyGate gate = running(e);
+      int k = 0;
+      for (; k < 200 && gate.state() == SafetyState::run; ++k)
+        (void)cycle(gate, k % every == every - 1 ? healthy() : facts);
+      EXPECT_EQ(gate.state(), SafetyState::fault);
+      EXPECT_GE(k, 20);
+      EXPECT_LT(k, 40);
+    }
+    SafetyGate gate = running(e);
+    for (int k = 0; k < 3000; ++k)
+      (void)cycle(gate, k % 4 == 0 ? facts : healthy());
+    EXPECT_EQ(gate.state(), SafetyState::run);
+  }
+  SafetyFacts swinging = healthy();  // agrees with itself and jumps by 1 V, where half a volt a cycle is a sensor
+  SafetyGate gate = running(e);
+  int k = 0;
+  for (; k < 200 && gate.state() == SafetyState::run; ++k) {
+    swinging.sensor_v = std::array{1.5 + 1.5 * (k % 2), 3.5 - 1.5 * (k % 2)};
+    (void)cycle(gate, swinging);
+  }
+  EXPECT_EQ(gate.state(), SafetyState::fault);
 }
 
 }  // namespace

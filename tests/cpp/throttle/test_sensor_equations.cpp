@@ -1,6 +1,7 @@
 // The pair of sensors sample by sample against its equations, with settings that differ from their defaults.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -159,7 +160,7 @@ TEST(SensorEquations, TheFaultStandsAfterTheDebounceTimeOfEachCheck) {
     for (int k = 0; k < 12; ++k) {
       const bool fault = sampler.step(30.0).fault;
       EXPECT_EQ(fault, k >= 6) << k;
-      EXPECT_EQ(sampler.state().failing, k < 2 ? 0 : k - 1) << k;
+      EXPECT_EQ(sampler.state().failing, k < 2 ? 0 : std::min(k - 1, 5)) << k;
     }
   }
   SensorPair at_once = exact_pair();

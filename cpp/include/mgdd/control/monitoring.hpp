@@ -3,6 +3,7 @@
 // the callers. noexcept and allocation-free; NaN counts as what did not arrive and fails every check.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -17,6 +18,15 @@ inline constexpr double sample_rounding = 1e-6;
 /// Whether so many samples make up the time.
 inline bool lasted(double samples, double sample_s, double time_s) noexcept {
   return (samples + sample_rounding) * sample_s >= time_s;
+}
+
+/// What a good sample takes back from the count of failing ones: an input that fails in more than every third sample is
+/// told in the end, however often it looks well between; rarer ones never add up.
+inline constexpr double leak = 0.5;
+
+/// Count of failing samples after these, never above `most`: what was told long ago does not last.
+inline double leaky(double count, double samples, bool failing, double most) noexcept {
+  return failing ? std::min(count + samples, std::max(count, most)) : std::max(0.0, count - leak * samples);
 }
 
 /// Whether an age is beyond the largest one.

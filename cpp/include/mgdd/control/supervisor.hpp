@@ -181,16 +181,19 @@ class ThrottleSupervisor {
  private:
   enum Count : std::uint8_t {
     no_reference,
+    no_angle,
     bad_sensor,
     no_duty,
     low,
-    lost,
+    lost,  // the last input
     jam,
     too_far_closed,
     too_far_open,
     overload,
     n_counts
   };
+  // An input that looks well now and then is as bad; an error or a duty may be large as often as it likes.
+  static constexpr bool is_input(Count which) noexcept { return which <= lost; }
   enum Filter : std::uint8_t { angle_once, angle_twice, excess_once, excess_twice, rate, quick_rate, n_filtered };
 
   /// Everything that changes from sample to sample.
@@ -205,7 +208,7 @@ class ThrottleSupervisor {
     bool trusted = false;                   // the angle is of now
     double silence_s;                       // since the last angle
     double supply_v;                        // nominal where unknown
-    std::array<double, n_counts> counts{};  // samples in a row
+    std::array<double, n_counts> counts{};  // failing samples
     double open = 0.0, quiet = 0.0;
     double anchor_deg = 0.0;  // from where a pushed plate has to move
     bool filtering = false;

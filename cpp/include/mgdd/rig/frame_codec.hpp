@@ -33,7 +33,7 @@ enum class Commanded {
 struct MeasuredSignal {
   Measured what{};
   SignalLayout layout{};
-  std::optional<std::uint64_t> missing_raw{};  ///< raw value of a missing number
+  std::vector<std::uint64_t> missing_raws{};  ///< raw values of a missing number
 };
 struct CommandedSignal {
   Commanded what{};

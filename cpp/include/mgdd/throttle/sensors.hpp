@@ -29,7 +29,7 @@ struct SensorPair {
   double sum_tolerance_v = 0.2;
   double low_v = 0.2;  ///< range of a healthy sensor
   double high_v = 4.8;
-  double debounce_s = 0.2;  ///< a check must fail without a break for so long
+  double debounce_s = 0.2;  ///< so long a check must fail; a sample that passes takes back half of one
 
   bool operator==(const SensorPair&) const = default;
 
@@ -79,8 +79,8 @@ struct SensorState {
   std::array<double, 2> filtered_v{};
   std::array<std::optional<double>, 2> stuck_v{};
   std::int64_t sample = 0;
-  std::int64_t failing = 0;  ///< samples in a row with a failing check
-  bool fault = false;        ///< latched
+  double failing = 0.0;  ///< samples with a failing check, less half of those that passed since
+  bool fault = false;    ///< latched
 };
 
 struct SensorReading {
@@ -130,7 +130,7 @@ class SensorSampler {
   double sample_s_, filter_, lsb_v_, highest_v_;
   std::uint64_t seed_;
   std::array<SensorFault, 2> faults_;
-  std::int64_t debounce_;
+  double debounce_;
   SensorState state_;
 };
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -11,13 +12,30 @@ from pathlib import Path
 from typing import Any
 
 from mgdd._core.rig import SignalLayout
-from mgdd.errors import DataError, did_you_mean
+from mgdd.errors import DataError, Error, did_you_mean
 from mgdd.io.extras import import_extra
 from mgdd.io.files import bytes_of, decoded, existing_file
 
 __all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
 
-_MISSING = ("invalid", "sna", "signal_not_available", "not_available")  # names of a raw value that says: no value
+_LOG = logging.getLogger(__name__)
+
+# What a value table calls a raw value that is no measurement, in words of lower case: of every signal, and of one that
+# carries a quantity: a switch or a state machine may well be in the state "error".
+_NO_VALUE = (
+    r"s ?n ?a|n ?a|(?:not|no) ?(?:avail(?:able)?|valid|present|defined|supported|value|data|signal|measurement|info)|"
+    r"unavail(?:able)?|inv(?:alid|ld)?|undef(?:ined)?|unknown|missing|reserved|ungueltig|ungültig|"
+    r"nicht (?:verfuegbar|verfügbar)"
+)
+_WRONG = (
+    r"err(?:or)?|fault(?:y|ed)?|fail(?:ed|ure)?|defect(?:ive)?|defekt|fehler|broken|implausible|unplausible|"
+    r"not plausible|out of range|(?:short|open) circuit|short to (?:ground|gnd|battery|supply)|(?:open|broken) wire"
+)
+_FILLERS = r"signal|sig|sensor|value|val|data|indicator|is|the|or|and|[0-9]+|0x[0-9a-f]+"
+_WORDS = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöüß])|[A-ZÄÖÜ]?[a-zäöüß]+|0x[0-9A-Fa-f]+|[0-9]+")
+_IS_NO_VALUE = re.compile(rf"(?:(?:{_FILLERS}) )*(?:(?:{_NO_VALUE}) (?:(?:{_FILLERS}) )*)+")
+_IS_WRONG = re.compile(rf"(?:(?:{_FILLERS}) )*(?:(?:{_NO_VALUE}|{_WRONG}) (?:(?:{_FILLERS}) )*)+")
+_MOST_SAID = 200  # letters of what the parser says: it may quote half a file
 
 # What the parser would allocate or count without a bound, looked for outside of texts in quotes and comments.
 _QUOTED = re.compile(r'"(?:\\"|[^"])*?"|//[^\n]*')
@@ -38,10 +56,23 @@ class DbcSignal:
     name: str
     layout: SignalLayout
     unit: str  # "-" if it has none
-    choices: Mapping[str, int] = field(default_factory=dict)  # raw value by its name in the value table
-    missing_raw: int | None = None  # raw value that means that the value is missing
+    names: Mapping[int, str] = field(default_factory=dict)  # of raw values, by its value table
+    missing_raws: tuple[int, ...] = ()  # raw values that are no measurement; the first one is sent for what is missing
     branches: tuple[int, ...] = ()  # values of the multiplexer that select it; none: always there
     multiplexer: bool = False  # whether it selects others
+
+    @property
+    def choices(self) -> dict[str, int]:
+        """Raw value by its name; of several of one name the first."""
+        out: dict[str, int] = {}
+        for raw, name in self.names.items():
+            out.setdefault(name, raw)
+        return out
+
+    @property
+    def missing_raw(self) -> int | None:
+        """Raw value that says that the value is missing; None where the signal cannot say it."""
+        return next(iter(self.missing_raws), None)
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -81,31 +112,48 @@ class DbcFile:
     file: Path
     sha256: str
     messages: Mapping[str, DbcMessage]
+    odd: Mapping[str, str] = field(default_factory=dict)  # messages that cannot be mapped, and why
 
     @classmethod
     def read(cls, path: Path) -> DbcFile:
-        """Read a file strictly; DataError where it is not a DBC, or its signals overlap or leave their message."""
+        """Read a file; DataError where it is not a DBC.
+
+        A message that cannot be mapped (signals that overlap, a multiplexer below another one, a factor of 0) is named
+        in the log, and by `message`; the others are there.
+        """
         cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
         content = bytes_of(file)
         text = decoded(content, str(file))
         _require_bounded(file, text)
         try:
-            database = cantools.database.load_string(text, database_format="dbc", strict=True)
-            messages = {message.name: _message(file, message) for message in database.messages}
-            _require_once(file, database.messages)
-        except DataError:
-            raise
-        except cantools.Error as error:
-            raise DataError(
-                f"{file}: {error}; correct the file, signals must fit their message and not overlap"
-            ) from error
+            logging.getLogger("cantools").setLevel(logging.ERROR)  # of one identifier twice we speak ourselves
+            database = cantools.database.load_string(text, database_format="dbc", strict=False)
         except Exception as error:  # the parser raises what it stumbles over
-            raise DataError(f"{file}: cannot be read as a DBC: {error}; correct the file") from error
-        return cls(file=file, sha256=hashlib.sha256(content).hexdigest(), messages=messages)
+            said = " ".join(str(error).split())
+            said = said if len(said) <= _MOST_SAID else f"{said[:_MOST_SAID]}…"
+            raise DataError(
+                f"{file}: cannot be read as a DBC: {said}; correct it there, or map a copy of the file that has only "
+                "the messages you need"
+            ) from error
+        odd = _taken_twice(database.messages)
+        messages: dict[str, DbcMessage] = {}
+        for message in database.messages:
+            if message.name in odd:
+                continue
+            try:
+                message.refresh(strict=True)
+                messages[message.name] = _message(message)
+            except (cantools.Error, Error, ValueError, OverflowError) as error:
+                odd[message.name] = str(error)
+        for name, why in odd.items():
+            _LOG.warning("%s: message %s cannot be mapped: %s", file.name, name, why)
+        return cls(file=file, sha256=hashlib.sha256(content).hexdigest(), messages=messages, odd=odd)
 
     def message(self, name: str) -> DbcMessage:
-        """Return a message; DataError guesses which one was meant."""
+        """Return a message; DataError guesses which one was meant, or says what is wrong with it."""
+        if name in self.odd:
+            raise DataError(f"{self.file}: message {name}: {self.odd[name].removesuffix('.')}; correct the file")
         if name in self.messages:
             message = self.messages[name]
             if message.size > _BYTES:
@@ -140,17 +188,17 @@ def _require_bounded(file: Path, text: str) -> None:
         raise DataError(f"{file}: SG_MUL_VAL_ names {branches} values: at most {_BRANCHES} are read; narrow the ranges")
 
 
-def _require_once(file: Path, messages: Sequence[Any]) -> None:
-    """Refuse two messages of one name or identifier: which of them is meant, nobody knows."""
+def _taken_twice(messages: Sequence[Any]) -> dict[str, str]:
+    """Find messages of one name or identifier: which of them is meant, nobody knows."""
     taken: dict[Any, str] = {}
+    odd: dict[str, str] = {}
     for message in messages:
         for key in (message.name, (message.frame_id, message.is_extended_frame)):
             if key in taken:
-                raise DataError(
-                    f"{file}: message {message.name} has the name or identifier {message.frame_id:#x} of "
-                    f"{taken[key]}: remove one"
-                )
-            taken[key] = message.name
+                for one, other in ((message.name, taken[key]), (taken[key], message.name)):
+                    odd[one] = f"it has the name or identifier {message.frame_id:#x} of {other}: remove one"
+            taken.setdefault(key, message.name)
+    return odd
 
 
 def near(name: str, known: Mapping[str, Any]) -> str:
@@ -158,14 +206,12 @@ def near(name: str, known: Mapping[str, Any]) -> str:
     return did_you_mean(name, known) or f"it has {', '.join(known) or 'none'}"
 
 
-def _message(file: Path, message: Any) -> DbcMessage:
+def _message(message: Any) -> DbcMessage:
     whole = [] if message.length > _BYTES else message.signals
     signals = {signal.name: _signal(signal) for signal in whole if signal.length <= _BITS}
     selecting = [signal.name for signal in signals.values() if signal.multiplexer]
     if len(selecting) > 1:
-        raise DataError(
-            f"{file}: {message.name} has the multiplexers {', '.join(selecting)}: at most one per message is supported"
-        )
+        raise DataError(f"it has the multiplexers {', '.join(selecting)}: at most one per message is supported")
     return DbcMessage(
         name=message.name,
         frame_id=message.frame_id,
@@ -178,7 +224,11 @@ def _message(file: Path, message: Any) -> DbcMessage:
 
 def _signal(signal: Any) -> DbcSignal:
     kind = "signed" if signal.is_signed else "unsigned"
-    choices = {str(name): int(raw) for raw, name in (signal.choices or {}).items()}
+    unit, scale, offset = signal.unit or "-", float(signal.scale), float(signal.offset)
+    wrap = 1 << signal.length if signal.is_signed else 0  # some tools write the raw values of a signed signal unsigned
+    names = {
+        int(raw) - (wrap if wrap and raw >= wrap // 2 else 0): str(name) for raw, name in (signal.choices or {}).items()
+    }
     return DbcSignal(
         name=signal.name,
         layout=SignalLayout(
@@ -186,14 +236,22 @@ def _signal(signal: Any) -> DbcSignal:
             length=signal.length,
             byte_order=signal.byte_order,
             raw_type=f"float{signal.length}" if signal.is_float else kind,
-            scale=float(signal.scale),
-            offset=float(signal.offset),
+            scale=scale,
+            offset=offset,
             minimum=None if signal.minimum is None else float(signal.minimum),
             maximum=None if signal.maximum is None else float(signal.maximum),
         ),
-        unit=signal.unit or "-",
-        choices=choices,
-        missing_raw=next((raw for name, raw in choices.items() if name.lower() in _MISSING), None),
+        unit=unit,
+        names=names,
+        missing_raws=_missing_of(names, quantity=unit != "-" or (scale, offset) != (1.0, 0.0) or signal.is_float),
         branches=tuple(signal.multiplexer_ids or ()),
         multiplexer=signal.is_multiplexer,
     )
+
+
+def _missing_of(names: Mapping[int, str], *, quantity: bool) -> tuple[int, ...]:
+    """Raw values that are no measurement by their names: "not available" first, then errors of a quantity."""
+    words = {raw: "".join(f"{word.lower()} " for word in _WORDS.findall(name)) for raw, name in names.items()}
+    missing = [raw for raw, said in words.items() if _IS_NO_VALUE.fullmatch(said)]
+    wrong = [raw for raw, said in words.items() if quantity and _IS_WRONG.fullmatch(said)]
+    return tuple(dict.fromkeys((*missing, *wrong)))

@@ -205,39 +205,40 @@ class Hub:
         now = time.monotonic() - self._start_s
         if self._injector.frozen(sender.number, now):
             return
-        for other, delivery in self._injector.deliver(identifier, data, now):
-            waiting_s = self._queueing_s(len(delivery.data), width, now)
+        for delivery in self._injector.deliver(Delivery(sender, identifier, data, extended=width > 3), now):
+            waiting_s = self._queueing_s(delivery, now)
             if waiting_s > _MOST_WAITING_S:
                 self._overload += 1
                 continue
             late = delivery.late_s + waiting_s
-            text = _text(other, width, delivery, arrived_s + late)
+            text = _text(delivery, arrived_s + late)
+            but = None if delivery.error_class else delivery.sender
             if late > 0.0:
-                asyncio.get_running_loop().call_later(late, self._write, sender, text)
+                asyncio.get_running_loop().call_later(late, self._write, but, text)
             else:
-                self._write(sender, text)
+                self._write(but, text)
 
-    def _queueing_s(self, size: int, width: int, now: float) -> float:
+    def _queueing_s(self, frame: Delivery, now: float) -> float:
         """Wait of a frame behind those before it, and its own time on the wire [s]."""
         if self._rate is None:
             return 0.0
-        bits = ((_OVERHEAD_BITS if width <= 3 else _EXTENDED_BITS) + 8 * size) * _STUFFING
+        bits = ((_EXTENDED_BITS if frame.extended else _OVERHEAD_BITS) + 8 * len(frame.data)) * _STUFFING
         free_s = max(self._free_s, now) + bits / self._rate
         if free_s - now <= _MOST_WAITING_S:
             self._free_s = free_s
         return free_s - now
 
-    def _write(self, sender: _Client, text: bytes) -> None:
+    def _write(self, but: _Client | None, text: bytes) -> None:
         now = time.monotonic() - self._start_s
         for client in list(self._clients):
-            if client is sender or self._injector.frozen(client.number, now):
+            if client is but or self._injector.frozen(client.number, now):
                 continue
             client.write(text)
 
 
-def _text(identifier: int, width: int, delivery: Delivery, at_s: float) -> bytes:
+def _text(delivery: Delivery, at_s: float) -> bytes:
     stamp = b"%.6f" % (time.time() - time.monotonic() + at_s)
     if delivery.error_class:
         return b"< error %08X %s >" % (delivery.error_class, stamp)
-    number = b"%08X" % identifier if width > 3 else b"%03X" % identifier
+    number = (b"%08X" if delivery.extended else b"%03X") % delivery.identifier
     return b"< frame %s %s %s >" % (number, stamp, delivery.data.hex().upper().encode())

@@ -39,8 +39,8 @@ def fault_of(text: str, keys: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
 class BusFault:
     """A fault of the bus, for each frame with a probability, and for a time after the start of the hub.
 
-    A frame is lost, comes twice, comes late, comes after the next one, comes with one byte changed; every client gets
-    an error frame instead of it; nothing goes to or comes from one client.
+    A frame is lost, comes twice, comes late, comes after the next one of whatever sender, comes with one byte changed;
+    every client, its sender too, gets an error frame instead of it; nothing goes to or comes from one client.
     """
 
     kind: str
@@ -74,9 +74,12 @@ class BusFault:
 
 
 class Delivery(NamedTuple):
-    """What leaves the hub for one frame: payload, how late [s], as error frame."""
+    """A frame on its way: all get it but who sent it; how late [s]; as error frame, which all get."""
 
+    sender: Any
+    identifier: int
     data: bytes
+    extended: bool = False
     late_s: float = 0.0
     error_class: int = 0
 
@@ -87,22 +90,26 @@ class FaultInjector:
     def __init__(self, faults: Sequence[BusFault], seed: int = 0) -> None:
         self._faults = tuple(faults)
         self._random = random.Random(seed)
-        self._held: list[tuple[int, Delivery]] = []
+        self._held: list[Delivery] = []
         self.counts = dict.fromkeys(KINDS, 0)
 
     def frozen(self, client: int, now_s: float) -> bool:
-        """Whether nothing goes to and comes from a client now."""
-        return any(
+        """Whether a frame does not go to, or come from, a client now."""
+        frozen = any(
             fault.kind == "freeze" and fault.client == client and fault.from_s <= now_s < fault.until_s
             for fault in self._faults
         )
+        self.counts["freeze"] += frozen
+        return frozen
 
-    def deliver(self, identifier: int, data: bytes, now_s: float) -> list[tuple[int, Delivery]]:
+    def deliver(self, frame: Delivery, now_s: float) -> list[Delivery]:
         """Say what leaves now for a frame: nothing where it was lost or is held back until the next one."""
-        out = [Delivery(data)]
+        out = [frame]
         hold = False
         for fault in self._faults:
-            if not self._strikes(fault, identifier, now_s):
+            if not self._strikes(fault, frame.identifier, now_s) or not out:
+                continue
+            if fault.kind == "corrupt" and not frame.data:
                 continue
             self.counts[fault.kind] += 1
             if fault.kind == "drop":
@@ -114,15 +121,14 @@ class FaultInjector:
             elif fault.kind == "corrupt":
                 out = [one._replace(data=self._changed(one.data)) for one in out]
             elif fault.kind == "error":
-                out = [Delivery(data, error_class=fault.error_class)]
+                out = [frame._replace(error_class=fault.error_class)]
             elif fault.kind == "reorder":
                 hold = True
-        leaving = [(identifier, one) for one in out]
         if hold and not self._held:
-            self._held = leaving
+            self._held = out
             return []
         held, self._held = self._held, []
-        return leaving + held
+        return out + held
 
     def _strikes(self, fault: BusFault, identifier: int, now_s: float) -> bool:
         if fault.kind == "freeze" or not fault.from_s <= now_s < fault.until_s:
@@ -130,8 +136,6 @@ class FaultInjector:
         return fault.id in (None, identifier) and self._random.random() < fault.p
 
     def _changed(self, data: bytes) -> bytes:
-        if not data:
-            return data
         place = self._random.randrange(len(data))
         flipped = data[place] ^ self._random.randrange(1, 256)
         return data[:place] + bytes([flipped]) + data[place + 1 :]

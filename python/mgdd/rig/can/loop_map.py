@@ -80,7 +80,7 @@ def _measurements(signal_map: SignalMap) -> Iterator[LoopMessage]:
         yield LoopMessage(
             can_id=message.message.frame_id,
             signals={name: _layout(own) for name, own in read.items()},
-            missing={n: own.signal.missing_raw for n, own in read.items() if own.signal.missing_raw is not None},
+            missing={name: own.signal.missing_raws for name, own in read.items()},
             extended=message.message.extended,
             size=message.message.size,
             protection=message.e2e,

@@ -245,7 +245,9 @@ def _raw_of(signal: DbcSignal, given: Any, table: TomlTable, key: str, size: int
     if isinstance(given, str):
         if given not in signal.choices:
             raise table.error(key, given, f"a name of its value table: {', '.join(signal.choices) or 'it has none'}")
-        return signal.choices[given]
+        if len(raws := [raw for raw, name in signal.names.items() if name == given]) > 1:
+            raise table.error(key, given, f"one of the raw values {', '.join(map(str, raws))}: all have that name")
+        return raws[0]
     if isinstance(given, bool) or not isinstance(given, int | float):
         raise table.error(key, given, "a number, or a name of its value table in quotes")
     low, high = signal.bounds

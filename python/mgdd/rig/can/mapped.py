@@ -46,9 +46,9 @@ class MappedSignal:
         return self.signal.layout.pack(payload, physical)
 
     def unpack(self, payload: bytes) -> float:
-        """Read the value; NaN where the raw value says that there is none."""
+        """Read the value; NaN where the raw value says that there is none, or an error."""
         layout = self.signal.layout
-        if self.signal.missing_raw is not None and layout.unpack_raw(payload) == self.signal.missing_raw:
+        if self.signal.missing_raws and layout.unpack_raw(payload) in self.signal.missing_raws:
             return math.nan
         physical = layout.unpack(payload)
         return physical if self.scale == 1.0 and self.offset == 0.0 else self.scale * physical + self.offset
@@ -167,7 +167,7 @@ class StateSignal:
     def name_of(self, payload: bytes) -> str:
         """Return the name of the state, or its raw number."""
         raw = self.signal.layout.unpack_raw(payload)
-        return next((name for name, value in self.signal.choices.items() if value == raw), str(raw))
+        return self.signal.names.get(int(raw), str(raw))
 
 
 def _is_in(signal: DbcSignal, branch: int | None) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import os
 import time
@@ -145,6 +146,8 @@ def run_node(
 ) -> None:
     """Serve an open bus until `keep_on`, asked once per sample and every 0.1 s of waiting, says no.
 
+    However it ends, by an error too, the bridge of a driven plant is opened first, and that is reported and logged.
+
     Parameters
     ----------
     core, bus, log, keep_on
@@ -154,9 +157,31 @@ def run_node(
     period_s : float, optional
         Time between two samples [s]; the cycle of the trigger message if left out.
     """
-    if step:
-        _run_steps(core, bus, log, keep_on)
+    try:
+        if step:
+            _run_steps(core, bus, log, keep_on)
+        else:
+            _run_clock(core, bus, period_s, log, keep_on)
+    finally:
+        _let_go(core, bus, log)
+
+
+def _let_go(core: NodeCore, bus: Bus, log: TruthLog | None) -> None:
+    """Open the bridge of a driven plant; what hinders the report of it is not the news."""
+    if not core.driven:
         return
+    frames = core.let_go()
+    with contextlib.suppress(OSError, ValueError):  # a full disk, a closed file
+        if log is not None:
+            log.write(core, time.monotonic_ns())
+    with contextlib.suppress(RigError):
+        for frame in frames:
+            bus.send(frame, final=True)
+
+
+def _run_clock(
+    core: NodeCore, bus: Bus, period_s: float | None, log: TruthLog | None, keep_on: Callable[[], bool]
+) -> None:
     period_ns = round((core.map.cycle_s if period_s is None else period_s) * 1e9)
     if period_ns < 100_000:
         raise ParameterError.of("period_s", period_s, ">= 1e-4 s")

@@ -2,11 +2,15 @@
 
 It trusts nobody: counter and CRC of every command are checked here, and what leaves for the plant passes the safety
 gate of the node. After the gate took the drive away, the host has to arm the node again with safe frames. A node that
-stood still longer than its limits allow trusts nothing that waited meanwhile.
+stood still longer than its limits allow trusts nothing that waited meanwhile. Another sender of a frame that only the
+node sends is a fault of the bus: it lets go, and can be armed again. What the plant does not measure is never sent as a
+number.
 """
 
 from __future__ import annotations
 
+import copy
+import logging
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -14,7 +18,7 @@ from typing import Any, NamedTuple, Protocol
 
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
-from mgdd.loop import Plant, VirtualThrottle
+from mgdd.loop import EngineBench, Plant, SurrogatePlant, VirtualThrottle
 from mgdd.rig.can.link import Receiver, Sender
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal
 from mgdd.rig.can.signal_map import SignalMap
@@ -23,7 +27,9 @@ from mgdd.rig.safety import SafetyEnvelope, SafetyGate
 
 __all__ = ["NodeCore", "NodePlant", "Sampled", "node_plant"]
 
+_LOG = logging.getLogger(__name__)
 _ARMING_FRAMES = 3  # safe commands in a row that arm it
+_OWN = ("command_timeout", "wrong_crc", "wrong_counter")  # values of the node, not of its plant
 _COUNTER_ERRORS = ("repeated", "lost", "wrong_counter")
 
 
@@ -47,6 +53,10 @@ class NodePlant(Protocol):
         """Time in the plant per sample [s]; None: that of the map."""
         ...
 
+    def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...] | None:
+        """Give the names of what it measures at some inputs, and take no time; None where only a sample tells."""
+        ...
+
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
         """Tell a gate what the sensors say, as `mgdd.rig.SafetyGate.observe` takes it; no time passes."""
         ...
@@ -65,12 +75,18 @@ class _Throttle:
         self.input_names = tuple(name for name in plant.input_names if name != "bridge_open")
         self.sample_s: float | None = plant.sample_s
 
+    def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...]:  # noqa: ARG002 - a throttle always measures
+        return tuple(self._known())
+
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
+        return facts_of(self._known(), envelope.cycle_s)
+
+    def _known(self) -> Mapping[str, float]:
         if self._values is None:  # nothing was sampled yet: a look ahead, taken back
             before = self._plant.state
             self.sample(None)
             self._plant.state = before
-        return facts_of(self._values, envelope.cycle_s)
+        return self._values or {}
 
     def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
         given = dict.fromkeys(self.input_names, 0.0) if inputs is None else dict(inputs)
@@ -88,6 +104,12 @@ class _Cyclic:
         self._plant = plant
         self.input_names = tuple(plant.input_names)
         self.sample_s: float | None = None
+
+    def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...] | None:
+        if not isinstance(self._plant, EngineBench | SurrogatePlant):
+            return None  # to run a plant of somebody else may cost more than time
+        ahead = _Cyclic(copy.deepcopy(self._plant))
+        return tuple(ahead.sample(inputs).values)
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
         # No plate to look at: told one in mid-travel, the same gate judges commands alone. An `ActuatorGuard` needs
@@ -129,7 +151,7 @@ class NodeCore:
                 f"those of the plant, {', '.join(plant.input_names)}",
             )
         self.plant, self.map = plant, signal_map
-        self.samples = self.late = 0
+        self.samples = self.late = self.foreign = 0  # foreign: frames that only this node may send
         self.last: Sampled | None = None
         self._receiver = Receiver(signal_map.commands)
         self._sender = Sender()
@@ -143,6 +165,11 @@ class NodeCore:
         self._is_asked_to_arm = False
         self._troubles: set[str] = set()  # why the drive was taken away so far, as ETB_Diag names it
         self._timeouts_s = {name: m.timeout_s for name, m in signal_map.commands.items() if m.timeout_s is not None}
+        self._own_keys = {message.key for message in signal_map.measurements.values()}
+        self._second_sender = False
+        middle = {name: 0.5 * (entry.lower + entry.upper) for name, entry in signal_map.inputs.items()}
+        self._known_values = plant.value_names(middle)
+        self._require_sayable()
         self._codes = {} if signal_map.state is None else signal_map.state.codes()
         trigger = signal_map.measurements[signal_map.trigger]
         last = [m for m in signal_map.measurements.values() if m is not trigger]
@@ -173,6 +200,10 @@ class NodeCore:
 
         That is the tick of a node that runs step by step. One with a clock gives the time: late frames are left out.
         """
+        if (frame.id, frame.extended) in self._own_keys:
+            self._second_sender = True
+            self.foreign += 1
+            return False
         if now_ns is not None and frame.monotonic_ns < max(self._deaf_until_ns, now_ns - round(self.patience_s * 1e9)):
             self.late += 1
             return False
@@ -219,6 +250,12 @@ class NodeCore:
             self.last = self.plant.sample(inputs)
         return self._report(self.last or Sampled(values={}, applied={}))
 
+    def let_go(self) -> list[Frame]:
+        """Open the bridge now; give the frames that report a sample without drive."""
+        self.gate.abort()
+        self.last = self.plant.sample(None)
+        return self._report(self.last)
+
     def _use(self, message: MappedMessage, payload: bytes) -> bool:
         """Take the inputs; False where one is not finite. A duty that is not, the gate judges."""
         inputs = message.read(payload)
@@ -255,9 +292,11 @@ class NodeCore:
                 "bad_frames": bad,
                 "age_s": None if age_s is None else max(age_s, facts["age_s"]),
                 "missed_deadlines": missed,
+                "bus": "off" if self._second_sender else "active",
                 "request": self._request(),
             }
         )
+        self._second_sender = False
         drive = self.gate.command(self._inputs.get("duty", 0.0))
         if was_driven and self.gate.mode == "limp":
             if self.gate.reason == "stale" and (age_s is None or age_s >= facts["age_s"]):
@@ -278,14 +317,32 @@ class NodeCore:
             return "none" if drives else "stop"  # at rest, or in a mode that this node does not have
         return "run" if drives else "none"
 
+    def _require_sayable(self) -> None:
+        """Refuse a map with a value that the plant does not measure and its signal cannot say to be missing."""
+        if self._known_values is None:
+            return
+        known = dict.fromkeys((*self._known_values, *_OWN), 0.0)
+        for message in self.map.measurements.values():
+            if lacking := _unsayable(message.signals, known):
+                raise ParameterError.of(
+                    f"values of {message.name}", ", ".join(lacking),
+                    f"measured by the plant ({', '.join(self._known_values)}), or give the signal a raw value "
+                    '"not available" in its value table (VAL_), or take it out of the map',
+                )  # fmt: skip
+            if lacking := [name for name in message.signals if name not in known]:
+                _LOG.warning("%s: the plant does not measure %s: sent as missing", message.name, ", ".join(lacking))
+
     def _report(self, sampled: Sampled) -> list[Frame]:
-        own = {name: float(name in self._troubles) for name in ("command_timeout", "wrong_crc", "wrong_counter")}
+        own = {name: float(name in self._troubles) for name in _OWN}
         values = {**own, **sampled.values}
+        stands = not sampled.values  # an engine: it measures nothing, and its state says so
         frames: list[Frame] = []
         for message in self._order:
             every = round((message.message.cycle_s or self.map.cycle_s) / self.map.cycle_s)
             if self.samples % max(1, every):
                 continue
+            if not stands and _unsayable(message.signals, values):
+                continue  # no number is better than a wrong one: its receiver sees it grow old
             raws: dict[str, Any] = {}
             state = self.map.state
             if state is not None and state.message == message.name:
@@ -297,8 +354,17 @@ class NodeCore:
         return frames
 
 
+def _unsayable(entries: Mapping[str, MappedSignal], values: Mapping[str, float]) -> list[str]:
+    """Names of what is missing and cannot be said to be."""
+    return [
+        name
+        for name, entry in entries.items()
+        if entry.signal.missing_raw is None and math.isnan(values.get(name, math.nan))
+    ]
+
+
 def _carried(entries: Mapping[str, MappedSignal], values: Mapping[str, float]) -> dict[str, float]:
-    """Give what the signals can carry: what is missing is NaN, or left at 0 where a signal has no NaN."""
+    """Give what the signals can carry: what is missing is NaN; of an engine that stands flags and counters are 0."""
     given = {name: float(values.get(name, math.nan)) for name in entries}
     return {
         name: value

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +33,7 @@ RUN = _core.rig.safety_states.index("run")
 _MAP_NAMES = {own: name for name, own in LOOP_NAMES.items()}
 _SENT = _core.rig.send_results.index("sent")
 _NOTHING = math.nan
+_KEPT = ("cycle", "asked_duty", "duty", "applied_duty", "sensed_angle_deg")  # what the result of a task needs
 
 
 class LoopSamples:
@@ -53,7 +54,7 @@ class LoopSamples:
         self._missing = dict.fromkeys(value_names, math.nan)
         self._before: dict[str, float] | None = None
         self._told, self._untold = 0, deque[Cycle]()
-        self._rows: list[dict[str, float]] = []
+        self._kept = _columns()
         self._first: int | None = None
         self._running = False
 
@@ -86,7 +87,7 @@ class LoopSamples:
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Give what the task came to, a row per grid point; see `task_columns`."""
-        return task_columns(self._rows, self._samples)
+        return task_columns(self._kept, self._samples)
 
     def _take(self, deadline_ns: int, now: dict[str, float]) -> None:
         if self._recorder is not None:
@@ -98,7 +99,7 @@ class LoopSamples:
         if self._running and not began:
             self._first = int(now["cycle"])
         if self._first is not None and not over:
-            self._rows.append(now)
+            _keep(self._kept, now)
         if before is None:
             return
         exchange = Exchange({"duty": before["duty"]}, self._measurement(before, now))
@@ -122,21 +123,33 @@ class LoopSamples:
         )
 
 
-def task_columns(rows: Sequence[Mapping[str, float]], samples: int) -> dict[str, NDArray[np.float64]]:
+def _columns() -> dict[str, array[float]]:
+    return {name: array("d") for name in _KEPT}
+
+
+def _keep(columns: Mapping[str, array[float]], row: Mapping[str, float]) -> None:
+    """Append a row: 40 bytes, where its mapping takes 2 kB."""
+    for name, column in columns.items():
+        column.append(row[name])
+
+
+def task_columns(kept: Mapping[str, Sequence[float]], samples: int) -> dict[str, NDArray[np.float64]]:
     """Give the duty that was asked, the one that the node reports and the angle that followed, a row per grid point.
 
     The rows begin with the first driven cycle; a grid point that the loop missed has the numbers of the one before.
     """
-    cycle = np.array([row["cycle"] for row in rows])
-    done = 0 if len(rows) == 0 else min(int(cycle[-1] - cycle[0]), samples)
+    columns = {name: np.array(values, dtype=np.float64) for name, values in kept.items()}
+    cycle = columns["cycle"]
+    done = 0 if len(cycle) == 0 else min(int(cycle[-1] - cycle[0]), samples)
     if done == 0:
         return {name: np.empty(0) for name in ("asked_duty", "duty", "sensed_angle_deg")}
     place = np.searchsorted(cycle, cycle[0] + np.arange(done + 1), side="right") - 1
-    applied = [_applied(rows[at], rows[after]) for at, after in pairwise(place)]
+    at, after = place[:-1], place[1:]
+    applied = columns["applied_duty"][after]
     return {
-        "asked_duty": np.array([rows[at]["asked_duty"] for at in place[:-1]]),
-        "duty": np.array(applied),
-        "sensed_angle_deg": np.array([rows[after]["sensed_angle_deg"] for after in place[1:]]),
+        "asked_duty": columns["asked_duty"][at],
+        "duty": np.where(np.isnan(applied), columns["duty"][at], applied),
+        "sensed_angle_deg": columns["sensed_angle_deg"][after],
     }
 
 
@@ -160,7 +173,7 @@ def replayed(
 ) -> tuple[Outcome, dict[str, Any]]:
     """Compute every duty of a recorded loop again, and compare it bit for bit."""
     controller, gate, sent = plan.controller(), SafetyGate(checked.envelope), True
-    again: list[dict[str, float]] = []
+    again = _columns()
     sizes: list[float] = []
     for row in rows:
         gate.observe(**_facts(row, sent=sent))
@@ -173,10 +186,10 @@ def replayed(
         if driven:
             pairs = ((asked, row["asked_duty"]), (drive.duty, row["duty"]))
             sizes.append(max(_distance(*pair) for pair in pairs))
-        if driven or again:
-            again.append({**row, "asked_duty": asked, "duty": drive.duty})
+        if driven or again["cycle"]:
+            _keep(again, {**row, "asked_duty": asked, "duty": drive.duty})
         record.say(said_of(gate.drain()))
-    if not again:
+    if not again["cycle"]:
         raise DataError(f"{checked.record}: ends before the first cycle of the task")
     different = [(place, size) for place, size in enumerate(sizes) if size > 0.0]
     outcome = plan.outcome(task_columns(again, plan.samples), interrupted=False)

@@ -22,7 +22,10 @@ from mgdd.rig.live.sources import Source
 __all__ = ["serve"]
 
 _LOG = logging.getLogger(__name__)
-_TICK_MS, _ALIVE_TICKS = 200, 5  # a sign of life each second, also where nothing is new
+_TICK_MS, _ALIVE_TICKS = (
+    500,
+    2,
+)  # the eye needs no more, and the loop needs the processor; a sign of life each second, also where nothing is new
 _UNSEEN = 3  # updates that a slow browser may owe: what is more would pile up here
 _WINDOWS_S = {"10 s": 10.0, "60 s": 60.0, "all": np.inf}
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # told apart by the colour-blind, too
@@ -30,6 +33,7 @@ _GOOD = {"run": "#2e7d32", "armed": "#b26a00", "init": "#555", "limp": "#c62828"
 _SD_OF_95 = 1.96
 _HEIGHT, _LEGEND_ROW, _WIDE_LABEL, _LONGEST_LABEL = 240, 22, 26, 34  # pixels, and letters
 _BROKEN_S = 3
+_OURS = frozenset({"127.0.0.1", "localhost"})
 _TEMPLATE = """{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 8px; font-family: sans-serif; }
@@ -246,17 +250,26 @@ def serve(source: Source, port: int, ready: Callable[[str], None], *, alive: Cal
     server_of = _bokeh("server.server").Server
     logging.getLogger("bokeh").setLevel(logging.ERROR)
     logging.getLogger("tornado.access").setLevel(logging.CRITICAL)
+    routing, web = (import_extra(f"tornado.{name}", "watch", "a live page") for name in ("routing", "web"))
     path = f"/{secrets.token_urlsafe(16)}"
+
+    class Foreign(routing.Matcher):  # type: ignore[misc, name-defined]
+        """A name of somebody else that has come to mean this machine: a page of his must not read from here."""
+
+        def match(self, request: Any) -> dict[str, Any] | None:
+            return None if request.host_name in _OURS else {}
+
     try:
         socket.create_server(("127.0.0.1", port)).close()  # the server leaves a socket behind where it fails
         server = server_of(
             {path: lambda document: _View(source, document) and None}, port=port, address="127.0.0.1",
-            allow_websocket_origin=["127.0.0.1", "localhost"], use_index=False, redirect_root=False,
+            allow_websocket_origin=sorted(_OURS), use_index=False, redirect_root=False,
             check_unused_sessions_milliseconds=2000, unused_session_lifetime_milliseconds=5000,
         )  # fmt: skip
     except OSError as error:
         why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
         raise RigError(f"port {port} {why}: name another one, 0 takes a free one") from error
+    server._tornado.default_router.rules.insert(0, routing.Rule(Foreign(), web.ErrorHandler, {"status_code": 403}))
     loop = server.io_loop.asyncio_loop
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, loop.stop)
