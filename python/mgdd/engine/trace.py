@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.engine.trace_cycles import COLUMNS, is_of_cycles, of_cycles
+from mgdd.engine.sample_doubts import sample_doubts
+from mgdd.engine.trace_cycles import COLUMNS, expansion_of, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.pressure import as_trace
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of
@@ -264,7 +265,10 @@ def _one(
     given: str | None,
 ) -> xr.Dataset:
     made = _core.engine.TraceOptions(**options)
-    raw = _core.engine.analyze(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, made)
+    angle, bar = trace[ANGLE].values, trace["pressure_bar"].values
+    raw = _core.engine.analyze(angle, bar, cylinder, point, made)
+    said = list(zip(raw["doubts"], raw["warnings"], strict=True)) + expansion_of(raw, cylinder, point)
+    said = sample_doubts(angle, bar) + said
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
@@ -278,8 +282,8 @@ def _one(
             "mass_source": raw["mass_source"],
             "heat_window": given or ("found" if raw["window_found"] else "no burn found"),
             "motored": int(raw["motored"]),
-            "warnings": "\n".join(raw["warnings"]),
-            "doubts": "\n".join(raw["doubts"]),
+            "warnings": "\n".join(text for _, text in said),
+            "doubts": "\n".join(kind for kind, _ in said),
         },
     )
 
