@@ -27,6 +27,8 @@ _JUMP_CAD, _REFUSED_CAD = 0.75, 2.0
 _SIGNIFICANT = 4.0
 # A step of the place: its t, its height over the scatter, and the least that matters [samples, °CA].
 _STEP_T, _STEP_SCATTERS, _STEP_SAMPLES, _STEP_CAD = 6.0, 5.0, 0.7, 0.15
+# Share of the standard error of a place that is noise of its own; the rest is the doubt about the charge.
+_OWN = 0.5
 _DEGREE = 7
 # The charge scatters by this share; what a cycle shows beyond is its place or its level.
 _CHARGE, _CHARGE_SCATTERS = (1e-3, 1e-2), 1.2
@@ -102,7 +104,8 @@ class Phases(NamedTuple):
                 least, best = rest, (k, float(found[2]), left, design)
         assert best is not None
         k, height, left, design = best
-        robust = max(1.4826 * float(np.median(np.abs(left - np.median(left)))), 1e-9)
+        robust = 1.4826 * float(np.median(np.abs(left - np.median(left)))) * np.sqrt(n / (n - 4.0))
+        robust = max(robust, _OWN * self.stderr_cad)
         unit = float(np.sqrt(np.linalg.inv(design.T @ design)[2, 2]))
         level = robust * np.sqrt(1.0 / k + 1.0 / (n - k))
         enough = abs(height) >= max(_STEP_SAMPLES * step_cad, _STEP_CAD)
@@ -237,20 +240,21 @@ def phase_warnings(
     odd = int(np.argmax(np.abs(off)))
     drift, _ = found.drift_cad
     jump = None if over_time else found.jump(step)
-    stands_apart = len(pressure) > 2 and abs(off[odd]) > found.visible_cad
-    bent = over_time and abs(off[odd]) > max(_REFUSED_CAD, odd_bound(off.size) * found.stderr_cad)
+    # A clock has no slips of its own: what is beyond the noise is the speed, however many cycles share it.
+    visible = max(_JUMP_CAD, odd_bound(off.size) * found.stderr_cad) if over_time else found.visible_cad
+    stands_apart = len(pressure) > 2 and abs(off[odd]) > visible
     if jump is not None:
         what = f"from cycle {jump.cycle + 1} on compression lies {jump.cad:+.2g} °CA off"
     elif found.drifts:
         first, last = ends or ("cycle 1", f"cycle {len(pressure)}")
         what = f"compression moves by {drift:+.2g} °CA from {first} to {last}"
-    elif stands_apart or bent:
+    elif stands_apart:
         what = f"compression of cycle {odd + 1} lies {off[odd]:+.2g} °CA off the others (±{found.stderr_cad:.1g})"
     else:
         return []
     causes = "the speed changes within the record" if over_time else "lost pulses, or cycles with clocks apart"
     text = f"the crank angle slips: {what}, and 1 °CA is some 9 % of the work: {causes}; take the angle of an encoder"
-    if bent:
+    if over_time and stands_apart and abs(off[odd]) > _REFUSED_CAD:
         raise DataError(f"{source}: {text}")
     return [text]
 
