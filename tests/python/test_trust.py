@@ -76,7 +76,7 @@ def test_a_motored_record_decides_dead_centre_and_not_the_burn() -> None:
 
 
 def test_what_a_degree_of_dead_centre_costs_is_that_of_the_record() -> None:
-    inside = (ANGLE >= ENGINE.ivc) & (ANGLE <= ENGINE.evo)
+    inside = np.abs(ANGLE - 0.5 * (ENGINE.ivc + ENGINE.evo)) <= 0.5 * (ENGINE.evo - ENGINE.ivc)
     mean, at = BAR.mean(axis=0)[inside], ANGLE[inside]
     cost = np.trapezoid(mean, ENGINE.volume(at + 1.0)) - np.trapezoid(mean, ENGINE.volume(at))
     told = float(seen()["top dead centre"].text.partition("adds ")[2].split()[0])

@@ -49,7 +49,9 @@ def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list
     top = top_of(angle, bar, 0.0)
     if not top.soft:
         return []
-    text = f"3 % below the top the cycles have {top.soft_ratio:.2f} of the width at 12 %, where a burn by spark has 0.48"
+    text = (
+        f"3 % below the top the cycles have {top.soft_ratio:.2f} of the width at 12 %, where a burn by spark has 0.48"
+    )
     return [("soft", f"{text}: a gain that falls off towards the peak; peak, work and heat are low")]
 
 
@@ -102,13 +104,19 @@ def hidden(
             out["crank angle"] = ("compression before the burn is too short to place the cycles", "")
     elif placed.visible_cad > min(step, _WANTED_CAD):
         lost = int(placed.visible_cad / step)
-        text = f"a cycle that lies less than {placed.visible_cad:.2g} °CA off, {max(lost, 1)} lost sample(s), is not seen"
+        text = (
+            f"a cycle that lies less than {placed.visible_cad:.2g} °CA off, {max(lost, 1)} lost sample(s), is not seen"
+        )
         out["crank angle"] = (text, "")
     return out
 
 
 def _of_a_degree(
-    angle: NDArray[np.float64], bar: NDArray[np.float64], engine: Cylinder, trace: xr.Dataset, point: OperatingPoint | None
+    angle: NDArray[np.float64],
+    bar: NDArray[np.float64],
+    engine: Cylinder,
+    trace: xr.Dataset,
+    point: OperatingPoint | None,
 ) -> float | None:
     """Give what angles that are 1 °CA too large add to the work of the closed part, as IMEP [bar]."""
     works = []

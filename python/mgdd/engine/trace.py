@@ -110,7 +110,8 @@ def analyze(
     n_cylinders : int
         Cylinders behind ``brake_torque_nm``.
     fuel_mg : float, optional
-        Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.93 to 1.18 of its heat is doubted.
+        Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.83 to 1.18 of its heat is doubted, below a
+        compression ratio of 14 outside 0.70 to 1.18.
     traces : bool
         False for the figures of a long record without its traces, which take the memory; the figures are the same.
     quiet : bool

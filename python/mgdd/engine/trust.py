@@ -72,7 +72,9 @@ _REMEDIES = {
 }
 # What a speed that swings within a turn makes of angles at one speed, 5 % of it an eighth of the work.
 _SWINGS = ("tdc", "level", "pegging", "compression", "expansion", "mass", "gain", "exchange", "drift", "slip")
-_SWING = "take the angle of an encoder: it is made of time at one speed, and a speed that swings within a turn does this"
+_SWING = (
+    "take the angle of an encoder: it is made of time at one speed, and a speed that swings within a turn does this"
+)
 _ONE = "one cycle: nothing to compare it with"
 
 

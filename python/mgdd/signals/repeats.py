@@ -91,9 +91,7 @@ def copies(rows: NDArray[np.float64]) -> Copies | None:
     share = (np.cumsum(covered)[:-1] > 0).reshape(n, m).mean(axis=1)
     k = int(np.argmin(again))
     cycles = tuple(np.flatnonzero(share > 0.0).tolist())
-    return Copies(
-        cycles, int(round(share.sum() * m)), divmod(int(first[k]), m), divmod(int(again[k]), m)
-    )
+    return Copies(cycles, int(round(share.sum() * m)), divmod(int(first[k]), m), divmod(int(again[k]), m))
 
 
 def _hashes(stream: NDArray[np.float64], window: int) -> NDArray[np.uint64]:
@@ -131,7 +129,9 @@ def still(rows: NDArray[np.float64], noise: float, near: int) -> Still | None:
     if n > 1:
         chance = _chance(equal, row, at, length, near)
     else:
-        usual = np.array([resolution_of(_alike(rows, rows[0, a])) for a in at]) / (2.0 * np.sqrt(np.pi) * max(noise, 1e-12))
+        usual = np.array([resolution_of(_alike(rows, rows[0, a])) for a in at]) / (
+            2.0 * np.sqrt(np.pi) * max(noise, 1e-12)
+        )
         chance = length * np.log(np.clip(usual, _LEAST_SHARE, 0.9))
     rare = np.flatnonzero(np.log(rows.size) + chance < np.log(_RUN_CHANCE))
     odd = []
