@@ -59,7 +59,7 @@ def lost_heat(
 
     design = np.vander((angle[inside] - middle) / half, _DEGREE + 1) * bar[inside, None]
     wanted = np.log(bar[inside]) * bar[inside]
-    terms, *_ = np.linalg.lstsq(design, wanted)
+    terms: NDArray[np.float64] = np.linalg.lstsq(design, wanted)[0]
     left = wanted - design @ terms
     variance = float(left @ left) / (inside.sum() - _DEGREE - 1) * np.linalg.inv(design.T @ design)
     found = ratio(terms)
@@ -83,9 +83,12 @@ def expansion_doubts(
     most = _MOST_SPARK if cylinder.compression_ratio < _SPARK_RATIO else _MOST_DIESEL
     what = f"late expansion loses {lost:.2f} ±{error:.2f} times the wall heat of Hohenberg's law"
     if lost - _STDERRS * error > most:
-        text = f"{what}, where sound traces lose at most {most:g}: suspect thermal shock of the sensor, then pegging and TDC"
+        text = (
+            f"{what}, where sound traces lose at most {most:g}: suspect "
+            "thermal shock of the sensor, then pegging, then TDC"
+        )
         return [("expansion", text)]
     if lost + _STDERRS * error < _LEAST:
-        text = f"{what}: it gains heat after the burn: suspect a TDC that is early, pegging too high, or a burn that goes on"
+        text = f"{what}: it gains heat after the burn: suspect an early TDC, then pegging too high, then a long burn"
         return [("expansion", text)]
     return []

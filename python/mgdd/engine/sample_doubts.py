@@ -59,8 +59,8 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
         which = f" (cycle {first + stands.cycle})" if many else ""
         text = (
             f"{who}the pressure stands still at {rows[stands.cycle, stands.first]:.4g} bar {where}, "
-            f"{stands.last - stands.first + 1} equal samples: a stuck sensor, lost samples or a channel that froze; work "
-            f"and heat are not those of the gas{which}"
+            f"{stands.last - stands.first + 1} equal samples: a stuck sensor, lost samples or a channel that froze; "
+            f"work and heat are not those of the gas{which}"
         )
         out.append(("stuck", text))
     return out
@@ -109,7 +109,7 @@ def top_of(angle: NDArray[np.float64], rows: NDArray[np.float64], noise: float) 
     bent = float(np.median(soft[np.isfinite(soft)])) if np.isfinite(soft).any() else np.nan
     shared = n >= _FEW and share.sum() >= sharers
     apart = float(np.median(top) - np.quantile(top, 0.16)) > _APART * usual
-    cut = flat > _FLAT and (shared or n < _FEW) or flat > _FLAT_SHARED and shared and apart
+    cut = (flat > _FLAT and (shared or n < _FEW)) or (flat > _FLAT_SHARED and shared and apart)
     return Top(flat, bent, highest, bool(cut), bool(not cut and n >= _SOFT_CYCLES and bent > _SOFT))
 
 

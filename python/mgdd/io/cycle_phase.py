@@ -32,7 +32,7 @@ _OWN = 0.5
 _DEGREE = 7
 # The charge scatters by this share; what a cycle shows beyond is its place or its level.
 _CHARGE, _CHARGE_SCATTERS = (1e-3, 1e-2), 1.2
-# Logarithm of the pressure at firing TDC over that at gas exchange: sound cycles 2.3, misfires 1.8, the other turn -2.3.
+# Logarithm of the pressure at firing TDC over that at gas exchange: sound cycles 2.3, misfires 1.8, another turn -2.3.
 _TURN = 0.5
 # Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed told as half.
 _SHORTEST_DEG = 200.0
@@ -93,17 +93,14 @@ class Phases(NamedTuple):
         n = self.late_cad.size
         if n < 6:
             return None
-        best, least = None, np.inf
+        fits = []
         count = np.arange(n) - 0.5 * (n - 1)
         for k in range(2, n - 1):
             design = np.column_stack([np.ones(n), count, np.arange(n) >= k])
             found, *_ = np.linalg.lstsq(design, self.late_cad)
             left = self.late_cad - design @ found
-            rest = float(left @ left)
-            if rest < least:
-                least, best = rest, (k, float(found[2]), left, design)
-        assert best is not None
-        k, height, left, design = best
+            fits.append((float(left @ left), k, float(found[2]), left, design))
+        _, k, height, left, design = min(fits, key=lambda fit: fit[0])
         robust = 1.4826 * float(np.median(np.abs(left - np.median(left)))) * np.sqrt(n / (n - 4.0))
         robust = max(robust, _OWN * self.stderr_cad)
         unit = float(np.sqrt(np.linalg.inv(design.T @ design)[2, 2]))
@@ -228,10 +225,8 @@ def phase_warnings(
     """
     turned = lost_turn(cad, pressure)
     if turned is not None:
-        return [
-            f"from cycle {turned + 1} on firing TDC stands at gas exchange: a turn of the shaft is missing before it; "
-            "cut the record there, each part with its own firing_tdc_deg"
-        ]
+        what = f"from cycle {turned + 1} on firing TDC stands at gas exchange: a turn of the shaft is missing before it"
+        return [f"{what}; cut the record there, each part with its own firing_tdc_deg"]
     found = phases(cad, pressure)
     if found is None:
         return []

@@ -230,6 +230,7 @@ def _running(
             f"{place.source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
             f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
         )
+    taken: tuple[int, ...] | None = None
     starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _ROUNDED * step)
     head, tail = int(starts[0]), degrees.size - int(starts[-1])
     grid = degrees[starts[0] : starts[1]]
@@ -251,7 +252,6 @@ def _running(
         at = at[at[:, -1] <= degrees[-1] + _ROUNDED * step]
         values = np.stack([np.interp(at, degrees, row) for row in values])
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
-    taken: tuple[int, ...] | None = None
     past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
     cad = np.where(past > 360.0 - SAME_ANGLE * step, past - 720.0, past)
     order = np.argsort(cad, kind="stable")
@@ -288,7 +288,7 @@ def _without_losses(
         out |= {behind - 1, behind}
         what = f"{abs(lost)} samples {'are missing' if lost > 0 else 'too many'}"
         notes.append(
-            f"{what} between the compressions of cycles {behind} and {behind + 1} of {count}: both are left out, and those "
+            f"{what} between the compressions of cycles {behind} and {behind + 1} of {count}: both are left out, those "
             "behind are cut "
             f"{abs(lost) * step:.3g} degrees {'earlier' if lost > 0 else 'later'}; the step of {step:g} stays"
         )

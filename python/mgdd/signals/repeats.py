@@ -91,7 +91,7 @@ def copies(rows: NDArray[np.float64]) -> Copies | None:
     share = (np.cumsum(covered)[:-1] > 0).reshape(n, m).mean(axis=1)
     k = int(np.argmin(again))
     cycles = tuple(np.flatnonzero(share > 0.0).tolist())
-    return Copies(cycles, int(round(share.sum() * m)), divmod(int(first[k]), m), divmod(int(again[k]), m))
+    return Copies(cycles, round(float(share.sum()) * m), divmod(int(first[k]), m), divmod(int(again[k]), m))
 
 
 def _hashes(stream: NDArray[np.float64], window: int) -> NDArray[np.uint64]:
@@ -190,4 +190,5 @@ def _chance(
 
 def _around(counts: NDArray[np.int64], low: NDArray[np.intp], high: NDArray[np.intp]) -> NDArray[np.int64]:
     total = np.concatenate([np.zeros((len(counts), 1), np.int64), np.cumsum(counts, axis=1)], axis=1)
-    return total[:, high] - total[:, low]
+    around: NDArray[np.int64] = total[:, high] - total[:, low]
+    return around
