@@ -59,7 +59,7 @@ def lost_heat(
 
     design = np.vander((angle[inside] - middle) / half, _DEGREE + 1) * bar[inside, None]
     wanted = np.log(bar[inside]) * bar[inside]
-    terms: NDArray[np.float64] = np.linalg.lstsq(design, wanted)[0]
+    terms = np.asarray(np.linalg.lstsq(design, wanted)[0], dtype=np.float64)
     left = wanted - design @ terms
     variance = float(left @ left) / (inside.sum() - _DEGREE - 1) * np.linalg.inv(design.T @ design)
     found = ratio(terms)
