@@ -20,7 +20,7 @@ _NEAR_CAD = 3.0
 # Widths at 1.5 % and 6 % below the top are as 1 to 2 of a parabola and alike of a plateau. Sound tops by spark have at
 # most 0.53, the two burns of a diesel up to 0.65, a top cut at 0.93 of the peak 0.72 to 0.85. Between, a level that
 # cycles share although the rest scatters by more decides.
-_CHORDS, _FLAT, _FLAT_MANY, _FLAT_SHARED, _APART = (0.015, 0.06), 0.66, 0.63, 0.57, 3.0
+_CHORDS, _FLAT, _FLAT_MANY, _FLAT_SHARED, _APART = (0.015, 0.06), 0.66, 0.63, 0.6, 3.0
 # Cycles whose top lies within this of the highest share it: two of 1.2 deviations of the noise and 0.2 % each.
 _SHARED_NOISE, _SHARED, _SHARERS, _FEW = 1.2, 2e-3, (3, 0.1), 8
 # The same at 3 % and 12 %, for a gain that falls off: sound Wiebe burns of spark ignition have 0.45 to 0.504, an
