@@ -32,7 +32,7 @@ def held(start, stop):
 def test_a_clipped_amplifier_is_named(step, decimals):
     assert analysed(step=step, decimals=decimals).attrs["warnings"] == ""
     cut = analysed(step=step, decimals=decimals, spoil=lambda _, bar: np.minimum(bar, 0.9 * bar.max()))
-    assert "equal samples: a clipped amplifier or the end of its range" in cut.attrs["warnings"]
+    assert "a saturated amplifier or the end of its range" in cut.attrs["warnings"]
 
 
 @pytest.mark.parametrize(("start", "stop"), [(-80.0, -70.0), (-50.0, -40.0), (85.0, 95.0)])

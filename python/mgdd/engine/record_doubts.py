@@ -1,4 +1,4 @@
-"""What the cycles of a record say against each other and over the whole cycle: slips, levels, gas exchange, TDC."""
+"""What the cycles of a record say against each other: copies, slips, levels, gas exchange, TDC, and what they hide."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.engine.dead_centre import motored_tdc
+from mgdd.engine.sample_doubts import copy_doubts, top_of
 from mgdd.engine.trace import conditions
-from mgdd.io.cycle_phase import phase_warnings
+from mgdd.io.cycle_phase import lost_turn, phase_warnings, phases
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
 
     from mgdd._core.engine import Cylinder, OperatingPoint
 
-__all__ = ["record_doubts"]
+__all__ = ["hidden", "record_doubts"]
 
 _COARSE_CAD = 2.5
+# A soft saturation is told from a burn by spark alone, and by so many cycles; a shift of a degree matters.
+_SPARK_RATIO, _SOFT_CYCLES, _WANTED_CAD = 14.0, 10, 1.0
 # Level of a cycle [bar]: off the median by more than this and six robust deviations, or drifting from first to last.
 _OFF_BAR, _OFF_SCATTERS, _DRIFT_BAR, _DRIFT_STDERRS = 0.1, 6.0, 0.1, 5.0
 # Over gas exchange: absolute pressures and pumping work that engines have, and the step at intake bottom dead centre.
@@ -31,8 +34,22 @@ def record_doubts(
     trace: xr.Dataset, found: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
 ) -> list[tuple[str, str]]:
     """Give the doubts of a record beyond those of its analysis, each as its kind and its text."""
-    said = _slips(trace) + _of_levels(trace, found) + _of_exchange(trace, found)
-    return said + _of_tdc(trace, found, engine, point)
+    said = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, found) + _of_exchange(trace, found)
+    return said + _of_soft_top(trace, found, engine) + _of_tdc(trace, found, engine, point)
+
+
+def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list[tuple[str, str]]:
+    """Doubt a gain that falls off towards the peak, where burns of one form would show it."""
+    angle, bar = _columns(trace)
+    if engine.compression_ratio >= _SPARK_RATIO or int(found.attrs["motored"]):
+        return []
+    top = top_of(angle, bar, 0.0)
+    if not top.soft:
+        return []
+    text = (
+        f"3 % below the top the cycles have {top.soft_ratio:.2f} of the width at 12 %, where a burn by spark has 0.48"
+    )
+    return [("soft", f"{text}: a gain that falls off towards the peak; peak, work and heat are low")]
 
 
 def _of_tdc(
@@ -55,7 +72,33 @@ def _columns(trace: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 def _slips(trace: xr.Dataset) -> list[tuple[str, str]]:
     angle, bar = _columns(trace)
-    return [("slip", text) for text in phase_warnings(angle, bar, over_time=False, source="trace")]
+    kind = "slip" if lost_turn(angle, bar) is None else "turn"
+    return [(kind, text) for text in phase_warnings(angle, bar, over_time=False, source="trace")]
+
+
+def hidden(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> dict[str, tuple[str, str]]:
+    """Say by check what faults these data would not show, and the size below which they stay hidden."""
+    angle, bar = _columns(trace)
+    step = float(np.median(np.diff(angle)))
+    out = {}
+    if int(found.attrs["motored"]) < len(bar):
+        said = found.attrs["open"] or "a fired trace hardly shows an error of TDC"
+        out["top dead centre"] = (said, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
+        if engine.compression_ratio >= _SPARK_RATIO or len(bar) < _SOFT_CYCLES:
+            text = "a gain that falls off above 0.7 of the peak looks like another burn"
+            few = "10 fired cycles or more" if engine.compression_ratio < _SPARK_RATIO else "a dead-weight calibration"
+            out["amplifier"] = (text, f"{few} would show it")
+    placed = phases(angle, bar)
+    if placed is None:
+        if len(bar) > 1:
+            out["crank angle"] = ("compression before the burn is too short to place the cycles", "")
+    elif placed.visible_cad > min(step, _WANTED_CAD):
+        lost = int(placed.visible_cad / step)
+        text = (
+            f"a cycle that lies less than {placed.visible_cad:.2g} °CA off, {max(lost, 1)} lost sample(s), is not seen"
+        )
+        out["crank angle"] = (text, "")
+    return out
 
 
 def _of_levels(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.dead_centre import degree_cost
-from mgdd.engine.trace_cycles import COLUMNS, is_of_cycles, of_cycles
+from mgdd.engine.sample_doubts import sample_doubts
+from mgdd.engine.trace_cycles import COLUMNS, expansion_of, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError, printable
 from mgdd.io.pressure import as_trace
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of, stated
@@ -112,7 +113,8 @@ def analyze(
     n_cylinders : int
         Cylinders behind ``brake_torque_nm``.
     fuel_mg : float, optional
-        Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.93 to 1.18 of its heat is doubted.
+        Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.83 to 1.18 of its heat is doubted, below a
+        compression ratio of 14 outside 0.70 to 1.18.
     traces : bool
         False for the figures of a long record without its traces, which take the memory; the figures are the same.
     quiet : bool
@@ -274,7 +276,10 @@ def _one(
     given: str | None,
 ) -> xr.Dataset:
     made = _core.engine.TraceOptions(**options)
-    raw = _core.engine.analyze(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, made)
+    angle, bar = trace[ANGLE].values, trace["pressure_bar"].values
+    raw = _core.engine.analyze(angle, bar, cylinder, point, made)
+    said = list(zip(raw["doubts"], raw["warnings"], strict=True)) + expansion_of(raw, cylinder, point)
+    said = sample_doubts(angle, bar) + said
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
@@ -288,8 +293,8 @@ def _one(
             "mass_source": raw["mass_source"],
             "heat_window": given or ("found" if raw["window_found"] else "no burn found"),
             "motored": int(raw["motored"]),
-            "warnings": "\n".join(raw["warnings"]),
-            "doubts": "\n".join(raw["doubts"]),
+            "warnings": "\n".join(text for _, text in said),
+            "doubts": "\n".join(kind for kind, _ in said),
             "open": "" if raw["motored"] else degree_cost(raw[ANGLE], raw["pressure_bar"], cylinder).of_fired(),
         },
     )

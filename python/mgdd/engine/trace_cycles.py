@@ -11,7 +11,9 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.dead_centre import degree_cost
+from mgdd.engine.heat_doubts import expansion_doubts
 from mgdd.engine.ringing import ringing, spectrum_of
+from mgdd.engine.sample_doubts import sample_doubts
 from mgdd.errors import DataError
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "is_of_cycles", "of_cycles", "scatter"]
+__all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "expansion_of", "is_of_cycles", "of_cycles", "scatter"]
 
 CYCLE = "cycle"
 # Net heat over the median of the record; own choices, in the spirit of a fifth and four fifths of the IMEP.
@@ -61,8 +63,9 @@ def of_cycles(
     A record in several parts has the same figures as in one; its traces are of one part.
     """
     # Brake work and fuel are stated as means: they judge the mean cycle, not one that misfired.
-    single = _core.engine.TraceOptions(**options | dict.fromkeys(("bmep_bar", "fuel_heat_j")))
+    alone = _core.engine.TraceOptions(**options | dict.fromkeys(("bmep_bar", "fuel_heat_j")))
     raws: list[dict[str, Any]] = []
+    samples: dict[str, str] = {}  # of each kind what the first part shows
     numbers: list[np.ndarray] = []
     angle, total, spectrum, n = np.empty(0), np.empty((0, 0)), None, 0
     for trace in parts:
@@ -71,9 +74,11 @@ def of_cycles(
         if not np.array_equal(own, angle):
             raise DataError(f"the chunk from cycle {n + 1} on has other crank angles than the first: read it again")
         try:
-            raws.append(_core.engine.analyze_cycles(own, pressure, cylinder, point, single, traces))
+            raws.append(_core.engine.analyze_cycles(own, pressure, cylinder, point, alone, traces))
         except DataError as error:
             raise error.reworded(f"from cycle {n + 1} on, {error}" if n else str(error)) from None
+        for kind, text in sample_doubts(own, pressure, n + 1):
+            samples.setdefault(kind, text)
         numbers.append(trace[CYCLE].values if CYCLE in trace.coords else np.arange(n + 1, n + 1 + len(pressure)))
         total = np.vstack([*total, pressure]).sum(axis=0, keepdims=True)  # one row after the other, as in one part
         n += len(pressure)
@@ -94,8 +99,10 @@ def of_cycles(
     marks = burn_marks(scalars)
     unburnt = burn_warnings(marks)
     counted = _counted(raws, n)
-    lines = [*counted.values(), *unburnt.values(), *(f"mean of {n} cycles: {text}" for text in mean["warnings"])]
-    kinds = [*counted, *unburnt, *mean["doubts"]]
+    single = {**samples, **counted, **unburnt}
+    judged = [*zip(mean["doubts"], mean["warnings"], strict=True), *expansion_of(mean, cylinder, point)]
+    lines = [*single.values(), *(f"mean of {n} cycles: {text}" for _, text in judged)]
+    kinds = [*single, *(kind for kind, _ in judged)]
     return labelled_dataset(
         {
             **columns,
@@ -121,6 +128,15 @@ def of_cycles(
             "open": "" if motored == n else degree_cost(mean[ANGLE], mean["pressure_bar"], cylinder).of_fired(),
         },
     )
+
+
+def expansion_of(raw: dict[str, Any], cylinder: Cylinder, point: OperatingPoint) -> list[tuple[str, str]]:
+    """Doubt the expansion of one analysed cycle that burns."""
+    if raw["motored"] or np.isnan(raw["scalars"]["ca50_cad"]):
+        return []
+    figures = raw["scalars"]
+    columns = (raw[ANGLE], raw["pressure_bar"], raw["volume_l"])
+    return expansion_doubts(*columns, figures["trapped_mass_g"], cylinder, point.speed_rpm)
 
 
 def _counted(raws: list[dict[str, Any]], n: int) -> dict[str, str]:

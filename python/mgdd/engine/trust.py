@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from mgdd.engine.record_doubts import record_doubts
+from mgdd.engine.record_doubts import hidden, record_doubts
 from mgdd.engine.trace import analyze
 from mgdd.engine.trace_cycles import CYCLE
 from mgdd.errors import DataError, ParameterError
@@ -30,8 +30,9 @@ _WORST: tuple[Verdict, ...] = ("no fault found", "open", "doubt", "fail")
 # Kinds of doubts of `analyze` by the check that they belong to, in the order of a look at a file.
 _CHECKS: dict[str, tuple[str, ...]] = {
     "file": ("reading", "coverage"),
-    "samples": ("spike", "clipped", "stuck"),
-    "crank angle": ("slip",),
+    "samples": ("spike", "clipped", "stuck", "copies"),
+    "amplifier": ("soft",),
+    "crank angle": ("turn", "slip"),
     "top dead centre": ("tdc", "strokes"),
     "level": ("level", "pegging"),
     "compression": ("compression",),
@@ -42,13 +43,16 @@ _CHECKS: dict[str, tuple[str, ...]] = {
     "gas exchange": ("exchange",),
     "cycles": ("misfire", "partial_burn", "odd_level", "drift"),
 }
-_FATAL = ("clipped", "stuck")  # the figures are not those of the gas
+_FATAL = ("clipped", "stuck", "copies", "turn")  # the figures are not those of the gas
 _REMEDIES = {
     "coverage": "record at least from IVC to EVO",
     "spike": "look for ignition noise and loose contacts; repair or drop the sample",
     "clipped": "lower the gain of the amplifier or widen its range, and measure again",
     "stuck": "look for lost samples, and measure again",
-    "slip": "look for lost pulses",
+    "copies": "look at the recorder's buffer, and measure again",
+    "soft": "lower the gain of the amplifier or widen its range, and measure again",
+    "turn": "look for lost pulses, and cut the record there",
+    "slip": "look for lost pulses; leave these cycles out",
     "tdc": "shift the angles by tdc_offset_cad, or measure TDC by a motored run or a sensor",
     "strokes": "take the offset off by tdc_offset_cad; first repair what wall heat or a peak names",
     "level": "peg it: pegging='inlet' with the measured pressure, or 'two_point'; correct the unit",
@@ -67,6 +71,23 @@ _REMEDIES = {
     "odd_level": "peg every cycle; look at the charge amplifier and the connectors",
     "drift": "peg every cycle; warm the sensor up, and let the amplifier settle",
 }
+# What a speed that swings within a turn makes of angles at one speed, 5 % of it an eighth of the work.
+_SWINGS = (
+    "tdc",
+    "strokes",
+    "level",
+    "pegging",
+    "compression",
+    "expansion",
+    "mass",
+    "gain",
+    "exchange",
+    "drift",
+    "slip",
+)
+_SWING = (
+    "take the angle of an encoder: it is made of time at one speed, and a speed that swings within a turn does this"
+)
 ENGINE = "engine"  # the check that is there only where the geometry is nobody's
 _ONE = "one cycle: nothing to compare it with"
 
@@ -247,17 +268,24 @@ def trust(
     except DataError as error:
         return Trust(name, (Check("file", "fail", str(error)),))
     said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
-    said = [(kind, text) for kind, text in said if not (kind == "reading" and "crank angle slips" in text)]
-    said += record_doubts(made, found, cylinder_of(cylinder), point_of(point))
+    said = [(kind, text) for kind, text in said if not (kind == "reading" and _of_angle(text))]
+    engine = cylinder_of(cylinder)
+    said += record_doubts(made, found, engine, point_of(point))
     fuel_mg = stated("fuel_mg", fuel_mg, point)
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
     known = [key for key, value in judged.items() if value or _known(made, key)]
-    skipped = _skipped(made, found, known)
-    checks = [_check(check, kinds, said, skipped) for check, kinds in _CHECKS.items()]
+    skipped = _skipped(made, found, known) | hidden(made, found, engine)
+    swing = _SWING if made.attrs.get("angle_from") == "time" else ""
+    checks = [_check(check, kinds, said, skipped, swing) for check, kinds in _CHECKS.items()]
     if assumed:
         text = f"no engine is given: read with {assumed}"
         checks.insert(0, Check(ENGINE, "open", text, "give bore, stroke, rod, compression ratio, IVC and EVO"))
     return Trust(name, tuple(checks), found)
+
+
+def _of_angle(text: str) -> bool:
+    """Whether a line of the reader is one that the record says again."""
+    return "crank angle slips" in text or "a turn of the shaft is missing" in text
 
 
 def _known(trace: xr.Dataset, name: str) -> bool:
@@ -265,14 +293,16 @@ def _known(trace: xr.Dataset, name: str) -> bool:
 
 
 def _check(
-    name: str, kinds: tuple[str, ...], said: list[tuple[str, str]], skipped: dict[str, tuple[str, str]]
+    name: str, kinds: tuple[str, ...], said: list[tuple[str, str]], skipped: dict[str, tuple[str, str]], swing: str
 ) -> Check:
-    """Put all that was said of one check together; the mean of the cycles repeats what single ones say."""
+    """Put all that was said of one check together; `swing` is the first cause of what an uneven turn looks like."""
     own = [(kind, text) for kind, text in said if kind in kinds]
     if not own:
         return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "no fault found")
     verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in own) else "doubt"
     remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in own if kind in _REMEDIES)
+    if swing and any(kind in _SWINGS for kind, _ in own):
+        remedies = {swing: None, **remedies}
     first: dict[str, str] = {}
     for kind, text in own:  # each line of the reader is a doubt of its own
         first.setdefault(text if kind == "reading" else kind, text)
@@ -286,11 +316,6 @@ def _skipped(trace: xr.Dataset, found: xr.Dataset, known: list[str]) -> dict[str
     motored = int(found.attrs["motored"]) == max(cycles, 1)
     if motored:
         out["burn"] = out["work and heat"] = ("no cycle burns", "")
-    else:
-        out["top dead centre"] = (
-            "a fired trace hardly shows an error",
-            "mgdd.identify.estimate_tdc scans it; a motored record shows it",
-        )
     if not known and not motored:
         out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
     if not np.isfinite(found["imep_net_bar"]).all():

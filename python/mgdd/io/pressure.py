@@ -208,7 +208,7 @@ def read_pressure(
     xarray.Dataset
         ``pressure_bar(crank_angle_cad)`` of one cycle, ``pressure_bar(cycle, crank_angle_cad)`` of several, ``cycle``
         counted from 1. ``attrs["file"]`` is the file's name without its folder, ``attrs["warnings"]`` what is doubtful
-        or was left out, one per line.
+        or was left out, one per line, and ``attrs["angle_from"]`` is ``time`` where the angle is a time at one speed.
 
     Raises
     ------
@@ -274,7 +274,9 @@ def cycle_count(count: int, first: int = 1) -> tuple[Any, ...]:
 
 def record_attrs(record: Record, name: str) -> dict[str, str | float]:
     """Return the attributes of a record: file, warnings, and the speed where a time was turned into an angle."""
-    speed = {} if record.speed_rpm is None else {"speed_rpm": float(record.speed_rpm)}
+    speed: dict[str, str | float] = {} if record.speed_rpm is None else {"speed_rpm": float(record.speed_rpm)}
+    if record.over_time:
+        speed["angle_from"] = "time"
     return {"file": name, "warnings": "\n".join(dict.fromkeys(record.notes)), **speed}
 
 

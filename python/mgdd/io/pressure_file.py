@@ -54,7 +54,7 @@ class Record(NamedTuple):
     """Angle [°CA aTDC], pressure [bar] (cycle, angle), what was cut with it (channel, cycle, angle), and notes.
 
     `taken` and `total` are those of `Cycles`, `rows` the row of each angle in the first cycle; `speed_rpm` is that of a
-    time.
+    time, and `over_time` whether the angle was made of that alone.
     """
 
     angle: NDArray[np.float64]
@@ -65,6 +65,7 @@ class Record(NamedTuple):
     total: int
     rows: NDArray[np.intp]
     speed_rpm: float | None = None
+    over_time: bool = False
 
 
 def cycles_of(table: Table, how: Reading) -> Record:
@@ -158,7 +159,7 @@ def record_of(
         unit_of_file=pressure.unit_of_file,
         over_time=over_time,
     )
-    return record._replace(speed_rpm=speed, notes=notes + record.notes)
+    return record._replace(speed_rpm=speed, notes=notes + record.notes, over_time=over_time and angle.turning is None)
 
 
 def checked(

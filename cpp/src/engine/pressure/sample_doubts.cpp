@@ -18,10 +18,6 @@ constexpr double spike_of_peak = 0.1, quiet_spike_of_peak = 0.01, spike_of_usual
 constexpr double spike_of_resolution = 2.0;
 // No burn that is found is believed here: what stands still or apart moves its ends.
 constexpr double zone_from_cad = -30.0, zone_to_cad = 60.0;
-constexpr std::size_t least_run = 4;
-// A top rounded to q stands still for 2 h and is lower by 4 q another h on (parabola), by 16 q if flatter still.
-constexpr double steps_of_resolution = 20.0;
-constexpr double exponent = 1.35;
 
 bool may_burn(const TraceAnalysis& a, double angle) {
   return !a.motored && angle >= zone_from_cad && angle <= zone_to_cad;
@@ -79,34 +75,6 @@ void doubt_spikes(TraceAnalysis& a) {
   const double rounding = spike_of_resolution * resolution_bar(a, a.pressure_bar[most]);
   if (std::abs(jump) > std::max({quiet_spike_of_peak * a.p_max_bar, spike_of_usual * *middle, rounding})) {
     add_spike(a, most, jump);
-  }
-}
-
-void doubt_runs(TraceAnalysis& a) {
-  const auto& p = a.pressure_bar;
-  const std::size_t n = p.size();
-  std::size_t first = 0;
-  for (std::size_t k = 1; k <= n; ++k) {
-    if (k < n && p[k] == p[first]) continue;
-    const std::size_t last = k - 1, length = k - first;
-    const std::size_t start = first;
-    first = k;
-    if (length < least_run) continue;
-    const double level = p[start], limit = steps_of_resolution * resolution_bar(a, level);
-    const std::size_t beyond = length / 2;
-    const bool inside = start >= beyond && last + beyond < n;
-    const double before = inside ? level - p[start - beyond] : 0.0, after = inside ? level - p[last + beyond] : 0.0;
-    const bool clipped = before * after > 0.0 && std::min(std::abs(before), std::abs(after)) > limit;
-    const double moved = level * (std::pow(a.volume_l[start] / a.volume_l[last], exponent) - 1.0);
-    const bool burns = may_burn(a, a.angle_cad[start]) || may_burn(a, a.angle_cad[last]);
-    if (!clipped && (burns || !(std::abs(moved) > limit || std::isinf(limit)))) continue;
-    a.warnings.push_back(
-        {clipped ? "clipped" : "stuck",
-         "the pressure stands still at " + shown(level) + " bar from " + shown(a.angle_cad[start]) + " to " +
-             shown(a.angle_cad[last]) + " °CA aTDC, " + std::to_string(length) + " equal samples: " +
-             (clipped ? "a clipped amplifier or the end of its range; peak, work and heat are not those of the gas"
-                      : "a stuck sensor or lost samples; work and heat are not those of the gas")});
-    return;
   }
 }
 

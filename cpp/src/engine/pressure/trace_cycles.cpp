@@ -59,6 +59,7 @@ std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad, 
   std::vector<TraceAnalysis> out(cycles);
   parallel_for(cycles, threads, [&](std::size_t cycle, std::size_t, StopRequest&) {
     naming_cycle(cycle, [&] { out[cycle] = analyze(row(cycle)); });
+    std::erase_if(out[cycle].warnings, [](const TraceWarning& w) { return w.kind != "spike"; });
     if (!columns) drop_columns(out[cycle], cycle == 0);
   });
   return out;

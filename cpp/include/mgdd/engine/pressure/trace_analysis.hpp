@@ -94,7 +94,8 @@ class TraceAnalyzer {
 
 /// Every cycle of a record on the same angles, one below the other, shared out over `threads` (0: one per core).
 /// Without `columns` only the first keeps its angles and volumes, and none another column: a long record is small then.
-/// An error names its cycle, counted from 1; ShapeError for another length than a whole number of cycles.
+/// An error names its cycle, counted from 1; ShapeError for another length than a whole number of cycles. Of the
+/// warnings only those of single samples are kept: bounds on one look judge the mean cycle, not each of many.
 std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad, std::span<const double> record,
                                           const Cylinder& cylinder, const OperatingPoint& point,
                                           const TraceOptions& options, bool columns = true, std::size_t threads = 0);

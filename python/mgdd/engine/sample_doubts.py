@@ -1,0 +1,142 @@
+"""What the samples of a record say without any engine: copies, samples that stand still, an amplifier at its end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mgdd.signals.repeats import copies, noise_of, still
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Top", "copy_doubts", "sample_doubts", "top_of"]
+
+# Compression from where the valves are shut to before any burn [°CA aTDC]: smooth, so that its third differences are
+# the noise.
+_QUIET_CAD = (-140.0, -60.0)
+_NEAR_CAD = 3.0
+# Widths at 1.5 % and 6 % below the top are as 1 to 2 of a parabola and alike of a plateau. Sound tops by spark have at
+# most 0.53, the two burns of a diesel up to 0.65, a top cut at 0.93 of the peak 0.72 to 0.85. Between, a level that
+# cycles share although the rest scatters by more decides.
+_CHORDS, _FLAT, _FLAT_MANY, _FLAT_SHARED, _APART = (0.015, 0.06), 0.66, 0.63, 0.6, 3.0
+# Cycles whose top lies within this of the highest share it: two of 1.2 deviations of the noise and 0.2 % each.
+_SHARED_NOISE, _SHARED, _SHARERS, _FEW = 1.2, 2e-3, (3, 0.1), 8
+# The same at 3 % and 12 %, for a gain that falls off: sound Wiebe burns of spark ignition have 0.45 to 0.504, an
+# amplifier that bends from 0.7 of the peak on 0.53 to 0.57. The two burns of a diesel have 0.37 to 0.56.
+_SOFT_CHORDS, _SOFT, _SOFT_CYCLES = (0.03, 0.12), 0.512, 10
+
+
+class Top(NamedTuple):
+    """The form of the highest cycles: ratios of the chords below the top, and whether they stop at one level [bar]."""
+
+    ratio: float
+    soft_ratio: float
+    level_bar: float
+    cut: bool
+    soft: bool
+
+
+def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: int = 1) -> list[tuple[str, str]]:
+    """Doubt the samples of cycles (cycle, angle), counted from `first`: what stands still, and a peak cut off."""
+    rows, noise, step = np.atleast_2d(bar), _noise(angle, bar), float(np.median(np.diff(angle)))
+    many = len(rows) > 1
+    out = []
+    top = top_of(angle, rows, noise)
+    if top.cut:
+        text = (
+            f"the highest cycles stop at {top.level_bar:.4g} bar: 1.5 % below the top they have {top.ratio:.2f} of the "
+            "width at 6 %, where a peak has 0.5: a saturated amplifier or the end of its range; peak, work and heat "
+            "are not those of the gas"
+        )
+        out.append(("clipped", text))
+    stands = still(rows, noise, max(1, round(_NEAR_CAD / step)))
+    on_top = stands is not None and top.cut and rows[stands.cycle, stands.first] > 0.97 * top.level_bar
+    if stands is not None and not on_top:
+        where = f"from {angle[stands.first]:g} to {angle[stands.last]:g} °CA aTDC"
+        who = f"{len(stands.cycles)} of {len(rows)} cycles: " if many else ""
+        which = f" (cycle {first + stands.cycle})" if many else ""
+        text = (
+            f"{who}the pressure stands still at {rows[stands.cycle, stands.first]:.4g} bar {where}, "
+            f"{stands.last - stands.first + 1} equal samples: a stuck sensor, lost samples or a channel that froze; "
+            f"work and heat are not those of the gas{which}"
+        )
+        out.append(("stuck", text))
+    return out
+
+
+def copy_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> list[tuple[str, str]]:
+    """Doubt a record (cycle, angle) in which samples stand twice, as where a buffer is written again."""
+    found = copies(np.atleast_2d(bar))
+    if found is None:
+        return []
+    (old, at), (new, there) = found.first, found.again
+    text = (
+        f"{found.samples} samples in {len(found.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
+        f"{angle[there]:g} °CA of cycle {new + 1} on those from {angle[at]:g} °CA of cycle {old + 1} on; scatter and "
+        "means are not those of the engine"
+    )
+    return [("copies", text)]
+
+
+def top_of(angle: NDArray[np.float64], rows: NDArray[np.float64], noise: float) -> Top:
+    """Judge the form of the top of the highest cycles: only they reach the end of an amplifier."""
+    step = float(np.median(np.diff(angle)))
+    width = max(1, round(1.0 / step))
+    near = np.abs(angle) <= 90.0
+    at, mean = angle[near], rows[:, near]
+    if width > 1 and at.size > 2 * width:  # running means over a degree
+        sums = np.concatenate([np.zeros((len(mean), 1)), np.cumsum(mean, axis=1)], axis=1)
+        mean, at = (sums[:, width:] - sums[:, :-width]) / width, at[: at.size - width + 1] + 0.5 * step * (width - 1)
+    n = len(rows)
+    top = mean.max(axis=1) if at.size else rows.max(axis=1)
+    highest = float(top.max())
+    nothing = Top(np.nan, np.nan, highest, False, False)
+    if at.size < 5:
+        return nothing
+    usual = _SHARED_NOISE * noise * np.sqrt(min(step, 1.0)) + _SHARED * highest
+    share = top > highest - 2.0 * usual
+    sharers = max(_SHARERS[0], _SHARERS[1] * n)
+    chosen = share if share.sum() >= sharers else top >= np.quantile(top, 0.75)
+    peak = mean.argmax(axis=1)
+    chords = [_chord(at, mean, top, peak, below) for below in (*_CHORDS, *_SOFT_CHORDS)]
+    ratio, soft = chords[0] / chords[1], chords[2] / chords[3]
+    known = chosen & np.isfinite(ratio)
+    if not known.any():
+        return nothing
+    flat = float(np.median(ratio[known]))
+    bent = float(np.median(soft[np.isfinite(soft)])) if np.isfinite(soft).any() else np.nan
+    shared = n >= _FEW and share.sum() >= sharers
+    apart = float(np.median(top) - np.quantile(top, 0.16)) > _APART * usual
+    cut = flat > (_FLAT if n < _FEW else _FLAT_MANY) and (shared or n < _FEW)
+    cut = cut or (flat > _FLAT_SHARED and shared and apart)
+    return Top(flat, bent, highest, bool(cut), bool(not cut and n >= _SOFT_CYCLES and bent > _SOFT))
+
+
+def _chord(
+    angle: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    top: NDArray[np.float64],
+    peak: NDArray[np.intp],
+    below: float,
+) -> NDArray[np.float64]:
+    """Measure how wide each cycle is, so far below its top, between samples; NaN where it does not fall so far."""
+    level, index, each = top * (1.0 - below), np.arange(angle.size), np.arange(len(rows))
+    under = rows < level[:, None]
+    left = np.where(under & (index < peak[:, None]), index, -1).max(axis=1)
+    right = np.where(under & (index > peak[:, None]), index, angle.size).min(axis=1)
+    inside = (left >= 0) & (right < angle.size)
+    left, right = np.where(inside, left, 0), np.where(inside, right, 1)
+
+    def crossing(outer: NDArray[np.intp], inner: NDArray[np.intp]) -> NDArray[np.float64]:
+        low, high = rows[each, outer], rows[each, inner]
+        share = np.divide(level - low, high - low, out=np.zeros_like(low), where=high != low)
+        return np.asarray(angle[outer] + share * (angle[inner] - angle[outer]))
+
+    return np.where(inside, crossing(right, right - 1) - crossing(left, left + 1), np.nan)
+
+
+def _noise(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> float:
+    quiet = (angle >= _QUIET_CAD[0]) & (angle <= _QUIET_CAD[1])
+    return noise_of(np.atleast_2d(bar)[:, quiet]) if quiet.sum() >= 8 else 0.0
