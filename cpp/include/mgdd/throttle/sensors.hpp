@@ -110,7 +110,7 @@ class SensorSampler {
   static void visit(Self& self, V& v) {
     auto& s = self.state_;
     v("sensor_sample", s.sample, counts_end);
-    v("sensor_failing", s.failing, counts_end);
+    v("sensor_failing", s.failing);
     v("sensor_fault", s.fault);
     for (std::size_t i = 0; i < s.filtered_v.size(); ++i) {
       const std::string which = i == 0 ? "first" : "second";
