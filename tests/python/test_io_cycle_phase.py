@@ -10,6 +10,7 @@ from independent_engine import record as foreign
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.errors import DataError
 from mgdd.io import pressure_trace, read_pressure
+from mgdd.io.cycle_phase import phase_warnings
 
 STEP, RPM = 0.5, 1500.0
 FULL = np.arange(-360.0, 360.0, STEP)
@@ -141,3 +142,11 @@ def test_a_noisy_spark_record_has_no_slip_beyond_its_error():
         random = np.random.default_rng(seed)
         whole = foreign(random, draw(random, "spark"), 100, step=0.5, noise_bar=0.1)
         assert pressure_trace(whole.angle, whole.bar).attrs["warnings"] == ""
+
+
+@pytest.mark.parametrize("at", [1, 5, 38])
+def test_one_cycle_that_stands_apart_is_no_step_of_all_behind_it(at: int) -> None:
+    cycles = foreign(np.random.default_rng(2), draw(np.random.default_rng(1), "diesel"), 40, noise_bar=0.02).bar
+    cycles[at] = np.roll(cycles[at], 4)
+    (text,) = phase_warnings(FULL, cycles, over_time=False, source="record")
+    assert f"compression of cycle {at + 1} lies +2" in text

@@ -54,7 +54,7 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
     stands = still(rows, noise, max(1, round(_NEAR_CAD / step)))
     on_top = stands is not None and top.cut and rows[stands.cycle, stands.first] > 0.97 * top.level_bar
     if stands is not None and not on_top:
-        where = f"from {angle[stands.first]:g} to {angle[stands.last]:g} °CA aTDC"
+        where = f"from {round(angle[stands.first], 3):g} to {round(angle[stands.last], 3):g} °CA aTDC"
         who = f"{len(stands.cycles)} of {len(rows)} cycles: " if many else ""
         which = f" (cycle {first + stands.cycle})" if many else ""
         text = (
@@ -74,7 +74,7 @@ def copy_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> list[tu
     (old, at), (new, there) = found.first, found.again
     text = (
         f"{found.samples} samples in {len(found.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
-        f"{angle[there]:g} °CA of cycle {new + 1} on those from {angle[at]:g} °CA of cycle {old + 1} on; scatter and "
+        f"{round(angle[there], 3):g} °CA of cycle {new + 1} on those from {round(angle[at], 3):g} °CA of cycle {old + 1} on; scatter and "
         "means are not those of the engine"
     )
     return [("copies", text)]

@@ -93,12 +93,13 @@ class Phases(NamedTuple):
         n = self.late_cad.size
         if n < 6:
             return None
+        late = self._without_odd()
         fits = []
         count = np.arange(n) - 0.5 * (n - 1)
         for k in range(2, n - 1):
             design = np.column_stack([np.ones(n), count, np.arange(n) >= k])
-            found, *_ = np.linalg.lstsq(design, self.late_cad)
-            left = self.late_cad - design @ found
+            found, *_ = np.linalg.lstsq(design, late)
+            left = late - design @ found
             fits.append((float(left @ left), k, float(found[2]), left, design))
         _, k, height, left, design = min(fits, key=lambda fit: fit[0])
         robust = 1.4826 * float(np.median(np.abs(left - np.median(left)))) * np.sqrt(n / (n - 4.0))
@@ -109,6 +110,14 @@ class Phases(NamedTuple):
         if enough and abs(height) > _STEP_T * robust * unit and abs(height) > _STEP_SCATTERS * level:
             return Jump(k, height)
         return None
+
+    def _without_odd(self) -> NDArray[np.float64]:
+        """Give the places with cycles that stand apart from their neighbours put among them: they are no step."""
+        padded = np.pad(self.late_cad, 2, mode="reflect")
+        local = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+        off = np.abs(self.late_cad - local)
+        usual = max(1.4826 * float(np.median(off)), _OWN * self.stderr_cad)
+        return np.where(off > odd_bound(off.size) * usual, local, self.late_cad)
 
 
 class Period(NamedTuple):
