@@ -72,10 +72,11 @@ def copy_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> list[tu
     if found is None:
         return []
     (old, at), (new, there) = found.first, found.again
+    again, before = round(angle[there], 3), round(angle[at], 3)
     text = (
         f"{found.samples} samples in {len(found.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
-        f"{round(angle[there], 3):g} °CA of cycle {new + 1} on those from {round(angle[at], 3):g} °CA of cycle {old + 1} on; scatter and "
-        "means are not those of the engine"
+        f"{again:g} °CA of cycle {new + 1} on those from {before:g} °CA of cycle {old + 1} on; scatter and means are "
+        "not those of the engine"
     )
     return [("copies", text)]
 
