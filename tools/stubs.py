@@ -4,6 +4,9 @@ import inspect
 import runpy
 from typing import Any
 
+from pybind11_stubgen.parser.mixins.filter import FilterClassMembers
+from pybind11_stubgen.structs import Identifier
+
 _of_python = inspect.getfullargspec
 
 
@@ -15,4 +18,6 @@ def _with_kinds(function: Any) -> inspect.FullArgSpec:
 
 if __name__ == "__main__":
     inspect.getfullargspec = _with_kinds
+    # Every class has it, with the types of `object`.
+    FilterClassMembers._FilterClassMembers__method_blacklist.add(Identifier("__reduce__"))  # type: ignore[attr-defined]
     runpy.run_module("pybind11_stubgen", run_name="__main__", alter_sys=True)

@@ -25,14 +25,29 @@ void* refuse_unmade(std::size_t) {
   throw py::type_error("this object was never made: its constructor has not run, or raised; make it anew");
 }
 
+// Python's own text of an object, for a class that has none: it does not look into the object.
+py::str shown(const py::object& self) {
+  auto* instance = reinterpret_cast<py::detail::instance*>(self.ptr());
+  if (!instance->get_value_and_holder().holder_constructed()) refuse_unmade(0);
+  return py::reinterpret_steal<py::str>(PyBaseObject_Type.tp_repr(self.ptr()));
+}
+
 }  // namespace
 
 void complete_class(const py::handle& cls) {
   py::detail::type_info* info = py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(cls.ptr()));
   if (info == nullptr) return;
   info->operator_new = &refuse_unmade;
-  cls.attr("__reduce__") = py::cpp_function(&reduced, py::name("__reduce__"), py::is_method(cls),
+  const auto own = [cls](auto answer) {  // any object may be given where a class is asked for its method
+    return [cls, answer](const py::object& self) {
+      if (!py::isinstance(self, cls)) throw py::reference_cast_error();
+      return answer(self);
+    };
+  };
+  cls.attr("__reduce__") = py::cpp_function(own(&reduced), py::name("__reduce__"), py::is_method(cls),
                                             "What pickle and copy make it again from.");
+  if (!cls.attr("__dict__").contains("__repr__"))
+    cls.attr("__repr__") = py::cpp_function(own(&shown), py::name("__repr__"), py::is_method(cls));
 }
 
 }  // namespace mgdd::bindings

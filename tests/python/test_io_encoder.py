@@ -231,9 +231,7 @@ def test_clock_that_jumps_is_refused(even_wheel, jump_s: float, jumps: int) -> N
     later = time.copy()
     for k in range(jumps):
         later[20000 + 6000 * k :] += jump_s * (1.0 + k * 0.01)
-    if not np.all(np.diff(later) > 0.0):  # beside 1e300 s no sample is apart from the next
-        later = np.concatenate([time[:20000], jump_s * (2.0 + np.arange(20000.0))])
-    with pytest.raises(DataError, match=r"clock has jumped|edges are lost|not one of a wheel"):
+    with pytest.raises(DataError, match=r"clock has jumped|edges are lost|times must increase"):
         Encoder(teeth=60).angle(later, signal)
 
 

@@ -687,6 +687,8 @@ class ThermalNoModel:
         rates : rate coefficients
         calibration : factor on the result, to be fitted
         """
+    def __repr__(self) -> str:
+        ...
 class PerformanceTerm:
     """
     One term of the performance J of a cycle.
@@ -853,8 +855,12 @@ class TraceOptions:
         bmep_bar : a gross IMEP that cannot reach it is refused
         fuel_heat_j : heat of the stated fuel
         """
+    def __repr__(self) -> str:
+        ...
 class Indicating:
     def __init__(self, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, speed_rpm: typing.SupportsFloat | typing.SupportsIndex, options: TraceOptions) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def many(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """

@@ -51,13 +51,15 @@ class Curve:
         """
     def __call__(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
-        Value at one input or at many.
+        Value at one input or at many; ParameterError for one that is not finite.
         """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict[str, list[float]]]:
         ...
     def __init__(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
@@ -116,6 +118,8 @@ class CurveSeeking:
         limits : measured quantities to keep
         limit_curves : of the guide, one per limit
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -269,6 +273,8 @@ class FeedForward:
     A seeker with feed-forward; see mgdd.guide.FeedForward.
     """
     def __init__(self, seeker: typing.Any, *, calibration_rate: typing.Any, following_share: typing.SupportsFloat | typing.SupportsIndex, trust: typing.SupportsFloat | typing.SupportsIndex, probe_cycles: typing.SupportsInt | typing.SupportsIndex, probe_settling: typing.SupportsInt | typing.SupportsIndex, trust_sd: typing.SupportsFloat | typing.SupportsIndex, doubt: typing.SupportsFloat | typing.SupportsIndex, curvature_spread: typing.SupportsFloat | typing.SupportsIndex, significance: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def _hold(self) -> None:
         """
@@ -424,6 +430,8 @@ class ModelOptimum:
     """
     def __init__(self, cylinder: mgdd._core.engine.Cylinder, *, performance: mgdd._core.engine.Performance, nox: mgdd._core.engine.NoxModel, method: str, bounds_cad: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], step_size: typing.SupportsFloat | typing.SupportsIndex, difference_cad: typing.SupportsFloat | typing.SupportsIndex, tolerance_cad: typing.SupportsFloat | typing.SupportsIndex, iterations: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def _curves(self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]) -> list[Curve] | None:
         """
         J and indicators over SOC at one operating point; None where the model has no physical cycle.
@@ -452,6 +460,8 @@ class TimingMap:
     """
     def __init__(self, *, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], values_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], prior_sd_cad: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def _learn(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], value_cad: typing.SupportsFloat | typing.SupportsIndex, sd_cad: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
         One confirmed optimum; False where it was not taken.
@@ -473,6 +483,8 @@ class OnlineCalibration:
     Calibration while an engine runs; use mgdd.guide.OnlineCalibration.
     """
     def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, method: str, parameters: collections.abc.Sequence[str], uncertainty: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], window_cycles: typing.SupportsInt | typing.SupportsIndex, steady_cycles: typing.SupportsInt | typing.SupportsIndex, cov_limit_percent: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex, soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex, jump_factor: typing.SupportsFloat | typing.SupportsIndex, trials_per_update: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def offer(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: mgdd._core.engine.OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, *, misfire: bool = False) -> str:
         """
@@ -537,6 +549,8 @@ class GuidedEngine:
     The guided loop of an engine; see mgdd.guide.GuidedEngine.
     """
     def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration | None, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None, keep_start: bool) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def _at(self, point: mgdd._core.engine.OperatingPoint) -> str:
         """

@@ -579,6 +579,8 @@ class ExtremumSeeking:
         limits : measured quantities to keep
         curvature : J'' where it is known
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -724,6 +726,8 @@ class NewtonSeeking:
         maximize : False to minimise J
         limits : measured quantities to keep
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -861,6 +865,8 @@ class BoundedSeeking:
         limits : measured quantities to keep
         curvature : J'' where it is known
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -999,6 +1005,8 @@ class Spsa:
         limits : measured quantities to keep
         curvature : J'' where it is known
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -1152,6 +1160,8 @@ class GradientDescent:
         limits : measured quantities to keep
         curvature : J'' where it is known
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -1293,6 +1303,8 @@ class GoldenSection:
         maximize : False to minimise J
         limits : measured quantities to keep
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -1422,6 +1434,8 @@ class Surface:
         ...
     def __init__(self, axes: collections.abc.Sequence, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
     @property
@@ -1460,6 +1474,8 @@ class GaussianProcessSeeking:
         guide : what a model says of J
         limit_guides : the same of every limit
         """
+    def __repr__(self) -> str:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -1604,6 +1620,8 @@ class IterativeLearning:
     Iterative learning control, ask and tell.
     """
     def __init__(self, initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, law: str, impulse_response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], relative_degree: typing.SupportsInt | typing.SupportsIndex | None = None, k_p: typing.SupportsFloat | typing.SupportsIndex | None = None, k_d: typing.SupportsFloat | typing.SupportsIndex | None = None, learning_function: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lead: typing.SupportsInt | typing.SupportsIndex | None = None, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, error_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, input_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, change_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., rate: typing.SupportsFloat | typing.SupportsIndex = ..., guard: bool = True) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """

@@ -181,6 +181,8 @@ class E2eCheck:
     """
     def __init__(self, settings: E2eSettings) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def push(self, payload: typing_extensions.Buffer) -> str:
         """
         Judge the next payload: 'ok', 'initial', 'repeated', 'lost', 'wrong_crc', 'wrong_length' or 'wrong_counter'.
@@ -426,6 +428,8 @@ class RecordWriter:
     """
     def __init__(self, path: str, *, run_id: bytes, wall_ns: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, json: str) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def add_table(self, name: str, columns: collections.abc.Sequence[str], monotonic_ns: typing.SupportsInt | typing.SupportsIndex) -> int:
         """
         Number of a new table of samples.
@@ -479,6 +483,8 @@ class RecordReader:
     def __iter__(self) -> RecordReader:
         ...
     def __next__(self) -> typing.Any:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def header(self) -> dict:
@@ -756,11 +762,15 @@ class Drive:
     """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
+    def __getstate__(self) -> tuple[int, float, bool, bool]:
+        ...
     def __hash__(self) -> int:
         ...
     def __iter__(self) -> collections.abc.Iterator:
         ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
         ...
     @property
     def bridge_open(self) -> bool:
@@ -782,6 +792,8 @@ class SafetyGate:
     The gate of the core; behind mgdd.rig.SafetyGate.
     """
     def __init__(self, envelope: SafetyEnvelope) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def command(self, duty: typing.SupportsFloat | typing.SupportsIndex) -> Drive:
         """
@@ -925,6 +937,8 @@ class RingTransport:
     """
     def __init__(self, *, receive_capacity: typing.SupportsInt | typing.SupportsIndex = 1024, send_capacity: typing.SupportsInt | typing.SupportsIndex = 16) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def fail(self) -> None:
         """
         Say that the bus is gone, for good: the loop sees it as off and opens the bridge.
@@ -1026,6 +1040,8 @@ class SocketCanTransport:
     """
     def __init__(self, interface: str, *, fd: bool = False, filters: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, bool]] = [], receive_buffer_bytes: typing.SupportsInt | typing.SupportsIndex = 4194304, send_patience_s: typing.SupportsFloat | typing.SupportsIndex = 0.0002) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def receive(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
         """
         Take the next frame from the bus; other threads run while it waits.
@@ -1089,6 +1105,8 @@ class RealtimeLoop:
     A controller in a thread of its own; behind mgdd.rig.realtime.RealtimeLoop.
     """
     def __init__(self, *, controller: typing.Any, transport: RingTransport | SocketCanTransport, envelope: SafetyEnvelope, command: tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None, typing.SupportsInt | typing.SupportsIndex | None]]], received: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None, typing.SupportsInt | typing.SupportsIndex | None]]]], period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, initial_reference_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, reference_timeout_s: typing.SupportsFloat | typing.SupportsIndex | None = None, transmit: bool = True, stop_frames: typing.SupportsInt | typing.SupportsIndex = 5, realtime: bool = True, priority: typing.SupportsInt | typing.SupportsIndex = 50, lock_memory: bool = True, sample_capacity: typing.SupportsInt | typing.SupportsIndex = 16384, queue_capacity: typing.SupportsInt | typing.SupportsIndex = 65536) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def events(self) -> list:
         """

@@ -14,10 +14,14 @@ class FreeRunRecord:
     """
     def __init__(self, *, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], output: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], free_start: collections.abc.Sequence[str] = [], skip: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
 class FreeRunFit:
     """
     What a free-run fit hands back.
     """
+    def __repr__(self) -> str:
+        ...
     @property
     def outputs(self) -> list:
         ...
@@ -38,6 +42,8 @@ class DriveAxis:
     state_names: typing.ClassVar[list] = ['position_m', 'speed_m_per_s', 'time_s']
     def __init__(self, *, force_n_per_v: typing.SupportsFloat | typing.SupportsIndex, centre_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def fit(self, *, base: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], free: collections.abc.Sequence[str], records: collections.abc.Sequence[FreeRunRecord], dt_s: typing.SupportsFloat | typing.SupportsIndex, options: mgdd._core.optimize.LeastSquaresOptions) -> FreeRunFit:
         """
         Levenberg-Marquardt on the free run with exact sensitivities; releases the GIL.
@@ -54,6 +60,8 @@ class TwoTanks:
     state_names: typing.ClassVar[list] = ['upper_level_v', 'lower_level_v', 'pump_before_v', 'pump_before_that_v']
     def __init__(self, *, lower_brim_v: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def fit(self, *, base: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], free: collections.abc.Sequence[str], records: collections.abc.Sequence[FreeRunRecord], dt_s: typing.SupportsFloat | typing.SupportsIndex, options: mgdd._core.optimize.LeastSquaresOptions) -> FreeRunFit:
         """
         Levenberg-Marquardt on the free run with exact sensitivities; releases the GIL.
@@ -67,6 +75,8 @@ class WienerHammerstein:
     Filter, static curve, filter.
     """
     def __init__(self, *, first_order: typing.SupportsInt | typing.SupportsIndex, last_order: typing.SupportsInt | typing.SupportsIndex, n_curve: typing.SupportsInt | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def curve(self, parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """

@@ -435,6 +435,8 @@ class Stepper:
         """
     def __init__(self, throttle: Throttle, *, sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
     def advance(self, state: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(7)"], duty: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
         """
         State after one sample under a duty [-], which is clipped to -1..1.
@@ -444,6 +446,8 @@ class PseudoWienerStepper:
     One sample of a pseudo-Wiener model from a given state; behind mgdd.throttle.to_iosystem.
     """
     def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def advance(self, state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], duty: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
         """
@@ -465,6 +469,8 @@ class PseudoWienerModel:
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def at_sample(self, sample_s: typing.SupportsFloat | typing.SupportsIndex, *, substeps: typing.SupportsInt | typing.SupportsIndex | None = None) -> dict:
         """
@@ -812,6 +818,8 @@ class DemandTracker:
     The chain sample by sample; see mgdd.throttle.DemandChain.tracker.
     """
     def __init__(self, chain: DemandChain, *, sample_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def reset(self) -> None:
         """

@@ -74,6 +74,8 @@ def public_objects() -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name, cls in public_classes().items():
+            if cls.__init__ is object.__init__ and cls.__subclasses__():  # made through those only
+                continue
             if cls.__module__ == "mgdd.loop.surrogate_plant":  # its example fits a surrogate first
                 continue
             thing = None if inspect.isabstract(cls) else _by_arguments(cls)
@@ -83,3 +85,8 @@ def public_objects() -> dict[str, Any]:
             if type(thing) is cls:
                 made[name] = thing
     return made
+
+
+def saved_state(thing: Any) -> Any:
+    """Give the saved state of what runs, a property or what a method gives."""
+    return thing.state() if callable(thing.state) else thing.state
