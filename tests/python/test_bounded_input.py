@@ -41,7 +41,7 @@ def refused(read: Callable[[Path], Any], path: Path) -> str:
         read(path)
     except Error as error:
         said = str(error)
-    assert len(said) < MESSAGE
+    assert len(said) <= 400
     return said
 
 
@@ -198,20 +198,20 @@ def test_nesting_is_counted_in_levels() -> None:
 
 
 def test_messages_keep_their_beginning_and_their_remedy() -> None:
-    assert shortened("a" * 400) == "a" * 400
+    assert shortened("a" * 120) == "a" * 120
     said = str(DataError(f"a.csv, column {LETTERS!r}: is not known: rename it"))
-    assert len(said) < 600
+    assert len(said) <= 400
     assert said.startswith("a.csv, column 'nnn")
     assert said.endswith("nnn': is not known: rename it")
-    assert re.search(r"\[\.\.\. 4996\d\d letters \.\.\.\]", said)
+    assert re.search(r"\[\.\.\. \d+ letters \.\.\.\]", said)
     said = str(DataError("a.csv: " + "word " * LONG + ": rename it"))
-    assert len(said) < MESSAGE
+    assert len(said) <= 400
     assert said.endswith(": rename it")
     said = str(DataError(f"a.csv: {'two words ' * LONG!r}: rename it"))
-    assert len(said) < 600
-    assert len(str(ParameterError.of("name", LETTERS, "short"))) < 600
+    assert len(said) <= 400
+    assert len(str(ParameterError.of("name", LETTERS, "short"))) <= 400
     assert did_you_mean("m" + LETTERS, [LETTERS]) == ""
-    whole = "a sentence of words that is not short, " * 60
+    whole = "a sentence of words that is not short, " * 10
     assert str(DataError(whole)) == whole
 
 
@@ -265,7 +265,6 @@ def test_units_with_a_degree_sign() -> None:
         ("(0.025,0)", "(0.025,1e999999)", "1e999999 is beyond all signals"),
         ("[-100|100]", "[-100|1" + "0" * 4000 + "]", "is beyond all signals"),
         ("INT 0 65535;", 'INT 0 65535;\nBA_ "GenMsgCycleTime" BO_ 2566848766 "1e99999999";', "1e99999999"),
-        ("2566849022 Answer", "2566849278 Answer", "message Done has the name or identifier 0x18ff02fe of Answer"),
         ("BA_DEF_ BO_", "SG_MUL_VAL_ 2566849022 Angle Select 0-4000000000;\nBA_DEF_ BO_", "names 4000000001 values"),
     ],
 )

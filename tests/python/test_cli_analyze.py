@@ -145,8 +145,8 @@ def test_only_geometry_that_nobody_gave_is_warned_of(file: str, caplog: pytest.L
     given = ["bore_mm=128", "stroke_mm=144", "compression_ratio=17.3", "connecting_rod_mm=230", "evo_cad=124"]
     options = [word for each in given for word in ("--set", each)]
     assert main(["engine", "analyze", file, *options]) == 0
-    (said,) = [record.message for record in caplog.records if "no --preset" in record.message]
-    assert said == "no --preset: the traces are read with ivc_cad = -140 of puma_single"
+    (said,) = [record.message for record in caplog.records if "no engine is given" in record.message]
+    assert said.startswith("no engine is given: the traces are read with ivc_cad = -140 of puma_single; ")
     caplog.clear()
     assert main(["engine", "analyze", file, *options, "--set", "ivc_cad=-143"]) == 0
-    assert not any("no --preset" in record.message for record in caplog.records)
+    assert not any("no engine is given" in record.message for record in caplog.records)

@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     angle = runs[0]["crank_angle_cad"].to_numpy()
     ms = np.maximum(angle - 5.0, 0.0) / 9.0  # at 1500 rpm
     ringing = 0.6 * np.exp(-ms) * np.sin(2.0 * np.pi * 6.5 * ms)
-    rows = [run["pressure_bar"] + ringing for run in runs]
+    rows = [run["pressure_bar"] + ringing + rng.normal(0.0, 0.005, angle.size) for run in runs]
     head = ",".join(["angle", *(f"p_{k}" for k in range(len(rows)))])
     table = np.column_stack([angle, *rows])
     np.savetxt(place / "record.csv", table, delimiter=",", header=head, comments="", fmt="%.12g")

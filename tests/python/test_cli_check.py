@@ -31,7 +31,7 @@ def test_every_file_has_a_verdict(files: list[str], capsys: pytest.CaptureFixtur
     ]  # fmt: skip
     (samples,) = [check for check in found[1]["checks"] if check["name"] == "samples"]
     assert samples["verdict"] == "fail"
-    assert "equal samples" in samples["text"]
+    assert "a saturated amplifier" in samples["text"]
     assert "amplifier" in samples["remedy"]
     assert "line 3" in found[2]["checks"][0]["text"]
 

@@ -93,7 +93,7 @@ def test_every_form_of_several_cycles(form: str, tmp_path: Path) -> None:
 
 def test_a_calibration_refuses_several_cycles_with_the_remedy() -> None:
     trace = pressure_trace(ANGLE, TWO, name="bench 7")
-    with pytest.raises(DataError, match=r"bench 7: 2 cycles, .* trace.mean\('cycle', keep_attrs=True\), .*column"):
+    with pytest.raises(DataError, match=r"bench 7: 2 cycles.* trace.mean\('cycle', keep_attrs=True.*isel\(cycle=0"):
         fit_cylinder([trace], CYLINDER)
     mean = trace.mean("cycle", keep_attrs=True)
     assert fit_cylinder([mean], CYLINDER, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"]).report.success
@@ -135,7 +135,7 @@ def test_a_calibration_takes_a_list_of_any_forms() -> None:
         (xr.Dataset(), "the trace has no crank_angle_cad, it has nothing"),
         (CYCLES.assign(torque_nm=200.0), "and torque_nm is not a cycle in bar of the cylinder of p_1"),
         (CYCLES.assign(p_2=np.roll(BAR, 90)), "and p_2 is not a cycle in bar"),
-        ((ANGLE, 1e5 * BAR), r"pressure_unit='Pa'"),
+        ((ANGLE, 1e5 * BAR), r"this looks like Pa; pass pressure_bar \* 1e-05"),
         ((ANGLE[::-1], BAR), "°bTDC"),
     ],
 )

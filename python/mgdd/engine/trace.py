@@ -169,7 +169,8 @@ def analyze(
     """
     cylinder, said = cylinder_of(cylinder), point
     point = point_of(point)
-    fuel_mg = stated("fuel_mg", fuel_mg, said)
+    named = stated("fuel_mg", fuel_mg, said)
+    fuel_mg = named if named or fuel_mg is not None else None  # a point without fuel is motored
     if isinstance(trace, Iterator):
         trace, chunks = _first_of(trace, traces=traces)
     else:
@@ -340,8 +341,8 @@ def _bmep(
 def _fuel_heat(trace: xr.Dataset, cylinder: Cylinder, fuel_mg: float | None) -> float | None:
     """Heat [J] of the fuel that is stated for this trace; mg times MJ/kg are J."""
     fuel = _number(trace, "fuel_mg", fuel_mg)
-    if fuel_mg is not None and not 0.0 <= fuel_mg < math.inf:
-        raise ParameterError.of("fuel_mg", fuel_mg, ">= 0 mg per cycle, 0 of a motored record")
+    if fuel_mg is not None and not 0.0 < fuel_mg < math.inf:
+        raise ParameterError.of("fuel_mg", fuel_mg, "> 0 mg per cycle")
     return fuel * cylinder.lower_heating_value_mj_per_kg if fuel else None
 
 

@@ -127,7 +127,7 @@ class Trust(Result):
     >>> report["work and heat"].verdict, report["gas exchange"].text
     ('no fault found', 'the record has no 720 degrees')
     >>> report.summary().splitlines()[0]
-    'pressure_a50_bar: no fault found, 8 of 12 checks made'
+    'pressure_a50_bar: no fault found, 8 of 13 checks made'
     """
 
     file: str

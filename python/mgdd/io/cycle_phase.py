@@ -32,6 +32,8 @@ _OWN = 0.5
 _DEGREE = 7
 # The charge scatters by this share; what a cycle shows beyond is its place or its level.
 _CHARGE, _CHARGE_SCATTERS = (1e-3, 1e-2), 1.2
+_QUIETEST_BAR = 1e-3  # no sensor is quieter; without noise the shift and the factor cannot be parted
+_UNKNOWN_CHARGE = 3e-2  # of two or three, which do not show how they scatter
 # Logarithm of the pressure at firing TDC over that at gas exchange: sound cycles 2.3, misfires 1.8, another turn -2.3.
 _TURN = 0.5
 # Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed told as half.
@@ -187,10 +189,10 @@ def _placed(
     usual_rise = float(np.median(rise))
     if not usual_rise > 0.0:
         return None
-    charge = _CHARGE[1]
+    charge = _UNKNOWN_CHARGE
     if len(part) > 3:
         charge = _CHARGE_SCATTERS * 1.4826 * float(np.median(np.abs(rise / usual_rise - 1.0)))
-    charge = float(np.clip(charge, *_CHARGE))
+        charge = float(np.clip(charge, *_CHARGE))
     n = len(part)
     late, factor, level = np.zeros(n), np.zeros(n), np.zeros(n)
     noise, error, spread = 1.0, np.zeros(n), np.ones(2)
@@ -204,7 +206,7 @@ def _placed(
             rest = left - np.median(left, axis=0) if n > 2 else left - left.mean(axis=0)
             rest = rest - rest.mean(axis=1, keepdims=True)
             each = np.sqrt((rest**2).mean(axis=1) / (1.0 - 1.0 / n))
-            spread = np.maximum(np.quantile(each, (0.5, 0.9)), 1e-9)
+            spread = np.maximum(np.quantile(each, (0.5, 0.9)), _QUIETEST_BAR)
             noise = float(spread[0])
         design = np.stack([np.ones_like(model), model, rate], axis=2)
         normal = np.einsum("ima,imb->iab", design, design)
