@@ -57,7 +57,7 @@ def test_a_page_has_a_section_per_file_and_the_exit_code_tells_of_a_refused_one(
     assert "line 3" in out["files"][1]["error"]["message"]
     text, captions = read(page)
     heads = re.findall("<h2>(.*?)</h2>", page.read_text(encoding="utf-8"))
-    heads = [re.sub(", [0-9]+ of 12 checks made", "", head) for head in heads]
+    heads = [re.sub(", [0-9]+ of [0-9]+ checks made", "", head) for head in heads]
     assert heads == ["record.csv: no fault found", "torn.csv: fail", "one.csv: no fault found"]
     assert "torn.csv: fail (file)" in text
     assert text.count("'?' is not a number") == 1

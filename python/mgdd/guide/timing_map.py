@@ -262,6 +262,8 @@ class TimingMap(_core.guide.TimingMap, MapForms):
             raise ParameterError.of("point", point, f"an operating point with {' and '.join(self._axes)}")
         return [numbers[name] for name in self._axes] if named else list(numbers.values())
 
+    __reduce__ = MapForms.__reduce__  # that of the core knows no axes
+
     def __repr__(self) -> str:
         size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
         return f"<TimingMap {size}, {np.count_nonzero(self.support > 0.0)} cells with support>"
