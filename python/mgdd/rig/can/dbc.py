@@ -212,12 +212,15 @@ def _message(message: Any) -> DbcMessage:
     selecting = [signal.name for signal in signals.values() if signal.multiplexer]
     if len(selecting) > 1:
         raise DataError(f"it has the multiplexers {', '.join(selecting)}: at most one per message is supported")
+    cycle_ms = message.cycle_time
+    if not isinstance(cycle_ms, int | float | None):
+        raise DataError(f"its GenMsgCycleTime is {cycle_ms!r}: give a number of milliseconds")
     return DbcMessage(
         name=message.name,
         frame_id=message.frame_id,
         extended=message.is_extended_frame,
         size=message.length,
-        cycle_s=message.cycle_time * 1e-3 if message.cycle_time else None,
+        cycle_s=cycle_ms * 1e-3 if cycle_ms else None,
         signals=signals,
     )
 
