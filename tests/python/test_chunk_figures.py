@@ -130,7 +130,7 @@ def test_a_record_that_memory_does_not_hold_becomes_figures(tmp_path: Path) -> N
     cad = np.arange(-360.0, 360.0, 0.4)
     pressure = 1.2 + 45.0 * np.exp(-(((cad - 8.0) / 35.0) ** 2))
     body = "".join(f"{a!r},{p!r}\n" for a, p in zip(cad.tolist(), pressure.tolist(), strict=True))
-    for name, count in (("small.csv", 40), ("large.csv", 250)):
+    for name, count in (("small.csv", 40), ("large.csv", 1200)):
         with (tmp_path / name).open("w") as stream:
             stream.write("angle,p\n")
             stream.writelines(itertools.repeat(body, count))
@@ -139,4 +139,4 @@ def test_a_record_that_memory_does_not_hold_becomes_figures(tmp_path: Path) -> N
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, *files], capture_output=True, text=True, env={**os.environ, **threads}
     )
-    assert done.stdout.split("\n")[:2] == ["250", "too large"], done.stderr
+    assert done.stdout.split("\n")[:2] == ["1200", "too large"], done.stderr

@@ -229,7 +229,7 @@ class TextTable(Table):
             self._known.update((index, values[k]) for k, index in enumerate(lacking) if plain[k])
 
     def _holds_number(self, index: int) -> bool:
-        return any(parse_number(row[index], self.decimal) is not None for row in self.cells)
+        return any(index < len(row) and parse_number(row[index], self.decimal) is not None for row in self.cells)
 
     def _slow(self, index: int) -> NDArray[np.float64]:
         values = np.empty(self.height)
