@@ -26,7 +26,8 @@ bool is_unbounded(const Domain& domain) {
 }
 
 [[noreturn]] void unknown_field(const char* owner, const py::handle& key, const py::dict& known) {
-  std::string hint = py::module_::import("mgdd.errors").attr("did_you_mean")(key, known.attr("keys")()).cast<std::string>();
+  std::string hint =
+      py::module_::import("mgdd.errors").attr("did_you_mean")(key, known.attr("keys")()).cast<std::string>();
   if (hint.empty()) hint = "one of " + std::string(py::str(py::str(", ").attr("join")(known.attr("keys")())));
   throw about(owner, ParameterError(std::string(owner) + " has no field '" + std::string(py::str(key)) + "': " + hint));
 }

@@ -162,8 +162,8 @@ def test_a_sheet_may_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (chunk,) = pressure_chunks(file, sheet="second")
     assert float(chunk["pressure_bar"].max()) == 2.0 * BAR.max()
     assert read_map(file, sheet="map").values.tolist() == [[1.0, 2.0], [3.0, 4.0]]
-    with pytest.raises(DataError, match="sheet='secnd': no such sheet: did you mean 'second'"):
-        read_pressure(file, sheet="secnd")
+    with pytest.raises(DataError, match="sheet='seconds': no such sheet: did you mean 'second'"):
+        read_pressure(file, sheet="seconds")
     (tmp_path / "t.csv").write_text("angle,p\n" + "\n".join(f"{a},{p}" for a, p in zip(ANGLE, BAR, strict=True)))
     for reader in (read_pressure, read, read_map):
         with pytest.raises((DataError, Exception), match="no workbook: leave sheet out"):
