@@ -110,5 +110,7 @@ def test_impossible_numbers_do_not_end_the_process() -> None:
 
 
 @pytest.mark.slow
-def test_five_thousand_hostile_states_do_not_end_the_process() -> None:
-    assert check(every=1) > 5000
+def test_thousands_of_hostile_states_do_not_end_the_process() -> None:
+    """All of them, over 5000, under the sanitizers, where a read beside its memory shows; a quarter elsewhere."""
+    every = 1 if "libasan" in os.environ.get("LD_PRELOAD", "") else 4
+    assert check(every=every) > 5000 // every
