@@ -232,9 +232,9 @@ def trust(
 
     Notes
     -----
-    Sound traces are those of simulated engines over wall heat, gamma and boost, and of measured heavy-duty engines:
-    ``docs/validation.md`` says how many faults of which size are met, and which are out of reach. An error of TDC of a
-    fired trace is: ``open``, see `mgdd.identify.estimate_tdc`.
+    Bounds come from spark- and compression-ignition engines that share no code with the package, over four wall-heat
+    laws: ``docs/validation.md`` says how many faults of which size are met, and which are out of reach. An error of TDC
+    of a fired trace is out of reach and stays ``open``, see `mgdd.identify.estimate_tdc`.
 
     Examples
     --------

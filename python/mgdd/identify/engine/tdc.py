@@ -59,7 +59,7 @@ class TdcEstimate(Result):
     wall_heat_scale : float
         Motored: the wall heat that the strokes need, over that of Hohenberg (1979) [-]; NaN if fired.
     findings : tuple of str
-        Motored: what no sound engine has, a wall heat outside 0.2 to 2.5 or a peak more than 1.3 °CA before TDC.
+        Motored: what no sound engine has, a wall heat outside 0.1 to 2.5 or a peak more than 1.3 °CA before TDC.
     others_cad : tuple of float
         Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
