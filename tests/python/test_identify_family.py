@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
-from independent_cycle import draw, record
 from mgdd import datasets, presets
 from mgdd.engine import OperatingPoint, analyze, find_optimum, simulate
 from mgdd.errors import ConvergenceError, DataError, ParameterError
@@ -190,37 +189,6 @@ def test_the_strokes_of_a_motored_trace_find_tdc() -> None:
         assert not estimate_tdc([right], TRUTH, point=point).suspect
         (doubt,) = found.doubts()
         assert doubt.endswith(f"suspect TDC; tdc_offset_cad={found.tdc_offset_cad:.2f} takes it off")
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_tdc_of_motored_engines_that_share_no_code(seed: int) -> None:
-    """Hohenberg's wall heat, a gas of its own, noise, a speed that nobody says, a level 0.15 bar off."""
-    random = np.random.default_rng(seed)
-    engine = draw(random)
-    angle, bar, _ = record(random, engine, 20, step=0.5, motored=True)
-    offset = float(random.choice([-1.3, -0.2, 0.2, 0.7]))
-    for level in (0.0, 0.15):
-        trace = pressure_trace(angle + offset, bar.mean(axis=0) + level)
-        found = estimate_tdc([trace], engine.cylinder(), point=OperatingPoint())
-        assert found.tdc_offset_cad == pytest.approx(offset, abs=0.1)
-        assert found.low_cad <= offset <= found.high_cad
-        assert found.high_cad - found.low_cad < 0.3
-
-
-@pytest.mark.parametrize("seed", [0, 3, 4])
-def test_tdc_of_fired_engines_that_share_no_code(seed: int) -> None:
-    """A gas whose gamma falls with temperature, by a cylinder that says nothing of it."""
-    random = np.random.default_rng(seed)
-    engine = draw(random)
-    angle, bar, fuel = record(random, engine, 30, step=0.5)
-    offset = (-0.8, 0.0, 0.6)[seed % 3]
-    point = OperatingPoint(
-        speed_rpm=engine.speed, fuel_mg=float(fuel.mean()), intake_pressure_kpa=100.0 * engine.intake_bar
-    )
-    trace = pressure_trace(angle + offset, bar.mean(axis=0))
-    found = estimate_tdc([trace], engine.cylinder(), point=point, fuel_heat_j=42.8 * float(fuel.mean()))
-    assert found.tdc_offset_cad == pytest.approx(offset, abs=0.3)
-    assert found.low_cad <= offset <= found.high_cad
 
 
 def test_tdc_of_one_kind_of_trace_only() -> None:

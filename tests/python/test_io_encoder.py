@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from independent_cycle import draw, record
+from independent_engine import draw, record
 from mgdd.cli import main
 from mgdd.engine import Indicating
 from mgdd.errors import DataError, ParameterError
@@ -23,8 +23,8 @@ WHEEL = Encoder(column="crank", teeth=60, missing_teeth=2)
 def engine():
     random = np.random.default_rng(5)
     drawn = draw(random)
-    angle, bar, _ = record(random, drawn, CYCLES, step=0.25)
-    return drawn, angle, bar
+    whole = record(random, drawn, CYCLES, step=0.25, noise_bar=0.015)
+    return drawn, whole.angle, whole.bar
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_other_edges_and_marks_give_the_same_figures(bench, engine, tmp_path: Pa
     angle = trace["crank_angle_cad"].to_numpy()
     found = Indicating(angle, cylinder, speed_rpm=speed).record(trace["pressure_bar"])
     wanted = Indicating(angle, cylinder, speed_rpm=speed).record(true_cycles(bench, trace))
-    for name, most in (("imep_net_bar", 0.04), ("ca50_cad", 0.05), ("p_max_bar", 0.1)):
+    for name, most in (("imep_net_bar", 0.05), ("ca50_cad", 0.05), ("p_max_bar", 0.1)):
         assert np.abs(found[name] - wanted[name]).max() < most, name
 
 
@@ -165,7 +165,8 @@ def test_lost_and_extra_edges_are_counted_aloud(bench, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("options", "said"), [
     ({"encoder": WHEEL}, "firing_tdc_deg= with the angle of TDC behind the mark"),
-    ({"encoder": WHEEL, "firing_tdc_deg": TDC_DEG + 60.0}, "is not TDC: the pressure is alike there in both turns"),
+    ({"encoder": WHEEL, "firing_tdc_deg": TDC_DEG + 60.0}, "is not TDC: the pressure peaks 1"),
+    ({"encoder": WHEEL, "firing_tdc_deg": TDC_DEG - 60.0}, "behind a mark, and TDC is near that"),
     ({"encoder": WHEEL, "firing_tdc_deg": 800.0}, "firing_tdc_deg = 800"),
     ({"encoder": WHEEL, "firing_tdc_deg": TDC_DEG, "speed_rpm": 900.0}, "speed_rpm and encoder are two ways"),
     ({"encoder": WHEEL, "firing_tdc_deg": TDC_DEG, "before_tdc": True}, "before_tdc and encoder are two ways"),

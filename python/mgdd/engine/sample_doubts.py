@@ -17,19 +17,19 @@ __all__ = ["Top", "copy_doubts", "sample_doubts", "top_of"]
 # the noise.
 _QUIET_CAD = (-140.0, -60.0)
 _NEAR_CAD = 3.0
-# Widths at 1.5 % and 6 % below the top are as 1 to 2 of a parabola and alike of a plateau. Sound tops by spark have at
-# most 0.53, the two burns of a diesel up to 0.65, a top cut at 0.93 of the peak 0.72 to 0.85. Between, a level that
-# cycles share although the rest scatters by more decides.
-_CHORDS, _FLAT, _FLAT_MANY, _FLAT_SHARED, _APART = (0.015, 0.06), 0.66, 0.63, 0.6, 3.0
-# Cycles whose top lies within this of the highest share it: two of 1.2 deviations of the noise and 0.2 % each.
-_SHARED_NOISE, _SHARED, _SHARERS, _FEW = 1.2, 2e-3, (3, 0.1), 8
-# The same at 3 % and 12 %, for a gain that falls off: sound Wiebe burns of spark ignition have 0.45 to 0.504, an
+# A parabola spends 0.29 of the time within 6 % of its top within 0.5 % of it. Sound tops by spark or of two burns spend
+# at most 0.46 in a cycle, 0.41 in the median of many; one cut at 0.93 of the peak, with noise behind, at least 0.5.
+# Fewer than _FEWEST samples within 6 % tell nothing.
+_NEAR_TOP, _BELOW, _FLAT, _FEWEST = 0.005, 0.06, 0.48, 8
+# Where noise is more, within as many of its deviations; cycles whose top lies within twice that share a level.
+_TOP_NOISE, _SHARERS = 1.8, (3, 0.1)
+# Widths at 3 % and 12 % below the top, for a gain that falls off: sound Wiebe burns by spark have 0.45 to 0.504, an
 # amplifier that bends from 0.7 of the peak on 0.53 to 0.57. The two burns of a diesel have 0.37 to 0.56.
 _SOFT_CHORDS, _SOFT, _SOFT_CYCLES = (0.03, 0.12), 0.512, 10
 
 
 class Top(NamedTuple):
-    """The form of the highest cycles: ratios of the chords below the top, and whether they stop at one level [bar]."""
+    """The form of the highest cycles: time at the top, ratio of chords, and whether they stop at a level [bar]."""
 
     ratio: float
     soft_ratio: float
@@ -46,9 +46,9 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
     top = top_of(angle, rows, noise)
     if top.cut:
         text = (
-            f"the highest cycles stop at {top.level_bar:.4g} bar: 1.5 % below the top they have {top.ratio:.2f} of the "
-            "width at 6 %, where a peak has 0.5: a saturated amplifier or the end of its range; peak, work and heat "
-            "are not those of the gas"
+            f"the highest cycles stop at {top.level_bar:.4g} bar: of the time within 6 % of the top they spend "
+            f"{100.0 * top.ratio:.0f} % at it, a peak 30 %: a saturated amplifier or the end of its range; peak, work "
+            "and heat are not those of the gas"
         )
         out.append(("clipped", text))
     stands = still(rows, noise, max(1, round(_NEAR_CAD / step)))
@@ -85,8 +85,8 @@ def top_of(angle: NDArray[np.float64], rows: NDArray[np.float64], noise: float) 
     """Judge the form of the top of the highest cycles: only they reach the end of an amplifier."""
     step = float(np.median(np.diff(angle)))
     width = max(1, round(1.0 / step))
-    near = np.abs(angle) <= 90.0
-    at, mean = angle[near], rows[:, near]
+    middle = np.abs(angle) <= 90.0
+    at, mean = angle[middle], rows[:, middle]
     if width > 1 and at.size > 2 * width:  # running means over a degree
         sums = np.concatenate([np.zeros((len(mean), 1)), np.cumsum(mean, axis=1)], axis=1)
         mean, at = (sums[:, width:] - sums[:, :-width]) / width, at[: at.size - width + 1] + 0.5 * step * (width - 1)
@@ -96,23 +96,21 @@ def top_of(angle: NDArray[np.float64], rows: NDArray[np.float64], noise: float) 
     nothing = Top(np.nan, np.nan, highest, False, False)
     if at.size < 5:
         return nothing
-    usual = _SHARED_NOISE * noise * np.sqrt(min(step, 1.0)) + _SHARED * highest
-    share = top > highest - 2.0 * usual
-    sharers = max(_SHARERS[0], _SHARERS[1] * n)
-    chosen = share if share.sum() >= sharers else top >= np.quantile(top, 0.75)
+    close = max(_NEAR_TOP * highest, _TOP_NOISE * noise * float(np.sqrt(min(step, 1.0))))
+    share = top > highest - 2.0 * close
+    chosen = share if share.sum() >= max(_SHARERS[0], _SHARERS[1] * n) else top >= np.quantile(top, 0.75)
+    near = _count(mean, top - _BELOW * np.abs(top))[chosen]
+    flat = float(np.median(_count(mean, top - close)[chosen] / near)) if near.min() >= _FEWEST else np.nan
     peak = mean.argmax(axis=1)
-    chords = [_chord(at, mean, top, peak, below) for below in (*_CHORDS, *_SOFT_CHORDS)]
-    ratio, soft = chords[0] / chords[1], chords[2] / chords[3]
-    known = chosen & np.isfinite(ratio)
-    if not known.any():
-        return nothing
-    flat = float(np.median(ratio[known]))
+    chords = [_chord(at, mean, top, peak, below) for below in _SOFT_CHORDS]
+    soft = chords[0] / chords[1]
     bent = float(np.median(soft[np.isfinite(soft)])) if np.isfinite(soft).any() else np.nan
-    shared = n >= _FEW and share.sum() >= sharers
-    apart = float(np.median(top) - np.quantile(top, 0.16)) > _APART * usual
-    cut = flat > (_FLAT if n < _FEW else _FLAT_MANY) and (shared or n < _FEW)
-    cut = cut or (flat > _FLAT_SHARED and shared and apart)
+    cut = flat > _FLAT
     return Top(flat, bent, highest, bool(cut), bool(not cut and n >= _SOFT_CYCLES and bent > _SOFT))
+
+
+def _count(rows: NDArray[np.float64], level: NDArray[np.float64]) -> NDArray[np.intp]:
+    return np.asarray((rows >= level[:, None]).sum(axis=1))
 
 
 def _chord(

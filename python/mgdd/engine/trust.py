@@ -279,7 +279,8 @@ def trust(
     checks = [_check(check, kinds, said, skipped, swing) for check, kinds in _CHECKS.items()]
     if assumed:
         text = f"no engine is given: read with {assumed}"
-        checks.insert(0, Check(ENGINE, "open", text, "give bore, stroke, rod, compression ratio, IVC and EVO"))
+        remedy = "give the engine: cylinder= in Python, --preset or --set bore_mm=... on the command line"
+        checks.insert(0, Check(ENGINE, "open", text, remedy))
     return Trust(name, tuple(checks), found)
 
 

@@ -26,6 +26,8 @@ __all__ = ["Encoder", "Turning", "on_even_angles", "turning_of"]
 _STEPS_DEG = (0.01, 0.02, 0.025, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 # Mean pressure around the two places of TDC: the firing one has more, by at least this share of the whole range.
 _AROUND_DEG, _CLEARLY = 15.0, 0.15
+# Pressure peaks about TDC where an engine is motored or burns late, some 45 degrees behind at most.
+_PEAK_DEG = (-15.0, 50.0)
 # An edge is displaced by at least so many degrees, and by so many times what is usual; looked for at parts of a pitch.
 _DISPLACED_DEG, _ODD, _PER_PITCH = 0.3, 8.0, 4
 
@@ -241,10 +243,12 @@ def _firing(even: NDArray[np.float64], pressure: NDArray[np.float64], tdc_deg: f
     past = (even - tdc_deg + 180.0) % 720.0 - 180.0
     levels = [float(np.mean(pressure[np.abs(past - turn) <= _AROUND_DEG])) for turn in (0.0, 360.0)]
     wide = float(np.ptp(pressure))
-    if not abs(levels[0] - levels[1]) > _CLEARLY * wide:
+    firing = (tdc_deg + (0.0 if levels[0] > levels[1] else 360.0)) % CYCLE_DEG
+    peak = (float(even[pressure.argmax()]) - firing + 180.0) % 360.0 - 180.0
+    if not (abs(levels[0] - levels[1]) > _CLEARLY * wide and _PEAK_DEG[0] <= peak <= _PEAK_DEG[1]):
         behind = float(even[pressure.argmax()] % 360.0)
         raise DataError(
             f"{source}: {argument('firing_tdc_deg', format(tdc_deg, 'g'))} behind the mark is not TDC: the pressure "
-            f"is alike there in both turns; it peaks {behind:.1f} degrees behind a mark, and TDC is near that"
+            f"peaks {behind:.1f} degrees behind a mark, and TDC is near that"
         )
-    return (tdc_deg + (0.0 if levels[0] > levels[1] else 360.0)) % 720.0
+    return firing
