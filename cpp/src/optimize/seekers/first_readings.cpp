@@ -109,7 +109,7 @@ void FirstReadings::close() noexcept {
     if (std::min(up, down) > least_moved * c) {
       const double rise = (y.row(4 * i + 1).mean() - start) / up, fall = (start - y.row(4 * i + 3).mean()) / down;
       slope = (rise * down + fall * up) / (up + down);
-      seen = std::abs(2.0 * (rise - fall) / (up + down)) - standard_errors * bend_error / (c * c);
+      seen = std::abs(2.0 * (rise - fall) / (up + down)) - standard_errors * bend_error / (up * down);
     }
     bend_[i] = std::max({share_ * noise / (c * c), seen, std::abs(slope) / (farthest * c)});
   }

@@ -69,7 +69,7 @@ const Inputs& GoldenSection::ask() noexcept {
   } else {
     applied_ = estimate_;
   }
-  return protocol_.ask(applied_);
+  return send();
 }
 
 TellStatus GoldenSection::tell(const Reading& reading) noexcept {
@@ -88,6 +88,7 @@ void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcep
     if (turn_ == 0 && settings_.noise_sd > 0.0) refine();
     return;
   }
+  if (!clamp_.arrived(applied_, applied, scalar_input(0.5 * (lower_ + upper_)))) return;
   Point& point = points_[static_cast<std::size_t>(turn_)];
   point.count += 1.0;
   point.sum += j;
@@ -133,7 +134,11 @@ void GoldenSection::decide() noexcept {
   if (n < 1.0) return;
   const double asked = inner(1) - inner(0);
   const double missed = mean(points_[1].missed, points_[1]) - mean(points_[0].missed, points_[0]);
-  if (asked + missed < least_distance * asked) {  // both are applied as one: the plant does not go there
+  if (asked + missed < least_distance * asked) {               // both are applied as one: the plant does not go there
+    if (points_[0].missed > 0.0 && points_[1].missed < 0.0) {  // it stands between them: they are finer than its steps
+      draws_ = last_draws;
+      return cut(inner(0), inner(1));
+    }
     draws_ = 0;
     return points_[0].missed + points_[1].missed > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }

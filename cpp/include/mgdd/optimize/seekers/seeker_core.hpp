@@ -18,12 +18,14 @@ class SeekerCore {
   const S& settings() const noexcept { return settings_; }
   const Inputs& estimate() const noexcept { return estimate_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
+  const Inputs& applied() const noexcept { return protocol_.sent(clamp_.sent(applied_)); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept {
     if constexpr (requires(const S& s) { s.components; }) return settings_.components.size();
     return 1;
   }
+  /// How far the plant follows.
+  const ClampWatch& clamp() const noexcept { return clamp_; }
   /// What has been learnt of the limits.
   const ConstraintFilter& filter() const noexcept { return filter_; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
@@ -38,6 +40,8 @@ class SeekerCore {
         estimate_(settings_.space.start),
         applied_(estimate_) {}
 
+  /// What to ask of the plant where `applied_` is wanted.
+  const Inputs& send() noexcept { return protocol_.ask(clamp_.stretched(applied_, estimate_, settings_.space)); }
   /// Counts a reading and takes its limits; of an accepted one `learn(the input that the plant applied)`, else
   /// `miss(the same)`: nothing was read, but what comes late has moved on by a cycle.
   template <class Learn, class Miss>
@@ -46,7 +50,7 @@ class SeekerCore {
     protocol_.count(status);
     if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
     Inputs told;
-    const Inputs& applied = protocol_.applied(reading, applied_, told);
+    const Inputs& applied = protocol_.applied(reading, clamp_.sent(applied_), told);
     if (status == TellStatus::accepted) {
       filter_.record(applied, reading.limits);
       learn(applied);
