@@ -112,7 +112,10 @@ const Inputs& ExtremumSeeking::ask() noexcept {
 }
 
 TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
-  return take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  const TellStatus status =
+      take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, first_.open());
+  return status;
 }
 
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.

@@ -73,7 +73,9 @@ const Inputs& GoldenSection::ask() noexcept {
 }
 
 TellStatus GoldenSection::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, false);
+  return status;
 }
 
 void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcept {
@@ -155,7 +157,7 @@ void GoldenSection::decide() noexcept {
   }
   const double rise = mean(points_[1].sum, points_[1]) - mean(points_[0].sum, points_[0]);
   const double error = settings_.noise_sd * std::sqrt(1.0 / points_[0].count + 1.0 / points_[1].count);
-  if (exact || std::abs(rise) > settings_.significance * error) {
+  if (exact ? rise != 0.0 : std::abs(rise) > settings_.significance * error) {  // alike to the last bit says nothing
     draws_ = 0;
     return rise > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }

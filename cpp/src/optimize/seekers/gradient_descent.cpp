@@ -67,7 +67,9 @@ const Inputs& GradientDescent::ask() noexcept {
 }
 
 TellStatus GradientDescent::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, true);
+  return status;
 }
 
 void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexcept {

@@ -99,7 +99,10 @@ const Inputs& NewtonSeeking::ask() noexcept {
 }
 
 TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
-  return take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  const TellStatus status =
+      take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, first_.open());
+  return status;
 }
 
 double NewtonSeeking::largest_inverse() const noexcept {
@@ -181,6 +184,16 @@ void NewtonSeeking::learn(const Reading& reading, const Inputs& applied) noexcep
   const double target = limited_cycles_ >= dither_.period() / 2 ? settings_.limit_amplitude : 1.0;
   share_ += 0.25 * (target - share_);
   limited_cycles_ = 0;
+}
+
+// Of first readings one of which bent the Hessian.
+void NewtonSeeking::begin_anew() noexcept {
+  restart();
+  held_ = settings_.hold_cycles;
+  hessian_.setZero();
+  inverse_.setZero();
+  hessian_.diagonal() = settings_.initial_hessian;
+  inverse_.diagonal() = settings_.initial_inverse;
 }
 
 void NewtonSeeking::restart() noexcept {

@@ -169,7 +169,9 @@ const Inputs& Spsa::ask() noexcept {
 }
 
 TellStatus Spsa::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, first_.open());
+  return status;
 }
 
 void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
@@ -289,6 +291,14 @@ void Spsa::finish_iteration() noexcept {
   candidate_ = estimate_;
   move_within(candidate_, step, settings_.space, room, clamp_, Inputs::Zero(step.size()));
   share_ += perturbation_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
+}
+
+// Of first readings one of which bent the Hessian and led the estimate away.
+void Spsa::begin_anew() noexcept {
+  restart();
+  estimate_ = candidate_ = settings_.space.start;
+  hessian_.setZero();
+  if (settings_.initial_hessian.size() > 0) hessian_.diagonal() = settings_.initial_hessian;
 }
 
 void Spsa::restart() noexcept {

@@ -117,6 +117,8 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept { restart(); }
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   bool remove_mean(const Reading& reading, const Inputs& applied) noexcept;
   void move(Inputs step, const Inputs& rate) noexcept;
