@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 from tests.python.support.stepped import stepped
 
+from mgdd.errors import ParameterError
 from mgdd.optimize import Seeker, Spsa
 
 BEST, START = 4.0, -8.0
@@ -153,3 +156,48 @@ def test_a_seeker_goes_on_bit_for_bit_from_its_state(name: str) -> None:
             seeker.tell(j, applied=applied)
     assert one.state == other.state
     assert codes(one) == codes(other)
+
+
+def path(make: Callable[[], Any], scale: float = 1.0, missing: int = 0) -> list[float]:
+    """What is asked over eighty cycles; every so many, where given, nothing is read."""
+    seeker, rng, asked = make(), np.random.default_rng(7), []
+    for cycle in range(80):
+        asked.append(float(np.ravel(seeker.ask())[0]))
+        assert float(np.ravel(seeker.ask())[0]) == asked[-1]
+        j = scale * j_at(asked[-1], rng)
+        if missing and cycle % missing == missing - 1:
+            seeker.tell(misfire=True)
+        else:
+            seeker.tell(j)
+        with pytest.raises(ParameterError, match="tell without ask"):
+            seeker.tell(j)
+        assert min(asked) >= -20.0
+        assert max(asked) <= 20.0
+    return asked
+
+
+@every
+def test_what_is_asked_is_the_same_again_and_within_bounds(name: str) -> None:
+    assert path(SEEKERS[name]) == path(SEEKERS[name])
+    assert np.isfinite(path(SEEKERS[name], missing=5)).all()
+    assert np.isfinite(path(SEEKERS[name], missing=1)).all()
+
+
+@every
+def test_copies_go_on_alike_and_apart(name: str) -> None:
+    one, rng = SEEKERS[name](), np.random.default_rng(5)
+    for _ in range(30):
+        one.tell(j_at(float(np.ravel(one.ask())[0]), rng))
+    for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        before = one.state
+        assert other.state == before
+        other.tell(j_at(float(np.ravel(other.ask())[0]), rng))
+        assert one.state == before
+        assert other.state != before
+
+
+@every
+def test_another_unit_of_j_is_the_same_search(name: str) -> None:
+    if name in {"GoldenSection", "CurveSeeking"}:
+        pytest.skip("is given the noise or a curve in the unit of J")
+    np.testing.assert_allclose(path(SEEKERS[name], scale=1024.0), path(SEEKERS[name]), rtol=1e-6, atol=1e-6)
