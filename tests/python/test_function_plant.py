@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from tests.python.support.stepped import stepped
 
 from mgdd import optimize
 from mgdd.errors import Interrupted, InUseError, ParameterError, RigError
-from mgdd.guide import Curve, CurveSeeking, FeedForward
+from mgdd.guide import FeedForward
 from mgdd.loop import EngineBench, FunctionPlant, LoopCriteria, monte_carlo, run_seeker, seek, seek_front
 
 SOURCE = r"""
@@ -90,16 +91,7 @@ def in_python(inputs: Any = ("soc_cad",), limits: Any = (), **more: Any) -> Func
     return FunctionPlant(plant, inputs, limits, **more)
 
 
-SEEKERS: dict[str, Callable[[], Any]] = {
-    "ExtremumSeeking": lambda: optimize.ExtremumSeeking(**SPACE),
-    "NewtonSeeking": lambda: optimize.NewtonSeeking(**SPACE),
-    "BoundedSeeking": lambda: optimize.BoundedSeeking(**SPACE),
-    "Spsa": lambda: optimize.Spsa(**SPACE, seed=5),
-    "GradientDescent": lambda: optimize.GradientDescent(**SPACE),
-    "GoldenSection": lambda: optimize.GoldenSection(**SPACE, noise_sd=0.25),
-    "GaussianProcessSeeking": lambda: optimize.GaussianProcessSeeking(**SPACE),
-    "CurveSeeking": lambda: CurveSeeking(**SPACE, curve=Curve.parabola(curvature=-0.05, best=2.0, reach=40.0)),
-}
+SEEKERS = stepped(**SPACE)
 
 
 @pytest.mark.parametrize("kind", SEEKERS)
@@ -135,7 +127,9 @@ def test_several_inputs_and_limits_too(library: ctypes.CDLL, named: bool) -> Non
 
 def test_what_the_core_cannot_match_runs_from_python(library: ctypes.CDLL) -> None:
     """A limit that the seeker does not keep, and inputs in another order."""
-    free = [run_seeker(p, SEEKERS["Spsa"](), 40) for p in (of(library, limits=["q"]), in_python(limits=["q"]))]
+    free = [
+        run_seeker(p, SEEKERS["Spsa first_order"](), 40) for p in (of(library, limits=["q"]), in_python(limits=["q"]))
+    ]
     xr.testing.assert_identical(free[0].dataset, free[1].dataset)
     assert np.isfinite(free[0].dataset["limits"]).all()
     turned = {"inputs": {"egr": (0.0, 0.4), "x": (-30.0, 20.0)}, "start": {"x": -9.0, "egr": 0.05}}
@@ -153,7 +147,7 @@ def test_a_failed_cycle_is_a_misfire(library: ctypes.CDLL) -> None:
     xr.testing.assert_identical(runs[0].dataset, runs[1].dataset)
     assert runs[0].summary["misfires"] > 0
     for name in ("unwritten", "overload"):
-        run = run_seeker(of(library, name), SEEKERS["Spsa"](), 9)
+        run = run_seeker(of(library, name), SEEKERS["Spsa first_order"](), 9)
         assert run.summary["misfires"] == 9
         assert math.isnan(run.dataset["j"][0])
     half = run_seeker(of(library, "not_a_number"), optimize.ExtremumSeeking(start=-5.0, lower=-9.0, upper=0.0), 50)
@@ -175,7 +169,11 @@ def test_seek_takes_one(library: ctypes.CDLL) -> None:
 
 # --- many loops ---------------------------------------------------------------------------------------------
 def test_many_loops_have_the_numbers_of_run_seeker(library: ctypes.CDLL) -> None:
-    seekers = [SEEKERS["ExtremumSeeking"](), SEEKERS["Spsa"](), FeedForward(SEEKERS["NewtonSeeking"]())]
+    seekers = [
+        SEEKERS["ExtremumSeeking batch"](),
+        optimize.Spsa(**SPACE, seed=5),
+        FeedForward(SEEKERS["NewtonSeeking"]()),
+    ]
     data = np.array([0.05, -7.0])
     plants = [of(library, noise_sd=0.2), of(library, noise_sd=0.1, user_data=data)]
     goal = LoopCriteria(optimum=-4.0)
@@ -236,8 +234,8 @@ def test_a_numba_function_is_one() -> None:
         return 0
 
     for function in (plant, plant.address):
-        run = run_seeker(FunctionPlant(function, ["soc_cad"]), SEEKERS["Spsa"](), 60)
-        xr.testing.assert_identical(run.dataset, run_seeker(in_python(), SEEKERS["Spsa"](), 60).dataset)
+        run = run_seeker(FunctionPlant(function, ["soc_cad"]), SEEKERS["Spsa first_order"](), 60)
+        xr.testing.assert_identical(run.dataset, run_seeker(in_python(), SEEKERS["Spsa first_order"](), 60).dataset)
 
     @numba.cfunc(types.float64(types.float64))
     def other(x: float) -> float:
@@ -258,11 +256,11 @@ def test_a_callback_into_python_is_kept_alive_and_may_fail() -> None:
 
         return FunctionPlant(FunctionPlant.C_TYPE(called), ["soc_cad"])
 
-    run = run_seeker(plant(), SEEKERS["ExtremumSeeking"](), 80)
+    run = run_seeker(plant(), SEEKERS["ExtremumSeeking batch"](), 80)
     good = ~run.dataset["misfire"].to_numpy()
     assert 0 < good.sum() < 80
     assert (run.dataset["soc_applied_cad"].to_numpy()[good] >= -12.5).all()
-    table = monte_carlo(plant(), SEEKERS["Spsa"](), range(4), cycles=30, workers=2)
+    table = monte_carlo(plant(), SEEKERS["Spsa first_order"](), range(4), cycles=30, workers=2)
     assert bool(table["finished"].all())
 
 
@@ -308,9 +306,9 @@ def data_of_two() -> np.ndarray[Any, Any]:
 
 
 def test_loops_refuse_what_does_not_fit_and_nothing_has_moved(library: ctypes.CDLL) -> None:
-    plant, seeker = of(library), SEEKERS["Spsa"]()
+    plant, seeker = of(library), SEEKERS["Spsa first_order"]()
     two = optimize.Spsa(start=[0.0, 0.0])
-    guided = FeedForward(SEEKERS["Spsa"](), lambda _: 0.0)
+    guided = FeedForward(SEEKERS["Spsa first_order"](), lambda _: 0.0)
     for call in (run_seeker, lambda plant, seeker, cycles: monte_carlo(plant, seeker, [1], cycles=cycles)):
         for own, cycles, message in (
             (two, 5, "start has 2 entries"),
@@ -332,7 +330,7 @@ def test_loops_refuse_what_does_not_fit_and_nothing_has_moved(library: ctypes.CD
 
 def test_copies_share_the_function_and_no_other_process_has_it(library: ctypes.CDLL) -> None:
     plant = of(library, noise_sd=0.3, seed=8)
-    run_seeker(plant, SEEKERS["Spsa"](), 7)
+    run_seeker(plant, SEEKERS["Spsa first_order"](), 7)
     twins = copy.copy(plant), copy.deepcopy(plant)
     for each in (plant, *twins):
         each.apply({"soc_cad": -3.0})
@@ -341,12 +339,12 @@ def test_copies_share_the_function_and_no_other_process_has_it(library: ctypes.C
     with pytest.raises(TypeError, match="stands in this process only"):
         pickle.dumps(plant)
     with pytest.raises(ParameterError, match="this process only"):
-        monte_carlo(plant, SEEKERS["Spsa"](), range(4), cycles=5, executor=lambda: ProcessPoolExecutor(1))
+        monte_carlo(plant, SEEKERS["Spsa first_order"](), range(4), cycles=5, executor=lambda: ProcessPoolExecutor(1))
     assert pickle.loads(pickle.dumps(FunctionPlant(math.hypot, ["x"]))).input_names == ("x",)
 
 
 def test_the_gil_is_released_while_it_runs(library: ctypes.CDLL) -> None:
-    plant, seeker, done = of(library, "slow"), SEEKERS["Spsa"](), threading.Event()
+    plant, seeker, done = of(library, "slow"), SEEKERS["Spsa first_order"](), threading.Event()
 
     def work() -> None:
         run_seeker(plant, seeker, 200)
@@ -376,14 +374,14 @@ def test_ctrl_c_leaves_what_was_run(library: ctypes.CDLL) -> None:
             call()
         return stop.value.partial
 
-    plant, seeker = of(library, "slow"), SEEKERS["Spsa"]()
+    plant, seeker = of(library, "slow"), SEEKERS["Spsa first_order"]()
     run = interrupted(lambda: run_seeker(plant, seeker, 100_000))
     n = run.dataset.sizes["cycle"]
     assert run.interrupted
     assert 0 < n == plant.cycle == seeker.cycle < 100_000
-    begun = run_seeker(of(library, "slow"), SEEKERS["Spsa"](), n)
+    begun = run_seeker(of(library, "slow"), SEEKERS["Spsa first_order"](), n)
     np.testing.assert_array_equal(run.dataset["estimate_cad"], begun.dataset["estimate_cad"])
     assert run.summary["mean_j"] == begun.summary["mean_j"]
-    table = interrupted(lambda: monte_carlo(plant, SEEKERS["Spsa"](), range(3), cycles=100_000))
+    table = interrupted(lambda: monte_carlo(plant, SEEKERS["Spsa first_order"](), range(3), cycles=100_000))
     assert not table["finished"].any()
     assert np.isnan(table["mean_j"]).all()

@@ -18,6 +18,7 @@ from mgdd.loop import EngineBench, Measurement, run_seeker
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
+    GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Limit,
@@ -135,3 +136,28 @@ def test_history_and_states_tell_of_the_limits() -> None:
     np.testing.assert_array_equal(history["limits"].sel(limit="low"), history["applied"][:, 0])
     assert history["limit_states"][-1].to_numpy().tolist() == [2, 2, 0]
     assert "limits" not in ExtremumSeeking(start=0.0).history
+
+
+@pytest.mark.parametrize("late", [0, 5])
+@pytest.mark.parametrize(("start", "best"), [(-18.0, 6.0), (-2.0, -14.0)])  # from below to the limit; from it down
+def test_a_limit_that_passes_zero_is_kept_as_the_same_one_far_above(start: float, best: float, late: int) -> None:
+    lost, above = {}, {}
+    for shift in (0.0, 100.0):
+        limit = Limit("ca50_cad", 8.0 + shift, delay_cycles=late)
+        seeker = GaussianProcessSeeking(
+            start={"soc_cad": start, "egr": 0.05},
+            inputs={"soc_cad": (-25.0, 15.0), "egr": (0.0, 0.4)},
+            limits=[limit],
+            seed=2,
+        )
+        rng, ca50 = np.random.default_rng(2), []
+        for _ in range(120):
+            asked = seeker.ask()
+            ca50.append(asked["soc_cad"] + 9.0 + 20.0 * asked["egr"])
+            j = 50.0 - 0.03 * (asked["soc_cad"] - best) ** 2 - 100.0 * (asked["egr"] - 0.25) ** 2
+            seeker.tell(j + rng.normal(0.0, 0.3), [ca50[max(0, len(ca50) - 1 - late)] + rng.normal(0.0, 0.5) + shift])
+        soc, egr = seeker.estimate
+        lost[shift] = 0.03 * (soc - best) ** 2 + 100.0 * (egr - 0.25) ** 2
+        above[shift] = np.mean(np.array(ca50) > 8.0)
+    assert above[0.0] <= 0.02
+    assert lost[0.0] < lost[100.0] + 0.3

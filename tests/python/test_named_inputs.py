@@ -148,7 +148,7 @@ class Two:
 
 
 def test_a_loop_goes_by_names() -> None:
-    run = run_seeker(Two(), Spsa(start=START, inputs=PAIR, schedule="constant", seed=4), 400)
+    run = run_seeker(Two(), Spsa(start=START, inputs=PAIR, seed=4), 400)
     check_labels(run.dataset)
     assert run.dataset["input"].to_numpy().tolist() == ["egr", "soc_cad"]
     last = run.dataset["estimate"][-1].to_numpy()

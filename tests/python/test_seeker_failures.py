@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.python.support.stepped import stepped
 
-from mgdd.guide import Curve, CurveSeeking, FeedForward
+from mgdd.guide import FeedForward
 from mgdd.loop import Measurement, run_seeker
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
     GaussianProcessSeeking,
-    GoldenSection,
     GradientDescent,
     NewtonSeeking,
     Seeker,
@@ -24,20 +24,8 @@ from mgdd.optimize import (
 )
 
 SPACE: dict[str, Any] = {"start": -5.0, "lower": -20.0, "upper": 20.0}
-CURVE = Curve.parabola(curvature=-0.06, best=0.0, reach=60.0)
-MAKERS: dict[str, Callable[[], Any]] = {
-    "batch": lambda: ExtremumSeeking(**SPACE),
-    "moving_average": lambda: ExtremumSeeking(**SPACE, form="moving_average"),
-    "washout": lambda: ExtremumSeeking(**SPACE, form="washout"),
-    "newton": lambda: NewtonSeeking(**SPACE),
-    "bounded": lambda: BoundedSeeking(**SPACE),
-    "spsa": lambda: Spsa(**SPACE),
-    "spsa_second_order": lambda: Spsa(**SPACE, form="second_order"),
-    "spsa_one_measurement": lambda: Spsa(**SPACE, form="one_measurement"),
-    "gradient": lambda: GradientDescent(**SPACE),
-    "golden": lambda: GoldenSection(**SPACE, noise_sd=0.3),
-    "curve": lambda: CurveSeeking(**SPACE, curve=CURVE),
-}
+# A process knows by itself which inputs fail, and sets no edges.
+MAKERS = {name: make for name, make in stepped(**SPACE).items() if name != "GaussianProcessSeeking"}
 every = pytest.mark.parametrize("name", MAKERS)
 
 
@@ -144,7 +132,7 @@ def test_what_is_asked_in_its_place_stands_in_the_history_and_survives_a_journey
 
 def test_asking_twice_and_a_start_that_fails_are_the_same_input() -> None:
     seeker = GradientDescent(start=5.0)
-    for _ in range(20):
+    for _ in range(12):  # after these other inputs are tried
         assert seeker.ask() == seeker.ask() == pytest.approx(5.0 + 0.5, abs=0.5)
         seeker.tell(misfire=True)
     assert seeker.failing_everywhere

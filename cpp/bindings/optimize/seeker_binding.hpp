@@ -68,6 +68,8 @@ py::dict watched(const S& seeker) {
   out["failing_below"] = input_array(failures.failing_below());
   out["failing_everywhere"] = failures.failing_everywhere();
   out["limit_delays"] = limit_delays(seeker);
+  out["alike"] = seeker.protocol().heard.alike();
+  out["applied_share"] = input_array(seeker.protocol().heard.applied_share());
   return out;
 }
 
@@ -149,6 +151,8 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
           "limit_delays", [](const B& b) { return limit_delays(*b.use()); },
           "The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit "
           "another.")
+      .def_property_readonly(
+          "_watched", [](const B& b) { return watched(*b.use()); }, "What the findings are made of.")
       .def_property_readonly(
           "limit_states",
           [](const B& b) {

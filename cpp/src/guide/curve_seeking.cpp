@@ -147,7 +147,7 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
       limits_(settings_.limits, settings_.limit_curves, settings_.space.lower[0], settings_.space.upper[0],
               limit_reach_share * settings_.prior_sd, settings_.memory_cycles),
       plain_(plain_settings(settings_)),
-      protocol_(1),
+      protocol_(settings_.space, 1 + settings_.limits.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       delay_(std::lround(settings_.sensor.delay_cycles)),
@@ -205,7 +205,7 @@ double CurveSeeking::within_limits(double wanted) noexcept {
 
 TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count(), 1);
-  protocol_.count(status);
+  protocol_.count(status, reading);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
   const double applied = protocol_.applied(reading, applied_, told)[0];

@@ -156,6 +156,11 @@ class CurveSeeking:
         1e30 in magnitude); the state is unchanged then.
         """
     @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
+        """
+    @property
     def answered(self) -> bool:
         """
         False where 60 readings and more have not shown that J answers the input: the estimate is the guide's.
@@ -324,6 +329,11 @@ class FeedForward:
     def _seeker_state(self) -> dict[str, list[float]]:
         """
         State of the seeker.
+        """
+    @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
         """
     @property
     def applied(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -582,6 +592,11 @@ class GuidedEngine:
         applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
         """
     @property
     def applied(self) -> numpy.typing.NDArray[numpy.float64]:

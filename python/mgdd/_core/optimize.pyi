@@ -613,6 +613,11 @@ class ExtremumSeeking:
         1e30 in magnitude); the state is unchanged then.
         """
     @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
+        """
+    @property
     def amplitude_share(self) -> float:
         """
         Amplitude now over that of the settings.
@@ -760,6 +765,11 @@ class NewtonSeeking:
         1e30 in magnitude); the state is unchanged then.
         """
     @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
+        """
+    @property
     def component_count(self) -> int:
         """
         Components of J that tell takes.
@@ -897,6 +907,11 @@ class BoundedSeeking:
         applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
         """
     @property
     def component_count(self) -> int:
@@ -1037,6 +1052,11 @@ class Spsa:
         applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
         """
     @property
     def blocked(self) -> int:
@@ -1194,6 +1214,11 @@ class GradientDescent:
         1e30 in magnitude); the state is unchanged then.
         """
     @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
+        """
+    @property
     def component_count(self) -> int:
         """
         Components of J that tell takes.
@@ -1335,6 +1360,11 @@ class GoldenSection:
         applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
         """
     @property
     def bracket(self) -> tuple[float, float]:
@@ -1506,6 +1536,11 @@ class GaussianProcessSeeking:
         applied: what the plant really applied, one number per input or by name; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def _watched(self) -> dict:
+        """
+        What the findings are made of.
         """
     @property
     def component_count(self) -> int:

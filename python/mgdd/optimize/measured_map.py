@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["MeasuredMap", "measure_map"]
 
+_SURE = 2.0  # standard errors
+
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class MeasuredMap(InputNumbers):
@@ -36,7 +38,9 @@ class MeasuredMap(InputNumbers):
         Measurements behind curvature and optimum.
     findings : tuple of Finding
         ``lack_of_fit`` where J over all inputs is not a parabola: curvature and optimum are those of the inputs nearest
-        to the best one, and their standard errors hold the difference to twice that range.
+        to the best one, and their standard errors hold the difference to twice that range. ``no_bend`` where a
+        curvature lies within two standard errors of none, and ``beyond_range`` where the optimum lies outside of the
+        measured inputs: then neither is known, nor what `tune` makes of them.
     inputs : tuple of str
         Names of the inputs, in their order; empty where `theta` had none.
     optimum_covariance : numpy.ndarray, shape (inputs, inputs)
@@ -84,6 +88,25 @@ def _columns(theta: Any) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     if not columns or len(set(shapes.values())) > 1 or len(next(iter(shapes.values()))) != 1:
         raise ShapeError(f"theta has columns of shape {shapes}: must be columns of one length")
     return np.column_stack(list(columns.values())), tuple(columns)
+
+
+def _unknown(
+    x: NDArray[np.float64], curvature: Any, stderr: Any, optimum: Any, names: tuple[str, ...]
+) -> tuple[Finding, ...]:
+    """Say of which inputs J does not show a bend, or no optimum between those that were measured."""
+    out = []
+    bends, errors = (np.diag(np.atleast_2d(one)) for one in (curvature, stderr))
+    for index, (low, high) in enumerate(zip(x.min(axis=0), x.max(axis=0), strict=True)):
+        name = names[index] if names else "theta" if x.shape[1] == 1 else f"theta[{index}]"
+        at = float(np.ravel(optimum)[index])
+        if abs(bends[index]) < _SURE * errors[index]:
+            text = f"J does not bend over {name} by more than its noise: {bends[index]:.3g} ± {errors[index]:.2g}"
+            remedy = f"measure farther out, or more often; tune with amplitude_max of at most {(high - low) / 2:.3g}"
+            out.append(Finding("no_bend", (name,), text, remedy))
+        if not low <= at <= high:
+            text = f"the optimum of {name}, {at:.4g}, lies outside of what was measured, {low:.4g} to {high:.4g}"
+            out.append(Finding("beyond_range", (name,), text, "measure on that side"))
+    return tuple(out)
 
 
 def measure_map(
@@ -192,6 +215,7 @@ def measure_map(
             "bends": narrow.bends,
             "directions": narrow.directions,
         }
+    findings += _unknown(x, narrow.curvature, np.sqrt(noise[0] * narrow.curvature_variance), narrow.optimum, names)
     return MeasuredMap(
         noise_sd=math.sqrt(noise[0]),
         noise_sd_stderr=math.sqrt(noise[0] / (2.0 * noise[1])),

@@ -83,7 +83,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     dither around it goes on: with `memory_cycles` at 143, some 0.02 bounds where noise is a hundredth of the bend.
     Cycles told as misfires have a process of their own, which keeps the search out of what is likely to fail.
     `trust` says how much of J a guide explains.
-    Of a limit above 0 the logarithm is learnt: quantities as NOx spread over powers of ten.
+    Of a limit whose readings stand well above 0 the logarithm is learnt: quantities as NOx spread over powers of ten.
 
     References
     ----------

@@ -9,11 +9,14 @@ import numpy as np
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
 __all__ = ["SeekerFindings", "findings_of"]
+
+_FROZEN = 12  # as many failures say that a plant fails; rounded readings near an optimum are seldom alike for longer
+_FOLLOWED = 0.5
 
 
 if TYPE_CHECKING:
@@ -22,17 +25,7 @@ if TYPE_CHECKING:
         """What every seeker has of its class of the core, and what stands around one."""
 
         @property
-        def cycle(self) -> int: ...
-        @property
-        def misfires(self) -> int: ...
-        @property
-        def failing_above(self) -> NDArray[np.float64]: ...
-        @property
-        def failing_below(self) -> NDArray[np.float64]: ...
-        @property
-        def failing_everywhere(self) -> bool: ...
-        @property
-        def limit_delays(self) -> dict[str, float]: ...
+        def _watched(self) -> dict[str, Any]: ...
         @property
         def settings(self) -> dict[str, Any]: ...
 else:
@@ -47,7 +40,8 @@ class SeekerFindings(_Watching):
         """What speaks against the run so far.
 
         Codes: ``failing_inputs``, ``failing_everywhere``, ``failing_cycles`` (a tenth of all, and no input is known
-        to fail) and ``limit_delay``.
+        to fail), ``limit_delay``, ``frozen`` (a channel read the same to the last bit, twelve cycles in a row, at
+        different inputs) and ``not_followed`` (less than half of the moves of an input are applied).
 
         Examples
         --------
@@ -59,15 +53,7 @@ class SeekerFindings(_Watching):
         >>> [finding.code for finding in seeker.findings], float(history["applied"][-1, 0]) <= 3.0
         (['failing_inputs'], True)
         """
-        return findings_of(
-            self.settings,
-            cycle=self.cycle,
-            misfires=self.misfires,
-            failing_above=self.failing_above,
-            failing_below=self.failing_below,
-            failing_everywhere=self.failing_everywhere,
-            limit_delays=self.limit_delays,
-        )
+        return findings_of(self.settings, **self._watched)
 
 
 def findings_of(
@@ -79,6 +65,8 @@ def findings_of(
     failing_below: NDArray[np.float64],
     failing_everywhere: bool,
     limit_delays: Mapping[str, float],
+    alike: Sequence[float],
+    applied_share: NDArray[np.float64],
 ) -> tuple[Finding, ...]:
     """Put into words what a seeker has seen."""
     out = list[Finding]()
@@ -87,8 +75,7 @@ def findings_of(
         out.append(Finding("failing_everywhere", (), text, "look at the plant, or start where it is known to run"))
     for side, edges in (("above", failing_above), ("below", failing_below)):
         for index in np.flatnonzero(np.isfinite(edges)):
-            inputs = settings["inputs"]
-            name, edge = inputs[index].name if inputs else f"input[{index}]", float(edges[index])
+            name, edge = _name(settings, int(index)), float(edges[index])
             text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
             remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
             out.append(Finding("failing_inputs", (name,), text, remedy))
@@ -104,4 +91,21 @@ def findings_of(
             at_end = abs(taken - limit.delay_cycles) >= limit.delay_uncertainty
             more = ", and raise delay_uncertainty: it is the end of the search" if at_end else ""
             out.append(Finding("limit_delay", (limit.name,), text, f"mend delay_cycles of the limit{more}"))
+    limits = [limit.name for limit in settings["limits"]]
+    components = len(alike) - len(limits)
+    channels = ["J" if components == 1 else f"J[{index}]" for index in range(components)] + limits
+    for name, count in zip(channels, alike, strict=True):
+        if count >= _FROZEN:
+            text = f"{name} read the same to the last bit in {count:.0f} cycles in a row, at different inputs"
+            out.append(Finding("frozen", (name,), text, "look at what measures it, or whether it is read at all"))
+    for index in np.flatnonzero(applied_share < _FOLLOWED):
+        name = _name(settings, int(index))
+        text = f"{applied_share[index]:.0%} of the moves of {name} that were asked for are applied"
+        remedy = "look at the actuator: a stop, a lag or coarse steps; set bounds inside of a stop"
+        out.append(Finding("not_followed", (name,), text, remedy))
     return tuple(out)
+
+
+def _name(settings: Mapping[str, Any], index: int) -> str:
+    inputs = settings["inputs"]
+    return str(inputs[index].name) if inputs else f"input[{index}]"

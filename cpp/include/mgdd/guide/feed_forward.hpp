@@ -26,7 +26,7 @@ class FeedForward {
   explicit FeedForward(S seeker, FeedForwardSettings settings = {})
       : seeker_(std::move(seeker)),
         path_(std::move(settings), seeker_.estimate().size()),
-        protocol_(seeker_.estimate().size()),
+        protocol_(seeker_.settings().space, seeker_.component_count() + seeker_.limit_count()),
         applied_(seeker_.applied()) {}
 
   /// What the guide says of the operating point of the next cycle. A refused value lowers the trust and moves nothing;
@@ -68,7 +68,7 @@ class FeedForward {
       if (fired) path_.searched(applied, j);
     }
     path_.advance();
-    protocol_.count(status);
+    protocol_.count(status, reading);
     return status;
   }
 

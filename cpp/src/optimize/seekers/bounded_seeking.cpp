@@ -71,7 +71,9 @@ const Inputs& BoundedSeeking::ask() noexcept {
 }
 
 TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, true);
+  return status;
 }
 
 void BoundedSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {

@@ -11,7 +11,6 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr double limit_memory_windows = 2.0;
-constexpr double least_response = 0.05;      // share of the dither that must arrive before a slope is told
 constexpr double share_rate = 0.25;          // how fast the amplitude follows its target, per window
 constexpr double own_periods = 4.0;          // time constant of the seeker's own gain
 constexpr double dither_unseen_bend = 0.17;  // |J''| A^2 over the noise: 0.051 for an amplitude of 1 and noise of 0.3
@@ -87,7 +86,6 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       sum_(gradient_),
       smooth_(gradient_),
       slow_(gradient_),
-      response_(Inputs::Ones(estimate_.size())),
       origin_(component_count(), 0.0) {
   if (settings_.form == MeanRemoval::moving_average) {
     window_.assign(component_count() * static_cast<std::size_t>(settings_.dither.period), 0.0);
@@ -102,16 +100,22 @@ Inputs ExtremumSeeking::gain() const noexcept {
 }
 
 const Inputs& ExtremumSeeking::ask() noexcept {
-  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
+  if (first_.open()) {
+    applied_ = first_.ask(estimate_);
+    return send();
+  }
   for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
     applied_[i] =
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
   }
-  return protocol_.ask(applied_);
+  return send();
 }
 
 TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
-  return take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  const TellStatus status =
+      take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, first_.open());
+  return status;
 }
 
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.
@@ -148,7 +152,7 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   const Inputs metric = first_.open() ? Inputs(a.cwiseAbs2()) : Inputs(gain().cwiseProduct(a));  // of slopes to steps
   step = filter_.project(
       estimate_, step,
-      {settings_.space, a, a * share_, rate, settings_.recovery_rate, InputMatrix(metric.asDiagonal())});
+      {settings_.space, a, clamp_.reach(a * share_), rate, settings_.recovery_rate, InputMatrix(metric.asDiagonal())});
   if (filter_.active()) ++limited_cycles_;
   move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
 }
@@ -182,10 +186,11 @@ void ExtremumSeeking::learn(const Reading& reading, const Inputs& applied) noexc
         sum_[i] += j * dither_.demodulation(static_cast<int>(phase_), c, i);
     }
   } else if (remove_mean(reading, applied)) {
-    gradient_ = (smooth_.cwiseQuotient(a) * (2.0 / share_)).cwiseProduct(response_);
+    gradient_ = (smooth_.cwiseQuotient(a) * (2.0 / share_)).cwiseProduct(clamp_.slope_factor());
     if (!holding) {
       // A limit passes what points inwards and turns the rest: of a ripple that would leave a bias.
-      move(gain().cwiseProduct(filter_.active() ? slow_ : smooth_) * share_, settings_.rate);
+      const Inputs& seen = filter_.active() ? slow_ : smooth_;
+      move(gain().cwiseProduct(seen).cwiseProduct(clamp_.step_factor()) * share_, settings_.rate);
       moved_by_alarm = true;
     }
   }
@@ -203,15 +208,14 @@ void ExtremumSeeking::learn(const Reading& reading, const Inputs& applied) noexc
   phase_ = 0;
   // The steps take the slope against what is asked, which fades where the plant does not follow; `gradient` tells it
   // against what is applied: the regression on the part of the dither that arrives.
-  const Inputs arriving = clamp_.response(a.cwiseAbs2() * (0.5 * period * share_ * share_));
-  response_ = (arriving.array() > least_response).select(arriving.cwiseInverse(), Inputs::Zero(a.size()));
-  clamp_.close_window();
+  clamp_.close_window(a.cwiseAbs2() * (0.5 * period * share_ * share_));
   if (settings_.form == MeanRemoval::batch) {
     gradient_ = (sum_ * (2.0 / (period * share_))).cwiseQuotient(a);
     if (!holding) {  // the mean rate of the continuous form: M g_r A/2 times the slope, smaller with a smaller dither
-      move(gain().cwiseProduct(a).cwiseProduct(gradient_) * (0.5 * period * share_ * share_), settings_.rate * period);
+      const Inputs slope = gradient_.cwiseProduct(clamp_.step_factor());
+      move(gain().cwiseProduct(a).cwiseProduct(slope) * (0.5 * period * share_ * share_), settings_.rate * period);
     }
-    gradient_ = gradient_.cwiseProduct(response_);
+    gradient_ = gradient_.cwiseProduct(clamp_.slope_factor());
   }
   end_of_window();
 }
@@ -235,7 +239,6 @@ void ExtremumSeeking::restart() noexcept {
   smooth_.setZero();
   slow_.setZero();
   sum_.setZero();
-  response_.setOnes();
   limited_cycles_ = 0;
   first_.restart();
   last_.forget();

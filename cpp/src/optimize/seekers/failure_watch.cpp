@@ -12,6 +12,7 @@ constexpr double remembered_cycles = 200.0, faultless_cycles = 10.0;  // behind 
 constexpr double first_wait = 5.0, longest_wait = 320.0;
 constexpr double finest_share = 0.01;  // of what works: an edge is not looked for more closely
 constexpr double none = largest_reading;
+constexpr std::array rings{0.125, 0.25, 0.5, 0.9};
 constexpr std::array places{0.0, 1.0, 0.5, 0.25, 0.75};  // between the lowest and the highest that has worked
 
 constexpr double sign(std::size_t side) noexcept {
@@ -74,6 +75,8 @@ const Inputs& FailureWatch::admit(const Inputs& wanted) noexcept {
   if (worked_ && failing_everywhere()) {  // in turn: as wanted, and places between the ends of what has ever worked
     const auto turn = static_cast<std::size_t>(in_a_row_ - hopeless) % (places.size() + 1);
     if (turn > 0) sent_ = places[turn - 1] * sides_[0].farthest - (1.0 - places[turn - 1]) * sides_[1].farthest;
+  } else if (edges_ && failing_everywhere() && start_.size() > 0) {
+    sent_ = (in_a_row_ - hopeless) % 4 == 3 ? wanted : elsewhere(in_a_row_ - hopeless - (in_a_row_ - hopeless) / 4);
   } else {
     for (Eigen::Index i = 0; i < sent_.size(); ++i) {
       for (std::size_t s = 0; s < 2; ++s) {
@@ -94,7 +97,33 @@ const Inputs& FailureWatch::admit(const Inputs& wanted) noexcept {
   return differs_ ? sent_ : wanted;  // NOLINT(bugprone-return-const-ref-from-parameter)
 }
 
+void FailureWatch::roam(const Inputs& start, const Inputs& lower, const Inputs& upper) noexcept {
+  start_ = start;
+  const Inputs away = start.cwiseAbs().cwiseMax(1.0);  // where there is no bound
+  lower_ = (lower.array() > -none).select(lower, start - away);
+  upper_ = (upper.array() < none).select(upper, start + away);
+}
+
+// The start, then one input at a time, an eighth, a quarter, a half and most of the way to each bound, then anywhere.
+Inputs FailureWatch::elsewhere(std::int64_t turn) const noexcept {
+  const Eigen::Index n = start_.size();
+  const std::int64_t ring = (turn - 1) / (2 * n);
+  Inputs out = start_;
+  if (turn == 0) return out;
+  if (ring < static_cast<std::int64_t>(rings.size())) {
+    const Eigen::Index i = (turn - 1) / 2 % n;
+    out[i] += rings[static_cast<std::size_t>(ring)] * ((turn % 2 == 1 ? upper_ : lower_)[i] - start_[i]);
+    return out;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {  // Kronecker's sequence: even, and never the same twice
+    const double place = static_cast<double>(turn) * std::sqrt(static_cast<double>(i * i + i + 2));
+    out[i] = lower_[i] + (place - std::floor(place)) * (upper_[i] - lower_[i]);
+  }
+  return out;
+}
+
 void FailureWatch::worked() noexcept {
+  found_ = !worked_ && differs_;
   good_ = sent_;
   worked_ = true;
   in_a_row_ = 0;
@@ -127,6 +156,7 @@ void FailureWatch::worked() noexcept {
 // The side on which the failing input lies farthest out of what has worked; where it lies within, away from what worked
 // last, or from the middle of what has worked where that is the same input.
 void FailureWatch::failed() noexcept {
+  found_ = false;
   ++in_a_row_;
   count_cycle();
   if (!worked_ || !edges_) return;  // nowhere to go back to

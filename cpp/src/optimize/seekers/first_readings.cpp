@@ -1,10 +1,12 @@
 #include "mgdd/optimize/seekers/first_readings.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "mgdd/optimize/reading.hpp"
+#include "mgdd/optimize/seekers/outliers.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -47,6 +49,7 @@ FirstReadings::FirstReadings(Inputs reach, double share, bool wanted, std::optio
   if (!open_) return;
   readings_.assign(static_cast<std::size_t>(rounds * slots()), 0.0);
   applied_.assign(static_cast<std::size_t>(slots()), 0.0);
+  scratch_ = readings_;
 }
 
 const Inputs& FirstReadings::ask(const Inputs& estimate) noexcept {
@@ -82,9 +85,32 @@ bool FirstReadings::fill() noexcept {
   return true;
 }
 
+// What lies far out of the readings of the same point counts as their median.
+void FirstReadings::bring_in() noexcept {
+  Eigen::Map<Eigen::MatrixXd> y(readings_.data(), slots(), rounds);
+  Eigen::MatrixXd::Index out = 0;
+  const auto middle = [&](Eigen::Index s) {
+    std::array<double, rounds> row{};
+    for (Eigen::Index r = 0; r < rounds; ++r)
+      row[static_cast<std::size_t>(r)] = y(s, r);
+    return median_of(row);
+  };
+  for (Eigen::Index s = 0; s < slots(); ++s) {
+    const double of_point = middle(s);
+    for (Eigen::Index r = 0; r < rounds; ++r)
+      scratch_[static_cast<std::size_t>(out++)] = std::abs(y(s, r) - of_point);
+  }
+  const double farthest = farthest_of(scratch_);
+  for (Eigen::Index s = 0; s < slots(); ++s) {
+    const double of_point = middle(s);
+    y.row(s) = ((y.row(s).array() - of_point).abs() > farthest).select(of_point, y.row(s).array());
+  }
+}
+
 void FirstReadings::close() noexcept {
   told_ = 0;
   if (!fill()) return restart();
+  bring_in();
   Eigen::Map<Eigen::MatrixXd> y(readings_.data(), slots(), rounds);
   const double highest = y.cwiseAbs().maxCoeff();
   // A steady drift of the level is neither a bend nor noise.
@@ -109,7 +135,7 @@ void FirstReadings::close() noexcept {
     if (std::min(up, down) > least_moved * c) {
       const double rise = (y.row(4 * i + 1).mean() - start) / up, fall = (start - y.row(4 * i + 3).mean()) / down;
       slope = (rise * down + fall * up) / (up + down);
-      seen = std::abs(2.0 * (rise - fall) / (up + down)) - standard_errors * bend_error / (c * c);
+      seen = std::abs(2.0 * (rise - fall) / (up + down)) - standard_errors * bend_error / (up * down);
     }
     bend_[i] = std::max({share_ * noise / (c * c), seen, std::abs(slope) / (farthest * c)});
   }

@@ -19,6 +19,7 @@ constexpr double surprise_rate = 0.1, most_surprise = 3.0;
 constexpr std::int64_t calm_cycles = 10;  // after a doubt
 constexpr double doubt_age = 10.0;        // memories
 constexpr double least_share = 1e-3;      // of a limit, that a reading counts as at least
+constexpr double clear_of_zero = 3.0;     // sd of a reading there, above which the logarithm of a reading has a scatter
 constexpr double expected_bend = 3.0;     // of a limited quantity, in its scale: few readings must not promise too much
 constexpr double label_noise = 0.3;       // of whether a cycle works: 1 or -1
 constexpr std::int64_t most_wary = 64;    // cycles that work, after a failure
@@ -46,10 +47,23 @@ std::vector<DelayFinder> finders_of(const GaussianProcessSeekingSettings& s) {
   return out;
 }
 
-// Limited quantities spread over powers of ten, as NOx: above 0 their logarithm is learnt, with slope 1 at the limit.
-double learnt_of(const Limit& limit, double value) {
-  if (!(limit.upper > 0.0)) return value;
+// Of quantities that spread over powers of ten, as NOx, the logarithm is learnt, with slope 1 at the limit.
+double learnt_of(const Limit& limit, bool logarithm, double value) {
+  if (!logarithm) return value;
   return limit.upper * (1.0 + std::log(std::max(value / limit.upper, least_share)));
+}
+double read_of(const Limit& limit, bool logarithm, double learnt) {
+  return logarithm ? limit.upper * std::exp(learnt / limit.upper - 1.0) : learnt;
+}
+
+// Whether a limited quantity may be learnt by its logarithm: not where it comes as near to zero as its noise.
+bool stands_above_zero(const Limit& limit, double lowest, double noise_sd) {
+  return limit.upper > 0.0 && lowest > std::max(clear_of_zero * noise_sd, least_share * limit.upper);
+}
+bool guide_above_zero(const GaussianProcessSeekingSettings& s, std::size_t i) {
+  if (s.limit_guides.empty() || s.limit_guides[i].empty()) return s.limits[i].upper > 0.0;
+  const std::vector<double>& values = s.limit_guides[i].values();
+  return stands_above_zero(s.limits[i], *std::min_element(values.begin(), values.end()), 0.0);
 }
 
 ProcessModel::Settings process_settings(const GaussianProcessSeekingSettings& s, int most_points) {
@@ -84,7 +98,7 @@ std::vector<ProcessModel> limit_processes(const GaussianProcessSeekingSettings& 
     if (!s.limit_guides.empty() && !s.limit_guides[i].empty()) {
       std::vector<double> values = s.limit_guides[i].values();
       for (double& value : values)
-        value = learnt_of(s.limits[i], value);
+        value = learnt_of(s.limits[i], guide_above_zero(s, i), value);
       own.guide.surface = Surface(s.limit_guides[i].axes(), std::move(values));
     }
     out.emplace_back(own);
@@ -108,7 +122,8 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
     : settings_(resolved(std::move(settings))),
       quantile_(random::normal_quantile(settings_.limit_probability)),
       hold_(1),
-      protocol_(settings_.space.size(), false),  // its own process knows what fails
+      protocol_(settings_.space, settings_.components.size() + settings_.limits.size(),
+                false),  // its own process knows what fails
       causes_(lags_of_limits(settings_), settings_.space.size()),
       finders_(finders_of(settings_)),
       j_(component_processes(settings_, candidates + most_on_their_way)),
@@ -122,6 +137,7 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       highest_(middle_),
       surprise_(j_.size(), 1.0),
       room_(settings_.limits.size(), 0.0),
+      logarithm_(room_),
       unsafe_(settings_.limits.empty() ? 0 : 1, 0.0),
       candidates_(InputTable::Zero(candidates + most_on_their_way, settings_.space.size())),
       covariance_(candidates, candidates),
@@ -133,6 +149,8 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       over_(candidates, 0.0),
       mean_over_(candidates, 0.0),
       order_(candidates, 0) {
+  for (std::size_t i = 0; i < logarithm_.size(); ++i)
+    logarithm_[i] = guide_above_zero(settings_, i) ? 1.0 : 0.0;
   double longest = 0.0;
   const auto add = [&](const ComponentLag& lag) {
     longest = std::max(longest, lag.lag_cycles);
@@ -156,7 +174,7 @@ Inputs GaussianProcessSeeking::unscaled(const Inputs& z) const noexcept {
 
 TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, j_.size(), limit_count(), applied_.size());
-  protocol_.count(status);
+  protocol_.count(status, reading);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
   const Inputs& applied = protocol_.applied(reading, applied_, told);
@@ -215,10 +233,30 @@ void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied
       if (causes_.known(i)) read = z;
     }
     if (causes_.known(i) && windows_[j_.size() + i].take(value, z, hold_)) {
-      limited_[i].record(z, learnt_of(settings_.limits[i], value), about);
+      learn_limit(i, z, value, about);
     }
   }
   if (read) explore(*read);
+}
+
+// The form of a limit follows its readings; one with a guide keeps the form of that.
+void GaussianProcessSeeking::learn_limit(std::size_t i, const Inputs& z, double value, const Inputs& about) noexcept {
+  const Limit& limit = settings_.limits[i];
+  ProcessModel& model = limited_[i];
+  const bool was = logarithm_[i] > 0.0, guided = !settings_.limit_guides.empty() && !settings_.limit_guides[i].empty();
+  if (!guided) {
+    double lowest = value, noise = 0.0;
+    if (model.count() > 0) {
+      lowest = std::min(lowest, read_of(limit, was, model.lowest()));
+      noise = model.count() > model.fewest() ? model.noise_sd() * (was ? lowest / limit.upper : 1.0) : 0.0;
+    }
+    const bool now = stands_above_zero(limit, lowest, was ? noise : 2.0 * noise);
+    if (now != was) {
+      model.retell([&](double told) { return learnt_of(limit, now, read_of(limit, was, told)); });
+      logarithm_[i] = now ? 1.0 : 0.0;
+    }
+  }
+  model.record(z, learnt_of(limit, logarithm_[i] > 0.0, value), about);
 }
 
 void GaussianProcessSeeking::explore(const Inputs& z) noexcept {

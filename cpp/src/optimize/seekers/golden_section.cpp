@@ -69,11 +69,13 @@ const Inputs& GoldenSection::ask() noexcept {
   } else {
     applied_ = estimate_;
   }
-  return protocol_.ask(applied_);
+  return send();
 }
 
 TellStatus GoldenSection::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, false);
+  return status;
 }
 
 void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcept {
@@ -88,6 +90,7 @@ void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcep
     if (turn_ == 0 && settings_.noise_sd > 0.0) refine();
     return;
   }
+  if (!clamp_.arrived(applied_, applied, scalar_input(0.5 * (lower_ + upper_)))) return;
   Point& point = points_[static_cast<std::size_t>(turn_)];
   point.count += 1.0;
   point.sum += j;
@@ -133,7 +136,11 @@ void GoldenSection::decide() noexcept {
   if (n < 1.0) return;
   const double asked = inner(1) - inner(0);
   const double missed = mean(points_[1].missed, points_[1]) - mean(points_[0].missed, points_[0]);
-  if (asked + missed < least_distance * asked) {  // both are applied as one: the plant does not go there
+  if (asked + missed < least_distance * asked) {               // both are applied as one: the plant does not go there
+    if (points_[0].missed > 0.0 && points_[1].missed < 0.0) {  // it stands between them: they are finer than its steps
+      draws_ = last_draws;
+      return cut(inner(0), inner(1));
+    }
     draws_ = 0;
     return points_[0].missed + points_[1].missed > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }
@@ -150,7 +157,7 @@ void GoldenSection::decide() noexcept {
   }
   const double rise = mean(points_[1].sum, points_[1]) - mean(points_[0].sum, points_[0]);
   const double error = settings_.noise_sd * std::sqrt(1.0 / points_[0].count + 1.0 / points_[1].count);
-  if (exact || std::abs(rise) > settings_.significance * error) {
+  if (exact ? rise != 0.0 : std::abs(rise) > settings_.significance * error) {  // alike to the last bit says nothing
     draws_ = 0;
     return rise > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }

@@ -10,7 +10,6 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr double least_difference = 0.5;     // of the difference: inputs applied nearer to each other show no slope
 constexpr double own_step = 0.5;             // step size times |J''|
 constexpr double step_tolerance = 0.02;      // in scales of the inputs
 constexpr double own_rate = 4.0;             // differences per step
@@ -58,18 +57,24 @@ Inputs GradientDescent::step_size() const noexcept {
 }
 
 const Inputs& GradientDescent::ask() noexcept {
-  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
+  if (first_.open()) {
+    applied_ = first_.ask(estimate_);
+    return send();
+  }
   applied_ = estimate_;
   applied_[stage_ / 2] += (stage_ % 2 == 0 ? 1.0 : -1.0) * settings_.difference[stage_ / 2];
-  return protocol_.ask(applied_);
+  return send();
 }
 
 TellStatus GradientDescent::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, true);
+  return status;
 }
 
 void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
+  if (!clamp_.arrived(applied_, applied, estimate_)) return;
   if (first_.open()) {
     first_.learn(applied, j);
     if (filter_.alarmed()) move(Inputs::Zero(applied.size()));
@@ -82,9 +87,8 @@ void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexc
     above_ = j;
     above_missed_ = missed;
   } else {
-    const double distance = 2.0 * settings_.difference[input] + (above_missed_ - missed);  // between the applied inputs
-    const bool moved = distance > least_difference * settings_.difference[input];
-    gradient_[input] = moved ? (above_ - j) / distance : 0.0;
+    const double asked = 2.0 * settings_.difference[input];
+    gradient_[input] = slope_between(above_ - j, asked + (above_missed_ - missed), asked);
   }
   if (++stage_ < 2 * estimate_.size()) return;
   stage_ = 0;
@@ -99,7 +103,8 @@ void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexc
 // True where every entry of the step that the limits leave is below its tolerance.
 bool GradientDescent::move(Inputs step) noexcept {
   const Inputs& reach = settings_.difference;
-  step = filter_.project(estimate_, step, {settings_.space, reach, reach, settings_.rate, settings_.rate, metric_});
+  step = filter_.project(estimate_, step,
+                         {settings_.space, reach, clamp_.reach(reach), settings_.rate, settings_.rate, metric_});
   move_within(estimate_, step, settings_.space, reach, clamp_, Inputs::Zero(step.size()));
   return (step.array().abs() < settings_.tolerance.array()).all();
 }

@@ -87,16 +87,22 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
 }
 
 const Inputs& NewtonSeeking::ask() noexcept {
-  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
+  if (first_.open()) {
+    applied_ = first_.ask(estimate_);
+    return send();
+  }
   for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
     applied_[i] =
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
   }
-  return protocol_.ask(applied_);
+  return send();
 }
 
 TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
-  return take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  const TellStatus status =
+      take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, first_.open());
+  return status;
 }
 
 double NewtonSeeking::largest_inverse() const noexcept {
@@ -153,26 +159,41 @@ void NewtonSeeking::learn(const Reading& reading, const Inputs& applied) noexcep
   if (full) {
     gradient_ = gradient;
     slow_ += (gradient - slow_) / static_cast<double>(period);
-    if (!clamp_.clamped()) {  // a dither that is cut off bends whatever it measures
+    if (!clamp_.distorted()) {  // a dither that does not arrive bends whatever it measures
       hessian_ += settings_.hessian_rate * (sample - hessian_);
       update_inverse();
     }
     // A limit passes what points inwards and turns the rest: of a ripple that would leave a bias.
-    if (!holding) step = inverse_ * (filter_.active() ? slow_ : gradient) * (-1.0 / settings_.time_constant_cycles);
+    if (!holding) {
+      const Inputs slope = (filter_.active() ? slow_ : gradient).cwiseProduct(clamp_.step_factor());
+      step = inverse_ * slope * (-1.0 / settings_.time_constant_cycles);
+    }
   }
   if ((full && !holding) || filter_.alarmed()) {
     const Inputs& margin = settings_.dither.amplitude;
-    step = filter_.project(estimate_, step, {settings_.space, margin, a, settings_.rate, settings_.rate, -inverse_});
+    const Inputs reach = clamp_.reach(a);
+    step =
+        filter_.project(estimate_, step, {settings_.space, margin, reach, settings_.rate, settings_.rate, -inverse_});
     if (filter_.active()) ++limited_cycles_;
     move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
   }
   ++seen_;
   if (++phase_ < dither_.period()) return;
   phase_ = 0;
-  clamp_.close_window();
+  clamp_.close_window(a.cwiseAbs2() * (0.5 * dither_.period()));
   const double target = limited_cycles_ >= dither_.period() / 2 ? settings_.limit_amplitude : 1.0;
   share_ += 0.25 * (target - share_);
   limited_cycles_ = 0;
+}
+
+// Of first readings one of which bent the Hessian.
+void NewtonSeeking::begin_anew() noexcept {
+  restart();
+  held_ = settings_.hold_cycles;
+  hessian_.setZero();
+  inverse_.setZero();
+  hessian_.diagonal() = settings_.initial_hessian;
+  inverse_.diagonal() = settings_.initial_inverse;
 }
 
 void NewtonSeeking::restart() noexcept {

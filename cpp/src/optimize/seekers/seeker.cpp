@@ -179,10 +179,14 @@ TellStatus Protocol::check(const Reading& reading, std::size_t components, std::
   return measured ? TellStatus::accepted : TellStatus::not_a_reading;
 }
 
-void Protocol::count(TellStatus status) noexcept {
+void Protocol::count(TellStatus status, const Reading& reading) noexcept {
   if (status != TellStatus::accepted && status != TellStatus::misfire) return;
   asked = false;
   ++cycle;
+  Inputs said;
+  const Inputs& applied = applied_input(reading, failures.sent(), said);
+  if (&applied == &said) heard.follow(failures.sent(), applied);
+  if (status == TellStatus::accepted) heard.read(reading.components, reading.limits, applied);
   if (status == TellStatus::misfire) {
     ++misfires;
     failures.failed();

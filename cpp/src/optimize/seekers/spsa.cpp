@@ -16,9 +16,9 @@ namespace {
 constexpr double memory = 10.0;              // measurements behind the trend and the limits
 constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
 constexpr double blocking_errors = 2.0;
-constexpr int clamp_window = 6;              // measurements, at least, before a clamp is judged
-constexpr double least_perturbation = 0.25;  // of the perturbation: with less applied a slope is not computed
-constexpr double perturbation_rate = 0.25;   // how fast the perturbation follows its target, per iteration
+constexpr int clamp_window = 6;             // measurements, at least, before a clamp is judged
+constexpr double even_perturbation = 0.25;  // of the perturbation: what is applied unevenly by more has no bend
+constexpr double perturbation_rate = 0.25;  // how fast the perturbation follows its target, per iteration
 constexpr double second_order_gain = 3.0;
 constexpr double own_perturbation = 1.5;   // in scales of the inputs
 constexpr double spsa_unseen_bend = 0.38;  // |J''| c^2 over the noise: 0.051 for a perturbation of 1.5 and noise of 0.3
@@ -150,7 +150,10 @@ double Spsa::direction(int kind, Eigen::Index input) const noexcept {
 }
 
 const Inputs& Spsa::ask() noexcept {
-  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
+  if (first_.open()) {
+    applied_ = first_.ask(estimate_);
+    return send();
+  }
   const int per = per_gradient();
   if (stage_ == std::int64_t{per} * settings_.averaging) {
     applied_ = candidate_;
@@ -162,15 +165,19 @@ const Inputs& Spsa::ask() noexcept {
       if (within >= 2) applied_[i] += c[i] * direction(1, i);
     }
   }
-  return protocol_.ask(applied_);
+  return send();
 }
 
 TellStatus Spsa::tell(const Reading& reading) noexcept {
-  return take(reading, [&](const Inputs& applied) { learn(reading, applied); });
+  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
+  look_back(*this, first_.open());
+  return status;
 }
 
 void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
+  const bool around = first_.open() || stage_ < std::int64_t{per_gradient()} * settings_.averaging;
+  if (around && !clamp_.arrived(applied_, applied, estimate_)) return;
   if (first_.open()) {
     first_.learn(applied, j);
     if (!first_.open() && settings_.initial_hessian.size() == 0) hessian_.diagonal() = -first_.bend();
@@ -198,9 +205,10 @@ void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
   ++iteration_;
 }
 
-// A window of the watch: whole iterations, as many as have measured to both sides.
+// A window of the watch: whole iterations, as many as have measured to both sides. The slope rests on the first two
+// measurements of a gradient.
 void Spsa::watch(const Inputs& applied) noexcept {
-  clamp_.record(applied_, applied, estimate_);
+  if (stage_ % per_gradient() < 2) clamp_.record(applied_, applied, estimate_);
   if (++watched_ < std::max(std::int64_t{clamp_window}, std::int64_t{per_gradient()} * settings_.averaging)) return;
   watched_ = 0;
   clamp_.close_window();
@@ -209,8 +217,8 @@ void Spsa::watch(const Inputs& applied) noexcept {
 // Adds a rise of J over the perturbation `c` times the direction, less what the plant did not apply of it.
 void Spsa::add_slope(double rise, const Inputs& c, const Inputs& missed) noexcept {
   for (Eigen::Index i = 0; i < sum_.size(); ++i) {
-    const double distance = c[i] * direction(0, i) + missed[i];
-    if (std::abs(distance) > least_perturbation * c[i]) sum_[i] += rise / distance;
+    const double asked = c[i] * direction(0, i);
+    sum_[i] += slope_between(rise, asked + missed[i], asked);
   }
 }
 
@@ -232,7 +240,7 @@ void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   if (within + 1 < static_cast<std::size_t>(per)) return;
   add_slope(measured_[0] - measured_[1], 2.0 * c, missed_.col(0) - missed_.col(1));
   const InputMatrix uneven = missed_.colwise() - missed_.col(0);  // an offset common to all four does not matter
-  const bool cut_off = (uneven.cwiseAbs().rowwise().maxCoeff().array() > least_perturbation * c.array()).any();
+  const bool cut_off = (uneven.cwiseAbs().rowwise().maxCoeff().array() > even_perturbation * c.array()).any();
   if (settings_.form == SpsaForm::second_order && cut_off) {
     hessian_sum_ += hessian_;  // perturbations that are cut off bend whatever they measure
   } else if (settings_.form == SpsaForm::second_order) {
@@ -279,10 +287,18 @@ void Spsa::finish_iteration() noexcept {
   Inputs step = share_ * share_ * gain_now().cwiseProduct(direction);
   const Inputs& most = settings_.step_max;
   const Inputs reach = perturbation_now() * (second ? 2.0 : 1.0), room = widest();
-  step = filter_.project(estimate_, step, {settings_.space, room, reach, most, most, metric_});
+  step = filter_.project(estimate_, step, {settings_.space, room, clamp_.reach(reach), most, most, metric_});
   candidate_ = estimate_;
   move_within(candidate_, step, settings_.space, room, clamp_, Inputs::Zero(step.size()));
   share_ += perturbation_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
+}
+
+// Of first readings one of which bent the Hessian and led the estimate away.
+void Spsa::begin_anew() noexcept {
+  restart();
+  estimate_ = candidate_ = settings_.space.start;
+  hessian_.setZero();
+  if (settings_.initial_hessian.size() > 0) hessian_.diagonal() = settings_.initial_hessian;
 }
 
 void Spsa::restart() noexcept {

@@ -75,6 +75,8 @@ class BoundedSeeking : public SeekerCore<BoundedSeekingSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept { restart(); }
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   FirstReadings first_;
   Inputs omega_;

@@ -110,7 +110,6 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
     v("sum", self.sum_);
     v("smooth", self.smooth_);
     v("slow", self.slow_);
-    v("response", self.response_);
     v("origin", self.origin_);
     v("limited_cycles", self.limited_cycles_, counts_end);
     FirstReadings::visit(self.first_, v);
@@ -118,6 +117,8 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept { restart(); }
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   bool remove_mean(const Reading& reading, const Inputs& applied) noexcept;
   void move(Inputs step, const Inputs& rate) noexcept;
@@ -137,7 +138,6 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
   Inputs sum_;                  // demodulated sum of the window
   Inputs smooth_;
   Inputs slow_;                 // mean of smooth_ over about a window: what steps along a limit
-  Inputs response_;             // what the slope is multiplied with where only a part of the dither is applied
   std::vector<double> origin_;  // first reading of the window, taken off before summing
   std::int64_t limited_cycles_ = 0;
 };

@@ -22,6 +22,9 @@ class FailureWatch {
   /// Without `edges` it only counts, for a seeker that keeps out of what fails by itself.
   explicit FailureWatch(Eigen::Index inputs, bool edges = true) noexcept;
 
+  /// Where else to look while nothing has worked yet: the start first, then ever farther from it within the bounds.
+  void roam(const Inputs& start, const Inputs& lower, const Inputs& upper) noexcept;
+
   /// What to ask of the plant where a seeker wants `wanted`: the same object as long as nothing speaks against it. One
   /// call per cycle.
   const Inputs& admit(const Inputs& wanted) noexcept;
@@ -29,6 +32,10 @@ class FailureWatch {
   const Inputs& pass(const Inputs& input) noexcept;
   /// What `admit` gave last where it differs from what was wanted; nullptr where it was the same.
   const Inputs* instead() const noexcept { return differs_ ? &sent_ : nullptr; }
+  /// What `admit` or `pass` gave last.
+  const Inputs& sent() const noexcept { return sent_; }
+  /// The input of the last cycle where it is the first that has ever worked, and not what was wanted; else nullptr.
+  const Inputs* found() const noexcept { return found_ ? &sent_ : nullptr; }
 
   /// What became of the input that `admit` gave.
   void worked() noexcept;
@@ -82,6 +89,7 @@ class FailureWatch {
     Column at;     // input times sign of the side
     Column since;  // the farthest on that side that has worked later
   };
+  Inputs elsewhere(std::int64_t turn) const noexcept;
   Inputs edge(std::size_t side) const noexcept;
   Inputs middle() const noexcept { return 0.5 * (sides_[0].reach - sides_[1].reach); }
   void count_cycle() noexcept;
@@ -92,6 +100,8 @@ class FailureWatch {
   bool edges_;
   std::array<Side, 2> sides_;
   Inputs sent_, good_;
+  Inputs start_{}, lower_{}, upper_{};  // of the space; empty: not known
+  bool found_ = false;                  // by the last cycle
   bool differs_ = false;
   bool worked_ = false;        // anything at all
   std::int64_t in_a_row_ = 0;  // failures

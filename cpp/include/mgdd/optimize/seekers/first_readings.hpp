@@ -52,6 +52,7 @@ class FirstReadings {
   Eigen::Index slots() const noexcept { return 4 * reach_.size(); }  // per round: start, above, start, below each input
   std::int64_t cycles() const noexcept { return settle_ * static_cast<std::int64_t>(readings_.size()); }
   bool fill() noexcept;
+  void bring_in() noexcept;
   void close() noexcept;
 
   Inputs reach_;
@@ -61,7 +62,8 @@ class FirstReadings {
   bool open_;
   std::int64_t told_ = 0;
   std::vector<double> readings_;  // round by round, slot by slot
-  std::vector<double> applied_;   // sum of what was applied to the input of a slot
+  std::vector<double> scratch_;
+  std::vector<double> applied_;  // sum of what was applied to the input of a slot
   Inputs bend_, asked_;
 };
 

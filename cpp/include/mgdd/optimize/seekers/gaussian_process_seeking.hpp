@@ -131,6 +131,7 @@ class GaussianProcessSeeking {
     v("since_doubt", self.since_doubt_, counts_end);
     v("doubts", self.doubts_, counts_end);
     v("limit_room", self.room_);
+    v("limit_logarithm", self.logarithm_);
     v("limit_unsafe", self.unsafe_);
     CausingInputs::visit(self.causes_, v, "cause");
     for (std::size_t i = 0; i < self.finders_.size(); ++i)
@@ -173,6 +174,7 @@ class GaussianProcessSeeking {
   double excess(std::size_t i, int point, double quantile) const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;
+  void learn_limit(std::size_t i, const Inputs& z, double value, const Inputs& about) noexcept;
   void explore(const Inputs& z) noexcept;
   void send(const Inputs& z) noexcept;
 
@@ -197,8 +199,9 @@ class GaussianProcessSeeking {
   double expected_ = 0.0, expected_sd_ = 0.0;
   std::vector<double> surprise_;  // running means of squared normalised innovations, of the components
   std::int64_t since_doubt_ = 0, doubts_ = 0;
-  std::vector<double> room_;    // of every limit at the estimate, in its scale
-  std::vector<double> unsafe_;  // cycles in a row in which no input was safe
+  std::vector<double> room_;       // of every limit at the estimate, in its scale
+  std::vector<double> logarithm_;  // 1 where a limit is learnt by it
+  std::vector<double> unsafe_;     // cycles in a row in which no input was safe
   // Scratch.
   InputTable candidates_;
   Eigen::MatrixXd covariance_, own_;

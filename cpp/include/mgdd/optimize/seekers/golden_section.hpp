@@ -80,6 +80,11 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept {
+    restart();
+    estimate_ = settings_.space.start;
+  }
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   struct Point {
     // Sums: of J, of the worst scaled excess over the limits in `judged` cycles, of the applied input less the asked

@@ -82,6 +82,8 @@ class GradientDescent : public SeekerCore<GradientDescentSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept { restart(); }
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   bool move(Inputs step) noexcept;
 

@@ -99,6 +99,8 @@ class NewtonSeeking : public SeekerCore<NewtonSeekingSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   void update_inverse() noexcept;
   double largest_inverse() const noexcept;

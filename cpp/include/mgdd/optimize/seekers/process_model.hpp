@@ -62,6 +62,16 @@ class ProcessModel {
   /// Knows these readings, the oldest first, in place of its own; its numbers begin anew.
   void replace(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages, int count,
                const Inputs& about) noexcept;
+  /// The least value of a kept reading; one at least.
+  double lowest() const noexcept { return values_.head(count_).minCoeff(); }
+  /// Every kept reading as `told` by another measure; the numbers begin anew.
+  template <class F>
+  void retell(const F& told) noexcept {
+    for (std::int64_t i = 0; i < count_; ++i)
+      values_[i] = told(values_[i]);
+    begun_ = factored_ = false;
+    settled_bend_.reset();
+  }
   /// Every reading so far counts as if it were this much older.
   void age(double cycles) noexcept;
   void forget() noexcept;

@@ -18,6 +18,7 @@
 #include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/failure_watch.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
+#include "mgdd/optimize/seekers/tell_watch.hpp"
 
 namespace mgdd::optimize {
 
@@ -118,12 +119,17 @@ enum class TellStatus {
 
 /// The bookkeeping of ask and tell, and the one place through which every input passes on its way to the plant.
 struct Protocol {
-  explicit Protocol(Eigen::Index inputs, bool failing_edges = true) noexcept : failures(inputs, failing_edges) {}
+  /// `channels`: how many components of J and limits a reading has.
+  Protocol(const SearchSpace& space, std::size_t channels, bool failing_edges = true)
+      : failures(space.size(), failing_edges), heard(space.size(), channels) {
+    failures.roam(space.start, space.lower, space.upper);
+  }
 
   std::int64_t cycle = 0;  ///< cycles told so far, misfires included
   std::int64_t misfires = 0;
   bool asked = false;
   FailureWatch failures;
+  TellWatch heard;
 
   /// What is asked of the plant where the seeker wants `wanted`; the same until it is told.
   const Inputs& ask(const Inputs& wanted) noexcept {
@@ -152,7 +158,7 @@ struct Protocol {
                    Eigen::Index inputs) const noexcept;
 
   /// Counts an accepted or misfired reading; a refused one changes nothing.
-  void count(TellStatus status) noexcept;
+  void count(TellStatus status, const Reading& reading) noexcept;
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
@@ -160,6 +166,7 @@ struct Protocol {
     v("misfires", self.misfires, counts_end);
     v("asked", self.asked);
     FailureWatch::visit(self.failures, v);
+    TellWatch::visit(self.heard, v);
   }
 };
 

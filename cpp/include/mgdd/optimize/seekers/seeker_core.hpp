@@ -8,6 +8,7 @@
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
+#include "mgdd/optimize/seekers/outliers.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -18,12 +19,14 @@ class SeekerCore {
   const S& settings() const noexcept { return settings_; }
   const Inputs& estimate() const noexcept { return estimate_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
+  const Inputs& applied() const noexcept { return protocol_.sent(clamp_.sent(applied_)); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept {
     if constexpr (requires(const S& s) { s.components; }) return settings_.components.size();
     return 1;
   }
+  /// How far the plant follows.
+  const ClampWatch& clamp() const noexcept { return clamp_; }
   /// What has been learnt of the limits.
   const ConstraintFilter& filter() const noexcept { return filter_; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
@@ -34,22 +37,27 @@ class SeekerCore {
       : settings_(std::move(checked)),
         filter_(settings_.limits, settings_.space.size(), memory(settings_)),
         clamp_(settings_.space.size()),
-        protocol_(settings_.space.size()),
+        outliers_(component_count(), settings_.space.size()),
+        protocol_(settings_.space, component_count() + settings_.limits.size()),
         estimate_(settings_.space.start),
         applied_(estimate_) {}
 
-  /// Counts a reading and takes its limits; of an accepted one `learn(the input that the plant applied)`, else
-  /// `miss(the same)`: nothing was read, but what comes late has moved on by a cycle.
+  /// What to ask of the plant where `applied_` is wanted.
+  const Inputs& send() noexcept { return protocol_.ask(clamp_.stretched(applied_, estimate_, settings_.space)); }
+  /// Counts a reading and takes its limits; of an accepted one `learn(what of it may be learnt, the input that the
+  /// plant applied)`, else `miss(that input)`: nothing was read, but what comes late has moved on by a cycle.
   template <class Learn, class Miss>
   TellStatus take(const Reading& reading, Learn&& learn, Miss&& miss) noexcept {
     const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
-    protocol_.count(status);
+    protocol_.count(status, reading);
     if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
     Inputs told;
-    const Inputs& applied = protocol_.applied(reading, applied_, told);
+    const Inputs& applied = protocol_.applied(reading, clamp_.sent(applied_), told);
     if (status == TellStatus::accepted) {
       filter_.record(applied, reading.limits);
-      learn(applied);
+      Reading read = reading;
+      read.components = outliers_.admit(reading.components);
+      learn(read, applied);
     } else {
       filter_.skip(applied);
       miss(applied);
@@ -63,11 +71,11 @@ class SeekerCore {
   /// The same where J may come late: there a dither goes on, and `learn(reading, applied)` with the last one.
   template <class Learn>
   TellStatus take_late(const Reading& reading, FirstReadings& first, LastReading& last, Learn&& learn) noexcept {
-    const auto read = [&](const Inputs& applied) {
-      last.keep(reading);
-      learn(reading, applied);
+    const auto keep = [&](const Reading& read, const Inputs& applied) {
+      last.keep(read);
+      learn(read, applied);
     };
-    return take(reading, read, [&](const Inputs& applied) {
+    return take(reading, keep, [&](const Inputs& applied) {
       if (first.open()) {
         first.skip(applied);
       } else if (last.stands_in()) {
@@ -80,6 +88,14 @@ class SeekerCore {
     filter_.forget();
     clamp_.forget();
     protocol_.failures.forget();
+    outliers_.forget();
+  }
+  /// After a reading: what the first ones made of `self` is void where one of them was far out, unless they are judged
+  /// together; and where nothing but another input has worked, the search goes on there.
+  template <class Self>
+  static void look_back(Self& self, bool judged_together) noexcept {
+    if (self.outliers_.spoiled() && !judged_together) self.begin_anew();
+    if (const Inputs* const works = self.protocol_.failures.found()) self.shift_estimate(*works - self.estimate_);
   }
   template <class Self, class V>
   static void visit_core(Self& self, V& v) {
@@ -88,11 +104,13 @@ class SeekerCore {
     v("applied", self.applied_);
     ConstraintFilter::visit(self.filter_, v);
     ClampWatch::visit(self.clamp_, v);
+    Outliers::visit(self.outliers_, v);
   }
 
   S settings_;
   ConstraintFilter filter_;
   ClampWatch clamp_;
+  Outliers outliers_;
   Protocol protocol_;
   Inputs estimate_, applied_;
 };

@@ -129,6 +129,8 @@ class Spsa : public SeekerCore<SpsaSettings> {
   }
 
  private:
+  friend SeekerCore;
+  void begin_anew() noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   Inputs gain_now() const noexcept;
   Inputs perturbation_now() const noexcept;

@@ -1,0 +1,50 @@
+// Readings far outside of what those around them scatter by. What a seeker may learn from one reading is bounded by
+// three times the third largest distance of the last readings from their median: what a perturbation or a new level
+// does to J is seen more than twice in them and passes. The first readings are looked at once there are enough.
+// noexcept and allocation-free after construction.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mgdd/common/state.hpp"
+#include "mgdd/optimize/seekers/inputs.hpp"
+
+namespace mgdd::optimize {
+
+/// Median of `values`, which are put in another order; at least one.
+double median_of(std::span<double> values) noexcept;
+/// How far a reading may lie from the median of its like, by their distances from it, which are put in another order.
+double farthest_of(std::span<double> distances) noexcept;
+
+class Outliers {
+ public:
+  Outliers(std::size_t components, Eigen::Index inputs);
+
+  /// These components of J, none farther out than the last readings allow; valid until the next call.
+  std::span<const double> admit(std::span<const double> components) noexcept;
+  /// True where the last reading showed that one of the first was far out.
+  bool spoiled() const noexcept { return spoiled_; }
+  void forget() noexcept;
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("outlier_count", self.count_, counts_end);
+    v("outlier_known", self.known_, self.room_ + 1);
+    v("outlier_ring", self.ring_);
+    v("outlier_low", self.low_);
+    v("outlier_high", self.high_);
+  }
+
+ private:
+  void bound(std::size_t component) noexcept;
+
+  std::int64_t room_;  // readings of each component
+  std::int64_t count_ = 0, known_ = 0;
+  bool spoiled_ = false;
+  std::vector<double> ring_, low_, high_, scratch_, admitted_;
+};
+
+}  // namespace mgdd::optimize

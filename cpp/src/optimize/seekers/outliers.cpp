@@ -1,0 +1,82 @@
+#include "mgdd/optimize/seekers/outliers.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mgdd/optimize/reading.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr std::int64_t fewest = 12, room_of_one = 24, room_per_input = 6;  // a strong input among weak ones thrice
+constexpr std::size_t ordinary = 3;                                        // that is no outlier, counted from the top
+constexpr double beyond = 3.0;                                             // 4.6 sd of a normal scatter
+constexpr double spoiling = 10.0;  // times that: a first reading that bends what was made of it
+
+}  // namespace
+
+double median_of(std::span<double> values) noexcept {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+double farthest_of(std::span<double> distances) noexcept {
+  if (distances.size() < ordinary) return unlimited;
+  const auto at = distances.end() - static_cast<std::ptrdiff_t>(ordinary);
+  std::nth_element(distances.begin(), at, distances.end());
+  return beyond * *at;
+}
+
+Outliers::Outliers(std::size_t components, Eigen::Index inputs)
+    : room_(room_of_one + room_per_input * (inputs - 1)),
+      ring_(components * static_cast<std::size_t>(room_), 0.0),
+      low_(components, -largest_reading),
+      high_(components, largest_reading),
+      scratch_(static_cast<std::size_t>(room_), 0.0),
+      admitted_(components, 0.0) {}
+
+// What this component may lie between, by the readings that are known.
+void Outliers::bound(std::size_t component) noexcept {
+  const auto n = static_cast<std::size_t>(known_);
+  const double* const ring = &ring_[component * static_cast<std::size_t>(room_)];
+  const std::span<double> scratch(scratch_.data(), n);
+  std::copy(ring, ring + n, scratch.begin());
+  const double middle = median_of(scratch);
+  std::transform(ring, ring + n, scratch.begin(), [&](double j) { return std::abs(j - middle); });
+  double farthest = farthest_of(scratch);
+  if (!(farthest > 0.0)) farthest = 2.0 * largest_reading;  // J that stands still shows no scatter
+  low_[component] = middle - farthest;
+  high_[component] = middle + farthest;
+  if (count_ > fewest) return;
+  for (const double distance : scratch)
+    spoiled_ = spoiled_ || distance > spoiling * farthest;
+}
+
+std::span<const double> Outliers::admit(std::span<const double> components) noexcept {
+  spoiled_ = false;
+  const bool late = count_ >= fewest, due = count_ % fewest == 0;
+  for (std::size_t c = 0; c < components.size(); ++c) {
+    const double j = components[c];
+    if (late && (due || j < low_[c] || j > high_[c])) bound(c);
+    admitted_[c] = late ? std::clamp(j, low_[c], high_[c]) : j;
+    ring_[c * static_cast<std::size_t>(room_) + static_cast<std::size_t>(count_ % room_)] = j;
+  }
+  ++count_;
+  known_ = std::min(known_ + 1, room_);
+  if (count_ == fewest) {
+    for (std::size_t c = 0; c < components.size(); ++c)
+      bound(c);
+  }
+  return admitted_;
+}
+
+void Outliers::forget() noexcept {
+  count_ = known_ = 0;
+  spoiled_ = false;
+  std::fill(low_.begin(), low_.end(), -largest_reading);
+  std::fill(high_.begin(), high_.end(), largest_reading);
+}
+
+}  // namespace mgdd::optimize

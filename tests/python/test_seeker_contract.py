@@ -1,0 +1,203 @@
+"""What every stepped seeker bears, whichever there are: bad readings, actuators, failing starts, dead channels."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.python.support.stepped import stepped
+
+from mgdd.errors import ParameterError
+from mgdd.optimize import Seeker, Spsa
+
+BEST, START = 4.0, -8.0
+SEEKERS = stepped(start=START, lower=-20.0, upper=20.0)
+every = pytest.mark.parametrize("name", SEEKERS)
+# Their own rules for readings, actuators and failing inputs are tested with them.
+OWN_LIKELIHOOD = {"GaussianProcessSeeking", "CurveSeeking"}
+shared = pytest.mark.parametrize("name", sorted(set(SEEKERS) - OWN_LIKELIHOOD))
+
+Actuator = Callable[[float], float]
+
+
+def lag(cycles: float) -> Actuator:
+    at = START
+
+    def apply(asked: float) -> float:
+        nonlocal at
+        at += (1.0 - math.exp(-1.0 / cycles)) * (asked - at)
+        return at
+
+    return apply
+
+
+def steps(width: float) -> Actuator:
+    return lambda asked: width * round(asked / width)
+
+
+def j_at(applied: float, rng: np.random.Generator) -> float:
+    return float(50.0 - 0.03 * (applied - BEST) ** 2 + rng.normal(0.0, 0.3))
+
+
+def search(
+    seeker: Any,
+    cycles: int = 500,
+    actuator: Actuator | None = None,
+    bad: dict[int, float] | None = None,
+    works: Callable[[float], bool] = math.isfinite,
+) -> tuple[float, int]:
+    """Mean of the last hundred estimates, and how many cycles failed."""
+    rng, estimates, failed = np.random.default_rng(3), [], 0
+    for cycle in range(cycles):
+        asked = float(np.ravel(seeker.ask())[0])
+        applied = asked if actuator is None else actuator(asked)
+        if works(applied):
+            j = (bad or {}).get(cycle, j_at(applied, rng))
+            seeker.tell(j, **({} if actuator is None else {"applied": applied}))
+        else:
+            failed += 1
+            seeker.tell(misfire=True, **({} if actuator is None else {"applied": applied}))
+        estimates.append(float(seeker.estimate[0]))
+    return float(np.mean(estimates[-100:])), failed
+
+
+def codes(seeker: Any) -> list[str]:
+    return [finding.code for finding in seeker.findings]
+
+
+def test_the_finder_finds_every_kind_of_seeker() -> None:
+    assert {SEEKERS[name]().kind for name in SEEKERS} == {one.kind for one in Seeker.__subclasses__()}
+    assert {"Spsa one_measurement", "ExtremumSeeking washout", "CurveSeeking"} <= set(SEEKERS)
+
+
+@shared
+@pytest.mark.parametrize("bad", [{0: 0.0}, {0: 1e6}, {0: -1e30, 1: 1e30}, {7: 0.0}, {60: 1e6}], ids=str)
+def test_a_bad_reading_does_not_lead_a_seeker_away(name: str, bad: dict[int, float]) -> None:
+    assert search(SEEKERS[name](), bad=bad)[0] == pytest.approx(BEST, abs=3.0)
+
+
+@shared
+@pytest.mark.parametrize(("kind", "size"), [(lag, 1.0), (lag, 4.0), (steps, 4.0)])
+def test_what_an_actuator_really_did_does_not_stop_a_seeker(
+    name: str, kind: Callable[[float], Actuator], size: float
+) -> None:
+    if name == "BoundedSeeking":
+        pytest.skip("J turns the phase of its oscillation, and what is late turns it too")
+    assert search(SEEKERS[name](), 900, kind(size))[0] == pytest.approx(BEST, abs=4.5)
+
+
+@shared
+@pytest.mark.parametrize("low", [-2.0, 2.0])
+def test_a_start_that_fails_is_left_for_what_works(name: str, low: float) -> None:
+    estimate, failed = search(SEEKERS[name](), works=lambda applied: applied > low)
+    assert estimate == pytest.approx(BEST, abs=3.0)
+    assert failed < 60
+
+
+@shared
+def test_a_start_that_works_is_found_where_all_else_fails(name: str) -> None:
+    seeker = SEEKERS[name]()
+    estimate, failed = search(seeker, works=lambda applied: abs(applied - START) < 1.7)
+    assert estimate == pytest.approx(START, abs=1.8)
+    assert failed < 60
+
+
+@every
+def test_a_channel_that_reads_the_same_at_every_input_is_said(name: str) -> None:
+    seeker, rng = SEEKERS[name](), np.random.default_rng(1)
+    for _ in range(60):
+        seeker.tell(j_at(float(np.ravel(seeker.ask())[0]), rng))
+    assert "frozen" not in codes(seeker)
+    for _ in range(60):
+        seeker.ask()
+        seeker.tell(49.88)
+    (found,) = [finding for finding in seeker.findings if finding.code == "frozen"]
+    assert found.names == ("J",)
+    assert str(found).startswith("J read the same to the last bit in ")
+
+
+def test_a_limit_that_reads_the_same_is_said_by_its_name() -> None:
+    seeker, rng = Spsa(start=0.0, limits={"p_max_bar": 100.0}), np.random.default_rng(1)
+    for _ in range(20):
+        seeker.tell(j_at(float(seeker.ask()[0]), rng), [80.0])
+    assert [finding.names for finding in seeker.findings if finding.code == "frozen"] == [("p_max_bar",)]
+
+
+@every
+def test_an_input_of_which_little_is_applied_is_said(name: str) -> None:
+    seeker = SEEKERS[name]()
+    search(seeker, 120, lambda _: START)
+    assert "not_followed" in codes(seeker)
+    as_asked = SEEKERS[name]()
+    search(as_asked, 120, lambda asked: asked)
+    assert "not_followed" not in codes(as_asked)
+
+
+@every
+def test_a_seeker_goes_on_bit_for_bit_from_its_state(name: str) -> None:
+    one, rng = SEEKERS[name](), np.random.default_rng(5)
+    slow = lag(3.0)
+    for cycle in range(50):
+        applied = slow(float(np.ravel(one.ask())[0]))
+        one.tell(0.0 if cycle == 20 else j_at(applied, rng), applied=applied)
+    other = SEEKERS[name]()
+    other.state = one.state
+    for _ in range(40):
+        asked, again = one.ask(), other.ask()
+        assert np.array_equal(asked, again)
+        applied = slow(float(np.ravel(asked)[0]))
+        j = j_at(applied, rng)
+        for seeker in (one, other):
+            seeker.tell(j, applied=applied)
+    assert one.state == other.state
+    assert codes(one) == codes(other)
+
+
+def path(make: Callable[[], Any], scale: float = 1.0, missing: int = 0) -> list[float]:
+    """What is asked over eighty cycles; every so many, where given, nothing is read."""
+    seeker, rng, asked = make(), np.random.default_rng(7), []
+    for cycle in range(80):
+        asked.append(float(np.ravel(seeker.ask())[0]))
+        assert float(np.ravel(seeker.ask())[0]) == asked[-1]
+        j = scale * j_at(asked[-1], rng)
+        if missing and cycle % missing == missing - 1:
+            seeker.tell(misfire=True)
+        else:
+            seeker.tell(j)
+        with pytest.raises(ParameterError, match="tell without ask"):
+            seeker.tell(j)
+        assert min(asked) >= -20.0
+        assert max(asked) <= 20.0
+    return asked
+
+
+@every
+def test_what_is_asked_is_the_same_again_and_within_bounds(name: str) -> None:
+    assert path(SEEKERS[name]) == path(SEEKERS[name])
+    assert np.isfinite(path(SEEKERS[name], missing=5)).all()
+    assert np.isfinite(path(SEEKERS[name], missing=1)).all()
+
+
+@every
+def test_copies_go_on_alike_and_apart(name: str) -> None:
+    one, rng = SEEKERS[name](), np.random.default_rng(5)
+    for _ in range(30):
+        one.tell(j_at(float(np.ravel(one.ask())[0]), rng))
+    for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        before = one.state
+        assert other.state == before
+        other.tell(j_at(float(np.ravel(other.ask())[0]), rng))
+        assert one.state == before
+        assert other.state != before
+
+
+@every
+def test_another_unit_of_j_is_the_same_search(name: str) -> None:
+    if name in {"GoldenSection", "CurveSeeking"}:
+        pytest.skip("is given the noise or a curve in the unit of J")
+    np.testing.assert_allclose(path(SEEKERS[name], scale=1024.0), path(SEEKERS[name]), rtol=1e-6, atol=1e-6)
