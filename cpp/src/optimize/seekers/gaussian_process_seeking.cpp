@@ -202,6 +202,7 @@ void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied
     if (!finder.known()) continue;
     Inputs z = finder.cause();
     if (!windows_[i].take(value, z, hold_)) continue;
+    if (j_[i].wakes_up(value)) begin_anew(i);
     watch_surprise(i, value, z);
     j_[i].record(z, value, about);
   }
@@ -219,6 +220,14 @@ void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied
     }
   }
   if (read) explore(*read);
+}
+
+// A channel that stood still says no more than where it stood; what it says now has a scale of its own.
+void GaussianProcessSeeking::begin_anew(std::size_t component) noexcept {
+  j_[component].forget();
+  surprise_[component] = 1.0;
+  middle_ = scaled(estimate_);
+  star_ = rested_ = 0;
 }
 
 void GaussianProcessSeeking::explore(const Inputs& z) noexcept {
