@@ -316,7 +316,7 @@ def test_a_damaged_matlab_file_never_ends_the_process(compressed: bool, tmp_path
     at = whole.find(b"\x10\x00\x04\x00warm")
     if at > 0:  # not compressed: a type that no list has, which SciPy's reader takes for an index
         file.write_bytes(whole[:at] + b"\x10\xc3" + whole[at + 2 :])
-        with pytest.raises(DataError, match=r"Type 49936 does not appear to be char type|its reader ended with SIG"):
+        with pytest.raises(DataError, match=r"Type 49936 does not appear to be char type|its reader ended with "):
             read_any_table(file)
 
 

@@ -40,6 +40,23 @@ TEST(GaussianProcessSeeking, ArrivesInAboutTenReadingsAndStays) {
   EXPECT_GE(within / seeds, 0.75) << "the stated expectation";
 }
 
+// An analyser that still answers with one value: what it said first must not set the scale of what follows.
+TEST(GaussianProcessSeeking, FindsTheBestAfterFirstReadingsThatAreAlike) {
+  for (const double level : {0.0, 50.0, 55.0, 1e6}) {
+    for (const int flat : {4, 30}) {
+      for (std::uint64_t seed = 0; seed < 3; ++seed) {
+        GaussianProcessSeeking seeker(two_inputs(seed));
+        for (int k = 0; k < 150; ++k) {
+          const double answer = 50.0 - lost(seeker.ask()) + noise(seed, k), j[] = {k < flat ? level : answer};
+          ASSERT_EQ(seeker.tell({j, {}}), TellStatus::accepted);
+          ASSERT_TRUE(std::isfinite(seeker.expected()) && std::isfinite(seeker.expected_sd())) << level << ", " << k;
+        }
+        EXPECT_LT(lost(seeker.estimate()), 0.25) << level << ", " << flat << ", " << seed;
+      }
+    }
+  }
+}
+
 TEST(GaussianProcessSeeking, MinimisingIsMaximisingTheNegative) {
   GaussianProcessSeeking up(two_inputs(1));
   auto s = two_inputs(1);

@@ -220,6 +220,7 @@ void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied
     if (!finder.known()) continue;
     Inputs z = finder.cause();
     if (!windows_[i].take(value, z, hold_)) continue;
+    if (j_[i].wakes_up(value)) begin_anew(i);
     watch_surprise(i, value, z);
     j_[i].record(z, value, about);
   }
@@ -257,6 +258,14 @@ void GaussianProcessSeeking::learn_limit(std::size_t i, const Inputs& z, double 
     }
   }
   model.record(z, learnt_of(limit, logarithm_[i] > 0.0, value), about);
+}
+
+// A channel that stood still says no more than where it stood; what it says now has a scale of its own.
+void GaussianProcessSeeking::begin_anew(std::size_t component) noexcept {
+  j_[component].forget();
+  surprise_[component] = 1.0;
+  middle_ = scaled(estimate_);
+  star_ = rested_ = 0;
 }
 
 void GaussianProcessSeeking::explore(const Inputs& z) noexcept {

@@ -114,6 +114,14 @@ void ProcessModel::record(const Inputs& z, double value, const Inputs& about) no
   factored_ = false;
 }
 
+// Bit-equal readings at different inputs: none of them says anything of J.
+bool ProcessModel::stands_still() const noexcept {
+  if (count_ < 2) return false;
+  const auto values = values_.head(count_).array();
+  const auto inputs = points_.topLeftCorner(count_, settings_.inputs);
+  return (values == values[0]).all() && (inputs.rowwise() - inputs.row(0)).cwiseAbs().maxCoeff() > 0.0;
+}
+
 void ProcessModel::age(double cycles) noexcept {
   ages_.head(count_).array() += cycles;
   factored_ = false;

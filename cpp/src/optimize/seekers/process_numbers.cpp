@@ -25,6 +25,7 @@ constexpr double wander_place = 0.04, wander_level = 1.2;  // in a memory: slope
 constexpr double wander_sd = 1.0;                          // of their logarithms
 constexpr double coarse_step = 0.8, fine_step = 0.25;
 constexpr double bend_offsets[] = {0.0, -0.7, 0.7, 1.4};  // logarithms; what is learnt first
+constexpr double least_rise = 1e-100;                     // of which the square, with its jitter, is still above 0
 constexpr double lowest_log = -12.0, highest_log = 3.0;
 
 double log_prior(double value, double middle, double sd) noexcept {
@@ -201,7 +202,7 @@ void ProcessModel::begin_numbers() noexcept {
     for (std::int64_t j = 0; j < i; ++j)
       farthest = std::max(farthest, (points_.row(i) - points_.row(j)).head(settings_.inputs).norm());
   }
-  const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), 1e-300});
+  const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), least_rise});
   numbers_[0] = std::log(rise / (0.3 * farthest));
   numbers_[1] = noise_prior;
   numbers_[2] = rest_prior;
@@ -247,6 +248,7 @@ void ProcessModel::try_numbers(int trials) noexcept {
       trial[which] += step;
       if (which == 0 && round % 3 == 0) trial[1] -= step;  // the noise stays
     }
+    if (trial[0] < std::log(least_rise)) continue;  // readings all alike: ever smaller is ever likelier
     const auto bounded = trial.segment(1, 2 + settings_.inputs);
     if (bounded.minCoeff() < lowest_log || bounded.maxCoeff() > highest_log) continue;
     const double found = evidence(trial, !jumps && (which < 3 || which >= 3 + settings_.inputs));

@@ -155,6 +155,7 @@ class GaussianProcessSeeking {
   double draw(std::uint64_t stream, int index) const noexcept;
   void fit(const Inputs& about) noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
+  void begin_anew(std::size_t component) noexcept;
   void watch_surprise(std::size_t component, double value, const Inputs& z) noexcept;
   void doubt() noexcept;
   void take_in(std::size_t component, int points) noexcept;

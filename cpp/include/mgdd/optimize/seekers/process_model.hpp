@@ -75,6 +75,8 @@ class ProcessModel {
   /// Every reading so far counts as if it were this much older.
   void age(double cycles) noexcept;
   void forget() noexcept;
+  /// All readings are bit-equal although their inputs differ, and `value` is another one.
+  bool wakes_up(double value) const noexcept { return count_ > 0 && value != values_[0] && stands_still(); }
   /// Variance by which its slopes wander per reading, and how much it bends, as of the last fit.
   double slope_wander() const noexcept { return now_.wander_slope; }
   double bend() const noexcept { return kernel_.whole_bend(now_); }
@@ -127,6 +129,7 @@ class ProcessModel {
   double wandered(const double* a, const double* b, double age, const Scales& s) const noexcept;
   void factor() noexcept;
   void refresh() noexcept;
+  bool stands_still() const noexcept;
   int crowded_reading(const Inputs& about) noexcept;
   bool noise_known() const noexcept { return settings_.noise_sd.has_value(); }
 
