@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from mgdd.optimize import Seeker
+    from mgdd.loop.seek_choice import Question
 
 __all__ = ["SeekResult", "found_by"]
 
@@ -44,7 +44,7 @@ class SeekResult(Result):
     limits : dict of str to float
         Mean of the ten readings nearest to the best inputs, by limit.
     seeker : Seeker
-        What sought; ``run_seeker(plant, found.seeker, cycles)`` goes on with it.
+        What sought; ``seek(plant, seeker=found.seeker)`` goes on with it.
     reason : str
         Why that one.
     findings : tuple of Finding
@@ -53,6 +53,8 @@ class SeekResult(Result):
         ``untrusted_guide``, ``delay``, ``interrupted``, and those of the seeker.
     run : LoopRun
         Every cycle.
+    asked : Question
+        Inputs, limits and what was said of J.
 
     Examples
     --------
@@ -69,22 +71,27 @@ class SeekResult(Result):
     gain_sd: float
     start: dict[str, float]
     limits: dict[str, float]
-    seeker: Seeker
+    seeker: Any
     reason: str
     findings: tuple[Finding, ...]
     run: LoopRun
+    asked: Question
+
+    @property
+    def _kind(self) -> str:
+        return str(getattr(self.seeker, "_seeker_kind", None) or self.seeker.kind)
 
     def _title(self) -> str:
-        return f"{self.seeker.kind}: {self.reason}"
+        return f"{self._kind}: {self.reason}"
 
     def _rows(self) -> list[Row]:
         rows = [
             Row(one.name, f"{self.inputs[one.name]:.6g} (from {self.start[one.name]:.6g})", unit_of_input(one))
-            for one in self.seeker.settings["inputs"]
+            for one in self.asked.inputs
         ]
         rows.append(Row("J", f"{self.value:.6g} ± {self.value_sd:.2g}", "unit of J"))
         rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", "unit of J"))
-        uppers = {limit.name: limit.upper for limit in self.seeker.settings["limits"]}
+        uppers = {limit.name: limit.upper for limit in self.asked.limits}
         rows += [
             Row(name, f"{value:.6g} (limit {uppers[name]:.6g})", unit_of(name)) for name, value in self.limits.items()
         ]
@@ -120,7 +127,7 @@ class SeekResult(Result):
             columns["limit"] = ("limit", measured, "-", "limited quantity")
             columns["limits_at_best"] = ("limit", at_best, own, "limited quantity at the best inputs")
         out = self.run.dataset.assign(labelled_dataset(columns).variables)
-        out.attrs |= {"seeker": self.seeker.kind, "reason": self.reason}
+        out.attrs |= {"seeker": self._kind, "reason": self.reason}
         if self.findings:
             out.attrs["findings"] = "\n".join(map(str, self.findings))
         return out
@@ -131,37 +138,38 @@ class SeekResult(Result):
         Returns
         -------
         dict
-            Fields by name; ``seeker`` as the name of its kind.
+            Fields by name; ``seeker`` as the name of its kind, ``figures`` as the summary of the run,
+            ``estimate_sd`` and ``trust`` of a seeker that has them, None otherwise. `mgdd engine seek --json` and the
+            figures of an experiment begin with them.
         """
-        names = ("inputs", "value", "value_sd", "gain", "gain_sd", "start", "limits", "reason")
+        names = ("inputs", "value", "value_sd", "gain", "gain_sd", "start", "limits", "reason", "interrupted")
         out = {name: getattr(self, name) for name in names}
-        out |= {"seeker": self.seeker.kind, "findings": [finding.to_dict() for finding in self.findings]}
-        plain: dict[str, Any] = to_jsonable(out | {"cycles": self.run.dataset.sizes["cycle"]})
+        out |= {"seeker": self._kind, "findings": [finding.to_dict() for finding in self.findings]}
+        out |= {name: _known(getattr(self.seeker, name, None)) for name in ("estimate_sd", "trust")}
+        figures = {name: value for name, value in self.run.summary.items() if math.isfinite(value)}
+        plain: dict[str, Any] = to_jsonable(out | {"cycles": self.run.dataset.sizes["cycle"], "figures": figures})
         return plain
 
     def _draw(self, ax: Axes | None) -> Axes:
         return self.run._draw(ax)
 
 
-def found_by(
-    seeker: Seeker, reason: str, run: LoopRun, start: Mapping[str, float], *, late_cycles: float, guided: bool
-) -> SeekResult:
-    """Sum up a run; `late_cycles` is how long after its input J is read."""
-    settings = seeker.settings
-    sign = 1.0 if settings["maximize"] else -1.0
-    readings = Readings(run.dataset, seeker)
-    at_best = readings.near_estimate(readings.j, late_cycles)
+def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float], asked: Question) -> SeekResult:
+    """Sum up a run of what was asked."""
+    sign = 1.0 if asked.maximize else -1.0
+    readings = Readings(run.dataset, asked.inputs, seeker.estimate, float(getattr(seeker, "noise_sd", math.nan)))
+    at_best = readings.near_estimate(readings.j, asked.late_cycles)
     if getattr(seeker, "expected_sd", 0.0) > 0.0:  # 0 before the process is fitted
-        at_best = Mean(float(seeker.expected), float(seeker.expected_sd))  # type: ignore[attr-defined]
-    gained = readings.gain(late_cycles)
+        at_best = Mean(float(seeker.expected), float(seeker.expected_sd))
+    gained = readings.gain(asked.late_cycles)
     kept = {
         limit.name: readings.near_estimate(readings.limit(limit.name), limit.delay_cycles + limit.lag_cycles)
-        for limit in settings["limits"]
+        for limit in asked.limits
     }
     gain = Mean(sign * gained.value, gained.sd)
-    doubts = doubts_about(seeker, run, readings, gain, kept, guided=guided)
+    doubts = doubts_about(seeker, run, readings, gain, kept, asked)
     return SeekResult(
-        inputs=dict(zip(seeker.input_names, seeker.estimate.tolist(), strict=True)),
+        inputs=dict(zip([one.name for one in asked.inputs], seeker.estimate.tolist(), strict=True)),
         value=at_best.value,
         value_sd=at_best.sd,
         gain=gain.value,
@@ -172,4 +180,9 @@ def found_by(
         reason=reason,
         findings=unique([*seeker.findings, *doubts]),
         run=run,
+        asked=asked,
     )
+
+
+def _known(value: Any) -> float | None:
+    return float(value) if isinstance(value, float) and math.isfinite(value) else None
