@@ -59,6 +59,12 @@ def a_limit() -> bool:
     return found.limits["p_max_bar"] < 97.0 and found.inputs["soc_cad"] > -4.0
 
 
+def a_lower_limit() -> bool:
+    timed = lambda x: (hill(x), {"ca50_cad": x["soc_cad"] + 9.0})  # noqa: E731
+    found = seek(timed, ONE, limits={"ca50_cad": (8.0, 15.0)}, start=3.0, cycles=80)
+    return 7.8 < found.limits["ca50_cad"] < 10.0 and "(lower limit 8)" in found.summary()
+
+
 def a_late_limit() -> bool:
     bench = EngineBench(seed=1, limits=["p_max_bar"])
     late = [Limit("p_max_bar", 95.0, delay_cycles=2.0)]
@@ -138,6 +144,19 @@ def a_failing_corner() -> bool:
     return abs(found.inputs["soc_cad"] + 4.0) < 2.0
 
 
+def several_at_once() -> bool:
+    seeker = GaussianProcessSeeking(inputs=TWO, start={"soc_cad": 8.0, "egr": 0.3})
+    for _ in range(15):
+        for x in seeker.ask(4):
+            seeker.tell(hill(x), applied=x)
+    return abs(seeker.estimate[0] + 4.0) < 2.0 and seeker.cycle == 60
+
+
+def until_it_is_good_enough() -> bool:
+    found = seek(hill, TWO, tolerance={"soc_cad": 1.0, "egr": 0.02}, cycles=400)
+    return 40 <= found.dataset.sizes["cycle"] < 300 and abs(found.inputs["soc_cad"] + 4.0) < 2.0
+
+
 def a_plant_with_noise() -> bool:
     plant = FunctionPlant(lambda x: -((x["x"] - 2.0) ** 2), ["x"], noise_sd=0.1, seed=3)
     return abs(seek(plant, {"x": (-5.0, 5.0)}, cycles=100).inputs["x"] - 2.0) < 0.5
@@ -154,6 +173,63 @@ def test_a_newcomer_writes_a_search(program: Any, tmp_path: Path) -> None:
     assert program(tmp_path) if inspect.signature(program).parameters else program()
     lines = inspect.getsource(program).splitlines()[1:]
     assert len([line for line in lines if line.strip()]) <= 6
+
+
+def test_points_that_are_asked_at_once_are_different_and_move_nothing() -> None:
+    bench_limits = {"p_max_bar": 100.0}
+    for limits in ({}, bench_limits):
+        seeker = GaussianProcessSeeking(inputs=TWO, start={"soc_cad": 8.0, "egr": 0.3}, limits=limits)
+        for cycle in range(12):
+            state = seeker.state
+            points = seeker.ask(3)
+            assert seeker.state == state
+            assert points[0] == seeker.ask()
+            if cycle < 6:
+                assert len({tuple(point.values()) for point in points}) == 3
+            seeker.tell(
+                hill(points[0]), {name: 90.0 - point["soc_cad"] for name in limits for point in points[:1]} or None
+            )
+    with pytest.raises(mgdd.errors.ParameterError, match="n = 0: must be a whole number"):
+        seeker.ask(0)
+
+
+def test_a_search_that_stops_early_is_the_beginning_of_the_whole_one() -> None:
+    inputs = {"soc_cad": (-20.0, 5.0)}
+    early = seek(EngineBench(seed=2), inputs, tolerance=1.5)
+    count = early.dataset.sizes["cycle"]
+    whole = seek(EngineBench(seed=2), inputs, cycles=count)
+    assert 20 <= count < 200
+    assert early.inputs == whole.inputs
+    np.testing.assert_array_equal(early.dataset["j"], whole.dataset["j"])
+    assert early.dataset.sizes == whole.dataset.sizes
+    assert early.run.summary.keys() == whole.run.summary.keys()
+
+
+@pytest.mark.parametrize("inputs", [ONE, TWO])
+def test_a_lower_limit_is_the_upper_one_of_the_negated_quantity(inputs: dict[str, tuple[float, float]]) -> None:
+    def quiet(x: dict[str, float]) -> float:
+        return -0.03 * (x["soc_cad"] + 4.0) ** 2 - 300.0 * (x.get("egr", 0.15) - 0.15) ** 2
+
+    start = {"soc_cad": 4.0, "egr": 0.2}
+    how: dict[str, Any] = {"start": {name: start[name] for name in inputs}, "cycles": 40}
+    found = seek(lambda x: (quiet(x), {"y": x["soc_cad"]}), inputs, limits={"y": (0.0, None)}, **how)
+    turned = seek(lambda x: (quiet(x), {"y": -x["soc_cad"]}), inputs, limits={"y": 0.0}, **how)
+    assert found.inputs == turned.inputs
+    assert found.limits["y"] == -turned.limits["y"]
+    assert found.to_dict()["limits"] == {"y": found.limits["y"]}
+    more = seek(lambda x: (quiet(x), {"y": x["soc_cad"]}), seeker=found.seeker, cycles=5)
+    assert more.seeker.cycle == 45
+    below = seek(lambda x: (quiet(x), {"y": x["soc_cad"]}), inputs, limits={"y": (30.0, None)}, **how)
+    said = {finding.code: finding.text for finding in below.findings}
+    assert said["start_above_limit"] == "the first reading of y, 4, is below its lower limit, 30"
+    assert "below its lower limit, 30" in said["limit_broken"]
+
+
+def test_a_lower_limit_of_a_bench_is_kept_at_its_operating_points() -> None:
+    bench = EngineBench(seed=4, limits=["p_max_bar"])
+    found = seek(bench, {"soc_cad": (-20.0, 8.0)}, limits={"p_max_bar": (120.0, None)}, start=-15.0, cycles=120)
+    assert 118.0 < found.limits["p_max_bar"] < 130.0
+    assert bench.cycle == 120
 
 
 def test_there_are_twenty() -> None:
@@ -187,6 +263,9 @@ def test_every_seeker_says_what_it_takes() -> None:
         (lambda s: seek(hill, seeker=s, maximize=False), "maximize: the seeker given has its own"),
         (lambda s: seek(hill, seeker=s, limits={"p_max_bar": 9.0}), "limits: the seeker given has none"),
         (lambda _: seek(hill), "inputs: none given"),
+        (lambda _: seek(hill, ONE, limits={"y": (5.0, 2.0)}), "limits: y = .*lower < upper"),
+        (lambda _: seek(hill, ONE, limits={"y": (None, None)}), "limits: y = .*one may be None"),
+        (lambda _: seek(hill, TWO, tolerance={"soc_cad": 0.0, "egr": 1.0}), "tolerance = .*must be > 0, one number"),
         (lambda _: seek(lambda: 3.0, ONE), "write lambda x: ... x\\['soc_cad'\\]"),
     ],
 )

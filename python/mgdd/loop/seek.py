@@ -13,13 +13,14 @@ from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.known import tell_known
+from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult, found_by
+from mgdd.loop.until_still import run_until_still
 from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import inputs_of, named_values
-from mgdd.optimize.optimum import limits_of
 
 if TYPE_CHECKING:
     from mgdd.optimize import ComponentLag, Input, Limit
@@ -36,7 +37,8 @@ def seek(
     seeker: Any = "auto",
     start: Mapping[str, float] | float | None = None,
     cycles: int | None = None,
-    limits: Mapping[str, float] | Sequence[Limit] = (),
+    tolerance: Mapping[str, float] | float | None = None,
+    limits: Mapping[str, float | tuple[float | None, float | None]] | Sequence[Limit] = (),
     noise_sd: float | None = None,
     delay_cycles: float = 0.0,
     lag_cycles: float = 0.0,
@@ -70,8 +72,11 @@ def seek(
     cycles : int, optional
         How many; the first readings to every side at least. Left out: 200, and 25 more per cycle that J is late; of a
         seeker that dithers 2000, or 64 of its periods.
-    limits : mapping of str to float, or sequence of Limit
-        Upper values of measured quantities.
+    tolerance : mapping of str to float, or float for one input, optional
+        Stop before all `cycles` once the estimate has moved by less over the last 20 cycles per input, in its unit.
+    limits : mapping of str to float or (float, float), or sequence of Limit
+        Upper values of measured quantities, or lower and upper ones, of which either may be None. A lower one is kept
+        as an upper one of the negated quantity, whose name begins with a minus in `run`.
     noise_sd : float, optional
         Standard deviation of one reading, > 0 [unit of J]; learnt without, but by golden section.
     delay_cycles, lag_cycles : float
@@ -128,7 +133,7 @@ def seek(
     """
     if cycles is not None and (isinstance(cycles, bool) or not isinstance(cycles, int | np.integer)):
         raise ParameterError.of("cycles", cycles, "a whole number")
-    wanted = limits_of(limits)
+    wanted = both_sides(limits)
     if isinstance(seeker, Seeker | FeedForward | GuidedEngine):
         left_out = {
             "start": start is None, "noise_sd": noise_sd is None, "delay_cycles": not delay_cycles,
@@ -147,14 +152,20 @@ def seek(
             lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
             settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
         )  # fmt: skip
-        _require_plant(plant, asked)
+        _require_plant(plant, asked)  # before anything is made
         choice = chosen(asked, seeker)
         if known is not None:
             choice = tell_known(asked, seeker, choice, known)
-    return searched(_require_plant(plant, asked), choice, asked, choice.cycles if cycles is None else int(cycles))
+    still = None
+    if tolerance is not None:
+        still = np.atleast_1d(named_values("tolerance", tolerance, [one.name for one in asked.inputs]))
+        if still.shape != (len(asked.inputs),) or not (np.isfinite(still) & (still > 0.0)).all():
+            raise ParameterError.of("tolerance", tolerance, "> 0, one number for each input")
+    wanted_cycles = choice.cycles if cycles is None else int(cycles)
+    return searched(_require_plant(plant, asked), choice, asked, wanted_cycles, still)
 
 
-def searched(plant: Plant, choice: Choice, asked: Question, cycles: int) -> SeekResult:
+def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: Any = None) -> SeekResult:
     """Let a seeker that was chosen run on a plant of its inputs; errors as those of `seek`."""
     if cycles < choice.first_cycles:
         raise ParameterError.of("cycles", cycles, f">= {choice.first_cycles}, one reading to the side of every input")
@@ -166,7 +177,9 @@ def searched(plant: Plant, choice: Choice, asked: Question, cycles: int) -> Seek
         return found_by(choice.seeker, choice.reason, run, begun, asked)
 
     try:
-        return result(run_seeker(plant, choice.seeker, cycles))
+        if still is None:
+            return result(run_seeker(plant, choice.seeker, cycles))
+        return result(run_until_still(plant, choice.seeker, cycles, asked, still))
     except (Exception, Interrupted) as stop:
         part = getattr(stop, "partial", None)
         if isinstance(part, LoopRun):
@@ -176,12 +189,12 @@ def searched(plant: Plant, choice: Choice, asked: Question, cycles: int) -> Seek
 
 def _require_plant(plant: Any, asked: Question) -> Plant:
     """Give the plant of these inputs and limits; ParameterError where it is none, or another."""
-    names, held = [one.name for one in asked.inputs], [limit.name for limit in asked.limits]
+    names, held = [one.name for one in asked.inputs], measured_names(asked.limits)
     if isinstance(plant, Plant):
         require_measured(plant, names, held)
-        return plant
+        return with_lower_sides(plant, asked.limits)
     if callable(plant):
-        return FunctionPlant(plant, names, held)
+        return with_lower_sides(FunctionPlant(plant, names, held), asked.limits)
     raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
 
 

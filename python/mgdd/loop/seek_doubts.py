@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mgdd.loop.lower_limits import plain_name
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
@@ -140,12 +141,14 @@ def _about_limits(readings: Readings, limits: Sequence[Limit], kept: Mapping[str
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
         mean = kept[limit.name]
+        name, side = plain_name(limit.name)
+        bound = f"{'above its' if side > 0.0 else 'below its lower'} limit, {side * limit.upper:.6g}"
         if values.size and values[0] > limit.upper:
-            text = f"the first reading of {limit.name}, {values[0]:.6g}, is above its limit, {limit.upper:.6g}"
-            yield Finding("start_above_limit", (limit.name,), text, "start where it holds")
+            text = f"the first reading of {name}, {side * values[0]:.6g}, is {bound}"
+            yield Finding("start_above_limit", (name,), text, "start where it holds")
         if mean.value - _SURE * mean.sd > limit.upper:
-            text = f"{limit.name} is {mean.value:.6g} at the best inputs, above its limit, {limit.upper:.6g}"
-            yield Finding("limit_broken", (limit.name,), text, "widen the bounds: none of the inputs tried holds it")
+            text = f"{name} is {side * mean.value:.6g} at the best inputs, {bound}"
+            yield Finding("limit_broken", (name,), text, "widen the bounds: none of the inputs tried holds it")
 
 
 def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> Iterator[Finding]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mgdd.loop.lower_limits import plain_name
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.loop.seek_doubts import Mean, Readings, doubts_about
 from mgdd.optimize.inputs import unit_of_input
@@ -91,10 +92,10 @@ class SeekResult(Result):
         ]
         rows.append(Row("J", f"{self.value:.6g} ± {self.value_sd:.2g}", "unit of J"))
         rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", "unit of J"))
-        uppers = {limit.name: limit.upper for limit in self.asked.limits}
-        rows += [
-            Row(name, f"{value:.6g} (limit {uppers[name]:.6g})", unit_of(name)) for name, value in self.limits.items()
-        ]
+        for limit in self.asked.limits:
+            name, side = plain_name(limit.name)
+            said = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
+            rows.append(Row(name, said, unit_of(name)))
         rows.append(Row("cycles", str(self.run.dataset.sizes["cycle"])))
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 
@@ -122,7 +123,8 @@ class SeekResult(Result):
         }
         if self.limits:
             measured = [str(name) for name in self.run.dataset["limit"].to_numpy()]
-            at_best = [self.limits.get(name, math.nan) for name in measured]
+            sides = [plain_name(name) for name in measured]
+            at_best = [side * self.limits.get(name, math.nan) for name, side in sides]
             own = "unit of the limit"
             columns["limit"] = ("limit", measured, "-", "limited quantity")
             columns["limits_at_best"] = ("limit", at_best, own, "limited quantity at the best inputs")
@@ -175,7 +177,7 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
         gain=gain.value,
         gain_sd=gain.sd,
         start=dict(start),
-        limits={name: mean.value for name, mean in kept.items()},
+        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]},
         seeker=seeker,
         reason=reason,
         findings=unique([*seeker.findings, *doubts]),
