@@ -9,6 +9,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
@@ -18,11 +20,10 @@ from mgdd.cli.ranges import bounds_of
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
-from mgdd.loop import EngineBench, LoopCriteria, seek
+from mgdd.loop import EngineBench, seek
 from mgdd.loop.limit_figures import FIGURES, NOISE_FREE
 from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
-from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import ComponentLag
 from mgdd.optimize.optimum import Optimum
 from mgdd.plot.style import drawn
@@ -31,6 +32,7 @@ from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
 __all__ = ["add_seek"]
 
@@ -40,6 +42,7 @@ _BENCH = Options(
 )  # fmt: skip
 _SEARCH = Options(seek, "cycles", "noise_sd")
 _BOUNDS_CAD = (-30.0, 10.0)  # of the timing, where nobody says
+_NEAR = 40.0  # arrived: within a fortieth of the bounds, the scale that an input has by itself
 _COV = "cov_imep_percent"  # has no steady value
 # Arguments of the library and the options that set them.
 _NAMES = {**_BENCH.options, **_SEARCH.options, "start": "start", "limits": "limit", "nox_sensor": "sensor",
@@ -120,7 +123,7 @@ def _seek(args: argparse.Namespace) -> None:
     for doubt in doubts:
         _LOG.warning("%s", doubt)
     payload = found.to_dict() | {"preset": preset, "sensor": args.sensor, "seed": bench.seed}
-    payload |= _judged(bench, best, found, limits) | _guided(args, found, guide) | learnt | {"warnings": doubts}
+    payload |= _judged(bench, best, found) | _guided(args, found, guide) | learnt | {"warnings": doubts}
     emit(args, payload, text=_text(payload, found, list(limits)), traces=_table(run.dataset))
     if args.figure:
         from mgdd import plot
@@ -168,20 +171,30 @@ def _lags(bench: EngineBench) -> list[ComponentLag] | None:
     return [ComponentLag(), ComponentLag(delay_cycles=float(bench.analyser_delay_cycles), lag_cycles=lag)]
 
 
-def _judged(bench: EngineBench, best: Optimum, found: SeekResult, limits: Mapping[str, float]) -> dict[str, Any]:
+def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, Any]:
     """Judge by the noise-free bench, which the search does not know."""
     steady = bench.steady_map({name: [value] for name, value in found.inputs.items()}, cycle=max(bench.cycle - 1, 0))
-    out: dict[str, Any] = {
+    estimates, aim = _estimates(found), np.array(list(best.inputs.values()))
+    width = np.array([high - low for low, high in best.bounds.values()])
+    near = (np.abs(estimates - aim) <= width / _NEAR).all(axis=1)
+    late = (estimates - aim)[len(estimates) // 2 :]
+    return {
         "optimum": dict(best.inputs),
         "optimum_active_limits": list(best.active_limits),
         "free_optimum": dict(best.free_inputs),
         "j_lost": best.value - float(steady["j"].squeeze()),
+        "cycles_to": int(near.argmax()) if near.any() else None,
+        "rms": dict(zip(best.inputs, np.sqrt(np.mean(late**2, axis=0)).tolist(), strict=True)) if late.size else None,
     }
-    if len(best.inputs) == 1:
-        goal = LoopCriteria(optimum=best["soc_cad"], limits=dict(limits) or None)
-        judged = summarize_cycles(found.run.dataset, goal)
-        out |= {"cycles_to_1_cad": judged["cycles_to"], "rms_cad": judged["rms_cad"]}
-    return out
+
+
+def _estimates(found: SeekResult) -> NDArray[np.float64]:
+    """Give the estimate before every cycle, per input."""
+    cycles = found.run.dataset
+    if "estimate_cad" in cycles:
+        return cycles["estimate_cad"].to_numpy()[:, None]
+    table: NDArray[np.float64] = cycles["estimate"].sel(input=list(found.inputs)).to_numpy()
+    return table
 
 
 def _guided(args: argparse.Namespace, found: SeekResult, guide: Any) -> dict[str, Any]:

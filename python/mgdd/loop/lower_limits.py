@@ -68,8 +68,11 @@ class _TwoSided:
 
     def measure(self) -> Measurement:
         measured: Measurement = self._plant.measure()
-        both = {"limits": measured.limits, "noise_free_limits": measured.noise_free_limits}
-        return replace(measured, **{name: {**values, **self._negated(values)} for name, values in both.items()})
+        free = measured.noise_free_limits
+        return replace(
+            measured, limits={**measured.limits, **self._negated(measured.limits)},
+            noise_free_limits={**free, **self._negated(free)},
+        )  # fmt: skip
 
     def _negated(self, values: Mapping[str, float]) -> dict[str, float]:
         return {name: -values.get(plain_name(name)[0], math.nan) for name in self._lower} if values else {}
