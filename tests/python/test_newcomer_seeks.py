@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mgdd
-from mgdd.loop import EngineBench, FunctionPlant, monte_carlo, seek
+from mgdd.loop import EngineBench, FunctionPlant, monte_carlo, run_seeker, seek
 from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Input, Limit, Seeker, Spsa
 
 RNG = np.random.default_rng(4)
@@ -262,6 +262,7 @@ def test_every_seeker_says_what_it_takes() -> None:
         (lambda s: seek(hill, seeker=s, start=3.0), "start: the seeker given has its own"),
         (lambda s: seek(hill, seeker=s, maximize=False), "maximize: the seeker given has its own"),
         (lambda s: seek(hill, seeker=s, limits={"p_max_bar": 9.0}), "limits: the seeker given has none"),
+        (lambda _: run_seeker(EngineBench(), "spsa", 5), r"seeker = 'spsa': must be a seeker.*seek\(plant, inputs"),
         (lambda _: seek(hill), "inputs: none given"),
         (lambda _: seek(hill, ONE, limits={"y": (5.0, 2.0)}), "limits: y = .*lower < upper"),
         (lambda _: seek(hill, ONE, limits={"y": (None, None)}), "limits: y = .*one may be None"),

@@ -29,6 +29,11 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
         ["--seeker", "spsa"],
         'seeker = "spsa"\n[seek.inputs]\nsoc_cad = [-20, 5]\n',
     ),
+    "a tolerance": (
+        {"inputs": {"soc_cad": (-20.0, 5.0)}, "tolerance": {"soc_cad": 1.5}},
+        ["--tolerance", "soc_cad=1.5"],
+        "[seek.tolerance]\nsoc_cad = 1.5\n[seek.inputs]\nsoc_cad = [-20, 5]\n",
+    ),
     "a process": (
         {"inputs": {"soc_cad": (-20.0, 5.0)}, "seeker": "gaussian_process_seeking", "cycles": 40},
         ["--seeker", "gaussian_process_seeking", "--cycles", "40"],

@@ -82,6 +82,13 @@ def add_seek(verbs: Any) -> None:
     )
     _SEARCH.add(parser)
     parser.add_argument(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="NAME=X",
+        help="stop before all cycles once the estimate moves by less, one for each input",
+    )
+    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help=f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X; repeatable",
     )  # fmt: skip
@@ -109,7 +116,8 @@ def _seek(args: argparse.Namespace) -> None:
         best = bench.find_optimum({name: value for name, value in limits.items() if name != _COV}, bounds=bounds)
         try:
             found: SeekResult = seek(
-                bench, bounds, seeker=args.seeker, start=start or None, limits=limits, components=_lags(bench),
+                bench, bounds, seeker=args.seeker, start=start or None, limits=limits,
+                tolerance=number_pairs(args.tolerance, "--tolerance") or None, components=_lags(bench),
                 guide=guide, settings=assignments(args.seeker_set, {}, "--seeker-set"), seed=bench.seed,
                 **_SEARCH.given(args),
             )  # fmt: skip

@@ -18,7 +18,7 @@ from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult, found_by
-from mgdd.loop.until_still import run_until_still
+from mgdd.loop.until_still import run_until_still, stillness
 from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import inputs_of, named_values
 
@@ -156,11 +156,7 @@ def seek(
         choice = chosen(asked, seeker)
         if known is not None:
             choice = tell_known(asked, seeker, choice, known)
-    still = None
-    if tolerance is not None:
-        still = np.atleast_1d(named_values("tolerance", tolerance, [one.name for one in asked.inputs]))
-        if still.shape != (len(asked.inputs),) or not (np.isfinite(still) & (still > 0.0)).all():
-            raise ParameterError.of("tolerance", tolerance, "> 0, one number for each input")
+    still = stillness(asked, tolerance)
     wanted_cycles = choice.cycles if cycles is None else int(cycles)
     return searched(_require_plant(plant, asked), choice, asked, wanted_cycles, still)
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.loop.summary import summarize_cycles
+from mgdd.optimize.inputs import named_values
 from mgdd.results.result import Figures
 
 if TYPE_CHECKING:
@@ -20,10 +21,22 @@ if TYPE_CHECKING:
     from mgdd.loop.plant import Plant
     from mgdd.loop.seek_choice import Question
 
-__all__ = ["run_until_still"]
+__all__ = ["run_until_still", "stillness"]
 
 _CYCLES = 20  # per input: twice what an estimate takes to arrive, docs/benchmarks.md
 _LOOK = 5  # cycles between two looks
+
+
+def stillness(asked: Question, tolerance: Any) -> NDArray[np.float64] | None:
+    """Read a tolerance, a number per input, by name or alone; None for none."""
+    if tolerance is None:
+        return None
+    still = np.atleast_1d(
+        np.asarray(named_values("tolerance", tolerance, [one.name for one in asked.inputs]), np.float64)
+    )
+    if still.shape != (len(asked.inputs),) or not (np.isfinite(still) & (still > 0.0)).all():
+        raise ParameterError.of("tolerance", tolerance, "> 0, one number for each input")
+    return still
 
 
 def run_until_still(plant: Plant, seeker: Any, cycles: int, asked: Question, tolerance: NDArray[np.float64]) -> LoopRun:

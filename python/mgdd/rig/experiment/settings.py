@@ -181,6 +181,7 @@ class SeekTask(Settings):
     )
     start: Mapping[str, float] = _key("scales", {})
     cycles: int | None = _key("integer", low=1, high=2_000_000)
+    tolerance: Mapping[str, float] = _key("scales", {})
     noise_sd: float | None = _key("number", low=0.0)
     limits: Mapping[str, float] = _key("scales", {})
 

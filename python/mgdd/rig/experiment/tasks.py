@@ -22,6 +22,7 @@ from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
+from mgdd.loop.until_still import stillness
 from mgdd.optimize import FitOptions
 from mgdd.optimize.optimum import limits_of
 from mgdd.plot.style import drawn
@@ -267,6 +268,7 @@ class SeekPlan:
             inputs=inputs, start=started(task.start or None, inputs), limits=limits_of(task.limits),
             noise_sd=task.noise_sd, guide=guide, seed=seed, point=known.point,
         )  # fmt: skip
+        self._still = stillness(self._asked, task.tolerance or None)
         choice = self._chosen()
         self.samples = choice.cycles if task.cycles is None else task.cycles
         self.start = dict(zip(task.inputs, choice.seeker.estimate.tolist(), strict=True))
@@ -284,7 +286,7 @@ class SeekPlan:
         choice = self._chosen()
         self._running = choice.seeker
         try:
-            found = searched(plant, choice, self._asked, _fewer(self.samples, most))
+            found = searched(plant, choice, self._asked, _fewer(self.samples, most), self._still)
         except Interrupted as stop:
             if not isinstance(stop.partial, SeekResult):
                 raise
