@@ -152,8 +152,8 @@ def _run_of(
 
 
 def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:
-    """ParameterError where it is no seeker, or one that names other inputs than the plant has."""
-    if not hasattr(seeker, "ask"):
+    """ParameterError where a seeker is a name, or names other inputs than the plant has."""
+    if isinstance(seeker, str):
         raise ParameterError(
             f"seeker = {seeker!r}: must be a seeker, as ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0); "
             "mgdd.loop.seek(plant, inputs, seeker=NAME) makes one by name"
