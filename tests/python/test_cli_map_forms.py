@@ -87,7 +87,7 @@ def test_a_seeker_takes_the_map_as_its_guide(ending: str, here: Path, capsys: py
         np.testing.assert_array_equal(table.sd_cad, np.full((3, 2), 0.4))
     run = ran(capsys, "engine", "seek", "--guide", "map", "--guide-map", f"guide.{ending}", "--cycles", "40")
     at = OperatingPoint().to_dict()
-    assert run["start_cad"] == pytest.approx(float(soc.lookup(at).values))
+    assert run["start"]["soc_cad"] == pytest.approx(float(soc.lookup(at).values))
     write_map(soc, here / "soc.csv")
     assert main(["engine", "seek", "--guide", "map", "--guide-map", "soc.csv", "--cycles", "40"]) == 2
     assert "a calibration map, another form of file: mgdd map export soc.csv --guide-map" in capsys.readouterr().err

@@ -21,7 +21,6 @@ from mgdd.loop import (
     run_seeker,
 )
 from mgdd.loop.summary import summarize_cycles
-from mgdd.loop.timing_search import TimingSearch
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
@@ -212,7 +211,7 @@ def test_steady_map_is_quiet_and_labelled() -> None:
         (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
         (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "3.0 is not a seeker"),
         (lambda: EngineBench().find_optimum({"nonsense": 1.0}), "'nonsense' is not an indicator"),
-        (lambda: EngineBench().find_optimum(bounds_cad=(5.0, -5.0)), "must increase"),
+        (lambda: EngineBench().find_optimum(bounds={"soc_cad": (5.0, -5.0)}), "must increase"),
     ],
 )
 def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:
@@ -228,17 +227,3 @@ def test_a_refused_run_moves_neither_bench_nor_seeker() -> None:
     assert plant.cycle == 0
     assert it.state == state
     assert math.isfinite(run_seeker(EngineBench(limits=["p_max_bar"]), it, 10).summary["mean_j"])
-
-
-def test_a_search_is_a_run_with_settings_of_its_own_and_names_its_arguments() -> None:
-    found = TimingSearch(bench=EngineBench(seed=3), limits={}, cycles=600).run()
-    assert (found.start_cad, found.start_reason, found.cycles) == (-20.0, "default", 600)
-    assert abs(found.run.summary["final_cad"] - found.best["soc_cad"]) < 1.0
-    for wrong, said in (
-        ({"form": "batch", "method": "spsa"}, "form acts with method=extremum_seeking only, not with spsa"),
-        ({"lower_cad": -61.0}, r"lower_cad=-61: must be in \[-60, 20\]"),
-        ({"limit_method": "barrier"}, "limit_method acts with limits=NAME=X only"),
-        ({"guide": "curve", "method": "newton"}, "method acts with guide=none, feed_forward or map"),
-    ):
-        with pytest.raises(ParameterError, match=said):
-            TimingSearch(bench=EngineBench(), **wrong)

@@ -45,9 +45,10 @@ def test_a_file_comes_back_equal(text: str) -> None:
     assert known.mode == "simulate"
 
 
-def test_bounds_by_name_are_those_of_lower_and_upper() -> None:
-    by_name = experiment(SEEK + "[seek.inputs]\nsoc_cad = [-20, 5.5]\n")
-    assert by_name == experiment(SEEK.replace("cycles", "lower_cad = -20.0\nupper_cad = 5.5\ncycles"))
+def test_bounds_and_start_have_the_names_of_inputs() -> None:
+    known = experiment(SEEK + "[seek.inputs]\nsoc_cad = [-20, 5.5]\n[seek.start]\nsoc_cad = 2\n")
+    assert known.settings.inputs == {"soc_cad": (-20.0, 5.5)}
+    assert Experiment.from_toml(known.to_toml()) == known
 
 
 @pytest.mark.parametrize(
@@ -58,10 +59,8 @@ def test_bounds_by_name_are_those_of_lower_and_upper() -> None:
         (TRACK.replace('task = "track"', 'task = "drive"'), r"task = 'drive': must be one of identify, track, seek"),
         (SEEK + "[seek.inputs]\nsoc_cad = [-20]\n", r"seek.inputs.soc_cad = \[-20\]: must be \[lower, upper\]"),
         (SEEK + "[seek.inputs]\negr = [0, 1]\n", r"seek.inputs.egr = .*must be one of the keys soc_cad"),
-        (
-            SEEK.replace("cycles", "upper_cad = 5.0\ncycles") + "[seek.inputs]\nsoc_cad = [-20, 5]\n",
-            r"seek.upper_cad = 5: must be left out, since seek.inputs.soc_cad gives the bounds",
-        ),
+        (SEEK + "[seek.inputs]\nsoc_cad = [5, -20]\n", r"seek.inputs.soc_cad = .*must be lower < upper"),
+        (SEEK.replace("cycles", 'seeker = "nelder"\ncycles'), r"seek.seeker = 'nelder': must be one of auto, curve_"),
         (TRACK + "speed = 3\n", r"track.speed = 3: must be one of the keys reference"),
         (TRACK + "controllr = 'pid'\n", r"track.controllr = 'pid': .*did you mean 'controller'"),
         (TRACK.replace('"pid"', '"bang"'), r"track.controller = 'bang': must be one of guided"),
@@ -99,12 +98,12 @@ def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
         (TRACK + 'model = "away.toml"\n', FileNotFoundError, r"away\.toml"),
         (TRACK + '[safety]\nenvelope = "ebt"\n', DataError, "ebt"),
         (SEEK + '[plant]\npreset = "P1"\n', ParameterError, "P1"),
+        (SEEK + "[seek.start]\nsoc_cad = 40\n", ParameterError, r"soc_cad = 40: must be in \[-30, 10\], its bounds"),
         (
-            SEEK.replace("cycles = 60", "lower_cad = 5.0\nupper_cad = 1.0"),
+            SEEK.replace("cycles", 'seeker = "golden_section"\ncycles'),
             ParameterError,
-            r"lower_cad = 5: must be < upper",
+            r"golden_section: needs noise_sd",
         ),
-        (SEEK.replace("cycles = 60", "start_cad = 40.0"), ParameterError, r"start_cad = 40: must be in \[-30, 10\]"),
         (TRACK + "[plant.scale]\ncoulomb = 1.2\n", ParameterError, r"plant.scale = 'coulomb': must be a number of"),
         (TRACK + "[plant.scale]\ncoulomb_nm = -1.2\n", ParameterError, r"plant.scale: coulomb_nm = -0.34\d* N m"),
         (TRACK + '[plant]\npreset = "puma_single"\n', ParameterError, "is an engine, not a throttle"),
@@ -235,7 +234,9 @@ def test_the_controller_of_a_run_takes_the_delay_of_its_model_and_doubts_are_tol
 @pytest.mark.parametrize("guide", ["curve", "feed_forward", "none"])
 def test_seeking_stays_inside_its_bounds_and_says_what_guided_it(guide: str) -> None:
     result = run_experiment(
-        experiment(SEEK.replace("cycles = 60", f'cycles = 60\nguide = "{guide}"\nlower_cad = -12.0'))
+        experiment(
+            SEEK.replace("cycles = 60", f'cycles = 60\nguide = "{guide}"') + "[seek.inputs]\nsoc_cad = [-12, 10]\n"
+        )
     )
     check_labels(result.dataset)
     applied = result.dataset["soc_applied_cad"].to_numpy()

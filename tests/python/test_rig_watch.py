@@ -175,7 +175,7 @@ def test_times_of_a_loop_are_counted_with_the_deadlines_it_missed(tmp_path: Path
 
 def test_a_seeker_is_shown_with_its_interval(tmp_path: Path) -> None:
     text = 'kind = "experiment"\nformat = 1\ntask = "seek"\n[seek]\ncycles = 40\nguide = "{}"\n'
-    for guide, has_sd in (("curve", True), ("none", False)):
+    for guide, has_sd in (("curve", True), ("feed_forward", False)):
         run_experiment(Experiment.from_toml(text.format(guide)), tmp_path / guide)
         source = source_of(tmp_path / guide)
         assert isinstance(source, RecordSource)

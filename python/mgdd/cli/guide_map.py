@@ -21,14 +21,15 @@ from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table
 from mgdd.io.files import existing_file
 from mgdd.io.parameters import ParameterFile
-from mgdd.loop.timing_search import TimingSearch
+from mgdd.loop import EngineBench
+from mgdd.loop.engine_guide import KINDS, EngineGuide
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["GUIDE", "add_guide", "check_guide", "guide_of", "learn_map"]
 
-GUIDE = Options(TimingSearch, "guide", "guide_shape")
+GUIDE = Options(EngineGuide, shape="guide_shape")
 _ENDINGS = (".csv", ".toml")
 _POINT = frozenset(OperatingPoint.fields())
 
@@ -36,6 +37,11 @@ _POINT = frozenset(OperatingPoint.fields())
 def add_guide(parser: argparse.ArgumentParser) -> None:
     """Add the options of the guide."""
     group = GUIDE.add(parser, "guide: a rough model that leads while the measurements decide")
+    group.add_argument(
+        "--guide", choices=("none", *KINDS, "map"), default="none",
+        help="curve: the model's whole curve; calibrated: the same while the model learns from the pressure; "
+        "feed_forward: the model's best timing; map: a table of timings (default: %(default)s)",
+    )  # fmt: skip
     group.add_argument(
         "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"
     )
@@ -52,9 +58,9 @@ def add_guide(parser: argparse.ArgumentParser) -> None:
 
 def check_guide(args: argparse.Namespace) -> None:
     """Refuse options of a guide that is not there, and a table that is not said, or written where nothing is learnt."""
-    guide = args.guide or default_of(TimingSearch, "guide")
+    guide = args.guide
     why = {"none": "has no model", "map": "has a table, not a model"}.get(guide, "has a model, not a table")
-    models, tables = ("guide_preset", "guide_set"), ("guide_map", "guide_map_out")
+    models, tables = ("guide_preset", "guide_set", "guide_shape"), ("guide_map", "guide_map_out")
     idle = {"none": (*models, *tables), "map": models}.get(guide, tables)
     refuse_idle(args, *idle, why=f"--guide {guide} {why}")
     if guide != "map":
@@ -70,11 +76,17 @@ def check_guide(args: argparse.Namespace) -> None:
         refuse_idle(args, "guide_map_out", why=why)
 
 
-def guide_of(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
-    """Give the guide as arguments of a search, whose bench has this cylinder."""
+def guide_of(args: argparse.Namespace, bench: EngineBench) -> TimingMap | EngineGuide | None:
+    """Give the guide of a search on this bench, whose cylinder the model has unless another is named."""
+    if args.guide == "none":
+        return None
     if args.guide == "map":
-        return {**GUIDE.given(args), "guide_table": _read_map(args.guide_map)}
-    return {**GUIDE.given(args), "guide_cylinder": _cylinder_of(args, cylinder)}
+        return _read_map(args.guide_map)
+    own = bench.settings
+    return EngineGuide(
+        cylinder=_cylinder_of(args, own["cylinder"]), kind=args.guide, performance=own["performance"],
+        nox=own["true_nox"], **GUIDE.given(args),
+    )  # fmt: skip
 
 
 def _cylinder_of(args: argparse.Namespace, base: Cylinder) -> Cylinder:

@@ -1,26 +1,30 @@
-"""`mgdd engine seek`: a seeker on the virtual bench, and what it came to."""
+"""`mgdd engine seek`: `mgdd.loop.seek` on the virtual bench, and what it came to."""
 
 from __future__ import annotations
 
 import argparse
 import logging
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
-from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
+from mgdd.cli.options import add_command, add_engine, assignments, engine_of, number_pairs
 from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
 from mgdd.cli.ranges import bounds_of
-from mgdd.cli.seek_inputs import seek_inputs
 from mgdd.engine import Performance
-from mgdd.errors import ConvergenceError, ParameterError, hinted
-from mgdd.loop import EngineBench
-from mgdd.loop.limit_figures import FIGURES
-from mgdd.loop.seek_limits import COV, SCATTER, limit_report
-from mgdd.loop.timing_search import TimingSearch, TimingSearchRun
+from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
+from mgdd.guide import GuidedEngine, TimingMap
+from mgdd.loop import EngineBench, seek
+from mgdd.loop.limit_figures import FIGURES, NOISE_FREE
+from mgdd.loop.seek_choice import SEEKERS
+from mgdd.loop.seek_result import SeekResult
+from mgdd.optimize import ComponentLag
 from mgdd.optimize.optimum import Optimum
 from mgdd.plot.style import drawn
 from mgdd.results.labels import VARIABLES, to_jsonable
@@ -28,6 +32,7 @@ from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
 __all__ = ["add_seek"]
 
@@ -35,31 +40,57 @@ _LOG = logging.getLogger(__name__)
 _BENCH = Options(
     EngineBench, "soc_scatter_cad", "seed", efficiency_noise_percent="noise", misfire_probability="misfire"
 )  # fmt: skip
-_SEARCH = Options(
-    TimingSearch, "method", "form", "start_cad", "lower_cad", "upper_cad", "cycles", "limit_method"
-)  # fmt: skip
+_SEARCH = Options(seek, "cycles", "noise_sd")
+_BOUNDS_CAD = (-30.0, 10.0)  # of the timing, where nobody says
+_NEAR = 40.0  # arrived: within a fortieth of the bounds, the scale that an input has by itself
+_COV = "cov_imep_percent"  # has no steady value
 # Arguments of the library and the options that set them.
-_NAMES = {**_BENCH.options, "start": "start_cad", "limits": "limit", "nox_sensor": "sensor",
-          "guide_cylinder": "guide_set", "guide_table": "guide_map"}  # fmt: skip
+_NAMES = {**_BENCH.options, **_SEARCH.options, "start": "start", "limits": "limit", "nox_sensor": "sensor",
+          "guide_cylinder": "guide_set", "guide_table": "guide_map", "settings": "seeker_set"}  # fmt: skip
 
 
 def add_seek(verbs: Any) -> None:
     """Add the command."""
     parser = add_command(
         verbs, "seek", _seek,
-        help_text="let a seeker find the best start of combustion on the virtual bench, one cycle at a time",
-        example="mgdd engine seek --method extremum_seeking --limit p_max_bar=95 --json",
+        help_text="seek the best start of combustion, or several inputs, on the virtual bench, one cycle at a time",
+        example="mgdd engine seek --input soc_cad=-20:5 --limit p_max_bar=95 --json",
         endings=".json or .csv, the cycles",
     )  # fmt: skip
-    _SEARCH.add(parser)
     parser.add_argument(
-        "--input", action="append", default=[], metavar="NAME=LOW:HIGH",
-        help=f"bounds of an input of the bench ({', '.join(bench_inputs)}), of soc_cad in place of --lower-cad and "
-        "--upper-cad; repeatable: several are sought at once, by gaussian_process_seeking",
+        "--seeker", choices=("auto", *SEEKERS), default="auto", metavar="NAME",
+        help=f"the seeker: auto or one of {', '.join(SEEKERS)} (default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
+        "--seeker-set",
+        action="append",
+        default=[],
+        metavar="FIELD=VALUE",
+        help="any setting of the seeker, repeatable, for example form=washout",
+    )
+    parser.add_argument(
+        "--input", action="append", default=[], metavar="NAME=LOW:HIGH",
+        help=f"bounds of an input of the bench ({', '.join(bench_inputs)}), repeatable: several are sought at once "
+        "(default: soc_cad=-30:10)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--start",
+        action="append",
+        default=[],
+        metavar="NAME=X",
+        help="first value of an input, repeatable; left out: the best of the guide, or the middle of the bounds",
+    )
+    _SEARCH.add(parser)
+    parser.add_argument(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="NAME=X",
+        help="stop before all cycles once the estimate moves by less, one for each input",
+    )
+    parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
-        help=f"keep an indicator, {', '.join(bench_limits)} or {COV} below X; repeatable",
+        help=f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X; repeatable",
     )  # fmt: skip
     parser.add_argument("--figure", metavar="FILE", help="draw the run (.png, .svg or .pdf)")
     group = parser.add_argument_group("bench")
@@ -76,31 +107,41 @@ def _seek(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
     check_guide(args)
-    limits = number_pairs(args.limit, "--limit")
+    limits, start = number_pairs(args.limit, "--limit"), number_pairs(args.start, "--start")
     with _option_names():
         given = bounds_of(args.input)
         bench, preset = _bench(args, limits, given)
-        bounds = _bounds(args, bench, given)
-        if len(bench.input_names) > 1:
-            _seek_several(args, bench, preset, bounds, limits)
-            return
-        guide = guide_of(args, bench.settings["cylinder"])
-        search = TimingSearch(bench=bench, limits=limits, **guide, **_SEARCH.given(args) | _timings(bounds))
-        found = search.run()
-        doubts = found.doubts()
-    run, table = found.run, search.guide_table
+        bounds = {name: given.get(name, _BOUNDS_CAD) for name in bench.input_names}
+        guide = guide_of(args, bench)
+        best = bench.find_optimum({name: value for name, value in limits.items() if name != _COV}, bounds=bounds)
+        try:
+            found: SeekResult = seek(
+                bench, bounds, seeker=args.seeker, start=start or None, limits=limits,
+                tolerance=number_pairs(args.tolerance, "--tolerance") or None, components=_lags(bench),
+                guide=guide, settings=assignments(args.seeker_set, {}, "--seeker-set"), seed=bench.seed,
+                **_SEARCH.given(args),
+            )  # fmt: skip
+        except Interrupted as stop:
+            if not isinstance(stop.partial, SeekResult):
+                raise
+            found = stop.partial
+    run, table = found.run, guide if isinstance(guide, TimingMap) else None
     learnt, unlearnt = learn_map(args, table, found.seeker, bench.point, interrupted=run.interrupted)
-    doubts += unlearnt
+    doubts = [*map(str, found.findings), *unlearnt]
     for doubt in doubts:
         _LOG.warning("%s", doubt)
-    payload = _payload(args, preset, found) | found.guide_figures() | learnt
-    payload |= {"start_cad": found.start_cad, "start_reason": found.start_reason, "warnings": doubts}
-    text = [lines(to_jsonable(payload)), *_limit_text(payload["limit_report"], int(run.summary["judged_from"]))]
-    emit(args, payload, text=text, traces=_table(run.dataset))
+    payload = found.to_dict() | {"preset": preset, "sensor": args.sensor, "seed": bench.seed}
+    payload |= _judged(bench, best, found) | _guided(args, found, guide) | learnt | {"warnings": doubts}
+    emit(args, payload, text=_text(payload, found, list(limits)), traces=_table(run.dataset))
     if args.figure:
-        _draw(run.dataset, found.best, limits, args.figure)
+        from mgdd import plot
+
+        how: dict[str, Any] = {"limit_values": limits}
+        if len(best.inputs) == 1:
+            how["optimum_cad"] = best["soc_cad"]
+        save_figure(drawn(plot.seeking, run.dataset, size=(8.0, 7.0), **how), args.figure)
     if run.interrupted:
-        raise Stopped(f"{run.dataset.sizes['cycle']} of {found.cycles} cycles are kept")
+        raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 
 
 def _bench(args: argparse.Namespace, limits: Mapping[str, float], inputs: Mapping[str, Any]) -> tuple[EngineBench, str]:
@@ -120,122 +161,80 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, float], inputs: Mappin
         inputs=["soc_cad", *(name for name in inputs if name != "soc_cad")],
         **_BENCH.given(args),
     )
-    return bench, preset.name
-
-
-def _bounds(
-    args: argparse.Namespace, bench: EngineBench, given: Mapping[str, tuple[float, float]]
-) -> dict[str, tuple[float, float]]:
-    """Check the bounds of ``--input`` against the bench."""
-    for name, bounds in given.items():
+    for name, bounds in inputs.items():
         least, greatest = bench.input_bounds[name]
         for value in bounds:
             if not least <= value <= greatest:
                 bound = f"must be in [{least:g}, {greatest:g}], the window of the bench"
                 raise ParameterError(f"--input {name}={bounds[0]:g}:{bounds[1]:g}: {value:g} {bound}")
-    for option in ("lower_cad", "upper_cad"):
-        if "soc_cad" in given and getattr(args, option) is not None:
-            raise ParameterError(f"--input soc_cad and {as_option(option)} contradict each other: give one")
-    return dict(given)
+    return bench, preset.name
 
 
-def _timings(bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-    return dict(zip(("lower_cad", "upper_cad"), bounds["soc_cad"], strict=True)) if bounds else {}
+def _lags(bench: EngineBench) -> list[ComponentLag] | None:
+    """Say what stands between the plant and each component of J: the data sheet of the analyser."""
+    if bench.settings["nox_sensor"] != "analyser":
+        return None
+    gain = bench.analyser_gain
+    lag = -1.0 / math.log1p(-gain) if gain < 1.0 else 0.0
+    return [ComponentLag(), ComponentLag(delay_cycles=float(bench.analyser_delay_cycles), lag_cycles=lag)]
 
 
-def _seek_several(
-    args: argparse.Namespace,
-    bench: EngineBench,
-    preset: str,
-    bounds: Mapping[str, tuple[float, float]],
-    limits: Mapping[str, float],
-) -> None:
-    """Seek several inputs at once."""
-    for option in ("form", "limit_method", "guide_shape"):
-        if getattr(args, option, None):
-            raise ParameterError(
-                f"{as_option(option)} acts with soc_cad alone, not with several of --input: leave it out"
-            )
-    if args.guide not in (None, "none"):
-        raise ParameterError(f"--guide {args.guide} guides soc_cad alone, not several of --input: leave it out")
-    if args.method not in (None, "gaussian_process_seeking"):
-        raise ParameterError(
-            f"--method {args.method} has settings for soc_cad alone here: leave it out, or use mgdd.loop.run_seeker"
-        )
-    if args.sensor == "analyser":
-        raise ParameterError("--sensor analyser is late, and one search takes J of the same cycle: use --sensor soft")
-    low = TimingSearch.lower_cad if args.lower_cad is None else args.lower_cad
-    high = TimingSearch.upper_cad if args.upper_cad is None else args.upper_cad
-    everything = {name: bounds.get(name, (low, high)) for name in bench.input_names}
-    run, payload = seek_inputs(bench, everything, limits, start_cad=args.start_cad, cycles=args.cycles)
-    payload = {"method": "gaussian_process_seeking", "preset": preset, "sensor": args.sensor} | payload
-    table = _table(run.dataset)
-    for name in bench.input_names:
-        for kind in ("estimate", "asked"):
-            table[f"{kind}_{name}"] = run.dataset[kind].sel(input=name, drop=True)
-    text = [
-        f"{name}: start {payload['start'][name]:.4g}, estimate {payload['final'][name]:.4g}, "
-        f"optimum {payload['optimum'][name]:.4g}"
-        for name in bench.input_names
-    ]
-    for name in limits:
-        own = {figure: payload["limit_figures"].get(f"{figure}_{name}") for figure in FIGURES}
-        text.append(f"{name} as measured: {_kept(own, int(payload['limit_figures']['judged_from']))}")
-    emit(args, payload, text=[lines(to_jsonable(payload)), *text], traces=table)
-    if args.figure:
-        from mgdd import plot
-
-        save_figure(drawn(plot.seeking, run.dataset, size=(8.0, 7.0), limit_values=dict(limits)), args.figure)
-    if run.interrupted:
-        raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
-
-
-def _payload(args: argparse.Namespace, preset: str, found: TimingSearchRun) -> dict[str, Any]:
-    search, run, best = found.search, found.run, found.best
-    summary = run.summary
-    out: dict[str, Any] = {
-        "method": search.method,
-        "preset": preset,
-        "sensor": args.sensor,
-        "seed": search.bench.settings["seed"],
-        "cycles": run.dataset.sizes["cycle"],
-        "start_cad": None,
-        "start_reason": None,
-        "final_cad": summary["final_cad"],
-        "optimum_cad": best["soc_cad"],
-        "free_optimum_cad": best.free_inputs["soc_cad"],
-        "cycles_to_1_cad": summary["cycles_to"],
-        "rms_cad": summary["rms_cad"],
-        "mean_j": summary["mean_j"],
-        "mean_efficiency_percent": summary["mean_efficiency_percent"],
-        "mean_nox_ppm": summary["mean_nox_ppm"],
-        "misfires": int(summary["misfires"]),
-        "findings": [str(finding) for finding in run.findings],
-        "limits": dict(search.limits),
-        "judged_from": int(summary["judged_from"]),
-        "limit_report": limit_report(run, best, search.limits, found.seeker.limit_states),
-        "interrupted": run.interrupted,
+def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, Any]:
+    """Judge by the noise-free bench, which the search does not know."""
+    steady = bench.steady_map({name: [value] for name, value in found.inputs.items()}, cycle=max(bench.cycle - 1, 0))
+    estimates, aim = _estimates(found), np.array(list(best.inputs.values()))
+    width = np.array([high - low for low, high in best.bounds.values()])
+    near = (np.abs(estimates - aim) <= width / _NEAR).all(axis=1)
+    late = (estimates - aim)[len(estimates) // 2 :]
+    return {
+        "optimum": dict(best.inputs),
+        "optimum_active_limits": list(best.active_limits),
+        "free_optimum": dict(best.free_inputs),
+        "j_lost": best.value - float(steady["j"].squeeze()),
+        "cycles_to": int(near.argmax()) if near.any() else None,
+        "rms": dict(zip(best.inputs, np.sqrt(np.mean(late**2, axis=0)).tolist(), strict=True)) if late.size else None,
     }
-    if search.method == "extremum_seeking":
-        out["form"] = search.form or "batch"
-    if search.limits and not search.is_curve and search.method != "gaussian_process_seeking":
-        out["limit_method"] = search.limit_method or "switching"
+
+
+def _estimates(found: SeekResult) -> NDArray[np.float64]:
+    """Give the estimate before every cycle, per input."""
+    cycles = found.run.dataset
+    if "estimate_cad" in cycles:
+        return cycles["estimate_cad"].to_numpy()[:, None]
+    table: NDArray[np.float64] = cycles["estimate"].sel(input=list(found.inputs)).to_numpy()
+    return table
+
+
+def _guided(args: argparse.Namespace, found: SeekResult, guide: Any) -> dict[str, Any]:
+    if guide is None:
+        return {"guide": "none"}
+    out: dict[str, Any] = {"guide": args.guide}
+    if isinstance(found.seeker, GuidedEngine) and args.guide == "calibrated":
+        out |= {
+            "guide_wall_heat_scale": found.seeker.cylinder.wall_heat_scale,
+            "recalibrations": found.seeker.recalibrations,
+        }
     return out
 
 
-def _limit_text(report: Mapping[str, Mapping[str, Any]], judged_from: int) -> list[str]:
-    """Say in two lines per limit how it was kept."""
-    out = []
-    for name, own in report.items():
-        infeasible = "; infeasible with the other limits and the bounds" if own["state"] == "infeasible" else ""
-        out.append(
-            f"{name} as measured: {_kept(own, judged_from)}, {_percent(own['judged_above_threshold_fraction'])} above "
-            f"{own['threshold_with_margin']:.6g} (plus {SCATTER:g} standard deviations of the scatter){infeasible}"
-        )
-        if own["noise_free"] is not None:
-            free = {"limit": own["limit"], **own["noise_free"]}
-            out.append(f"{name} noise-free at the applied timing: {_kept(free, judged_from)}")
-    return out
+def _text(payload: Mapping[str, Any], found: SeekResult, limits: list[str]) -> list[str]:
+    plain = to_jsonable(payload)
+    text = [
+        lines(plain | plain["figures"]),
+        *(
+            f"{name}: start {found.start[name]:.4g}, best {value:.4g}, optimum {payload['optimum'][name]:.4g}"
+            for name, value in found.inputs.items()
+        ),
+    ]
+    summary = found.run.summary
+    judged_from = int(summary["judged_from"])
+    for name in limits:
+        for prefix, how in (("", "as measured"), (NOISE_FREE, "noise-free at what was applied")):
+            own = {figure: summary.get(f"{prefix}{figure}_{name}") for figure in FIGURES}
+            own["limit"] = summary.get(f"limit_{name}")
+            if own["worst"] is not None and math.isfinite(own["worst"]):
+                text.append(f"{name} {how}: {_kept(own, judged_from)}")
+    return text
 
 
 def _kept(own: Mapping[str, Any], judged_from: int) -> str:
@@ -251,19 +250,15 @@ def _percent(share: float) -> str:
 
 
 def _table(cycles: xr.Dataset) -> xr.Dataset:
-    """Leave the columns over cycles; limited indicators are among them, COV is added."""
+    """Leave the columns over cycles, those of several inputs by name; COV is added."""
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
-    if "limit" in cycles.dims and COV in cycles["limit"].to_numpy():
-        cov = cycles["limits"].sel(limit=COV, drop=True).drop_vars("limit_units", errors="ignore")
-        table[COV] = cov.assign_attrs(unit_attributes(*VARIABLES[COV]))
+    for name in cycles["input"].to_numpy().tolist() if "input" in cycles.dims else []:
+        for kind in ("estimate", "asked"):
+            table[f"{kind}_{name}"] = cycles[kind].sel(input=name, drop=True)
+    if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
+        cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
+        table[_COV] = cov.assign_attrs(unit_attributes(*VARIABLES[_COV]))
     return table
-
-
-def _draw(cycles: xr.Dataset, best: Optimum, limits: Mapping[str, float], file: str) -> None:
-    from mgdd import plot
-
-    how = {"optimum_cad": best["soc_cad"], "limit_values": limits}
-    save_figure(drawn(plot.seeking, cycles, size=(8.0, 7.0), **how), file)
 
 
 @contextmanager

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
         @property
         def cycle(self) -> int: ...
         @property
+        def input_names(self) -> list[str]: ...
+        @property
         def trust(self) -> float: ...
         def tell(
             self,
@@ -106,7 +108,8 @@ class Guided(SeekerFindings, _CoreGuided):
         """Keep the cycle whose result is given inside, unless it is refused."""
         before = (self.cycle, *self._standing().values())
         yield
-        done = self.applied if applied is None else np.array(applied, np.float64)
+        told = [applied[name] for name in self.input_names] if isinstance(applied, Mapping) else applied
+        done = self.applied if told is None else np.array(told, np.float64)
         total = math.nan if misfire else float(np.sum(np.asarray(objective, np.float64)))
         self._rows.append((*before, done, total, misfire))
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
+from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.drive import simulate_drive
 from mgdd.loop.function_plant import FunctionPlant
@@ -18,7 +19,7 @@ from mgdd.loop.many_loops import monte_carlo
 from mgdd.loop.many_tracks import track_many
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
-from mgdd.loop.seek import run_seeker, seek
+from mgdd.loop.seek import seek
 from mgdd.loop.seek_front import seek_front
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track

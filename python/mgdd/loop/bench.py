@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["EngineBench"]
 
+_SEARCHED_CAD = (-30.0, 10.0)  # where nobody says, as `mgdd engine seek` does
 _RANDOM = (
     "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
     "wall_heat_drift_per_kcycle",
@@ -308,7 +309,6 @@ class EngineBench(_core.loop.EngineBench):
         self,
         limits: Mapping[str, float] | Sequence[Limit] | None = None,
         *,
-        bounds_cad: tuple[float, float] = (-30.0, 10.0),
         bounds: Mapping[str, tuple[float, float]] | None = None,
         cycle: int = 0,
     ) -> Optimum:
@@ -319,10 +319,8 @@ class EngineBench(_core.loop.EngineBench):
         limits : mapping of str to float, or sequence of Limit, optional
             Upper limits on what the bench can limit, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is
             kept. NOx of any sensor is the true steady one.
-        bounds_cad : tuple of float
-            Searched range of the timing [°CA aTDC].
         bounds : mapping of str to (float, float), optional
-            Searched ranges by input; those left out are `input_bounds`, of the timing ``bounds_cad``.
+            Searched ranges by input; those left out are `input_bounds`, of the timing -30 to 10 °CA aTDC.
         cycle : int
             The operating point is that of this cycle of the schedule.
 
@@ -349,7 +347,7 @@ class EngineBench(_core.loop.EngineBench):
         """
         kept = limits_to_keep(limits)
         split_inputs(self.input_names, bounds or {}, None)
-        searched = self.input_bounds | {"soc_cad": bounds_cad} | dict(bounds or {})
+        searched = self.input_bounds | {"soc_cad": _SEARCHED_CAD} | dict(bounds or {})
         quiet = self._quiet(cycle, limits=[limit.name for limit in kept])
         return find_optimum(quiet, kept, searched, float(self.settings["soc_scatter_cad"]))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import math
 from collections.abc import Mapping, Sequence
@@ -24,11 +25,11 @@ _FORMS = "return J, or (J, {limit: value}), or None for a failed cycle"
 class FunctionPlant:
     """A function of your own as a plant: in Python, or compiled.
 
-    A Python function takes inputs by name and gives J, or J and limits by name, or None for a failed cycle. A compiled
-    one runs in loops of the core, without the GIL and on all cores. It is ``int f(const double *inputs, size_t
-    n_inputs, double *outputs, size_t n_outputs, void *user_data)``: it reads the inputs in their order, writes J and
-    then the limits, and returns 0. Any other status, a number that is not finite or beyond 1e30, and one that is not
-    written make a failed cycle.
+    A Python function takes inputs by name, or as plain numbers in their order, and gives J, or J and limits by name, or
+    None for a failed cycle. A compiled one runs in loops of the core, without the GIL and on all cores. It is ``int
+    f(const double *inputs, size_t n_inputs, double *outputs, size_t n_outputs, void *user_data)``: it reads the inputs
+    in their order, writes J and then the limits, and returns 0. Any other status, a number that is not finite or beyond
+    1e30, and one that is not written make a failed cycle.
 
     Parameters
     ----------
@@ -91,6 +92,7 @@ class FunctionPlant:
         self._noise_sd, self._seed, self._cycle = float(noise_sd), int(seed), 0
         self.input_names, self.limit_names = tuple(inputs), tuple(limits)
         self._applied: dict[str, float] | None = None
+        self._of_a_number = False
         self._core: _core.loop.FunctionPlant | None = None
         if (found := address_of(function)) is not None:
             address, data = found
@@ -147,9 +149,27 @@ class FunctionPlant:
             raise RigError("measure() before apply(): apply inputs first")
         if self._core is not None:
             return self._measurement(self._core.measure([*self._applied.values()]))
-        measured = self._answer(self._function(dict(self._applied)))
+        measured = self._answer(self._called(dict(self._applied)))
         self._cycle += 1
         return measured
+
+    def _called(self, inputs: dict[str, float]) -> Any:
+        """Call the function by name; one of a plain number shows itself at the first cycle."""
+        if self._of_a_number:
+            return self._function(*inputs.values())
+        try:
+            return self._function(inputs)
+        except TypeError as error:
+            if self._cycle:
+                raise
+            with contextlib.suppress(Exception):
+                answer = self._function(*inputs.values())
+                self._of_a_number = True
+                return answer
+            form = ", ".join(f"x[{name!r}]" for name in self.input_names)
+            raise ParameterError(
+                f"function: takes one mapping of inputs by name, write lambda x: ... {form}: {error}"
+            ) from error
 
     def _measurement(self, outputs: Sequence[float] | None) -> Measurement:
         if outputs is None:

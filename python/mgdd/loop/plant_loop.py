@@ -152,7 +152,12 @@ def _run_of(
 
 
 def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:
-    """ParameterError where a seeker names other inputs than the plant has."""
+    """ParameterError where a seeker is a name, or names other inputs than the plant has."""
+    if isinstance(seeker, str):
+        raise ParameterError(
+            f"seeker = {seeker!r}: must be a seeker, as ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0); "
+            "mgdd.loop.seek(plant, inputs, seeker=NAME) makes one by name"
+        )
     named = list(getattr(seeker, "input_names", ()))
     if named and set(named) != set(plant.input_names):
         raise ParameterError(

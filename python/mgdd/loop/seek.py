@@ -1,4 +1,4 @@
-"""A seeker on a plant, one closed loop: with a seeker of your own, or one that `seek` chooses."""
+"""One search: which seeker, from where and how long, on any plant; what Python, the command and the rig call."""
 
 from __future__ import annotations
 
@@ -8,153 +8,91 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, ShapeError, hand_over, hinted, or_partial
+from mgdd.errors import Interrupted, ParameterError, ShapeError, hinted
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.loop.bench import EngineBench
-from mgdd.loop.bench_record import cycles_to_dataset
-from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.function_plant import FunctionPlant
-from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
+from mgdd.loop.known import tell_known
+from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
 from mgdd.loop.plant import Plant
-from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
-from mgdd.loop.seek_choice import chosen
+from mgdd.loop.plant_loop import LoopRun, require_inputs_of
+from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult, found_by
+from mgdd.loop.until_still import run_until_still, stillness
 from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import inputs_of, named_values
-from mgdd.optimize.optimum import limits_of
-from mgdd.optimize.seeker_findings import findings_of
-from mgdd.results.result import Figures
 
 if TYPE_CHECKING:
-    from mgdd.optimize import Input, Limit
+    from mgdd.optimize import ComponentLag, Input, Limit
 
-__all__ = ["LoopRun", "require_measured", "run_seeker", "seek", "seek_inputs", "started"]
+__all__ = ["require_measured", "searched", "seek", "seek_inputs", "started"]
 
-
-def run_seeker(
-    plant: Plant,
-    seeker: Seeker | FeedForward | GuidedEngine,
-    cycles: int,
-    *,
-    criteria: LoopCriteria | None = None,
-) -> LoopRun:
-    """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
-
-    Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is reported as such. A new operating
-    point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
-    the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
-    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` of
-    one input, and on a compiled `FunctionPlant`, the loop runs in the core without the GIL where a seeker of
-    `mgdd.optimize` or a `CurveSeeking` has the inputs and limits of the plant in their order; one ask and tell at a
-    time from Python gives the same trajectory, bit for bit.
-
-    Parameters
-    ----------
-    plant : Plant
-        It advances by ``cycles``; a rig is open and stays open.
-    seeker
-        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, in their
-        order or, where it has ``inputs``, by their names; one component or as many as the plant measures, and limits
-        that the plant measures.
-    cycles : int
-        How many, >= 1.
-    criteria : LoopCriteria, optional
-        Where the estimate should go and what counts as a broken limit.
-
-    Returns
-    -------
-    LoopRun
-        Cycles with everything that was measured, and their summary.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A seeker that does not fit the plant, or fewer than one cycle.
-    mgdd.errors.DataError
-        A fired cycle whose reading is not finite. Errors of the plant pass through as well, with the LoopRun so far
-        as ``partial``; the seeker then stands before that cycle, and its ``history`` holds the cycles so far.
-    mgdd.errors.InUseError
-        Bench or seeker are in a call of another thread.
-    mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Plant and seeker are in the state after them, and
-        running them again goes on.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
-    >>> from mgdd.optimize import ExtremumSeeking
-    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
-    >>> run = run_seeker(EngineBench(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
-    >>> run.summary["cycles_to"] < 400
-    True
-    """
-    criteria = criteria or LoopCriteria()
-    if (
-        not isinstance(plant, EngineBench)
-        or len(plant.input_names) > 1
-        or isinstance(seeker, FeedForward | GuidedEngine)
-        or (isinstance(seeker, Seeker) and tuple(seeker.limit_names) != plant.limit_names)  # the core wants the same
-    ):
-        return steer(plant, seeker, cycles, criteria)
-    require_inputs_of(plant, seeker)
-    goal = criteria.to_core(plant.limit_names)
-    run_loop: Any = _core.loop.run_loop  # one overload for each class of seeker
-    raw, stop = or_partial(lambda: run_loop(plant, seeker, cycles, **goal))
-    columns, names = raw["columns"], plant.limit_names
-    known = plant.noise_free_limits(columns["soc_requested_cad"], columns["cycle"])
-    dataset = cycles_to_dataset(plant, columns, estimate_cad=raw["estimate_cad"], noise_free_limits=known)
-    dataset.attrs["interrupted"] = int(raw["interrupted"])
-    summary = Figures(with_a_limit(raw["summary"], names))
-    summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
-    uppers = criteria.limits_of(names, seeker)
-    dataset.attrs |= criteria.attributes(names, uppers)
-    summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
-    findings = findings_of(seeker.settings, **raw["watched"])
-    run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=findings)
-    return hand_over(run, stop)
+_MOST_CYCLES = 2_000_000
 
 
 def seek(
-    plant: Plant | Callable[[dict[str, float]], Any],
-    inputs: Mapping[str, tuple[float, float]] | Sequence[Input],
+    plant: Plant | Callable[[Any], Any],
+    inputs: Mapping[str, tuple[float, float]] | Sequence[Input] | None = None,
     *,
+    seeker: Any = "auto",
     start: Mapping[str, float] | float | None = None,
-    cycles: int = 200,
-    limits: Mapping[str, float] | Sequence[Limit] = (),
+    cycles: int | None = None,
+    tolerance: Mapping[str, float] | float | None = None,
+    limits: Mapping[str, float | tuple[float | None, float | None]] | Sequence[Limit] = (),
     noise_sd: float | None = None,
     delay_cycles: float = 0.0,
     lag_cycles: float = 0.0,
+    components: Sequence[ComponentLag] | None = None,
     guide: Any = None,
+    known: Any = None,
     maximize: bool = True,
+    settings: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> SeekResult:
     """Seek the best inputs of a plant or a function, with a seeker that is chosen and said in the result.
 
-    One input is sought by `CurveSeeking`, with the curve of the guide or with a parabola. Several inputs are sought by
+    `mgdd engine seek` and ``task = "seek"`` of an experiment are this call. By itself one input is sought by
+    `CurveSeeking`, with the curve of the guide or with a parabola. Several inputs are sought by
     `GaussianProcessSeeking`, whose mean is the guide.
 
     Parameters
     ----------
     plant : Plant or callable
-        It advances by `cycles`. A function takes the inputs by name and gives J, or ``(J, {limit: value})`` where there
-        are limits, or None for a failed cycle; a compiled one is as `FunctionPlant` takes it.
-    inputs : mapping of str to (float, float), or sequence of Input
-        Bounds of every input, finite, in its unit; one to eight.
+        It advances by `cycles`. A function takes the inputs by name, one input also as a number, and gives J, or
+        ``(J, {limit: value})`` where there are limits, or None for a failed cycle; a compiled one is as
+        `FunctionPlant` takes it.
+    inputs : mapping of str to (float, float), or sequence of Input, optional
+        Bounds of every input, finite, in its unit; one to eight. Left out where `seeker` has them.
+    seeker : str, class or Seeker
+        ``auto``, or a name: ``curve_seeking``, ``gaussian_process_seeking``, ``extremum_seeking``, ``newton_seeking``,
+        ``bounded_seeking``, ``spsa``, ``gradient_descent``, ``golden_section``. Or a seeker, as that of an earlier
+        result, which goes on where it stands and changes.
     start : mapping of str to float, or float for one input, optional
-        First inputs; limits should hold there. The middle of the bounds if left out, for a curve its best input.
-    cycles : int
-        How many; the first readings to every side at least.
-    limits : mapping of str to float, or sequence of Limit
-        Upper values of measured quantities.
+        First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle.
+    cycles : int, optional
+        How many; the first readings to every side at least. Left out: 200, and 25 more per cycle that J is late; of a
+        seeker that dithers 2000, or 64 of its periods.
+    tolerance : mapping of str to float, or float for one input, optional
+        Stop before all `cycles` once the estimate has moved by less over the last 20 cycles per input, in its unit.
+    limits : mapping of str to float or (float, float), or sequence of Limit
+        Upper values of measured quantities, or lower and upper ones, of which either may be None. A lower one is kept
+        as an upper one of the negated quantity, whose name begins with a minus in `run`.
     noise_sd : float, optional
-        Standard deviation of one reading, > 0 [unit of J]; learnt without.
+        Standard deviation of one reading, > 0 [unit of J]; learnt without, but by golden section.
     delay_cycles, lag_cycles : float
         Transport delay and time constant between the plant and J [cycles].
-    guide : Curve, or what `GaussianProcessSeeking` takes, optional
-        What a model says of J, in the unit of J; a Curve for one input, of -J where J is minimised.
+    components : sequence of ComponentLag, optional
+        The same for every component of J, in their order.
+    guide : Curve, EngineGuide, TimingMap, or what `GaussianProcessSeeking` takes, optional
+        What a model says of J, in the unit of J; a Curve for one input, of -J where J is minimised. The last two of the
+        start of combustion.
+    known : DataFrame, Dataset or mapping of columns, optional
+        Readings of before, in their order: a column per input and limit, and ``j``, as the Dataset of a result is. A
+        row whose J is not finite failed. They are told first, to ``curve_seeking`` or ``gaussian_process_seeking``.
     maximize : bool
         False to minimise J.
+    settings : mapping of str to any, optional
+        Further settings of the seeker, by name.
     seed : int
         Of the seeker; the same seed gives the same run.
 
@@ -168,7 +106,7 @@ def seek(
     ------
     mgdd.errors.ParameterError
         Inputs that the plant does not have or that are missing, bounds that are not finite, a start outside of them,
-        limits that are not measured, too few cycles. The plant has not moved.
+        limits that are not measured, too few cycles, a seeker without what it needs. The plant has not moved.
     mgdd.errors.DataError
         A reading that is not a finite number. Its ``partial`` is the SeekResult of the cycles so far, as that of any
         error of the plant.
@@ -177,7 +115,7 @@ def seek(
 
     See Also
     --------
-    run_seeker : with a seeker of your own, and to go on.
+    run_seeker : the loop alone.
 
     Examples
     --------
@@ -189,36 +127,101 @@ def seek(
     '2 inputs: it loses least on the way, whatever their units'
     >>> round(found.inputs["soc_cad"]), round(found.inputs["egr"], 2), found.findings
     (-4, 0.15, ())
+    >>> more = seek(engine, seeker=found.seeker, cycles=10)
+    >>> more.seeker.cycle
+    70
     """
-    given = seek_inputs(inputs)
-    names, wanted = [one.name for one in given], limits_of(limits)
-    if isinstance(cycles, bool) or not isinstance(cycles, int | np.integer):
+    if cycles is not None and (isinstance(cycles, bool) or not isinstance(cycles, int | np.integer)):
         raise ParameterError.of("cycles", cycles, "a whole number")
-    if isinstance(plant, Plant):
-        require_measured(plant, names, [limit.name for limit in wanted])
-    elif callable(plant):
-        plant = FunctionPlant(plant, names, [limit.name for limit in wanted])
+    wanted = both_sides(limits)
+    if isinstance(seeker, Seeker | FeedForward | GuidedEngine):
+        left_out = {
+            "start": start is None, "noise_sd": noise_sd is None, "delay_cycles": not delay_cycles,
+            "lag_cycles": not lag_cycles, "components": components is None, "guide": guide is None,
+            "known": known is None, "settings": not settings, "seed": not seed,
+            "maximize": maximize or not seeker.settings["maximize"],
+        }  # fmt: skip
+        if named := [name for name, out in left_out.items() if not out]:
+            raise ParameterError(f"{', '.join(named)}: the seeker given has its own: leave it out, or name the seeker")
+        asked = _question_of(seeker, inputs, wanted, plant)
+        choice = Choice(seeker, "as given", 1, asked.budget(seeker))
     else:
-        raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
-    choice = chosen(
-        given, started(start, given), limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
-        lag_cycles=lag_cycles, guide=guide, maximize=maximize, seed=seed,
-    )  # fmt: skip
+        given = seek_inputs(inputs)
+        asked = Question(
+            inputs=given, start=started(start, given), limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
+            lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
+            settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
+        )  # fmt: skip
+        _require_plant(plant, asked)  # before anything is made
+        choice = chosen(asked, seeker)
+        if known is not None:
+            choice = tell_known(asked, seeker, choice, known)
+    still = stillness(asked, tolerance)
+    wanted_cycles = choice.cycles if cycles is None else int(cycles)
+    return searched(_require_plant(plant, asked), choice, asked, wanted_cycles, still)
+
+
+def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: Any = None) -> SeekResult:
+    """Let a seeker that was chosen run on a plant of its inputs; errors as those of `seek`."""
     if cycles < choice.first_cycles:
         raise ParameterError.of("cycles", cycles, f">= {choice.first_cycles}, one reading to the side of every input")
-    begun = dict(zip(names, choice.seeker.estimate.tolist(), strict=True))
+    if cycles > _MOST_CYCLES:
+        raise ParameterError.of("cycles", cycles, f"<= {_MOST_CYCLES}; go on with seeker=found.seeker")
+    begun = dict(zip([one.name for one in asked.inputs], choice.seeker.estimate.tolist(), strict=True))
 
     def result(run: LoopRun) -> SeekResult:
-        late = delay_cycles + lag_cycles
-        return found_by(choice.seeker, choice.reason, run, begun, late_cycles=late, guided=guide is not None)
+        return found_by(choice.seeker, choice.reason, run, begun, asked)
 
     try:
-        return result(run_seeker(plant, choice.seeker, cycles))
+        if still is None:
+            return result(run_seeker(plant, choice.seeker, cycles))
+        return result(run_until_still(plant, choice.seeker, cycles, asked, still))
     except (Exception, Interrupted) as stop:
         part = getattr(stop, "partial", None)
         if isinstance(part, LoopRun):
             stop.partial = result(part)  # type: ignore[union-attr]
         raise
+
+
+def _require_plant(plant: Any, asked: Question) -> Plant:
+    """Give the plant of these inputs and limits; ParameterError where it is none, or another."""
+    names, held = [one.name for one in asked.inputs], measured_names(asked.limits)
+    if isinstance(plant, Plant):
+        require_measured(plant, names, held)
+        return with_lower_sides(plant, asked.limits)
+    if callable(plant):
+        return with_lower_sides(FunctionPlant(plant, names, held), asked.limits)
+    raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
+
+
+def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any) -> Question:
+    """Ask again what a seeker was made for; ParameterError where inputs or limits are others."""
+    own = seeker.settings
+    there = tuple(own["inputs"])
+    if inputs is not None:
+        given = seek_inputs(inputs)
+        if there and {one.name: (one.lower, one.upper) for one in given} != {
+            one.name: (one.lower, one.upper) for one in there
+        }:
+            said = ", ".join(f"{one.name} in [{one.lower:g}, {one.upper:g}]" for one in there)
+            raise ParameterError(f"inputs: the seeker given has {said}: leave them out")
+        there = there or given
+    if not there:
+        if not isinstance(plant, Plant):
+            raise ParameterError("inputs: the seeker given has no names for them: give their bounds by name")
+        require_inputs_of(plant, seeker)
+        low, high = (np.broadcast_to(own[side], seeker.estimate.shape) for side in ("lower", "upper"))
+        bounds = zip(plant.input_names, low.tolist(), high.tolist(), strict=True)
+        there = inputs_of({name: (a, b) for name, a, b in bounds})
+    held = tuple(own["limits"])
+    if limits and {one.name: one.upper for one in limits} != {one.name: one.upper for one in held}:
+        said = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
+        raise ParameterError(f"limits: the seeker given has {said}: leave them out")
+    return Question(
+        inputs=there, limits=held, components=own.get("components"), maximize=own["maximize"],
+        delay_cycles=float(own.get("delay_cycles", 0.0)), lag_cycles=float(own.get("lag_cycles", 0.0)),
+        guide=own.get("guide") or (True if isinstance(seeker, FeedForward | GuidedEngine) else None),
+    )  # fmt: skip
 
 
 def seek_inputs(inputs: Any) -> tuple[Input, ...]:

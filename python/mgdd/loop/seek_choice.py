@@ -1,67 +1,297 @@
-"""Which seeker one call of `seek` takes, and why; the figures are those of the page of the benchmarks."""
+"""Which seeker a search takes, from where and how long; the figures are those of the page of the benchmarks."""
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mgdd.errors import ParameterError
-from mgdd.guide import Curve, CurveSeeking
-from mgdd.optimize import GaussianProcessSeeking, Input, Limit
+from mgdd.errors import ParameterError, argument, hinted
+from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
+from mgdd.loop.engine_guide import EngineGuide
+from mgdd.optimize import (
+    BoundedSeeking,
+    ComponentLag,
+    ExtremumSeeking,
+    GaussianProcessSeeking,
+    GoldenSection,
+    GradientDescent,
+    Input,
+    Limit,
+    NewtonSeeking,
+    Seeker,
+    Spsa,
+    tune,
+)
 
 if TYPE_CHECKING:
-    from mgdd.optimize import Seeker
+    from mgdd._core.engine import OperatingPoint
 
-__all__ = ["Choice", "chosen"]
+__all__ = ["SEEKERS", "Choice", "Question", "chosen"]
 
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
+_CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
+_PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later
+_PERIODS = 64  # of a dither: 16 time constants of four periods
+_NEWTON_HOLD_PERIODS = 5  # until gradient and Hessian behind a lag have settled
+_FIRST = (CurveSeeking, GaussianProcessSeeking)
+SEEKERS: Mapping[str, type[Seeker]] = {
+    re.sub(r"(?<!^)(?=[A-Z])", "_", cls.kind).lower(): cls
+    for cls in (
+        *_FIRST, ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection,
+    )
+}  # fmt: skip
 
 
 class Choice(NamedTuple):
-    """A seeker, why it was taken, and the cycles without which it has not looked to every side."""
+    """A seeker, why it was taken, the cycles without which it has not looked to every side, and how many to take."""
 
-    seeker: Seeker
+    seeker: Any
     reason: str
     first_cycles: int
+    cycles: int
 
 
-def chosen(
-    inputs: Sequence[Input],
-    start: Mapping[str, float] | None,
-    *,
-    limits: Sequence[Limit],
-    noise_sd: float | None,
-    delay_cycles: float,
-    lag_cycles: float,
-    guide: Any,
-    maximize: bool,
-    seed: int,
-) -> Choice:
-    """Choose: a curve for one input, a Gaussian process for several."""
-    if isinstance(guide, Curve) and len(inputs) > 1:
-        names = ", ".join(one.name for one in inputs)
-        raise ParameterError(f"guide = {guide!r}: a Curve has one input, not {names}; give a function of them")
-    space: dict[str, Any] = {"inputs": list(inputs), "maximize": maximize, "limits": list(limits)}
-    late: dict[str, Any] = {"delay_cycles": delay_cycles, "lag_cycles": lag_cycles}
-    first = math.ceil(delay_cycles) + (len(inputs) + 1) * max(1, math.ceil(2.0 * lag_cycles))
-    if isinstance(guide, Curve) or (guide is None and len(inputs) == 1):
-        (one,) = inputs
-        curve = guide or _parabola(one)
-        best = {one.name: min(max(curve.best, one.lower), one.upper)}
-        seeker: Seeker = CurveSeeking(start=start or best, curve=curve, noise_sd=noise_sd, **space, **late)
+@dataclass(frozen=True, kw_only=True)
+class Question:
+    """What is sought, and what is known of it."""
+
+    inputs: Sequence[Input]
+    start: Mapping[str, float] | None = None
+    limits: Sequence[Limit] = ()
+    noise_sd: float | None = None
+    delay_cycles: float = 0.0
+    lag_cycles: float = 0.0
+    components: Sequence[ComponentLag] | None = None
+    guide: Any = None
+    maximize: bool = True
+    seed: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    point: OperatingPoint | None = None
+
+    @property
+    def late_cycles(self) -> float:
+        """How long after its input the last component of J is read."""
+        lags = self.components or [ComponentLag(delay_cycles=self.delay_cycles, lag_cycles=self.lag_cycles)]
+        return max(lag.delay_cycles + lag.lag_cycles for lag in lags)
+
+    @property
+    def first_cycles(self) -> int:
+        """How many readings look to every side once."""
+        lags = self.components or [ComponentLag(delay_cycles=self.delay_cycles, lag_cycles=self.lag_cycles)]
+        delay, lag = max(each.delay_cycles for each in lags), max(each.lag_cycles for each in lags)
+        return math.ceil(delay) + (len(self.inputs) + 1) * max(1, math.ceil(2.0 * lag))
+
+    def made(self, cls: type[Seeker], start: Mapping[str, float] | None, **own: Any) -> Seeker:
+        """Make a seeker of that class; ParameterError for what is known that it cannot know."""
+        takes = inspect.signature(cls).parameters
+        known: dict[str, Any] = {
+            "inputs": list(self.inputs), "maximize": self.maximize, "limits": list(self.limits),
+            "start": start or {one.name: 0.5 * (one.lower + one.upper) for one in self.inputs},
+        }  # fmt: skip
+        lags = None if self.components is None else list(self.components)
+        late = {"delay_cycles": self.delay_cycles, "lag_cycles": self.lag_cycles}
+        if any(late.values()) and lags is not None:
+            raise ParameterError("components: hold the delays: leave delay_cycles and lag_cycles out")
+        if "delay_cycles" in takes and lags is None:
+            known |= late
+        elif self.late_cycles > 0.0:
+            if "components" not in takes:
+                late_ones = ", ".join(name for name, one in SEEKERS.items() if _bears_delay(one))
+                raise ParameterError(
+                    f"{argument('seeker', _name_of(cls))}: takes J of the same cycle, and J is late here: take one of "
+                    f"{late_ones}"
+                )
+            known["components"] = lags or [ComponentLag(**late)]
+            if "period" in takes:
+                slowest = max(known["components"], key=lambda lag: lag.delay_cycles + lag.lag_cycles)
+                slow = tune(
+                    1.0, -1.0, delay_cycles=slowest.delay_cycles, lag_cycles=slowest.lag_cycles
+                )  # whose period does not depend on noise and curvature
+                known["period"] = max(takes["period"].default, slow.period)
+                if cls is NewtonSeeking:
+                    known |= _slowed(takes, known["period"])
+        elif lags is not None:
+            known["components"] = lags
+        if self.noise_sd is not None and "noise_sd" in takes:
+            known["noise_sd"] = self.noise_sd
+        elif cls is GoldenSection and "noise_sd" not in self.settings:
+            raise ParameterError(
+                f"{argument('seeker', _name_of(cls))}: needs {argument('noise_sd')}, the standard deviation of one "
+                "reading"
+            )
+        if "seed" in takes:
+            known["seed"] = self.seed
+        for name in self.settings:
+            if name not in takes:
+                have = ", ".join(takes)
+                raise ParameterError(hinted(f"settings: {name!r}: {cls.kind} takes {have}", name, list(takes)))
+        return cls(**known | own | dict(self.settings))
+
+    def budget(self, seeker: Any) -> int:
+        """How many cycles a search takes where nobody says."""
+        kind = getattr(seeker, "_seeker_kind", None) or seeker.kind
+        if kind in {cls.kind for cls in _FIRST}:
+            return _CYCLES + math.ceil(_PER_LATE * self.late_cycles)
+        return max(_DITHER_CYCLES, _PERIODS * int(seeker.settings.get("period", 0)))
+
+
+def chosen(asked: Question, seeker: str | type[Seeker] = "auto") -> Choice:
+    """Choose a seeker, or make the one that is named."""
+    if isinstance(asked.guide, Curve) and len(asked.inputs) > 1:
+        names = ", ".join(one.name for one in asked.inputs)
+        raise ParameterError(f"guide = {asked.guide!r}: a Curve has one input, not {names}; give a function of them")
+    if isinstance(asked.guide, EngineGuide | TimingMap):
+        made, reason = _led(asked, seeker)
+    elif seeker == "auto":
+        made, reason = _automatic(asked)
+    else:
+        made, reason = _named(asked, seeker), "as asked for"
+    return Choice(made, reason, asked.first_cycles, asked.budget(made))
+
+
+def _slowed(takes: Mapping[str, inspect.Parameter], period: int) -> dict[str, Any]:
+    """Slow the filters of Newton seeking as much as its dither."""
+    slow = period / takes["period"].default
+    own: dict[str, Any] = {name: takes[name].default / slow for name in ("hessian_rate", "riccati_rate")}
+    own["time_constant_cycles"] = takes["time_constant_cycles"].default * slow
+    return own | {"hold_cycles": _NEWTON_HOLD_PERIODS * period}
+
+
+def _class_of(seeker: Any) -> type[Seeker]:
+    if isinstance(seeker, type) and issubclass(seeker, Seeker):
+        return seeker
+    if isinstance(seeker, str):
+        named = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", seeker).lower()
+        if named in SEEKERS:
+            return SEEKERS[named]
+        said = f"{argument('seeker', seeker)}: must be auto or one of {', '.join(SEEKERS)}"
+        raise ParameterError(hinted(said, seeker, list(SEEKERS)), field="seeker", value=seeker)
+    raise ParameterError.of("seeker", seeker, f"auto, a name ({', '.join(SEEKERS)}) or a seeker")
+
+
+def _name_of(cls: type[Seeker]) -> str:
+    return next((name for name, one in SEEKERS.items() if one is cls), cls.kind)
+
+
+def _bears_delay(cls: type[Seeker]) -> bool:
+    return bool({"components", "delay_cycles"} & inspect.signature(cls).parameters.keys())
+
+
+def _named(asked: Question, seeker: Any) -> Seeker:
+    cls = _class_of(seeker)
+    if cls is CurveSeeking:
+        return _by_curve(asked)
+    guided: dict[str, Any] = {}
+    if asked.guide is not None:
+        if cls is not GaussianProcessSeeking:
+            raise ParameterError(
+                f"{argument('seeker', _name_of(cls))}: takes no guide of J; give an EngineGuide of kind "
+                "feed_forward or a TimingMap, or leave the guide out"
+            )
+        guided = {"guide": asked.guide}
+    return asked.made(cls, asked.start, **guided)
+
+
+def _by_curve(asked: Question, **own: Any) -> Seeker:
+    if len(asked.inputs) != 1:
+        raise ParameterError(f"{argument('seeker', 'curve_seeking')}: seeks one input, not {len(asked.inputs)}")
+    (one,) = asked.inputs
+    curve = asked.guide if isinstance(asked.guide, Curve) else own.pop("curve", None) or _parabola(one)
+    best = {one.name: min(max(curve.best, one.lower), one.upper)}
+    return asked.made(CurveSeeking, asked.start or best, curve=curve, **own)
+
+
+def _automatic(asked: Question) -> tuple[Seeker, str]:
+    """Take a curve for one input, a Gaussian process for several and for components of their own delays."""
+    guide, inputs = asked.guide, asked.inputs
+    if asked.components is None and (isinstance(guide, Curve) or (guide is None and len(inputs) == 1)):
         told = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
-        return Choice(seeker, f"{told}, placed by the readings", first)
+        return _by_curve(asked), f"{told}, placed by the readings"
     middle = {one.name: 0.5 * (one.lower + one.upper) for one in inputs}
-    space["start"] = start or (middle if guide is None or limits else _best_of(guide, inputs, middle, maximize))
+    start = asked.start
+    if start is None and guide is not None and not asked.limits and asked.components is None:
+        start = _best_of(guide, inputs, middle, asked.maximize)
     guided: dict[str, Any] = {} if guide is None else {"guide": guide}
-    seeker = GaussianProcessSeeking(**space, **late, **guided, noise_sd=noise_sd, seed=seed)
     count = "one input" if len(inputs) == 1 else f"{len(inputs)} inputs"
-    kept = f", {', '.join(limit.name for limit in limits)} to keep" if limits else ""
+    kept = f", {', '.join(limit.name for limit in asked.limits)} to keep" if asked.limits else ""
     by = " and a guide" if guided else ""
-    return Choice(seeker, f"{count}{by}{kept}: it loses least on the way, whatever their units", first)
+    return (
+        asked.made(GaussianProcessSeeking, start, **guided),
+        f"{count}{by}{kept}: it loses least on the way, whatever their units",
+    )
+
+
+def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
+    """Put a model or a table in front: it says where to begin, and the readings decide."""
+    guide, (one, *more), point = asked.guide, asked.inputs, asked.point
+    if more or one.name != "soc_cad":
+        names = ", ".join(each.name for each in asked.inputs)
+        raise ParameterError(f"{argument('guide')}: guides soc_cad alone, not {names}: leave it out")
+    if point is None:
+        raise ParameterError(f"{argument('guide')}: the plant has no operating point: give EngineGuide its point")
+    plain = _with(asked, guide=None)
+    if isinstance(guide, TimingMap):
+        said = guide(point)
+        if said is None:
+            raise ParameterError(
+                f"{argument('guide_table')}: has nothing to say at {point}; its axes end before: widen them"
+            )
+        inner = _inner(plain, seeker, float(said))
+        return FeedForward(inner, guide, keep_start=True), f"{inner.kind} after the timing of a table"
+    model = guide.model((one.lower, one.upper))
+    if guide.kind == "feed_forward":
+        best = guide.best_of(model, point)
+        inner = _inner(plain, seeker, guide.start(model, point, asked.limits, best))
+        return GuidedEngine(inner, model, point, keep_start=True), f"{inner.kind} after the best timing of a model"
+    if seeker not in ("auto", "curve_seeking"):
+        raise ParameterError(
+            f"{argument('seeker')} acts with {argument('guide', 'none')}, feed_forward or map: "
+            f"{argument('guide', guide.kind)} is a seeker itself"
+        )
+    curve = guide.curve(model, point)
+    begin = asked.start or {one.name: guide.start(model, point, asked.limits, curve.best)}
+    drawn = model.limit_curves(point, [limit.name for limit in asked.limits]) if asked.limits else None
+    if asked.components is not None:
+        if guide.kind == "calibrated" or guide.shape == "parabola":
+            raise ParameterError(
+                f"{argument('guide', guide.kind)} takes J of the same cycle, and a component of J is late: use "
+                f"{argument('nox_sensor', 'soft')}, or {argument('guide', 'curve')} with the model's shape"
+            )
+        own: dict[str, Any] = {"guide": guide.component_guides((one.lower, one.upper), point)}
+        if drawn is not None:
+            own["limit_guides"] = [lambda x, each=each: each(x[one.name]) for each in drawn]
+        return plain.made(GaussianProcessSeeking, begin, **own), "one input, late components and a model of each"
+    made = _by_curve(_with(plain, start=begin), curve=curve, limit_curves=drawn)
+    if guide.kind == "curve":
+        return made, "one input and the curve of a model, placed by the readings"
+    return (
+        GuidedEngine(made, model, point, calibration=guide.calibration(), keep_start=True),
+        "one input and the curve of a model that learns from the pressure",
+    )
+
+
+def _inner(asked: Question, seeker: Any, best: float) -> Seeker:
+    """Make the seeker of what is left; a dither that knows nothing of J is the default behind a feed-forward."""
+    cls = ExtremumSeeking if seeker == "auto" else _class_of(seeker)
+    if cls in (GoldenSection, CurveSeeking):
+        raise ParameterError(
+            f"{argument('seeker', _name_of(cls))} searches its whole range, whatever the guide says: use another one"
+        )
+    (one,) = asked.inputs
+    if asked.start is not None:
+        return asked.made(cls, asked.start)
+    room = (one.scale or (one.upper - one.lower) / 40.0) * 2.0  # the widest dither of their defaults
+    return asked.made(cls, {one.name: min(max(best, one.lower + room), one.upper - room)})
+
+
+def _with(asked: Question, **changes: Any) -> Question:
+    return Question(**{**vars(asked), **changes})
 
 
 def _best_of(guide: Any, inputs: Sequence[Input], middle: Mapping[str, float], maximize: bool) -> dict[str, float]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mgdd.loop.lower_limits import plain_name
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.loop.plant_loop import LoopRun
-    from mgdd.optimize import Input, Limit, Seeker
+    from mgdd.loop.seek_choice import Question
+    from mgdd.optimize import Input, Limit
 
 __all__ = ["Mean", "Readings", "doubts_about"]
 
@@ -37,14 +39,18 @@ class Mean(NamedTuple):
 class Readings:
     """The cycles of a run whose reading counts."""
 
-    def __init__(self, data: xr.Dataset, seeker: Seeker) -> None:
-        self._data, self._seeker = data, seeker
-        names = list(seeker.input_names)
+    def __init__(
+        self, data: xr.Dataset, inputs: Sequence[Input], estimate: NDArray[np.float64], noise_sd: float
+    ) -> None:
+        self._data, self._estimate, self._noise_sd = data, estimate, noise_sd
+        names = [one.name for one in inputs]
         one = "estimate_cad" in data
         self.estimates = _per_input(data, "estimate_cad" if one else "estimate", names)
         self.applied = _per_input(data, "soc_applied_cad" if one else "applied", names)
-        bounds = np.array([(each.lower, each.upper) for each in seeker.settings["inputs"]])
-        self.width = bounds[:, 1] - bounds[:, 0]
+        bounds = np.array([(each.lower, each.upper) for each in inputs])
+        tried = np.maximum(np.ptp(self.applied, axis=0), 1e-300) if len(self.applied) else np.ones(len(names))
+        width = bounds[:, 1] - bounds[:, 0]
+        self.width = np.where(np.isfinite(width), width, tried)
         self.counts = ~data["void" if "void" in data else "misfire"].to_numpy().astype(bool)
         self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
 
@@ -60,7 +66,7 @@ class Readings:
         late = round(late_cycles)
         read, caused = values[late:], self.applied[: max(values.size - late, 0)]
         known = np.isfinite(read)
-        away = np.linalg.norm((caused - self._seeker.estimate) / self.width, axis=1)[known]
+        away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[known]
         return _mean(read[known][np.argsort(away, kind="stable")[:_NEAREST]])
 
     def gain(self, late_cycles: float) -> Mean:
@@ -70,7 +76,7 @@ class Readings:
         last = last[np.isfinite(last)]
         if first.size < 2 or not last.size:
             return Mean(math.nan, math.nan)
-        noise = float(getattr(self._seeker, "noise_sd", math.nan))
+        noise = self._noise_sd
         if not math.isfinite(noise):
             noise = float(np.std(last))
         return Mean(float(last.mean() - first[0]), noise * math.sqrt(1.0 + 1.0 / last.size))
@@ -92,21 +98,22 @@ def _mean(values: NDArray[np.float64]) -> Mean:
 
 
 def doubts_about(
-    seeker: Seeker, run: LoopRun, readings: Readings, gain: Mean, kept: Mapping[str, Mean], *, guided: bool
+    seeker: Any, run: LoopRun, readings: Readings, gain: Mean, kept: Mapping[str, Mean], asked: Question
 ) -> list[Finding]:
     """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
-    inputs, limits = seeker.settings["inputs"], seeker.settings["limits"]
     return [
-        *_about_run(run, readings, inputs, gain),
-        *_about_limits(readings, limits, kept),
-        *_about_seeker(seeker, guided, readings.j.size, seen=gain.value > _SURE * gain.sd),
+        *_about_run(run, readings, asked.inputs, gain),
+        *_about_limits(readings, asked.limits, kept),
+        *_about_seeker(seeker, asked, readings.j.size, seen=gain.value > _SURE * gain.sd),
     ]
 
 
 def _about_run(run: LoopRun, readings: Readings, inputs: Sequence[Input], gain: Mean) -> Iterator[Finding]:
     cycles = readings.j.size
     if run.interrupted:
-        yield Finding("interrupted", (), f"interrupted after {cycles} cycles", "run_seeker goes on with .seeker")
+        yield Finding(
+            "interrupted", (), f"interrupted after {cycles} cycles", "seek(plant, seeker=found.seeker) goes on"
+        )
     if not readings.counts.any():
         yield Finding("no_reading", (), "no cycle gave a reading of J", "look at the plant, or start where it runs")
         return
@@ -134,16 +141,18 @@ def _about_limits(readings: Readings, limits: Sequence[Limit], kept: Mapping[str
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
         mean = kept[limit.name]
+        name, side = plain_name(limit.name)
+        bound = f"{'above its' if side > 0.0 else 'below its lower'} limit, {side * limit.upper:.6g}"
         if values.size and values[0] > limit.upper:
-            text = f"the first reading of {limit.name}, {values[0]:.6g}, is above its limit, {limit.upper:.6g}"
-            yield Finding("start_above_limit", (limit.name,), text, "start where it holds")
+            text = f"the first reading of {name}, {side * values[0]:.6g}, is {bound}"
+            yield Finding("start_above_limit", (name,), text, "start where it holds")
         if mean.value - _SURE * mean.sd > limit.upper:
-            text = f"{limit.name} is {mean.value:.6g} at the best inputs, above its limit, {limit.upper:.6g}"
-            yield Finding("limit_broken", (limit.name,), text, "widen the bounds: none of the inputs tried holds it")
+            text = f"{name} is {side * mean.value:.6g} at the best inputs, {bound}"
+            yield Finding("limit_broken", (name,), text, "widen the bounds: none of the inputs tried holds it")
 
 
-def _about_seeker(seeker: Seeker, guided: bool, cycles: int, *, seen: bool) -> Iterator[Finding]:
-    doubts = int(getattr(seeker, "doubts", 0))
+def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> Iterator[Finding]:
+    guided, doubts = asked.guide is not None, int(getattr(seeker, "doubts", 0))
     if doubts > 1 + cycles // _PER_DOUBT:
         text = f"readings were not explained by earlier ones, {doubts} times: J drifts or jumps"
         yield Finding("unexplained", (), text, "look at what else changes; the newest readings count")
@@ -152,9 +161,9 @@ def _about_seeker(seeker: Seeker, guided: bool, cycles: int, *, seen: bool) -> I
         text = f"the shape {which} did not explain the readings, and extremum seeking took over"
         yield Finding("handed_over", (), text, "take more cycles" + ("" if guided else ", or give a guide"))
     elif guided and getattr(seeker, "trust", 1.0) < _TRUSTED:
-        text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"  # type: ignore[attr-defined]
+        text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"
         yield Finding("untrusted_guide", (), text, "look at its shape")
-    told, taken = seeker.settings.get("delay_cycles"), getattr(seeker, "delay_cycles", None)
-    if seen and taken is not None and told is not None and taken != told:
+    told, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
+    if seen and isinstance(taken, int | float) and asked.components is None and taken != told:
         text = f"the readings fit a delay of {taken:g} cycles, not {told:g} as stated"
         yield Finding("delay", (), text, "mend delay_cycles")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mgdd.loop.lower_limits import plain_name
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.loop.seek_doubts import Mean, Readings, doubts_about
 from mgdd.optimize.inputs import unit_of_input
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from mgdd.optimize import Seeker
+    from mgdd.loop.seek_choice import Question
 
 __all__ = ["SeekResult", "found_by"]
 
@@ -44,7 +45,7 @@ class SeekResult(Result):
     limits : dict of str to float
         Mean of the ten readings nearest to the best inputs, by limit.
     seeker : Seeker
-        What sought; ``run_seeker(plant, found.seeker, cycles)`` goes on with it.
+        What sought; ``seek(plant, seeker=found.seeker)`` goes on with it.
     reason : str
         Why that one.
     findings : tuple of Finding
@@ -53,6 +54,8 @@ class SeekResult(Result):
         ``untrusted_guide``, ``delay``, ``interrupted``, and those of the seeker.
     run : LoopRun
         Every cycle.
+    asked : Question
+        Inputs, limits and what was said of J.
 
     Examples
     --------
@@ -69,25 +72,30 @@ class SeekResult(Result):
     gain_sd: float
     start: dict[str, float]
     limits: dict[str, float]
-    seeker: Seeker
+    seeker: Any
     reason: str
     findings: tuple[Finding, ...]
     run: LoopRun
+    asked: Question
+
+    @property
+    def _kind(self) -> str:
+        return str(getattr(self.seeker, "_seeker_kind", None) or self.seeker.kind)
 
     def _title(self) -> str:
-        return f"{self.seeker.kind}: {self.reason}"
+        return f"{self._kind}: {self.reason}"
 
     def _rows(self) -> list[Row]:
         rows = [
             Row(one.name, f"{self.inputs[one.name]:.6g} (from {self.start[one.name]:.6g})", unit_of_input(one))
-            for one in self.seeker.settings["inputs"]
+            for one in self.asked.inputs
         ]
         rows.append(Row("J", f"{self.value:.6g} ± {self.value_sd:.2g}", "unit of J"))
         rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", "unit of J"))
-        uppers = {limit.name: limit.upper for limit in self.seeker.settings["limits"]}
-        rows += [
-            Row(name, f"{value:.6g} (limit {uppers[name]:.6g})", unit_of(name)) for name, value in self.limits.items()
-        ]
+        for limit in self.asked.limits:
+            name, side = plain_name(limit.name)
+            said = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
+            rows.append(Row(name, said, unit_of(name)))
         rows.append(Row("cycles", str(self.run.dataset.sizes["cycle"])))
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 
@@ -115,12 +123,13 @@ class SeekResult(Result):
         }
         if self.limits:
             measured = [str(name) for name in self.run.dataset["limit"].to_numpy()]
-            at_best = [self.limits.get(name, math.nan) for name in measured]
+            sides = [plain_name(name) for name in measured]
+            at_best = [side * self.limits.get(name, math.nan) for name, side in sides]
             own = "unit of the limit"
             columns["limit"] = ("limit", measured, "-", "limited quantity")
             columns["limits_at_best"] = ("limit", at_best, own, "limited quantity at the best inputs")
         out = self.run.dataset.assign(labelled_dataset(columns).variables)
-        out.attrs |= {"seeker": self.seeker.kind, "reason": self.reason}
+        out.attrs |= {"seeker": self._kind, "reason": self.reason}
         if self.findings:
             out.attrs["findings"] = "\n".join(map(str, self.findings))
         return out
@@ -131,45 +140,51 @@ class SeekResult(Result):
         Returns
         -------
         dict
-            Fields by name; ``seeker`` as the name of its kind.
+            Fields by name; ``seeker`` as the name of its kind, ``figures`` as the summary of the run,
+            ``estimate_sd`` and ``trust`` of a seeker that has them, None otherwise. `mgdd engine seek --json` and the
+            figures of an experiment begin with them.
         """
-        names = ("inputs", "value", "value_sd", "gain", "gain_sd", "start", "limits", "reason")
+        names = ("inputs", "value", "value_sd", "gain", "gain_sd", "start", "limits", "reason", "interrupted")
         out = {name: getattr(self, name) for name in names}
-        out |= {"seeker": self.seeker.kind, "findings": [finding.to_dict() for finding in self.findings]}
-        plain: dict[str, Any] = to_jsonable(out | {"cycles": self.run.dataset.sizes["cycle"]})
+        out |= {"seeker": self._kind, "findings": [finding.to_dict() for finding in self.findings]}
+        out |= {name: _known(getattr(self.seeker, name, None)) for name in ("estimate_sd", "trust")}
+        figures = {name: value for name, value in self.run.summary.items() if math.isfinite(value)}
+        plain: dict[str, Any] = to_jsonable(out | {"cycles": self.run.dataset.sizes["cycle"], "figures": figures})
         return plain
 
     def _draw(self, ax: Axes | None) -> Axes:
         return self.run._draw(ax)
 
 
-def found_by(
-    seeker: Seeker, reason: str, run: LoopRun, start: Mapping[str, float], *, late_cycles: float, guided: bool
-) -> SeekResult:
-    """Sum up a run; `late_cycles` is how long after its input J is read."""
-    settings = seeker.settings
-    sign = 1.0 if settings["maximize"] else -1.0
-    readings = Readings(run.dataset, seeker)
-    at_best = readings.near_estimate(readings.j, late_cycles)
+def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float], asked: Question) -> SeekResult:
+    """Sum up a run of what was asked."""
+    sign = 1.0 if asked.maximize else -1.0
+    readings = Readings(run.dataset, asked.inputs, seeker.estimate, float(getattr(seeker, "noise_sd", math.nan)))
+    at_best = readings.near_estimate(readings.j, asked.late_cycles)
     if getattr(seeker, "expected_sd", 0.0) > 0.0:  # 0 before the process is fitted
-        at_best = Mean(float(seeker.expected), float(seeker.expected_sd))  # type: ignore[attr-defined]
-    gained = readings.gain(late_cycles)
+        at_best = Mean(float(seeker.expected), float(seeker.expected_sd))
+    gained = readings.gain(asked.late_cycles)
     kept = {
         limit.name: readings.near_estimate(readings.limit(limit.name), limit.delay_cycles + limit.lag_cycles)
-        for limit in settings["limits"]
+        for limit in asked.limits
     }
     gain = Mean(sign * gained.value, gained.sd)
-    doubts = doubts_about(seeker, run, readings, gain, kept, guided=guided)
+    doubts = doubts_about(seeker, run, readings, gain, kept, asked)
     return SeekResult(
-        inputs=dict(zip(seeker.input_names, seeker.estimate.tolist(), strict=True)),
+        inputs=dict(zip([one.name for one in asked.inputs], seeker.estimate.tolist(), strict=True)),
         value=at_best.value,
         value_sd=at_best.sd,
         gain=gain.value,
         gain_sd=gain.sd,
         start=dict(start),
-        limits={name: mean.value for name, mean in kept.items()},
+        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]},
         seeker=seeker,
         reason=reason,
         findings=unique([*seeker.findings, *doubts]),
         run=run,
+        asked=asked,
     )
+
+
+def _known(value: Any) -> float | None:
+    return float(value) if isinstance(value, float) and math.isfinite(value) else None

@@ -90,8 +90,9 @@ def find_optimum(
     for name, (low, high) in bounds.items():
         least, greatest = windows[name]
         if not least <= low < high <= greatest:
-            said = f"bounds_cad = ({low:g}, {high:g})" if name == "soc_cad" else f"bounds: {name} = ({low:g}, {high:g})"
-            raise ParameterError(f"{said}: must increase and lie in [{least:g}, {greatest:g}]")
+            raise ParameterError(
+                f"bounds: {name} = ({low:g}, {high:g}): must increase and lie in [{least:g}, {greatest:g}]"
+            )
     caps = {limit.name: limit.upper - limit.margin for limit in kept}
     search = _best_timing if len(bounds) == 1 else _best_of_several
     best, free, curvature = search(quiet, caps, bounds)

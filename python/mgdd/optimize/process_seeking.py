@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any, ClassVar
 
+import numpy as np
+
 from mgdd import _core
+from mgdd.errors import ParameterError
 from mgdd.optimize.guide_surface import with_guides
 from mgdd.optimize.seeker import Seeker
 
@@ -111,5 +115,99 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
 
     kind: ClassVar[str] = "GaussianProcessSeeking"
 
+    def ask(self, n: int | None = None) -> Any:
+        """Give the input of the next cycle, or of several that a bench measures in parallel.
+
+        Parameters
+        ----------
+        n : int, optional
+            How many, >= 1: a list, each as if those before had read what is expected. Tell each with its ``applied``.
+
+        Returns
+        -------
+        array, mapping by name, or list of them
+            Asking again before `tell` gives the same.
+
+        Raises
+        ------
+        ParameterError
+            Fewer than one, or several where J has components of their own.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import GaussianProcessSeeking
+        >>> seeker = GaussianProcessSeeking(start={"x": 4.0}, inputs={"x": (-5.0, 5.0)})
+        >>> for _ in range(6):
+        ...     points = seeker.ask(4)
+        ...     for x in points:
+        ...         seeker.tell(-((x["x"] - 1.0) ** 2), applied=x)
+        >>> seeker.cycle, bool(abs(seeker.estimate[0] - 1.0) < 0.2)
+        (24, True)
+        """
+        if n is None:
+            return super().ask()
+        if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+            raise ParameterError.of("n", n, "a whole number >= 1")
+        if self.component_count > 1:
+            raise ParameterError("n: several at once take J as one number: leave components out, or ask for one")
+        believer, out = copy.deepcopy(self), list[Any]()
+        for _ in range(n):
+            out.append(believer.ask())
+            believer._believe(out[-1])
+        return out
+
+    def _believe(self, applied: Any) -> None:
+        """Tell what is expected there: J of the best input, limits as last read near it."""
+        told = self._history_columns()
+        fired = told["misfire"] == 0.0
+        names = self.input_names
+        at = np.array([applied[name] for name in names] if names else applied, np.float64)
+        if not fired.any():
+            self.tell(
+                0.0, [limit.upper - abs(limit.upper) for limit in self.settings["limits"]] or None, applied=applied
+            )
+            return
+        near = np.flatnonzero(fired)[
+            np.argmin(np.linalg.norm((told["applied"] - at)[fired] / np.ptp(_bounds(self), axis=1), axis=1))
+        ]
+        j = float(self.expected) if self.expected_sd > 0.0 else float(told["objective"][near])
+        self.tell(j, told["limits"][near].tolist() or None, applied=applied)
+
+    def tell(
+        self,
+        J: Any = None,  # noqa: N803
+        limits: Any = None,
+        *,
+        misfire: bool = False,
+        applied: Any = None,
+    ) -> None:
+        """Accept what was measured: at the input of the last `ask`, or at `applied`, one of several asked at once.
+
+        Parameters
+        ----------
+        J : float or array_like
+            Performance, or one number per component.
+        limits : sequence or mapping of str to float, optional
+            One value per limit.
+        misfire : bool
+            The cycle is counted and its J and limits are not read.
+        applied : array_like or mapping, optional
+            What the plant really applied, if not what was asked for.
+
+        Raises
+        ------
+        ParameterError, ShapeError, DataError
+            Neither asked nor told where, a wrong count, a number that is not finite; nothing has changed then.
+        """
+        if applied is not None:
+            super().ask()  # which gives the same where it was asked already
+        super().tell(J, limits, misfire=misfire, applied=applied)
+
     def _prepared(self, settings: dict[str, Any]) -> dict[str, Any]:
         return with_guides(settings)
+
+
+def _bounds(seeker: GaussianProcessSeeking) -> Any:
+    own = seeker.settings
+    pairs = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
+    return np.array(pairs, np.float64)

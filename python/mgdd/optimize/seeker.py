@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 import warnings
@@ -97,6 +98,13 @@ class Seeker(SeekerFindings, _CoreSeeker):
     """
 
     kind: ClassVar[str]
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        """Show what a seeker takes: the settings of its class of the core."""
+        super().__init_subclass__(**more)
+        core = next((base for base in cls.__mro__[1:] if base.__module__.startswith("mgdd._core")), None)
+        if core is not None:
+            cls.__signature__ = inspect.signature(core)  # type: ignore[attr-defined]
 
     if not TYPE_CHECKING:  # the constructors of the core say what they take
 

@@ -200,7 +200,7 @@ def run_guided(
 
 def _bench_engine() -> _Engine:
     bench, bounds = EngineBench(), (-30.0, 10.0)
-    best = bench.find_optimum(bounds_cad=bounds)
+    best = bench.find_optimum(bounds={"soc_cad": bounds})
     grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
     model = ModelOptimum(bench.settings["cylinder"].replace(wall_heat_scale=_WRONG_WALL_HEAT), bounds_cad=bounds)
     gain = approach_gain(abs(best.curvature), _TIME_CONSTANT, amplitude=_AMPLITUDE_CAD)

@@ -185,7 +185,7 @@ def _checked(experiment: Experiment) -> CheckedExperiment:
     recorded = None if record is None else readable_record(record)
     plan: IdentifyPlan | TrackPlan | SeekPlan
     if isinstance(settings, SeekTask):
-        plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder), None, None
+        plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder, seed=experiment.seed), None, None
     else:
         # Over a bus the DBC of the recorded run said the time between its samples.
         said = None if recorded is None else recorded.config.get("sample_s")

@@ -14,6 +14,8 @@ from mgdd.identify.throttle.excitation_design import EXCITATIONS
 from mgdd.identify.throttle.fits import CHOICES
 from mgdd.io.parameters import fits
 from mgdd.loop.controller_families import FAMILIES
+from mgdd.loop.engine_guide import KINDS
+from mgdd.loop.seek_choice import SEEKERS
 from mgdd.rig.can.toml_table import TomlTable
 
 __all__ = [
@@ -26,7 +28,7 @@ PACES = ("step", "real_time")
 LOOPS = ("auto", "core", "python")
 TASKS = ("identify", "track", "seek")
 SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
-GUIDES = ("none", "feed_forward", "curve")
+_BOUNDS_CAD = {"soc_cad": (-30.0, 10.0)}  # of a search, where nobody says; as of `mgdd engine seek`
 _T = TypeVar("_T")
 
 
@@ -48,11 +50,14 @@ class Settings:
     def read(cls, table: TomlTable) -> Self:
         """Take all keys of a table; an unknown key, a wrong form or range is a ParameterError that names the file."""
         table.only([own.name for own in dataclasses.fields(cls)])  # type: ignore[arg-type]
-        values = {}
+        values: dict[str, Any] = {}
         for own in dataclasses.fields(cls):  # type: ignore[arg-type]
             facts = own.metadata
             if facts["form"] == "scales":
                 values[own.name] = _numbers(table.table(own.name))
+                continue
+            if facts["form"] == "bounds":
+                values[own.name] = _bounds(table.table(own.name)) or dict(_BOUNDS_CAD)
                 continue
             value = table.take(own.name, facts["form"], own.default)
             if value is not None:
@@ -64,6 +69,17 @@ class Settings:
         """Give the keys that are set."""
         every = {own.name: getattr(self, own.name) for own in dataclasses.fields(self)}  # type: ignore[arg-type]
         return {name: value for name, value in every.items() if value is not None and value != {}}
+
+
+def _bounds(table: TomlTable) -> dict[str, tuple[float, float]]:
+    table.only(("soc_cad",))  # what an engine of an experiment is steered by
+    found = table.items()
+    for name, value in found.items():
+        if not (isinstance(value, list) and len(value) == 2 and all(fits(one, "number") for one in value)):
+            raise table.error(name, value, "[lower, upper], two numbers")
+        if not -60.0 <= value[0] < value[1] <= 60.0:
+            raise table.error(name, value, "lower < upper, in [-60, 60]")
+    return {name: (float(value[0]), float(value[1])) for name, value in found.items()}
 
 
 def _numbers(table: TomlTable) -> dict[str, float]:
@@ -154,31 +170,20 @@ class TrackTask(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class SeekTask(Settings):
-    """Let a seeker with a guide find the best start of combustion."""
+    """Let `mgdd.loop.seek` find the best start of combustion."""
 
-    guide: str = _key("text", "curve", among=GUIDES)
+    seeker: str = _key("text", "auto", among=("auto", *SEEKERS))
+    guide: str = _key("text", "none", among=("none", *KINDS))
     model: str = _key("text", "puma_single")
     scale: Mapping[str, float] = _key("scales", {})
-    start_cad: float | None = _key("number", low=-60.0, high=60.0)
-    lower_cad: float = _key("number", -30.0, low=-60.0, high=60.0)
-    upper_cad: float = _key("number", 10.0, low=-60.0, high=60.0)
-    cycles: int = _key("integer", 300, low=1, high=2_000_000)
+    inputs: Mapping[str, tuple[float, float]] = field(
+        default_factory=lambda: dict(_BOUNDS_CAD), metadata={"form": "bounds"}
+    )
+    start: Mapping[str, float] = _key("scales", {})
+    cycles: int | None = _key("integer", low=1, high=2_000_000)
+    tolerance: Mapping[str, float] = _key("scales", {})
+    noise_sd: float | None = _key("number", low=0.0)
     limits: Mapping[str, float] = _key("scales", {})
-
-    @classmethod
-    def read(cls, table: TomlTable) -> Self:
-        """Take all keys; a table ``inputs`` gives the bounds by name."""
-        inputs, left = table.table("inputs"), table.items()
-        inputs.only(("soc_cad",))
-        bounds = inputs.anything("soc_cad")
-        if bounds is not None:
-            if not (isinstance(bounds, list) and len(bounds) == 2 and all(fits(one, "number") for one in bounds)):
-                raise inputs.error("soc_cad", bounds, "[lower, upper], two numbers")
-            for key, bound in zip(("lower_cad", "upper_cad"), bounds, strict=True):
-                if key in left:
-                    raise table.error(key, left[key], f"left out, since {inputs.key('soc_cad')} gives the bounds")
-                left[key] = bound
-        return super().read(TomlTable(left, origin=table.origin, path=table.path))
 
 
 def beside(folder: Path, name: str) -> Path | str:

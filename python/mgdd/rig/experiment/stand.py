@@ -156,8 +156,8 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
         raise TypeError(f"{type(plan).__name__} without an envelope")
     guard = ActuatorGuard(
         recorded,
-        start={"soc_cad": plan.start_cad},
-        bounds={"soc_cad": (plan.task.lower_cad, plan.task.upper_cad)},
+        start=plan.start,
+        bounds=dict(plan.task.inputs),
         rates={"soc_cad": safety.rate_cad},
         limits=[Limit(name, upper) for name, upper in safety.limits.items()],
     )
@@ -176,6 +176,6 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
         plant=guard,
         counters=lambda: {**counters(), "guard": guard.counts},
         events=new_events,
-        start=lambda: plan.start_cad,
+        start=lambda: plan.start["soc_cad"],
         left=left,
     )

@@ -12,19 +12,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core, identify, presets
-from mgdd.engine import Performance
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.guide import CurveSeeking, GuidedEngine, ModelOptimum
 from mgdd.io import throttle_log
-from mgdd.loop import LoopCriteria, Plant, Reference, run_seeker
+from mgdd.loop import Plant, Reference
 from mgdd.loop.controller_families import groups_of
-from mgdd.loop.plant_loop import LoopRun
+from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop.seek import searched, seek_inputs, started
+from mgdd.loop.seek_choice import Choice, Question, chosen
+from mgdd.loop.seek_result import SeekResult
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
-from mgdd.optimize import ExtremumSeeking, FitOptions, Limit
+from mgdd.loop.until_still import stillness
+from mgdd.optimize import FitOptions
+from mgdd.optimize.optimum import limits_of
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
-from mgdd.results.labels import labelled_dataset, to_jsonable
+from mgdd.results.labels import labelled_dataset
 from mgdd.rig.experiment.settings import IdentifyTask, SeekTask, TrackTask, beside, scaled
 
 if TYPE_CHECKING:
@@ -33,7 +36,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.loop.track import AngleController
-    from mgdd.optimize import Seeker
     from mgdd.presets.preset import Preset
     from mgdd.throttle import Throttle
 
@@ -41,9 +43,6 @@ __all__ = ["IdentifyPlan", "Outcome", "SeekPlan", "TrackPlan", "compared", "engi
 
 _OF_THE_DUTY = "total_variation"  # the one figure that no angle enters
 _SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
-_START_CAD = -20.0
-_DITHER_CAD = 1.0  # amplitude of extremum seeking
-_ARRIVAL_CAD = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,53 +254,27 @@ def engine_named(name: str, folder: Path) -> Preset:
 
 
 class SeekPlan:
-    """A seeker and what guides it, made and checked before anything moves."""
+    """A search, made and checked before anything moves."""
 
-    def __init__(self, task: SeekTask, *, folder: Path) -> None:
+    def __init__(self, task: SeekTask, *, folder: Path, seed: int) -> None:
         self.task = task
-        if not task.lower_cad < task.upper_cad:
-            raise ParameterError.of("seek.lower_cad", task.lower_cad, f"< upper_cad, {task.upper_cad:g}")
-        self.samples = task.cycles
         known = engine_named(task.model, folder)
-        cylinder = scaled(known.cylinder, task.scale, "seek")
-        self.point = known.point
-        self.model = ModelOptimum(
-            cylinder, performance=Performance.efficiency_only(), bounds_cad=(task.lower_cad, task.upper_cad)
-        )
-        best = self.model(self.point)
-        self.guide_cad = None if best is None else float(best["soc_cad"])
-        if task.guide != "none" and self.guide_cad is None:
-            raise ParameterError(
-                f"seek.model {task.model}: has no best timing between {task.lower_cad:g} and {task.upper_cad:g} °CA: "
-                "move the bounds or change scale"
-            )
-        curve = self.model.curve(self.point) if task.guide == "curve" else None
-        self._curve = curve
-        room = 0.0 if task.guide == "curve" else _DITHER_CAD
-        start = task.start_cad
-        if start is None:
-            start = _START_CAD if self.guide_cad is None or task.guide == "none" else self.guide_cad
-            start = min(max(start, task.lower_cad + room), task.upper_cad - room)
-        elif not task.lower_cad + room <= start <= task.upper_cad - room:
-            raise ParameterError.of(
-                "seek.start_cad", start, f"in [{task.lower_cad + room:g}, {task.upper_cad - room:g}] °CA aTDC"
-            )
-        self.start_cad = start
+        guide = None
+        if task.guide != "none":
+            cylinder = scaled(known.cylinder, task.scale, "seek")
+            guide = EngineGuide(cylinder=cylinder, kind=task.guide, point=known.point)
+        inputs = seek_inputs(task.inputs)
+        self._asked = Question(
+            inputs=inputs, start=started(task.start or None, inputs), limits=limits_of(task.limits),
+            noise_sd=task.noise_sd, guide=guide, seed=seed, point=known.point,
+        )  # fmt: skip
+        self._still = stillness(self._asked, task.tolerance or None)
+        choice = self._chosen()
+        self.samples = choice.cycles if task.cycles is None else task.cycles
+        self.start = dict(zip(task.inputs, choice.seeker.estimate.tolist(), strict=True))
 
-    def seeker(self) -> Seeker | GuidedEngine:
-        """Make the seeker, at its beginning."""
-        task = self.task
-        limits = [Limit(name, upper) for name, upper in task.limits.items()]
-        if self._curve is not None:
-            curves = self.model.limit_curves(self.point, list(task.limits)) if limits else None
-            return CurveSeeking(
-                start=self.start_cad, lower=task.lower_cad, upper=task.upper_cad, curve=self._curve, limits=limits,
-                limit_curves=curves,
-            )  # fmt: skip
-        plain = ExtremumSeeking(
-            start=self.start_cad, lower=task.lower_cad, upper=task.upper_cad, amplitude=_DITHER_CAD, limits=limits
-        )
-        return plain if task.guide == "none" else GuidedEngine(plain, self.model, self.point, keep_start=True)
+    def _chosen(self) -> Choice:
+        return chosen(self._asked, self.task.seeker)
 
     def estimate(self) -> dict[str, float]:
         """Give what the running seeker takes for the best timing, and its standard deviation: NaN where it has none."""
@@ -310,24 +283,19 @@ class SeekPlan:
 
     def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many cycles."""
-        cycles = _fewer(self.samples, most)
-        self._running = self.seeker()
-        criteria = LoopCriteria(arrival=_ARRIVAL_CAD, limits=dict(self.task.limits) or None)
+        choice = self._chosen()
+        self._running = choice.seeker
         try:
-            run = run_seeker(plant, self._running, cycles, criteria=criteria)
+            found = searched(plant, choice, self._asked, _fewer(self.samples, most), self._still)
         except Interrupted as stop:
-            if not isinstance(stop.partial, LoopRun):
+            if not isinstance(stop.partial, SeekResult):
                 raise
-            run = stop.partial
-        summary = {name: value for name, value in run.summary.items() if value == value}
-        said = {"guide": self.task.guide, "guide_cad": self.guide_cad, "start_cad": self.start_cad}
+            found = stop.partial
         return Outcome(
-            figures=to_jsonable(
-                {**said, "cycles": run.dataset.sizes["cycle"], **summary, "findings": [str(f) for f in run.findings]}
-            ),
-            dataset=run.dataset,
-            interrupted=run.interrupted,
-            drawings={"seek": partial(_draw, run.dataset, dict(self.task.limits))},
+            figures=found.to_dict() | {"guide": self.task.guide},
+            dataset=found.run.dataset,
+            interrupted=found.interrupted,
+            drawings={"seek": partial(_draw, found.run.dataset, dict(self.task.limits))},
         )
 
 

@@ -1,0 +1,105 @@
+"""A seeker on a plant, one closed loop: in the core where both are of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from mgdd import _core
+from mgdd.errors import hand_over, or_partial
+from mgdd.guide import FeedForward, GuidedEngine
+from mgdd.loop.bench import EngineBench
+from mgdd.loop.bench_record import cycles_to_dataset
+from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
+from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
+from mgdd.optimize import Seeker
+from mgdd.optimize.seeker_findings import findings_of
+from mgdd.results.result import Figures
+
+if TYPE_CHECKING:
+    from mgdd.loop.plant import Plant
+
+__all__ = ["run_seeker"]
+
+
+def run_seeker(
+    plant: Plant,
+    seeker: Seeker | FeedForward | GuidedEngine,
+    cycles: int,
+    *,
+    criteria: LoopCriteria | None = None,
+) -> LoopRun:
+    """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
+
+    Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is reported as such. A new operating
+    point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
+    the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
+    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` of
+    one input, and on a compiled `FunctionPlant`, the loop runs in the core without the GIL where a seeker of
+    `mgdd.optimize` or a `CurveSeeking` has the inputs and limits of the plant in their order; one ask and tell at a
+    time from Python gives the same trajectory, bit for bit.
+
+    Parameters
+    ----------
+    plant : Plant
+        It advances by ``cycles``; a rig is open and stays open.
+    seeker
+        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, in their
+        order or, where it has ``inputs``, by their names; one component or as many as the plant measures, and limits
+        that the plant measures.
+    cycles : int
+        How many, >= 1.
+    criteria : LoopCriteria, optional
+        Where the estimate should go and what counts as a broken limit.
+
+    Returns
+    -------
+    LoopRun
+        Cycles with everything that was measured, and their summary.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A seeker that does not fit the plant, or fewer than one cycle.
+    mgdd.errors.DataError
+        A fired cycle whose reading is not finite. Errors of the plant pass through as well, with the LoopRun so far
+        as ``partial``; the seeker then stands before that cycle, and its ``history`` holds the cycles so far.
+    mgdd.errors.InUseError
+        Bench or seeker are in a call of another thread.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Plant and seeker are in the state after them, and
+        running them again goes on.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+    >>> from mgdd.optimize import ExtremumSeeking
+    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    >>> run = run_seeker(EngineBench(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
+    >>> run.summary["cycles_to"] < 400
+    True
+    """
+    criteria = criteria or LoopCriteria()
+    if (
+        not isinstance(plant, EngineBench)
+        or len(plant.input_names) > 1
+        or isinstance(seeker, FeedForward | GuidedEngine)
+        or (isinstance(seeker, Seeker) and tuple(seeker.limit_names) != plant.limit_names)  # the core wants the same
+    ):
+        return steer(plant, seeker, cycles, criteria)
+    require_inputs_of(plant, seeker)
+    goal = criteria.to_core(plant.limit_names)
+    run_loop: Any = _core.loop.run_loop  # one overload for each class of seeker
+    raw, stop = or_partial(lambda: run_loop(plant, seeker, cycles, **goal))
+    columns, names = raw["columns"], plant.limit_names
+    known = plant.noise_free_limits(columns["soc_requested_cad"], columns["cycle"])
+    dataset = cycles_to_dataset(plant, columns, estimate_cad=raw["estimate_cad"], noise_free_limits=known)
+    dataset.attrs["interrupted"] = int(raw["interrupted"])
+    summary = Figures(with_a_limit(raw["summary"], names))
+    summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
+    uppers = criteria.limits_of(names, seeker)
+    dataset.attrs |= criteria.attributes(names, uppers)
+    summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
+    findings = findings_of(seeker.settings, **raw["watched"])
+    run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=findings)
+    return hand_over(run, stop)

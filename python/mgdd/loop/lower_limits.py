@@ -1,0 +1,84 @@
+"""Lower limits, which a seeker keeps as upper ones of the negated quantity: ``-NAME``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from mgdd.errors import ParameterError
+from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
+from mgdd.optimize import Limit
+from mgdd.optimize.optimum import limits_of
+
+__all__ = ["both_sides", "measured_names", "plain_name", "with_lower_sides"]
+
+_LOWER = "-"
+
+
+def both_sides(limits: Any) -> tuple[Limit, ...]:
+    """Read limits as `limits_of` does, and pairs (lower, upper) by name, of which one may be None."""
+    if not isinstance(limits, Mapping):
+        return limits_of(limits)
+    sides = dict[str, Any]()
+    for name, value in limits.items():
+        if not isinstance(value, Sequence) or isinstance(value, str):
+            sides[name] = value
+            continue
+        low, high = value if len(value) == 2 else (None, None)
+        if (low is None and high is None) or (low is not None and high is not None and not low < high):
+            raise ParameterError(f"limits: {name} = {value!r}: must be (lower, upper), lower < upper, one may be None")
+        sides |= {} if low is None else {f"{_LOWER}{name}": -low}
+        sides |= {} if high is None else {name: high}
+    return limits_of(sides)
+
+
+def plain_name(name: str) -> tuple[str, float]:
+    """Give the quantity of a limit, and the sign by which it was taken."""
+    return (name[1:], -1.0) if name.startswith(_LOWER) else (name, 1.0)
+
+
+def measured_names(limits: Sequence[Limit]) -> list[str]:
+    """Give the quantities that a plant has to measure."""
+    return list(dict.fromkeys(plain_name(limit.name)[0] for limit in limits))
+
+
+def with_lower_sides(plant: Plant, limits: Sequence[Limit]) -> Plant:
+    """Let a plant measure the negated quantities as well; the same plant where none is needed."""
+    lower = tuple(limit.name for limit in limits if limit.name.startswith(_LOWER))
+    if not lower:
+        return plant
+    return (_AnnouncingTwoSided if isinstance(plant, AnnouncingPlant) else _TwoSided)(plant, lower)
+
+
+class _TwoSided:
+    def __init__(self, plant: Any, lower: tuple[str, ...]) -> None:
+        self._plant, self._lower = plant, lower
+        self.input_names = tuple(plant.input_names)
+        self.limit_names = (*plant.limit_names, *lower)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._plant, name)  # as its operating point
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        self._plant.apply(inputs)
+
+    def measure(self) -> Measurement:
+        measured: Measurement = self._plant.measure()
+        free = measured.noise_free_limits
+        return replace(
+            measured, limits={**measured.limits, **self._negated(measured.limits)},
+            noise_free_limits={**free, **self._negated(free)},
+        )  # fmt: skip
+
+    def _negated(self, values: Mapping[str, float]) -> dict[str, float]:
+        return {name: -values.get(plain_name(name)[0], math.nan) for name in self._lower} if values else {}
+
+
+class _AnnouncingTwoSided(_TwoSided):
+    @property
+    def operating_point_changes(self) -> bool:
+        return bool(self._plant.operating_point_changes)
