@@ -161,7 +161,7 @@ class CurveSeeking {
   double allowed_mean() noexcept;
   void learn(double applied, double j) noexcept;
   void watch_repeats(double applied, double j) noexcept;
-  void judge_surprise(double input, double j) noexcept;
+  void judge_surprise(double surprise) noexcept;
   void take_over() noexcept;
   void tell_plain(double j, double applied) noexcept;
   double last_held() const noexcept;
