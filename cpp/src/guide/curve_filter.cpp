@@ -18,18 +18,18 @@ constexpr std::array<Shape, CurveBank::shapes> shape_table{{{1.0, 1.0, 0.0}, {st
 
 constexpr double curvature_reach = 0.3;  // of the prior's sd: second differences and the guess of the noise
 
-constexpr double slow_level =
-    0.2;  // of a lag: behind a slow sensor a level moves no faster than what is read through it
+constexpr double slow_level = 0.2;  // of a lag: behind a slow sensor a level moves no faster than what it shows
+
 // Every delay has one bank of each, or the delay whose assumption on the level is the least wrong would be believed.
 struct Assumption {
   double memory_share, drift, slope, prior;
 };
-constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.72},
+constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.75},
                                                  {1.0, 0.05, 0.0, 0.05},
                                                  {1.0, 0.4, 0.0, 0.04},
                                                  {1.0, 2.0, 0.0, 0.02},
                                                  {0.25, 0.01, 0.1, 0.1},
-                                                 {0.1, 0.05, 0.0, 0.07}}};
+                                                 {0.1, 0.05, 0.0, 0.04}}};
 constexpr std::size_t begins_anew = 4;                         // the one of these whose memory the others take over
 constexpr std::int64_t doubt_lasts = 60, recent_in_doubt = 6;  // cycles after it in which it is settled
 constexpr double believed_anew = 0.8;
@@ -38,7 +38,7 @@ constexpr double little = 0.03;  // weight of a bank whose posterior follows its
 constexpr std::int64_t early = 40, seldom = 8;
 constexpr double told_prior = 0.8;  // probability that the delay is as told
 constexpr double change = 0.0002;   // ... that another one is right from one cycle to the next
-constexpr double assumption_change = 0.01;
+constexpr double assumption_change = 0.005;
 constexpr double most_said = 0.7;  // by one reading for or against a delay, a logarithm
 // A reading may be an outlier: as likely anywhere within twenty standard deviations, under every assumption.
 constexpr double outliers = 0.02, outlier_reach = 20.0;

@@ -1,8 +1,7 @@
-// Where a known curve stands, from noisy readings of J at any inputs: a mixture of filters (`CurveBank`), each with its
-// own delay between input and reading, or its own memory and drift of J's level. Their weights follow from how well
-// each foretold the readings, with a small chance that another one is right from now on (dynamic model averaging:
-// Raftery, Karny and Ettler 2010). Every delay has one bank; the most probable
-// delay has one for every assumption of memory and drift.
+// Where a known curve stands, from noisy readings of J at any inputs: a mixture of filters (`CurveBank`), one for every
+// delay between input and reading and every assumption of memory and of the drift of J's level. Their weights follow
+// from how well each foretold the readings, with a small chance that another one is right from now on (dynamic model
+// averaging: Raftery, Karny and Ettler 2010). A reading far off counts for less, and for or against no delay much.
 // Shapes: as the guide says, and steep on one side, which is what a knock limit or a cliff looks like.
 // A first-order lag of the sensor is part of every hypothesis. noexcept and allocation-free after construction.
 #pragma once
