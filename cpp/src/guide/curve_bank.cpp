@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace mgdd::guide {
 namespace {
@@ -19,15 +20,15 @@ constexpr std::array<ScaleClass, CurveBank::classes> class_table{{{0.01, 0.6, ot
                                                                   {100.0, 0.6, other}}};
 constexpr double flat_log_prior = -6.0;  // J that does not answer, of each class
 constexpr double guess_counts = 4.0;     // readings that the first guess of the noise is worth
-constexpr double least_scale = 0.1;      // of a class: a curve flatter, or upside down, is hardly believed
-constexpr double scale_penalty = 1500.0;
-constexpr double negligible = 1e-2;  // share of a class that is looked at only now and then
+constexpr double least_scale = 0.1;      // of a class: a curve flatter belongs to another one
+constexpr double negligible = 1e-2;      // share of a class that is looked at only now and then
 constexpr double negligible_place = 1e-4;
 constexpr double most_remembered = -10.0, slowly = 0.0005, class_learnt = 30.0;
 constexpr int margin = 4;               // places beyond those that count
 constexpr double noise_learnt = 12.0;   // readings that tell the noise better than the curve does
 constexpr double least_noise = 0.0025;  // of the guess: what a plant without noise leaves
 constexpr std::int64_t now_and_then = 16;
+constexpr double per_root_two_pi = 0.5 * std::numbers::inv_sqrtpi * std::numbers::sqrt2;
 
 using Part = Eigen::Array<double, Eigen::Dynamic, 1, 0, CurveBank::places, 1>;
 
@@ -59,8 +60,8 @@ double CurveBank::own_weight(const Prior& prior, const Column& drops) const noex
   return noise_variance_ / (noise_variance_ + error * error);
 }
 
-void CurveBank::add(const Prior& prior, const Column& drops, double j) noexcept {
-  const double own = own_weight(prior, drops);
+void CurveBank::add(const Prior& prior, const Column& drops, double j, double heard) noexcept {
+  const double own = heard * own_weight(prior, drops);
   if (count_ > 0.0) {
     advance();
     const double total = level_variance_ + 1.0 / own, per = 1.0 / total;
@@ -112,24 +113,27 @@ double CurveBank::level_variance() const noexcept {
   return (level_variance_ + 2.0 * covariance_ + slope_variance_) / fading_ + assumed_.drift;
 }
 
-double CurveBank::learn(const Prior& prior, const Column& drops, double j, bool counts) noexcept {
-  double log_likely = 0.0;
-  if (count_ > 0.0) {
-    const double own = own_weight(prior, drops);
-    const double base = noise_variance_ * (level_variance() + 1.0 / own);
-    double likely = 0.0;
-    for (std::size_t s = 0; s < shapes; ++s) {
-      const auto at = static_cast<Eigen::Index>(s) * places + from_, size = static_cast<Eigen::Index>(to_ - from_);
-      const Part away = drops.segment(at, size) - level_.segment(at, size) - slope_.segment(at, size);
-      const Part variance = base + scale_variance_.segment(at, size) * away.square();
-      const Part off = (j - level_j_ - slope_j_) - own_scale_.segment(at, size) * away;
-      likely += (share_.segment(at, size) * (-0.5 * off.square() / variance).exp() / variance.sqrt()).sum();
-    }
-    log_likely = std::log(std::max(likely, 1e-300));
+CurveBank::Foretold CurveBank::foretell(const Prior& prior, const Column& drops, double j) const noexcept {
+  const double base = noise_variance_ * (level_variance() + 1.0);
+  const double known = level_j_ + slope_j_, off = j - known;
+  double seen = 0.0, likely = 0.0, mean = 0.0, square = 0.0;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const auto at = static_cast<Eigen::Index>(s) * places + from_, size = static_cast<Eigen::Index>(to_ - from_);
+    const Part away = drops.segment(at, size) - level_.segment(at, size) - slope_.segment(at, size);
+    // What a wrong curve errs by is alike at like inputs, and the level has taken it: what is left goes by `away`.
+    const Part variance =
+        base + (scale_variance_.segment(at, size) + (prior.discrepancy * own_scale_.segment(at, size)).square()) *
+                   away.square();
+    const Part means = own_scale_.segment(at, size) * away;
+    const auto share = share_.segment(at, size);
+    likely += (share * (-0.5 * (off - means).square() / variance).exp() / variance.sqrt()).sum();
+    seen += share.sum();
+    mean += (share * means).sum();
+    square += (share * (variance + means.square())).sum();
   }
-  add(prior, drops, j);
-  if (counts) judge(prior);
-  return log_likely;
+  const double per = 1.0 / std::max(seen, 1e-300);
+  mean *= per;
+  return {{known + mean, std::max(base, square * per - mean * mean)}, per_root_two_pi * likely * per};
 }
 
 void CurveBank::fade(double kept) noexcept {
@@ -223,11 +227,13 @@ void CurveBank::judge(const Prior& prior) noexcept {
       const auto bend = bend_.segment(at, size), cross = cross_.segment(at, size);
       l.precision[s] = per_scale + bend;
       const Part pull = (cross - m * bend) / l.precision[s];
-      l.scale[s] = m + pull;
-      l.left[s] = l.guess + (rest_ - 2.0 * m * cross + m * m * bend - pull.square() * l.precision[s]).max(0.0);
-      const Part low = (least_scale - l.scale[s] / m).max(0.0);
+      // A curve upside down has its worst at its place: the readings are held against the flattest that is none.
+      l.scale[s] = (m + pull).max(least_scale * m);
+      const Part held = l.scale[s] - m - pull;
+      l.left[s] = l.guess + (rest_ - 2.0 * m * cross + m * m * bend - pull.square() * l.precision[s]).max(0.0) +
+                  held.square() * l.precision[s];
       l.log_of[s] = prior.log_of.segment(at, size) + guessed - 0.5 * (l.precision[s] * per).log() -
-                    0.5 * counts * l.left[s].log() - scale_penalty * low.square();
+                    0.5 * counts * l.left[s].log();
       highest = std::max(highest, l.log_of[s].maxCoeff());
     }
     l.flat = guessed + flat_log_prior + remembered_flat_ - 0.5 * counts * std::log(l.guess + rest_);

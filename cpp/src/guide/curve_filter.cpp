@@ -18,18 +18,31 @@ constexpr std::array<Shape, CurveBank::shapes> shape_table{{{1.0, 1.0, 0.0}, {st
 
 constexpr double curvature_reach = 0.3;  // of the prior's sd: second differences and the guess of the noise
 
-// The first is that of every delay.
+constexpr double slow_level = 0.2;  // of a lag: behind a slow sensor a level moves no faster than what it shows
+
+// Every delay has one bank of each, or the delay whose assumption on the level is the least wrong would be believed.
 struct Assumption {
   double memory_share, drift, slope, prior;
 };
-constexpr std::array<Assumption, 4> assumptions{
-    {{1.0, 2e-4, 0.03, 0.8}, {1.0, 0.05, 0.0, 0.05}, {0.25, 0.01, 0.1, 0.1}, {0.1, 0.05, 0.0, 0.05}}};
+constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.75},
+                                                 {1.0, 0.05, 0.0, 0.05},
+                                                 {1.0, 0.4, 0.0, 0.04},
+                                                 {1.0, 2.0, 0.0, 0.02},
+                                                 {0.25, 0.01, 0.1, 0.1},
+                                                 {0.1, 0.05, 0.0, 0.04}}};
+constexpr std::size_t begins_anew = 4;                         // the one of these whose memory the others take over
+constexpr std::int64_t doubt_lasts = 60, recent_in_doubt = 6;  // cycles after it in which it is settled
+constexpr double believed_anew = 0.8;
 constexpr double shortest_memory = 8.0;
 constexpr double little = 0.03;  // weight of a bank whose posterior follows its readings only now and then
 constexpr std::int64_t early = 40, seldom = 8;
-constexpr double told_prior = 0.5;  // probability that the delay is as told
-constexpr double change = 0.0001;   // ... that another one is right from one cycle to the next
-constexpr double assumption_change = 0.01;
+constexpr double told_prior = 0.8;  // probability that the delay is as told
+constexpr double change = 0.0002;   // ... that another one is right from one cycle to the next
+constexpr double assumption_change = 0.005;
+constexpr double most_said = 0.7;  // by one reading for or against a delay, a logarithm
+// A reading may be an outlier: as likely anywhere within twenty standard deviations, under every assumption.
+constexpr double outliers = 0.02, outlier_reach = 20.0;
+constexpr double heard_whole = 4.0, heard_scale = 5.0;  // squared distance up to which a reading counts in full
 
 }  // namespace
 
@@ -52,18 +65,19 @@ CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve
       delays_(static_cast<std::size_t>(settings.earlier + settings.later) + 1),
       ring_(delays_ + recent, Column::Zero()),
       delay_weights_(delays_),
-      assumption_weights_(assumptions.size()),
+      bank_weights_(delays_ * assumptions.size()),
       leader_(settings.earlier) {
   lagged_.setZero();
   for (std::size_t d = 0; d < delays_; ++d) {
-    banks_.emplace_back(CurveBank::Assumed{settings.memory_cycles, assumptions[0].drift, assumptions[0].slope});
-    delay_weights_[d] = delays_ == 1 ? 1.0 : (1.0 - told_prior) / static_cast<double>(delays_ - 1);
+    delay_weights_[d] = delay_prior(d);
+    const double slowly = 1.0 / (1.0 + slow_level * settings.lag_cycles);
+    for (const Assumption& a : assumptions) {
+      const double memory = std::max(shortest_memory, a.memory_share * settings.memory_cycles);
+      banks_.emplace_back(CurveBank::Assumed{a.memory_share < 1.0 ? memory : settings.memory_cycles,
+                                             slowly * slowly * a.drift, slowly * a.slope});
+    }
   }
-  if (delays_ > 1) delay_weights_[leader()] = told_prior;
-  for (std::size_t i = 1; i < assumptions.size(); ++i) {
-    const double memory = std::max(shortest_memory, assumptions[i].memory_share * settings.memory_cycles);
-    banks_.emplace_back(CurveBank::Assumed{memory, assumptions[i].drift, assumptions[i].slope});
-  }
+  foretold_.resize(banks_.size());
   prior_.first = settings.lower;
   prior_.step = (settings.upper - settings.lower) / (places - 1);
   for (int i = 0; i < places; ++i)
@@ -99,10 +113,10 @@ void CurveFilter::place_prior() noexcept {
 void CurveFilter::restart(const Curve& curve, double mean, double sd) noexcept {
   expect(curve, mean, sd);
   recent_count_ = 0;
-  cycles_ = 0;
+  cycles_ = doubted_ = 0;
   started_ = false;
-  for (std::size_t i = 0; i < assumptions.size(); ++i)
-    assumption_weights_[i] = assumptions[i].prior;
+  for (std::size_t i = 0; i < banks_.size(); ++i)
+    bank_weights_[i] = assumptions[i % assumptions.size()].prior;
   for (CurveBank& bank : banks_)
     bank.restart(prior_);
   mix();
@@ -149,52 +163,88 @@ const CurveFilter::Column& CurveFilter::drops_at(std::int64_t cycle, std::size_t
   return ring_[static_cast<std::size_t>((cycle - static_cast<std::int64_t>(delay) + size) % size)];
 }
 
-void CurveFilter::learn(double input, double j) noexcept {
+double CurveFilter::learn(double input, double j) noexcept {
   pass(input);
   prior_extra_ *= fading_ * fading_;  // sooner than the readings, or a guide that is wrong would draw the end to itself
   place_prior();
-  std::array<double, 64> log_likely{};
+  double surprise = std::numeric_limits<double>::quiet_NaN(), heard = 1.0;
+  if (readings() > 0.0) {
+    for (std::size_t i = 0; i < banks_.size(); ++i)
+      foretold_[i] = banks_[i].foretell(prior_, drops_at(cycles_ - 1, delay_of(i)), j);
+    const Prediction whole = expected();
+    surprise = (j - whole.mean) * (j - whole.mean) / whole.variance;
+    heard = std::min(1.0, (heard_whole + heard_scale) / (heard_scale + surprise));
+    weigh();
+  }
   for (std::size_t i = 0; i < banks_.size(); ++i) {
     const bool turn = recent_count_ < early || (cycles_ + static_cast<std::int64_t>(i)) % seldom == 0;
-    log_likely[i] = banks_[i].learn(prior_, drops_at(cycles_ - 1, delay_of(i)), j, turn || weight_of(i) > little);
+    banks_[i].add(prior_, drops_at(cycles_ - 1, delay_of(i)), j, heard);
+    if (turn || weight_of(i) > little) banks_[i].judge(prior_);
   }
   const auto at = static_cast<std::size_t>(recent_count_++) % recent;
   recent_at_[at] = cycles_ - 1;
   recent_j_[at] = j;
-  weigh(log_likely.data());
+  settle_doubt();
   mix();
+  return surprise;
 }
 
-void CurveFilter::weigh(const double* log_likely) noexcept {
-  const auto update = [](std::vector<double>& weights, const auto& log_of, double chance, const auto& prior_of) {
-    double highest = log_of(0), sum = 0.0;
-    for (std::size_t i = 1; i < weights.size(); ++i)
-      highest = std::max(highest, log_of(i));
-    for (std::size_t i = 0; i < weights.size(); ++i)
-      sum += weights[i] *= std::exp(log_of(i) - highest);
-    for (std::size_t i = 0; i < weights.size(); ++i)
-      weights[i] = (1.0 - chance) * weights[i] / sum + chance * prior_of(i);
+// Where the banks that began anew foretell the readings better by far, the others go on from what these know.
+void CurveFilter::settle_doubt() noexcept {
+  if (doubted_ == 0) return;
+  --doubted_;
+  if (doubted_ > doubt_lasts - recent_in_doubt) return;
+  const std::size_t first = leader() * per_delay();
+  double anew = 0.0;
+  for (std::size_t a = 0; a < per_delay(); ++a)
+    anew += assumptions[a].memory_share < 1.0 ? bank_weights_[first + a] : 0.0;
+  if (anew < believed_anew) return;
+  doubted_ = 0;
+  for (std::size_t b = 0; b < banks_.size(); ++b) {
+    if (assumptions[b % per_delay()].memory_share < 1.0) continue;
+    banks_[b].take_over(banks_[delay_of(b) * per_delay() + begins_anew]);
+  }
+}
+
+double CurveFilter::delay_prior(std::size_t delay) const noexcept {
+  if (delays_ == 1) return 1.0;
+  return offset_of(delay) == 0 ? told_prior : (1.0 - told_prior) / static_cast<double>(delays_ - 1);
+}
+
+CurveFilter::Prediction CurveFilter::expected() const noexcept {
+  const double about = foretold_[leader() * per_delay()].reading.mean;  // or the squares would lose all digits
+  double mean = 0.0, square = 0.0;
+  for (std::size_t i = 0; i < banks_.size(); ++i) {
+    const auto& [own, variance] = foretold_[i].reading;
+    mean += weight_of(i) * (own - about);
+    square += weight_of(i) * (variance + (own - about) * (own - about));
+  }
+  return {about + mean, square - mean * mean};
+}
+
+void CurveFilter::weigh() noexcept {
+  const double anywhere = outliers / (outlier_reach * noise_sd());
+  const auto evidence = [&](std::size_t delay) {  // and the weights of its banks
+    double sum = 0.0;
+    for (std::size_t i = delay * per_delay(); i < (delay + 1) * per_delay(); ++i) {
+      bank_weights_[i] += assumption_change * (assumptions[i % per_delay()].prior - bank_weights_[i]);
+      sum += bank_weights_[i] *= (1.0 - outliers) * foretold_[i].density + anywhere;
+    }
+    for (std::size_t i = delay * per_delay(); i < (delay + 1) * per_delay(); ++i)
+      bank_weights_[i] /= sum;
+    return std::log(sum);
   };
   const auto told = static_cast<std::size_t>(settings_.earlier);
-  update(
-      delay_weights_, [&](std::size_t d) { return log_likely[d]; }, change,
-      [&](std::size_t d) {
-        return delays_ == 1 ? 1.0 : d == told ? told_prior : (1.0 - told_prior) / static_cast<double>(delays_ - 1);
-      });
-  update(
-      assumption_weights_, [&](std::size_t i) { return log_likely[i == 0 ? leader() : delays_ + i - 1]; },
-      assumption_change, [&](std::size_t i) { return assumptions[i].prior; });
-  const auto best = std::max_element(delay_weights_.begin(), delay_weights_.end()) - delay_weights_.begin();
-  if (best == leader_) return;
-  leader_ = best;
-  for (std::size_t i = delays_; i < banks_.size(); ++i)
-    banks_[i].take_over(banks_[leader()]);
-}
-
-double CurveFilter::weight_of(std::size_t bank) const noexcept {
-  const double delay = delay_weights_[delay_of(bank)];
-  if (bank < delays_ && bank != leader()) return delay;
-  return delay * assumption_weights_[bank < delays_ ? 0 : bank - delays_ + 1];
+  const double of_told = evidence(told);
+  double sum = 0.0;
+  for (std::size_t d = 0; d < delays_; ++d) {
+    const double said = d == told ? 0.0 : std::clamp(evidence(d) - of_told, -most_said, most_said);
+    delay_weights_[d] += change * (delay_prior(d) - delay_weights_[d]);
+    sum += delay_weights_[d] *= std::exp(said);
+  }
+  for (double& weight : delay_weights_)
+    weight /= sum;
+  leader_ = std::max_element(delay_weights_.begin(), delay_weights_.end()) - delay_weights_.begin();
 }
 
 void CurveFilter::mix() noexcept {
@@ -219,15 +269,24 @@ void CurveFilter::mix() noexcept {
   stated_sd_ = std::sqrt(stated);
 }
 
-void CurveFilter::forget(double kept) noexcept {
+// What is known stays: the banks of short memory begin anew with half of all weight, and the readings to come decide.
+void CurveFilter::doubt(double kept) noexcept {
   const auto known = std::min<std::int64_t>(recent_count_, recent);
+  doubted_ = doubt_lasts;
+  double anew = 0.0;
+  for (const Assumption& a : assumptions)
+    anew += a.memory_share < 1.0 ? a.prior : 0.0;
   for (std::size_t b = 0; b < banks_.size(); ++b) {
+    const Assumption& own = assumptions[b % per_delay()];
+    bank_weights_[b] *= 0.5;
+    if (!(own.memory_share < 1.0)) continue;
+    bank_weights_[b] += 0.5 * own.prior / anew;
     banks_[b].fade(kept);
     for (std::int64_t i = recent_count_ - known; i < recent_count_; ++i) {
       const auto at = static_cast<std::size_t>(i) % recent;
       const std::int64_t cycle = recent_at_[at];
       if (cycles_ - cycle <= static_cast<std::int64_t>(recent)) {
-        banks_[b].add(prior_, drops_at(cycle, delay_of(b)), recent_j_[at]);
+        banks_[b].add(prior_, drops_at(cycle, delay_of(b)), recent_j_[at], 1.0);
       }
     }
     banks_[b].judge(prior_);
@@ -241,7 +300,7 @@ CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {
   fill_drops(input, drops);
   if (per_lag_ < 1.0) drops = (lagged_ + per_lag_ * (drops - lagged_)).eval();
   double mean = 0.0, square = 0.0;
-  const double about = banks_[leader()].predict(prior_, drops).mean;
+  const double about = banks_[leader() * per_delay()].predict(prior_, drops).mean;
   for (std::size_t i = 0; i < banks_.size(); ++i) {
     const std::size_t delay = delay_of(i);
     const Prediction own = banks_[i].predict(prior_, delay == 0 ? drops : drops_at(cycles_, delay));

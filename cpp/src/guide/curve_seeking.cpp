@@ -223,10 +223,15 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
     }
     return status;
   }
-  if (sent_count_ < ring) return status;
+  if (sent_count_ < ring) {
+    // Standing still until the first reading comes would teach nothing: it says no more of the place than the guide.
+    estimate_[0] = allowed_mean();
+    return status;
+  }
   const double cause = sent_[static_cast<std::size_t>(sent_count_ % ring)];
   if (status == TellStatus::misfire || sent_count_ <= delay_) {
     filter_.pass(cause);  // what is read now was caused before the first cycle
+    if (!(filter_.readings() > 0.0)) estimate_[0] = allowed_mean();
   } else {
     learn(cause, objective_of(reading, settings_.maximize));
   }
@@ -249,14 +254,13 @@ void CurveSeeking::tell_plain(double j, double applied) noexcept {
 }
 
 void CurveSeeking::learn(double cause, double j) noexcept {
-  judge_surprise(cause, j);
   watch_repeats(cause, j);
-  filter_.learn(cause, j);
+  judge_surprise(filter_.learn(cause, j));
   ++since_doubt_;
   doubt_rate_ *= std::exp(-1.0 / doubt_memory_cycles);
   const double usual = std::sqrt(surprise_share_of(settings_.sensor) / surprise_share);  // scatter of a longer mean
   if (surprise_ > 1.0 + (surprise_limit - 1.0) * usual && since_doubt_ > calm_cycles) {
-    filter_.forget(kept_in_doubt);
+    filter_.doubt(kept_in_doubt);
     surprise_ = 1.0;
     since_doubt_ = 0;
     doubt_rate_ += 1.0;
@@ -273,12 +277,9 @@ double CurveSeeking::allowed_mean() noexcept {
   return protocol_.failures.keep(scalar_input(mean))[0];
 }
 
-void CurveSeeking::judge_surprise(double input, double j) noexcept {
-  if (!(filter_.readings() > 0.0)) return;
-  const CurveFilter::Prediction expected = filter_.predict(input);
-  const double off = j - expected.mean;
-  surprise_ +=
-      surprise_share_of(settings_.sensor) * (std::min(off * off / expected.variance, surprise_cap) - surprise_);
+void CurveSeeking::judge_surprise(double surprise) noexcept {
+  if (!std::isfinite(surprise)) return;
+  surprise_ += surprise_share_of(settings_.sensor) * (std::min(surprise, surprise_cap) - surprise_);
 }
 
 // Two readings of one side in a row that lie close together differ by noise alone: half their squared difference.

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mgdd/common/random.hpp"
@@ -14,17 +16,20 @@ namespace mgdd::guide {
 namespace {
 
 using optimize::scalar_input;
+constexpr double pi = std::numbers::pi;
 
 /// -0.03 (u - 4)^2 on bounds of +-20, noise 0.3, 4 away from the guide's best input, on either side by turns.
 struct Plant {
   std::function<double(double)> drop = [](double away) { return -0.03 * away * away; };
   double guide_best = 0.0, unit = 1.0, noise_sd = 0.3;
   double level_per_cycle = 0.0, optimum_per_cycle = 0.0, step = 0.0;  // the step comes and goes every 50 cycles
+  double swing = 0.0, period = 1.0, outliers = 0.0;                   // of the level; share of readings off by 20 sd
   int delay = 0, told_delay = 0, stuck_from = 1 << 30, cycles = 500, seeds = 6;
 };
 
 struct Figures {
   double early_loss = 0.0, late_loss = 0.0;  // J lost in 100 cycles, and per cycle in the second half
+  double off = 0.0;                          // share of cycles after the tenth more than 1.5 off
   double inside = 0.0, wrong_delay = 0.0, unanswered = 0.0, handed_over = 0.0, at_bound = 0.0;  // shares
 };
 
@@ -48,9 +53,13 @@ Figures figures_of(const Plant& plant) {
       const double cause = sent[static_cast<std::size_t>(std::max(0, k - plant.delay))];
       const double noise =
           plant.noise_sd * random::normal(static_cast<std::uint64_t>(seed), 7, static_cast<std::uint64_t>(k));
-      const double j[] = {plant.unit * (50.0 + plant.drop(cause - best) + plant.level_per_cycle * k + noise)};
+      const double level = plant.level_per_cycle * k + plant.swing * std::sin(2.0 * pi * k / plant.period + seed);
+      const double chance = random::uniform(static_cast<std::uint64_t>(seed), 8, static_cast<std::uint64_t>(k));
+      const double thrown = chance < plant.outliers ? (k % 2 == 0 ? 20.0 : -20.0) * plant.noise_sd : 0.0;
+      const double j[] = {plant.unit * (50.0 + plant.drop(cause - best) + level + noise + thrown)};
       EXPECT_EQ(seeker.tell({j, {}, false}), optimize::TellStatus::accepted);
       const double off = seeker.estimate()[0] - best;
+      if (k >= 10) out.off += std::abs(off) > 1.5 ? share / (plant.cycles - 10) : 0.0;
       if (k < 100) out.early_loss -= share * plant.drop(asked - best);
       const int half = plant.cycles / 2;
       if (k >= half) out.late_loss -= share * plant.drop(asked - best) / (plant.cycles - half);
@@ -79,6 +88,97 @@ TEST(CurveRobustness, ADriftOfTheLevelOfJCostsNothing) {
     EXPECT_LE(drifting.late_loss, 1.5 * still.late_loss) << slope;
     EXPECT_GE(drifting.inside, 0.85) << slope;
   }
+}
+
+TEST(CurveRobustness, ALevelThatSwingsIsNoDelay) {
+  for (const auto& [swing, period] : {std::pair{3.0, 300.0}, std::pair{3.0, 100.0}, std::pair{1.5, 50.0}}) {
+    Plant plant;
+    plant.swing = swing;
+    plant.period = period;
+    const Figures found = figures_of(plant);
+    EXPECT_LE(found.late_loss, 0.04) << period;
+    EXPECT_LE(found.off, 0.03) << period;
+    EXPECT_LE(found.wrong_delay, 0.2) << period;
+    EXPECT_LE(found.handed_over, 0.2) << period;
+  }
+}
+
+TEST(CurveRobustness, ReadingsFarOffAreNoDelay) {
+  Plant plant;
+  plant.outliers = 0.02;
+  plant.seeds = 12;
+  const Figures found = figures_of(plant);
+  EXPECT_LE(found.late_loss, 0.035);
+  EXPECT_LE(found.off, 0.06);
+  EXPECT_LE(found.wrong_delay, 0.1);
+}
+
+TEST(CurveRobustness, AnEstimateThatALimitHoldsIsNoDelay) {
+  for (int seed = 0; seed < 12; ++seed) {
+    CurveSeekingSettings settings;
+    settings.space = {scalar_input(1.0), scalar_input(0.0), scalar_input(10.0)};
+    settings.curve = Curve::parabola(-0.06, 5.0, 10.0);
+    settings.limits = {{.name = "p", .upper = 4.0}};
+    CurveSeeking seeker(settings);
+    for (int k = 0; k < 200; ++k) {
+      const auto at = static_cast<std::uint64_t>(k), run = static_cast<std::uint64_t>(seed);
+      const double x = seeker.ask()[0];
+      const double j = 0.3 * x + 0.1 * random::normal(run, 1, at), p = x + 0.1 * random::normal(run, 2, at);
+      seeker.tell({{&j, 1}, {&p, 1}, false});
+    }
+    EXPECT_EQ(seeker.delay_cycles(), 0) << seed;
+    EXPECT_NEAR(seeker.estimate()[0], 3.9, 0.15) << seed;
+  }
+}
+
+TEST(CurveRobustness, TheBestAtABoundIsFoundThere) {
+  const std::pair<double, std::function<double(double)>> rising[] = {
+      {-0.32, [](double x) { return std::exp(x / 5.0); }}, {-0.6, [](double x) { return 0.8 * x; }}};
+  for (const auto& [curvature, j_of] : rising) {
+    for (int seed = 0; seed < 8; ++seed) {
+      const bool up = seed % 2 == 0;
+      CurveSeekingSettings settings;
+      settings.space = {scalar_input(up ? 4.0 : 6.0), scalar_input(0.0), scalar_input(10.0)};
+      settings.curve = Curve::parabola(curvature, 5.0, 10.0);
+      CurveSeeking seeker(settings);
+      double last = 0.0;
+      for (int k = 0; k < 200; ++k) {
+        const double x = seeker.ask()[0], best_at_ten = up ? x : 10.0 - x;
+        const double j = j_of(best_at_ten) +
+                         0.06 * random::normal(static_cast<std::uint64_t>(seed), 1, static_cast<std::uint64_t>(k));
+        seeker.tell({{&j, 1}, {}, false});
+        if (k >= 150) last += best_at_ten / 50.0;
+      }
+      EXPECT_GT(last, 9.0) << seed;
+      EXPECT_NEAR(seeker.estimate()[0], up ? 10.0 : 0.0, 1.0) << seed;
+    }
+  }
+}
+
+TEST(CurveRobustness, BehindALateSensorTheFirstMoveIsMadeBeforeTheFirstReading) {
+  std::vector<int> arrivals;
+  for (int seed = 0; seed < 5; ++seed) {
+    CurveSeekingSettings settings;
+    settings.space = {scalar_input(-20.0), scalar_input(-30.0), scalar_input(10.0)};
+    settings.curve = Curve::parabola(-0.05, 3.0, 40.0);
+    settings.sensor = {38.0, 25.0};
+    CurveSeeking seeker(settings);
+    std::vector<double> sent;
+    double lagged = 0.0;
+    int arrived = 1000;
+    for (int k = 0; k < 200; ++k) {
+      sent.push_back(seeker.ask()[0]);
+      const double away = sent[static_cast<std::size_t>(std::max(0, k - 38))] + 6.0, steady = -0.0255 * away * away;
+      lagged += k == 0 ? steady : -std::expm1(-1.0 / 25.0) * (steady - lagged);
+      const double j =
+          lagged + 0.25 * random::normal(static_cast<std::uint64_t>(seed), 1, static_cast<std::uint64_t>(k));
+      seeker.tell({{&j, 1}, {}, false});
+      if (arrived == 1000 && std::abs(seeker.estimate()[0] + 6.0) < 1.5) arrived = k + 1;
+    }
+    arrivals.push_back(arrived);
+  }
+  std::sort(arrivals.begin(), arrivals.end());
+  EXPECT_LE(arrivals[2], 80) << "two delays: the time to see what a move does";
 }
 
 TEST(CurveRobustness, ADelayToldWrongIsFound) {

@@ -47,16 +47,20 @@ class CurveBank {
   struct Prediction {
     double mean = 0.0, variance = 0.0;
   };
+  /// The same of a reading that has come, and the density at it.
+  struct Foretold {
+    Prediction reading;
+    double density = 0.0;
+  };
 
   explicit CurveBank(const Assumed& assumed) noexcept;
 
   /// Nothing is known of J's level and of T but the prior; what was learnt of the noise stays.
   void restart(const Prior& prior) noexcept;
-  /// Takes a reading whose drops under every hypothesis are these; the logarithm of how likely it was. The posterior
-  /// follows at once where it counts.
-  double learn(const Prior& prior, const Column& drops, double j, bool counts) noexcept;
-  /// Adds a reading to the sums alone.
-  void add(const Prior& prior, const Column& drops, double j) noexcept;
+  /// How likely this reading is, whose drops under every hypothesis are these. None was taken yet: not defined.
+  Foretold foretell(const Prior& prior, const Column& drops, double j) const noexcept;
+  /// Adds a reading to the sums alone; `heard` is its weight beside a usual one, in (0, 1].
+  void add(const Prior& prior, const Column& drops, double j, double heard) noexcept;
   /// Keeps this share of what the readings said.
   void fade(double kept) noexcept;
   /// The posterior from the sums.

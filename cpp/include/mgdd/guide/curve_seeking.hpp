@@ -2,10 +2,10 @@
 // over the place of the curve (`CurveFilter`) takes every reading; the next input lies one standard deviation of the
 // place to one side of its mean or the other, at least as far as keeping track costs least, every fourth time at it.
 // Kin: self-tuning extremum control (Wellstead and Zarrop 1991). The sides have no period and the delay of the readings
-// is learnt about the one told. Readings that the curve cannot explain raise a doubt: what was known is dropped but for
-// the last few readings. A guide that keeps failing hands over to plain extremum seeking. Behind a slow sensor a side
-// is held for two time constants of its lag, which would blot out a faster change. ask and tell are noexcept and
-// allocation-free.
+// is learnt about the one told. Readings that the curve cannot explain raise a doubt: banks of short memory begin anew,
+// the others keep what they know until these foretell better. A guide that keeps failing hands over to plain extremum
+// seeking. Behind a slow sensor a side is held for two time constants of its lag, which would blot out a faster change.
+// ask and tell are noexcept and allocation-free.
 #pragma once
 
 #include <cstdint>
@@ -161,7 +161,7 @@ class CurveSeeking {
   double allowed_mean() noexcept;
   void learn(double applied, double j) noexcept;
   void watch_repeats(double applied, double j) noexcept;
-  void judge_surprise(double input, double j) noexcept;
+  void judge_surprise(double surprise) noexcept;
   void take_over() noexcept;
   void tell_plain(double j, double applied) noexcept;
   double last_held() const noexcept;
