@@ -82,7 +82,7 @@ def test_any_setting_of_a_seeker_can_be_said(capsys: pytest.CaptureFixture[str])
         for form in ("washout", "batch")
     ]
     assert runs[0]["inputs"] != runs[1]["inputs"]
-    said = refused(capsys, *by("extremum_seeking"), "--seeker-set", "fom=washout")
+    said = refused(capsys, *by("extremum_seeking"), "--seeker-set", "forms=washout")
     assert "did you mean 'form'" in said
 
 
