@@ -115,9 +115,10 @@ Inputs ClampWatch::slope_factor() const noexcept {
 
 Inputs ClampWatch::step_factor() const noexcept {
   Inputs out = Inputs::Ones(response_.size());
-  for (Eigen::Index i = 0; i < out.size(); ++i)
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
     if (response_[i] < -least_response || response_[i] > 1.0)
       out[i] = std::copysign(std::min(1.0, 1.0 / std::abs(response_[i])), response_[i]);
+  }
   return out;
 }
 

@@ -17,10 +17,11 @@ void TellWatch::read(std::span<const double> components, std::span<const double>
   before_ = applied;
   for (std::size_t i = 0; i < last_.size(); ++i) {
     const double value = i < components.size() ? components[i] : limits[i - components.size()];
-    if (value != last_[i])
+    if (value != last_[i]) {
       alike_[i] = 1.0;
-    else if (moved)
+    } else if (moved) {
       most_alike_[i] = std::max(most_alike_[i], ++alike_[i]);
+    }
     last_[i] = value;
   }
 }
