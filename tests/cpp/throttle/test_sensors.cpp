@@ -179,9 +179,9 @@ TEST(Sensors, SecondSensorServesWhereTheFirstIsOutOfRange) {
 
 TEST(Sensors, ShortFailureIsForgotten) {
   SensorSampler sampler(SensorPair{}, sample_s, 1, healthy);
-  for (int k = 0; k < 1800; ++k)
-    EXPECT_FALSE(sampler.step(k % 600 < 199 ? -20.0 : 30.0).fault)
-        << k;  // 199 samples out of range, then twice as many within
+  for (int k = 0; k < 1800; ++k) {  // 199 samples out of range, then twice as many within
+    EXPECT_FALSE(sampler.step(k % 600 < 199 ? -20.0 : 30.0).fault) << k;
+  }
   SensorReading r;
   for (int k = 0; k < 200; ++k)
     r = sampler.step(-20.0);

@@ -60,8 +60,10 @@ MGDD_INLINE void keep_peak(Lane<double>& best, Lane<double>& best_at, std::size_
 template <WallHeatModel wall, bool burning, Heat heat, bool stopping = false, bool peaks = true, class T>
 MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, CycleBlock<T>& b,
                        Lane<T>* trace) noexcept {
+  // NOLINTBEGIN(misc-const-correctness): set where a wall heat needs them
   alignas(64) Lane<double> root{}, fifth{};
-  alignas(64) Lane<T> velocity{}, film{}, released{};  // NOLINT(misc-const-correctness): set where a wall heat needs it
+  alignas(64) Lane<T> velocity{}, film{}, released{};
+  // NOLINTEND(misc-const-correctness)
   for (std::size_t k = from; k < to; ++k) {
     const double v0 = t.volume_m3[k], v1 = t.volume_m3[k + 1], dv = v1 - v0, term = t.wall_term[k];
     const double ratio = t.motored_ratio[k], keep = t.keep[k], gain = t.gain[k];
