@@ -46,7 +46,8 @@ _NEAR = 40.0  # arrived: within a fortieth of the bounds, the scale that an inpu
 _COV = "cov_imep_percent"  # has no steady value
 # Arguments of the library and the options that set them.
 _NAMES = {**_BENCH.options, **_SEARCH.options, "start": "start", "limits": "limit", "nox_sensor": "sensor",
-          "guide_cylinder": "guide_set", "guide_table": "guide_map", "settings": "seeker_set"}  # fmt: skip
+          "tolerance": "tolerance", "guide_cylinder": "guide_set", "guide_table": "guide_map",
+          "settings": "seeker_set"}  # fmt: skip
 
 
 def add_seek(verbs: Any) -> None:

@@ -130,7 +130,9 @@ class Question:
         for name in self.settings:
             if name not in takes:
                 have = ", ".join(takes)
-                raise ParameterError(hinted(f"settings: {name!r}: {cls.kind} takes {have}", name, list(takes)))
+                raise ParameterError(
+                    hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {have}", name, list(takes))
+                )
         return cls(**known | own | dict(self.settings))
 
     def budget(self, seeker: Any) -> int:
