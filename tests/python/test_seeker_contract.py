@@ -76,7 +76,9 @@ def test_the_finder_finds_every_kind_of_seeker() -> None:
 
 
 @shared
-@pytest.mark.parametrize("bad", [{0: 0.0}, {0: 1e6}, {0: -1e30, 1: 1e30}, {7: 0.0}, {60: 1e6}], ids=str)
+@pytest.mark.parametrize(
+    "bad", [{0: 0.0}, {0: 1e6}, {0: -1e30, 1: 1e30}, {1: 20.0, 2: 20.0, 3: 20.0}, {7: 0.0}, {60: 1e6}], ids=str
+)
 def test_a_bad_reading_does_not_lead_a_seeker_away(name: str, bad: dict[int, float]) -> None:
     assert search(SEEKERS[name](), bad=bad)[0] == pytest.approx(BEST, abs=3.0)
 

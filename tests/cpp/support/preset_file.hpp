@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <map>
 #include <string>
 
@@ -11,20 +10,7 @@ namespace mgdd::test_support {
 
 using PresetValues = std::map<std::string, std::string>;
 
-inline PresetValues preset_values(const std::string& preset, const std::string& section) {
-  std::ifstream file(std::string(MGDD_PRESETS_DIR) + "/" + preset + ".toml");
-  PresetValues values;
-  bool inside = false;
-  for (std::string line; std::getline(file, line);) {
-    if (line.starts_with('[')) inside = line == "[" + section + "]";
-    const std::string key = " = { value = ";
-    const auto at = line.find(key);
-    if (!inside || at == std::string::npos) continue;
-    const auto from = at + key.size();
-    values[line.substr(0, at)] = line.substr(from, line.find(", unit") - from);
-  }
-  return values;
-}
+PresetValues preset_values(const std::string& preset, const std::string& section);
 
 /// What a user gets who says nothing is that preset: every number, and every option, whose names `options` gives.
 template <class Record>

@@ -18,6 +18,7 @@ constexpr double least_moved = 0.25;  // of the reach: with less applied neither
 constexpr double least_of_all = 1e-3;
 constexpr double least_movement = 1e-13;  // of J
 constexpr double lags = 3.0;              // after which a first-order lag has settled
+constexpr double far_quartiles = 4.0;  // upper quartiles of the distances from the median: 4.2 sd of a normal scatter
 
 // Whole cycles by which every component is late.
 std::int64_t delay_of(const std::vector<ComponentLag>& components) {
@@ -85,7 +86,8 @@ bool FirstReadings::fill() noexcept {
   return true;
 }
 
-// What lies far out of the readings of the same point counts as their median.
+// What lies far out of the readings of the same point counts as their median. No perturbation is in these: up to a
+// quarter of all may be out. Of a J on coarse steps, most of whose distances are 0, what three have in common stays.
 void FirstReadings::bring_in() noexcept {
   Eigen::Map<Eigen::MatrixXd> y(readings_.data(), slots(), rounds);
   Eigen::MatrixXd::Index out = 0;
@@ -100,7 +102,9 @@ void FirstReadings::bring_in() noexcept {
     for (Eigen::Index r = 0; r < rounds; ++r)
       scratch_[static_cast<std::size_t>(out++)] = std::abs(y(s, r) - of_point);
   }
-  const double farthest = farthest_of(scratch_);
+  const auto quartile = scratch_.begin() + static_cast<std::ptrdiff_t>(3 * scratch_.size() / 4);
+  std::nth_element(scratch_.begin(), quartile, scratch_.end());
+  const double farthest = *quartile > 0.0 ? far_quartiles * *quartile : farthest_of(scratch_);
   for (Eigen::Index s = 0; s < slots(); ++s) {
     const double of_point = middle(s);
     y.row(s) = ((y.row(s).array() - of_point).abs() > farthest).select(of_point, y.row(s).array());

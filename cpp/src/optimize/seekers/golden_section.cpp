@@ -16,6 +16,7 @@ constexpr std::size_t ring = 256;               // samples behind the parabola
 constexpr double reach_share = 0.3;             // of the bracket: how far the refinement looks to both sides
 constexpr double near_widths = 1.5;             // from the middle: samples beyond do not shape the parabola
 constexpr double first_samples = 2.0;           // of each point before chance is judged
+constexpr double bad_scatter = 3.0;             // times noise_sd, of four readings by chance once in 10,000
 constexpr double limit_samples = 4.0;           // ... before a limit decides: its noise is not known
 constexpr double widest_share = 0.2;            // of the first bracket: the refinement looks no wider
 constexpr double width_rate = 0.05;             // how fast the width follows what the parabola says, per triple
@@ -92,6 +93,8 @@ void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcep
   }
   if (!clamp_.arrived(applied_, applied, scalar_input(0.5 * (lower_ + upper_)))) return;
   Point& point = points_[static_cast<std::size_t>(turn_)];
+  const double from_mean = point.count > 0.0 ? j - point.sum / point.count : 0.0;
+  point.squares += from_mean * from_mean * point.count / (point.count + 1.0);
   point.count += 1.0;
   point.sum += j;
   point.missed += applied[0] - applied_[0];
@@ -156,7 +159,11 @@ void GoldenSection::decide() noexcept {
     return over0 > over1 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }
   const double rise = mean(points_[1].sum, points_[1]) - mean(points_[0].sum, points_[0]);
-  const double error = settings_.noise_sd * std::sqrt(1.0 / points_[0].count + 1.0 / points_[1].count);
+  // Readings of one point that lie further apart than the noise lets them: one of them is bad, and which is unknown.
+  const double scatter =
+      std::sqrt((points_[0].squares + points_[1].squares) / std::max(1.0, points_[0].count + points_[1].count - 2.0));
+  const double sd = scatter > bad_scatter * settings_.noise_sd ? scatter : settings_.noise_sd;
+  const double error = sd * std::sqrt(1.0 / points_[0].count + 1.0 / points_[1].count);
   if (exact ? rise != 0.0 : std::abs(rise) > settings_.significance * error) {  // alike to the last bit says nothing
     draws_ = 0;
     return rise > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));

@@ -76,6 +76,7 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
       v(name + "_excess", self.points_[p].excess);
       v(name + "_judged", self.points_[p].judged);
       v(name + "_missed", self.points_[p].missed);
+      v(name + "_squares", self.points_[p].squares);
     }
   }
 
@@ -88,8 +89,8 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   struct Point {
     // Sums: of J, of the worst scaled excess over the limits in `judged` cycles, of the applied input less the asked
-    // one.
-    double count = 0.0, sum = 0.0, excess = 0.0, judged = 0.0, missed = 0.0;
+    // one; and of squares of J about the mean.
+    double count = 0.0, sum = 0.0, excess = 0.0, judged = 0.0, missed = 0.0, squares = 0.0;
   };
   struct Parabola {
     double vertex, bend;
