@@ -22,6 +22,7 @@ every = pytest.mark.parametrize("name", SEEKERS)
 OWN_LIKELIHOOD = {"GaussianProcessSeeking", "CurveSeeking"}
 shared = pytest.mark.parametrize("name", sorted(set(SEEKERS) - OWN_LIKELIHOOD))
 
+LIMITED = stepped(start=START, lower=-20.0, upper=20.0, limits={"p_max_bar": 100.0})
 Actuator = Callable[[float], float]
 
 
@@ -81,6 +82,21 @@ def test_the_finder_finds_every_kind_of_seeker() -> None:
 )
 def test_a_bad_reading_does_not_lead_a_seeker_away(name: str, bad: dict[int, float]) -> None:
     assert search(SEEKERS[name](), bad=bad)[0] == pytest.approx(BEST, abs=3.0)
+
+
+@shared
+@pytest.mark.parametrize("bad", [{0: 1e6}, {2: 1e6}, {2: 0.0}, {60: 1e6}, {60: 0.0}], ids=str)
+def test_a_bad_reading_of_a_limit_neither_breaks_it_nor_holds_a_seeker_back(name: str, bad: dict[int, float]) -> None:
+    """Pressure rises by 2 bar a unit: the limit lies at 0, the best at 4."""
+    seeker, rng = LIMITED[name](), np.random.default_rng(2)
+    above = 0
+    for cycle in range(400):
+        asked = float(np.ravel(seeker.ask())[0])
+        above += asked > 1.0
+        seeker.tell(j_at(asked, rng), [bad.get(cycle, 100.0 + 2.0 * asked + rng.normal(0.0, 0.5))])
+    assert above <= 40
+    assert float(seeker.estimate[0]) == pytest.approx(0.0, abs=2.5)
+    assert "limit_delay" not in codes(seeker)
 
 
 @shared

@@ -113,8 +113,16 @@ void GoldenSection::judge(Point& point, const Reading& reading) noexcept {
     const Limit& limit = filter_.limits()[i];
     worst = std::max(worst, (reading.limits[i] + filter_.margin(i) - limit.upper) / limit.scale);
   }
+  point.least = point.judged > 0.0 ? std::min(point.least, worst) : worst;
+  point.most = point.judged > 0.0 ? std::max(point.most, worst) : worst;
   point.excess += worst;
   point.judged += 1.0;
+}
+
+// Mean of what was read, without the least and the most of enough of them: one may be bad.
+double GoldenSection::excess_at(const Point& point) noexcept {
+  if (point.judged < limit_samples) return point.excess / point.judged;
+  return (point.excess - point.least - point.most) / (point.judged - 2.0);
 }
 
 // In turns; but where limits come late, one point until they have judged it.
@@ -151,8 +159,8 @@ void GoldenSection::decide() noexcept {
   const double judged = std::min(points_[0].judged, points_[1].judged);
   const double enough = filter_.settling() > 0 && !exact ? limit_samples : 1.0;
   if (limit_count() > 0 && judged < enough) return;
-  const double over0 = limit_count() > 0 ? points_[0].excess / points_[0].judged : 0.0;
-  const double over1 = limit_count() > 0 ? points_[1].excess / points_[1].judged : 0.0;
+  const double over0 = limit_count() > 0 ? excess_at(points_[0]) : 0.0;
+  const double over1 = limit_count() > 0 ? excess_at(points_[1]) : 0.0;
   if (std::max(over0, over1) > 0.0) {
     if (!exact && judged < limit_samples) return;
     draws_ = 0;

@@ -29,44 +29,54 @@ double farthest_of(std::span<double> distances) noexcept {
   return beyond * *at;
 }
 
-Outliers::Outliers(std::size_t components, Eigen::Index inputs)
-    : room_(room_of_one + room_per_input * (inputs - 1)),
-      ring_(components * static_cast<std::size_t>(room_), 0.0),
-      low_(components, -largest_reading),
-      high_(components, largest_reading),
+Outliers::Outliers(std::size_t components, const std::vector<Limit>& limits, Eigen::Index inputs)
+    : components_(components),
+      room_(room_of_one + room_per_input * (inputs - 1)),
+      ring_((components + limits.size()) * static_cast<std::size_t>(room_), 0.0),
+      low_(components + limits.size(), -largest_reading),
+      high_(low_.size(), largest_reading),
       scratch_(static_cast<std::size_t>(room_), 0.0),
-      admitted_(components, 0.0) {}
+      admitted_(low_.size(), 0.0) {
+  for (const Limit& limit : limits)
+    uppers_.push_back(limit.upper);
+}
 
-// What this component may lie between, by the readings that are known.
-void Outliers::bound(std::size_t component) noexcept {
+// What this channel may lie between, by the readings that are known.
+void Outliers::bound(std::size_t channel) noexcept {
   const auto n = static_cast<std::size_t>(known_);
-  const double* const ring = &ring_[component * static_cast<std::size_t>(room_)];
+  const double* const ring = &ring_[channel * static_cast<std::size_t>(room_)];
   const std::span<double> scratch(scratch_.data(), n);
   std::copy(ring, ring + n, scratch.begin());
   const double middle = median_of(scratch);
-  std::transform(ring, ring + n, scratch.begin(), [&](double j) { return std::abs(j - middle); });
+  std::transform(ring, ring + n, scratch.begin(), [&](double value) { return std::abs(value - middle); });
   double farthest = farthest_of(scratch);
-  if (!(farthest > 0.0)) farthest = 2.0 * largest_reading;  // J that stands still shows no scatter
-  low_[component] = middle - farthest;
-  high_[component] = middle + farthest;
+  if (!(farthest > 0.0)) farthest = 2.0 * largest_reading;  // what stands still shows no scatter
+  low_[channel] = middle - farthest;
+  high_[channel] = middle + farthest;
   if (count_ > fewest) return;
+  bool& spoiled = channel < components_ ? spoiled_ : limits_spoiled_;
   for (const double distance : scratch)
-    spoiled_ = spoiled_ || distance > spoiling * farthest;
+    spoiled = spoiled || distance > spoiling * farthest;
 }
 
-std::span<const double> Outliers::admit(std::span<const double> components) noexcept {
-  spoiled_ = false;
+std::span<const double> Outliers::admit(std::span<const double> components, std::span<const double> limits) noexcept {
+  spoiled_ = limits_spoiled_ = false;
   const bool late = count_ >= fewest, due = count_ % fewest == 0;
-  for (std::size_t c = 0; c < components.size(); ++c) {
-    const double j = components[c];
-    if (late && (due || j < low_[c] || j > high_[c])) bound(c);
-    admitted_[c] = late ? std::clamp(j, low_[c], high_[c]) : j;
-    ring_[c * static_cast<std::size_t>(room_) + static_cast<std::size_t>(count_ % room_)] = j;
+  for (std::size_t c = 0; c < admitted_.size(); ++c) {
+    const bool of_j = c < components_;
+    const double value = of_j ? components[c] : limits[c - components_];
+    if (late && (due || value < low_[c] || value > high_[c])) bound(c);
+    double& admitted = admitted_[c];
+    admitted = late ? std::clamp(value, low_[c], high_[c]) : value;
+    if (!of_j && value > uppers_[c - components_]) {
+      admitted = std::max(admitted, std::min(value, uppers_[c - components_] + 0.5 * (high_[c] - low_[c])));
+    }
+    ring_[c * static_cast<std::size_t>(room_) + static_cast<std::size_t>(count_ % room_)] = value;
   }
   ++count_;
   known_ = std::min(known_ + 1, room_);
   if (count_ == fewest) {
-    for (std::size_t c = 0; c < components.size(); ++c)
+    for (std::size_t c = 0; c < admitted_.size(); ++c)
       bound(c);
   }
   return admitted_;
@@ -74,7 +84,7 @@ std::span<const double> Outliers::admit(std::span<const double> components) noex
 
 void Outliers::forget() noexcept {
   count_ = known_ = 0;
-  spoiled_ = false;
+  spoiled_ = limits_spoiled_ = false;
   std::fill(low_.begin(), low_.end(), -largest_reading);
   std::fill(high_.begin(), high_.end(), largest_reading);
 }

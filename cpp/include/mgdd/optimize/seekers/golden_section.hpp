@@ -77,6 +77,8 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
       v(name + "_judged", self.points_[p].judged);
       v(name + "_missed", self.points_[p].missed);
       v(name + "_squares", self.points_[p].squares);
+      v(name + "_least", self.points_[p].least);
+      v(name + "_most", self.points_[p].most);
     }
   }
 
@@ -91,11 +93,13 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
     // Sums: of J, of the worst scaled excess over the limits in `judged` cycles, of the applied input less the asked
     // one; and of squares of J about the mean.
     double count = 0.0, sum = 0.0, excess = 0.0, judged = 0.0, missed = 0.0, squares = 0.0;
+    double least = 0.0, most = 0.0;  // of that excess
   };
   struct Parabola {
     double vertex, bend;
   };
   double inner(std::size_t p) const noexcept;
+  static double excess_at(const Point& point) noexcept;
   void judge(Point& point, const Reading& reading) noexcept;
   void next_turn() noexcept;
   void decide() noexcept;

@@ -1,6 +1,7 @@
 // Readings far outside of what those around them scatter by. What a seeker may learn from one reading is bounded by
 // three times the third largest distance of the last readings from their median: what a perturbation or a new level
-// does to J is seen more than twice in them and passes. The first readings are looked at once there are enough.
+// does to J is seen more than twice in them and passes. The same of what is limited; but what is above its limit stays
+// above. The first readings are looked at once there are enough.
 // noexcept and allocation-free after construction.
 #pragma once
 
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "mgdd/common/state.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/inputs.hpp"
 
 namespace mgdd::optimize {
@@ -21,12 +23,14 @@ double farthest_of(std::span<double> distances) noexcept;
 
 class Outliers {
  public:
-  Outliers(std::size_t components, Eigen::Index inputs);
+  Outliers(std::size_t components, const std::vector<Limit>& limits, Eigen::Index inputs);
 
-  /// These components of J, none farther out than the last readings allow; valid until the next call.
-  std::span<const double> admit(std::span<const double> components) noexcept;
-  /// True where the last reading showed that one of the first was far out.
+  /// These components of J and these limits behind them, none farther out than the last readings allow; valid until the
+  /// next call.
+  std::span<const double> admit(std::span<const double> components, std::span<const double> limits) noexcept;
+  /// True where the last reading showed that one of the first of J was far out, or one of the first of a limit.
   bool spoiled() const noexcept { return spoiled_; }
+  bool limits_spoiled() const noexcept { return limits_spoiled_; }
   void forget() noexcept;
 
   template <class Self, class V>
@@ -39,11 +43,13 @@ class Outliers {
   }
 
  private:
-  void bound(std::size_t component) noexcept;
+  void bound(std::size_t channel) noexcept;
 
-  std::int64_t room_;  // readings of each component
+  std::size_t components_;
+  std::vector<double> uppers_;  // of the limits
+  std::int64_t room_;           // readings of each channel
   std::int64_t count_ = 0, known_ = 0;
-  bool spoiled_ = false;
+  bool spoiled_ = false, limits_spoiled_ = false;
   std::vector<double> ring_, low_, high_, scratch_, admitted_;
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
@@ -37,7 +38,7 @@ class SeekerCore {
       : settings_(std::move(checked)),
         filter_(settings_.limits, settings_.space.size(), memory(settings_)),
         clamp_(settings_.space.size()),
-        outliers_(component_count(), settings_.space.size()),
+        outliers_(component_count(), settings_.limits, settings_.space.size()),
         protocol_(settings_.space, component_count() + settings_.limits.size()),
         estimate_(settings_.space.start),
         applied_(estimate_) {}
@@ -54,9 +55,11 @@ class SeekerCore {
     Inputs told;
     const Inputs& applied = protocol_.applied(reading, clamp_.sent(applied_), told);
     if (status == TellStatus::accepted) {
-      filter_.record(applied, reading.limits);
       Reading read = reading;
-      read.components = outliers_.admit(reading.components);
+      const std::span<const double> admitted = outliers_.admit(reading.components, reading.limits);
+      read.components = admitted.first(component_count());
+      read.limits = admitted.subspan(component_count());
+      filter_.record(applied, read.limits);
       learn(read, applied);
     } else {
       filter_.skip(applied);
@@ -90,11 +93,11 @@ class SeekerCore {
     protocol_.failures.forget();
     outliers_.forget();
   }
-  /// After a reading: what the first ones made of `self` is void where one of them was far out, unless they are judged
-  /// together; and where nothing but another input has worked, the search goes on there.
+  /// After a reading: what the first ones made of `self` is void where one of them was far out, those of J unless they
+  /// are judged together; and where nothing but another input has worked, the search goes on there.
   template <class Self>
   static void look_back(Self& self, bool judged_together) noexcept {
-    if (self.outliers_.spoiled() && !judged_together) self.begin_anew();
+    if (self.outliers_.limits_spoiled() || (self.outliers_.spoiled() && !judged_together)) self.begin_anew();
     if (const Inputs* const works = self.protocol_.failures.found()) self.shift_estimate(*works - self.estimate_);
   }
   template <class Self, class V>
