@@ -83,8 +83,8 @@ def test_plot_a_run_of_a_seeker() -> None:
     seeker = mgdd.optimize.ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0, limits=limits)
     run = mgdd.loop.run_seeker(bench, seeker, 300)
     assert len(mgdd.plot.seeking(run).figure.axes) == len(run.plot().figure.axes)
-    assert run.summary["final_cad"] > -30.0
-    assert "final_cad" in run.summary()
+    assert run.summary["final_soc_cad"] > -30.0
+    assert "final_soc_cad" in run.summary()
 
 
 def test_look_a_map_up_at_a_point() -> None:

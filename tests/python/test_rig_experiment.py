@@ -239,7 +239,7 @@ def test_seeking_stays_inside_its_bounds_and_says_what_guided_it(guide: str) -> 
         )
     )
     check_labels(result.dataset)
-    applied = result.dataset["soc_applied_cad"].to_numpy()
+    applied = result.dataset["applied"][:, 0].to_numpy()
     assert applied.min() >= -12.0
     assert result.figures["guide"] == guide
     assert result.counters["guard"]["bounds"] == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from mgdd.cli import main
 from mgdd.engine import Cylinder
 from mgdd.loop import EngineBench, seek
 from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop.summary import FIGURES_OF_INPUT
 from mgdd.results.labels import to_jsonable
 from mgdd.rig import Experiment, run_experiment
 
@@ -74,16 +76,39 @@ def test_three_doors_give_the_same_bits(question: str, capsys: pytest.CaptureFix
     assert len(shared) > 5
     for name in shared:
         assert by_experiment.figures["figures"][name] == pytest.approx(own["figures"][name], rel=1e-12), name
-    np.testing.assert_array_equal(by_experiment.dataset["soc_applied_cad"], found.dataset["soc_applied_cad"])
+    np.testing.assert_array_equal(by_experiment.dataset["applied"][:, 0], found.dataset["applied"][:, 0])
 
 
-def test_one_input_and_two_have_the_same_keys(capsys: pytest.CaptureFixture[str]) -> None:
-    keys = []
+def test_one_input_and_two_have_the_same_layout(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    keys, columns = [], []
     for more in ([], ["--input", "egr=0:0.3"]):
         options = ["--input", "soc_cad=-20:5", *more, "--cycles", "12", "--json", "--quiet"]
-        assert main(["engine", "seek", *options]) == 0
-        keys.append(set(json.loads(capsys.readouterr().out)))
+        assert main(["engine", "seek", *options, "-o", str(tmp_path / "run.csv")]) == 0
+        out = json.loads(capsys.readouterr().out)
+        keys.append([set(own) - {f"{name}_egr" for name in FIGURES_OF_INPUT} for own in (out, out["figures"])])
+        names = (tmp_path / "run.csv").read_text().splitlines()
+        columns.append(set(next(line for line in names if not line.startswith("#")).split(",")))
     assert keys[0] == keys[1]
+    steered = {f"{what}_soc_cad" for what in ("estimate", "asked", "applied")}
+    assert all(steered <= own for own in columns)
+
+
+@pytest.mark.parametrize("inputs", [("soc_cad",), ("soc_cad", "egr"), ("x",), ("x", "y")], ids="-".join)
+def test_the_cycles_of_every_plant_have_one_layout(inputs: tuple[str, ...]) -> None:
+    bounds = {name: (-20.0, 5.0) if name == "soc_cad" else (0.0, 0.3) for name in inputs}
+
+    def linear(x: Any) -> float:
+        return -sum(x[name] for name in inputs)
+
+    found = seek(linear if "x" in inputs else EngineBench(inputs=list(inputs), seed=1), bounds, cycles=12)
+    for name in ("estimate", "asked", "applied"):
+        assert found.dataset[name].dims == ("cycle", "input")
+        assert found.dataset[name].sel(input=list(inputs)).shape == (12, len(inputs))
+    assert found.dataset["void"].dims == ("cycle",)
+    for name in inputs:
+        mean = float(found.dataset["estimate"].sel(input=name).mean())
+        assert found.run.summary[f"final_{name}"] == pytest.approx(mean)
+    assert not {"estimate_cad", "soc_requested_cad", "soc_applied_cad"} & set(found.dataset.variables)
 
 
 def test_gains_do_not_come_from_the_truth_of_the_plant() -> None:

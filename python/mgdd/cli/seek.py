@@ -32,7 +32,6 @@ from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
 __all__ = ["add_seek"]
 
@@ -183,7 +182,8 @@ def _lags(bench: EngineBench) -> list[ComponentLag] | None:
 def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, Any]:
     """Judge by the noise-free bench, which the search does not know."""
     steady = bench.steady_map({name: [value] for name, value in found.inputs.items()}, cycle=max(bench.cycle - 1, 0))
-    estimates, aim = _estimates(found), np.array(list(best.inputs.values()))
+    names, aim = list(best.inputs), np.array(list(best.inputs.values()))
+    estimates = found.run.dataset["estimate"].sel(input=names).to_numpy()
     width = np.array([high - low for low, high in best.bounds.values()])
     near = (np.abs(estimates - aim) <= width / _NEAR).all(axis=1)
     late = (estimates - aim)[len(estimates) // 2 :]
@@ -195,15 +195,6 @@ def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, A
         "cycles_to": int(near.argmax()) if near.any() else None,
         "rms": dict(zip(best.inputs, np.sqrt(np.mean(late**2, axis=0)).tolist(), strict=True)) if late.size else None,
     }
-
-
-def _estimates(found: SeekResult) -> NDArray[np.float64]:
-    """Give the estimate before every cycle, per input."""
-    cycles = found.run.dataset
-    if "estimate_cad" in cycles:
-        return cycles["estimate_cad"].to_numpy()[:, None]
-    table: NDArray[np.float64] = cycles["estimate"].sel(input=list(found.inputs)).to_numpy()
-    return table
 
 
 def _guided(args: argparse.Namespace, found: SeekResult, guide: Any) -> dict[str, Any]:
@@ -251,10 +242,10 @@ def _percent(share: float) -> str:
 
 
 def _table(cycles: xr.Dataset) -> xr.Dataset:
-    """Leave the columns over cycles, those of several inputs by name; COV is added."""
+    """Leave the columns over cycles, those of the inputs by name; COV is added."""
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
-    for name in cycles["input"].to_numpy().tolist() if "input" in cycles.dims else []:
-        for kind in ("estimate", "asked"):
+    for name in cycles["input"].to_numpy().tolist():
+        for kind in ("estimate", "asked", "applied"):
             table[f"{kind}_{name}"] = cycles[kind].sel(input=name, drop=True)
     if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
         cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")

@@ -54,8 +54,6 @@ def _column(known: Any, name: str, table: str, over: str | None) -> Any:
         raise ParameterError(f"known = {type(known).__name__}: must be a table with columns by name")
     if over is not None and table in there and name not in there and name in known.coords[over].to_numpy():
         values = known[table].sel({over: name})
-    elif name == "soc_cad" and name not in there and "soc_applied_cad" in there:
-        values = known["soc_applied_cad"]
     elif name in there:
         values = known[name]
     elif over is None and table in there:

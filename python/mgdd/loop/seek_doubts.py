@@ -44,14 +44,12 @@ class Readings:
     ) -> None:
         self._data, self._estimate, self._noise_sd = data, estimate, noise_sd
         names = [one.name for one in inputs]
-        one = "estimate_cad" in data
-        self.estimates = _per_input(data, "estimate_cad" if one else "estimate", names)
-        self.applied = _per_input(data, "soc_applied_cad" if one else "applied", names)
+        self.estimates, self.applied = (data[name].sel(input=names).to_numpy() for name in ("estimate", "applied"))
         bounds = np.array([(each.lower, each.upper) for each in inputs])
         tried = np.maximum(np.ptp(self.applied, axis=0), 1e-300) if len(self.applied) else np.ones(len(names))
         width = bounds[:, 1] - bounds[:, 0]
         self.width = np.where(np.isfinite(width), width, tried)
-        self.counts = ~data["void" if "void" in data else "misfire"].to_numpy().astype(bool)
+        self.counts = ~data["void"].to_numpy().astype(bool)
         self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
 
     def limit(self, name: str) -> NDArray[np.float64]:
@@ -80,14 +78,6 @@ class Readings:
         if not math.isfinite(noise):
             noise = float(np.std(last))
         return Mean(float(last.mean() - first[0]), noise * math.sqrt(1.0 + 1.0 / last.size))
-
-
-def _per_input(data: xr.Dataset, name: str, names: Sequence[str]) -> NDArray[np.float64]:
-    values = data[name]
-    table: NDArray[np.float64] = (
-        values.sel(input=list(names)).to_numpy() if "input" in values.dims else values.to_numpy()[:, None]
-    )
-    return table
 
 
 def _mean(values: NDArray[np.float64]) -> Mean:

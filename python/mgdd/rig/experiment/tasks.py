@@ -277,9 +277,13 @@ class SeekPlan:
         return chosen(self._asked, self.task.seeker)
 
     def estimate(self) -> dict[str, float]:
-        """Give what the running seeker takes for the best timing, and its standard deviation: NaN where it has none."""
-        sd = getattr(self._running, "estimate_sd", math.nan)
-        return {"estimate_cad": float(self._running.estimate[0]), "estimate_sd_cad": float(np.ravel(sd)[0])}
+        """Give what the running seeker takes for the best inputs, and standard deviations: NaN where it has none."""
+        best = self._running.estimate.tolist()
+        sds = np.broadcast_to(getattr(self._running, "estimate_sd", math.nan), len(best)).tolist()
+        named = zip(self.task.inputs, best, sds, strict=True)
+        return {
+            f"{what}.{name}": own[at] for name, *own in named for at, what in enumerate(("estimate", "estimate_sd"))
+        }
 
     def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many cycles."""
