@@ -26,6 +26,11 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
         ["--limit", "p_max_bar=95", "--start", "soc_cad=2", "--cycles", "120"],
         "cycles = 120\n[seek.limits]\np_max_bar = 95\n[seek.start]\nsoc_cad = 2\n[seek.inputs]\nsoc_cad = [-25, 8]\n",
     ),
+    "a limit without a start": (
+        {"inputs": {"soc_cad": (-25.0, 8.0)}, "limits": {"p_max_bar": 95.0}},
+        ["--limit", "p_max_bar=95"],
+        "[seek.limits]\np_max_bar = 95\n[seek.inputs]\nsoc_cad = [-25, 8]\n",
+    ),
     "a seeker by name": (
         {"inputs": {"soc_cad": (-20.0, 5.0)}, "seeker": "spsa"},
         ["--seeker", "spsa"],

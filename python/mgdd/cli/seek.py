@@ -78,7 +78,8 @@ def add_seek(verbs: Any) -> None:
         action="append",
         default=[],
         metavar="NAME=X",
-        help="first value of an input, repeatable; left out: the best of the guide, or the middle of the bounds",
+        help="first value of an input, repeatable; left out: the best of the guide, or the "
+        "middle of the bounds, under limits the safe side of the timing",
     )
     _SEARCH.add(parser)
     parser.add_argument(

@@ -16,7 +16,7 @@ from mgdd.optimize import GaussianProcessSeeking
 __all__ = ["tell_known"]
 
 
-def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> Choice:
+def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tuple[Question, Choice]:
     """Tell the readings, in their order, to a seeker that begins at the best of them where no start is given."""
     if not isinstance(choice.seeker, CurveSeeking | GaussianProcessSeeking):
         raise ParameterError(
@@ -36,7 +36,8 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> Choi
         kept = read & (limits <= uppers).all(axis=1)
         worth = np.where(kept if kept.any() else read, j if asked.maximize else -j, -math.inf)
         best = dict(zip(names, x[int(np.argmax(worth))].tolist(), strict=True))
-        choice = chosen(Question(**{**vars(asked), "start": best}), seeker)
+        asked = Question(**{**vars(asked), "start": best})
+        choice = chosen(asked, seeker)
     for row, value, measured, fired in zip(x.tolist(), j.tolist(), limits.tolist(), read.tolist(), strict=True):
         choice.seeker.ask()
         applied = dict(zip(names, row, strict=True))
@@ -44,7 +45,7 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> Choi
             choice.seeker.tell(value, measured or None, applied=applied)
         else:
             choice.seeker.tell(math.nan, misfire=True, applied=applied)
-    return choice._replace(reason=f"{choice.reason}, after {j.size} readings of before", first_cycles=1)
+    return asked, choice._replace(reason=f"{choice.reason}, after {j.size} readings of before", first_cycles=1)
 
 
 def _column(known: Any, name: str, table: str, over: str | None) -> Any:

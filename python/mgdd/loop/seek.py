@@ -68,7 +68,9 @@ def seek(
         ``bounded_seeking``, ``spsa``, ``gradient_descent``, ``golden_section``. Or a seeker, as that of an earlier
         result, which goes on where it stands and changes.
     start : mapping of str to float, or float for one input, optional
-        First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle.
+        First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle; with
+        limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where nobody knows one
+        it is the middle, with a finding.
     cycles : int, optional
         How many; the first readings to every side at least. Left out: 200, and 25 more per cycle that J is late; of a
         seeker that dithers 2000, or 64 of its periods.
@@ -155,7 +157,7 @@ def seek(
         _require_plant(plant, asked)  # before anything is made
         choice = chosen(asked, seeker)
         if known is not None:
-            choice = tell_known(asked, seeker, choice, known)
+            asked, choice = tell_known(asked, seeker, choice, known)
     still = stillness(asked, tolerance)
     wanted_cycles = choice.cycles if cycles is None else int(cycles)
     return searched(_require_plant(plant, asked), choice, asked, wanted_cycles, still)
@@ -217,8 +219,9 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
     if limits and {one.name: one.upper for one in limits} != {one.name: one.upper for one in held}:
         said = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
         raise ParameterError(f"limits: the seeker given has {said}: leave them out")
+    begun = dict(zip([one.name for one in there], seeker.estimate.tolist(), strict=True))
     return Question(
-        inputs=there, limits=held, components=own.get("components"), maximize=own["maximize"],
+        inputs=there, start=begun, limits=held, components=own.get("components"), maximize=own["maximize"],
         delay_cycles=float(own.get("delay_cycles", 0.0)), lag_cycles=float(own.get("lag_cycles", 0.0)),
         guide=own.get("guide") or (True if isinstance(seeker, FeedForward | GuidedEngine) else None),
     )  # fmt: skip

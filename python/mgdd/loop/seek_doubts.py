@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mgdd.loop.lower_limits import plain_name
+from mgdd.errors import argument
+from mgdd.loop.lower_limits import measured_names, plain_name
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from mgdd.loop.plant_loop import LoopRun
     from mgdd.loop.seek_choice import Question
-    from mgdd.optimize import Input, Limit
+    from mgdd.optimize import Input
 
 __all__ = ["Mean", "Readings", "doubts_about"]
 
@@ -93,7 +94,7 @@ def doubts_about(
     """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
     return [
         *_about_run(run, readings, asked.inputs, gain),
-        *_about_limits(readings, asked.limits, kept),
+        *_about_limits(readings, asked, kept),
         *_about_seeker(seeker, asked, readings.j.size, seen=gain.value > _SURE * gain.sd),
     ]
 
@@ -126,8 +127,12 @@ def _about_run(run: LoopRun, readings: Readings, inputs: Sequence[Input], gain: 
         yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
 
 
-def _about_limits(readings: Readings, limits: Sequence[Limit], kept: Mapping[str, Mean]) -> Iterator[Finding]:
-    for limit in limits:
+def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean]) -> Iterator[Finding]:
+    if asked.started_blindly:
+        names = tuple(measured_names(asked.limits))
+        text = f"no start was given, and nobody knows where {', '.join(names)} would hold: it began where that was open"
+        yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
+    for limit in asked.limits:
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
         mean = kept[limit.name]
