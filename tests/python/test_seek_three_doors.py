@@ -36,6 +36,41 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
         ["--seeker", "spsa"],
         'seeker = "spsa"\n[seek.inputs]\nsoc_cad = [-20, 5]\n',
     ),
+    "a setting": (
+        {
+            "inputs": {"soc_cad": (-20.0, 5.0)},
+            "seeker": "extremum_seeking",
+            "settings": {"form": "washout", "gain": 0.4},
+        },
+        ["--seeker", "extremum_seeking", "--seeker-set", "form=washout", "--seeker-set", "gain=0.4"],
+        'seeker = "extremum_seeking"\nsettings = { form = "washout", gain = 0.4 }\n[seek.inputs]\nsoc_cad = [-20, 5]\n',
+    ),
+    "limits on both sides": (
+        {
+            "inputs": {"soc_cad": (-25.0, 8.0)},
+            "start": {"soc_cad": 0.0},
+            "cycles": 80,
+            "limits": {"imep_gross_bar": (9.5, None), "p_max_bar": (None, 100.0), "ca50_cad": (5.0, 20.0)},
+        },
+        [
+            "--start",
+            "soc_cad=0",
+            "--cycles",
+            "80",
+            "--limit",
+            "imep-gross-bar=9.5:",
+            "--limit",
+            "p_max_bar=:100",
+            "--limit",
+            "ca50_cad=5:20",
+        ],
+        "cycles = 80\nstart.soc_cad = 0\ninputs.soc_cad = [-25, 8]\nlimits = { imep_gross_bar = [9.5, inf], p_max_bar = [-inf, 100], ca50_cad = [5, 20] }\n",  # noqa: E501
+    ),
+    "two inputs": (
+        {"inputs": {"soc_cad": (-20.0, 5.0), "egr": (0.0, 0.3)}, "cycles": 40, "start": {"soc_cad": 2.0, "egr": 0.1}},
+        ["--cycles", "40", "--start", "soc_cad=2", "--start", "egr=0.1"],
+        "cycles = 40\n[seek.start]\nsoc_cad = 2\negr = 0.1\n[seek.inputs]\nsoc_cad = [-20, 5]\negr = [0, 0.3]\n",
+    ),
     "a tolerance": (
         {"inputs": {"soc_cad": (-20.0, 5.0)}, "tolerance": {"soc_cad": 1.5}},
         ["--tolerance", "soc_cad=1.5"],
@@ -60,15 +95,15 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_three_doors_give_the_same_bits(question: str, capsys: pytest.CaptureFixture[str]) -> None:
     asked, options, table = QUESTIONS[question]
-    low, high = asked["inputs"]["soc_cad"]
     given = dict(asked)
     if "guide" in given:
         rough = Cylinder(wall_heat_scale=1.6 * Cylinder().wall_heat_scale)
         given["guide"] = EngineGuide(cylinder=rough, kind=given["guide"])
-    found = seek(EngineBench(seed=3, limits=list(asked.get("limits", ()))), seed=3, **given)
+    bench = EngineBench(seed=3, limits=list(asked.get("limits", ())), inputs=list(asked["inputs"]))
+    found = seek(bench, seed=3, **given)
 
-    bounds = f"soc_cad={low}:{high}"
-    assert main(["engine", "seek", "--input", bounds, *options, "--seed", "3", "--json", "--quiet"]) == 0
+    bounds = [word for name, (low, high) in asked["inputs"].items() for word in ("--input", f"{name}={low}:{high}")]
+    assert main(["engine", "seek", *bounds, *options, "--seed", "3", "--json", "--quiet"]) == 0
     by_command = json.loads(capsys.readouterr().out)
     by_experiment = run_experiment(Experiment.from_toml(HEAD.format(seed=3) + table))
 
@@ -81,7 +116,26 @@ def test_three_doors_give_the_same_bits(question: str, capsys: pytest.CaptureFix
     assert len(shared) > 5
     for name in shared:
         assert by_experiment.figures["figures"][name] == pytest.approx(own["figures"][name], rel=1e-12), name
-    np.testing.assert_array_equal(by_experiment.dataset["applied"][:, 0], found.dataset["applied"][:, 0])
+    np.testing.assert_array_equal(by_experiment.dataset["applied"], found.dataset["applied"])
+
+
+def test_readings_of_before_go_through_every_door(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    options = ["engine", "seek", "--input", "soc_cad=-25:8", "--limit", "t_evo_k=960", "--quiet"]
+    before, after = tmp_path / "before.csv", ["--seed", "4", "--cycles", "30", "--json"]
+    assert main([*options, "--seed", "3", "--cycles", "40", "-o", str(before)]) == 0
+    capsys.readouterr()
+    assert main([*options, *after, "--known", str(before)]) == 0
+    by_command = json.loads(capsys.readouterr().out)
+    asked: dict[str, Any] = {"inputs": {"soc_cad": (-25.0, 8.0)}, "limits": {"t_evo_k": 960.0}}
+    first = seek(EngineBench(seed=3, limits=["t_evo_k"]), seed=3, cycles=40, **asked)
+    found = seek(EngineBench(seed=4, limits=["t_evo_k"]), seed=4, cycles=30, known=first.dataset, **asked)
+    assert "after 40 readings" in by_command["reason"]
+    table = "cycles = 30\nknown = 'before.csv'\ninputs.soc_cad = [-25, 8]\nlimits.t_evo_k = 960\n"
+    (tmp_path / "known.toml").write_text(HEAD.format(seed=4) + table)
+    by_experiment = run_experiment(Experiment.load(tmp_path / "known.toml"), tmp_path / "run")
+    assert (tmp_path / "run" / "inputs" / "before.csv").read_bytes() == before.read_bytes()
+    for other in (by_command, by_experiment.figures):
+        assert other["inputs"] == pytest.approx(found.inputs, abs=1e-9)  # a table has fewer digits than a number
 
 
 def test_one_input_and_two_have_the_same_layout(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

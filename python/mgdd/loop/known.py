@@ -20,7 +20,7 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tupl
     """Tell the readings, in their order, to a seeker that begins at the best of them where no start is given."""
     if not isinstance(choice.seeker, CurveSeeking | GaussianProcessSeeking):
         raise ParameterError(
-            f"known: goes to curve_seeking or gaussian_process_seeking, not to {argument('seeker')} "
+            f"{argument('known')}: goes to curve_seeking or gaussian_process_seeking, not to "
             f"{type(choice.seeker).__name__}, which asks for the readings that it needs: leave it out"
         )
     names, held = [one.name for one in asked.inputs], [limit.name for limit in asked.limits]
@@ -29,7 +29,9 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tupl
     limits = np.column_stack([_column(known, name, "limits", "limit") for name in held] or [np.empty((j.size, 0))])
     for at, one in enumerate(asked.inputs):
         if outside := [value for value in x[:, at].tolist() if not one.lower <= value <= one.upper]:
-            raise ParameterError(f"known: {one.name} = {outside[0]:g}: must be in [{one.lower:g}, {one.upper:g}]")
+            raise ParameterError(
+                f"{argument('known')}: {one.name} = {outside[0]:g}: must be in [{one.lower:g}, {one.upper:g}]"
+            )
     read = np.isfinite(j) & np.isfinite(limits).all(axis=1)
     if asked.start is None and asked.late_cycles == 0.0 and read.any():
         uppers = np.array([limit.upper for limit in asked.limits])
@@ -52,18 +54,26 @@ def _column(known: Any, name: str, table: str, over: str | None) -> Any:
     """Take a column by its name, or from the table that results of ours have."""
     there = known if isinstance(known, Mapping) else getattr(known, "variables", getattr(known, "columns", None))
     if there is None:
-        raise ParameterError(f"known = {type(known).__name__}: must be a table with columns by name")
-    if over is not None and table in there and name not in there and name in known.coords[over].to_numpy():
+        raise ParameterError(f"{argument('known')} = {type(known).__name__}: must be a table with columns by name")
+    if over is not None and table in there and name in known.coords[over].to_numpy():
         values = known[table].sel({over: name})
+    elif f"{table}_{name}" in there:  # of a table that the command wrote
+        values = known[f"{table}_{name}"]
     elif name in there:
         values = known[name]
     elif over is None and table in there:
         values = known[table]
     else:
-        raise ParameterError(hinted(f"known: has no column {name!r}", name, [str(each) for each in there]))
+        raise ParameterError(
+            hinted(
+                f"{argument('known')}: has no column {name!r}, but {', '.join(map(str, there))}",
+                name,
+                [str(each) for each in there],
+            )
+        )
     column = np.asarray(values, np.float64)
     if column.ndim != 1:
-        raise ParameterError(f"known: {name} has shape {column.shape}: must be a column")
+        raise ParameterError(f"{argument('known')}: {name} has shape {column.shape}: must be a column")
     if table == "applied" and not np.isfinite(column).all():
-        raise ParameterError(f"known: {name} must be finite in every row")
+        raise ParameterError(f"{argument('known')}: {name} must be finite in every row")
     return column

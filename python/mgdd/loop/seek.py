@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError, ShapeError, hinted
+from mgdd.errors import Interrupted, ParameterError, ShapeError, argument, hinted
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.function_plant import FunctionPlant
@@ -25,7 +25,7 @@ from mgdd.optimize.inputs import inputs_of, named_values
 if TYPE_CHECKING:
     from mgdd.optimize import ComponentLag, Input, Limit
 
-__all__ = ["require_measured", "searched", "seek", "seek_inputs", "started"]
+__all__ = ["require_cycles", "require_measured", "searched", "seek", "seek_inputs", "started"]
 
 _MOST_CYCLES = 2_000_000
 
@@ -165,10 +165,8 @@ def seek(
 
 def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: Any = None) -> SeekResult:
     """Let a seeker that was chosen run on a plant of its inputs; errors as those of `seek`."""
-    if cycles < choice.first_cycles:
-        raise ParameterError.of("cycles", cycles, f">= {choice.first_cycles}, one reading to the side of every input")
-    if cycles > _MOST_CYCLES:
-        raise ParameterError.of("cycles", cycles, f"<= {_MOST_CYCLES}; go on with seeker=found.seeker")
+    require_cycles(choice, cycles)
+    plant = with_lower_sides(plant, asked.limits)
     begun = dict(zip([one.name for one in asked.inputs], choice.seeker.estimate.tolist(), strict=True))
 
     def result(run: LoopRun) -> SeekResult:
@@ -185,14 +183,24 @@ def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: 
         raise
 
 
+def require_cycles(choice: Choice, cycles: int) -> None:
+    """ParameterError for fewer than look to every side, or more than one search takes."""
+    if cycles < choice.first_cycles:
+        raise ParameterError.of("cycles", cycles, f">= {choice.first_cycles}, one reading to the side of every input")
+    if cycles > _MOST_CYCLES:
+        raise ParameterError.of(
+            "cycles", cycles, f"<= {_MOST_CYCLES}; go on in another search, with {argument('known')}"
+        )
+
+
 def _require_plant(plant: Any, asked: Question) -> Plant:
     """Give the plant of these inputs and limits; ParameterError where it is none, or another."""
     names, held = [one.name for one in asked.inputs], measured_names(asked.limits)
     if isinstance(plant, Plant):
         require_measured(plant, names, held)
-        return with_lower_sides(plant, asked.limits)
+        return plant
     if callable(plant):
-        return with_lower_sides(FunctionPlant(plant, names, held), asked.limits)
+        return FunctionPlant(plant, names, held)
     raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
 
 
@@ -243,13 +251,15 @@ def started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
     if start is None:
         return None
     names = [one.name for one in inputs]
-    values = np.atleast_1d(np.asarray(named_values("start", start, names), np.float64))
+    values = np.atleast_1d(np.asarray(named_values(argument("start"), start, names), np.float64))
     if values.shape != (len(names),):
-        raise ShapeError(f"start has {values.size} entries: must have one number for each of {', '.join(names)}")
+        raise ShapeError(
+            f"{argument('start')} has {values.size} entries: must have one number for each of {', '.join(names)}"
+        )
     for one, value in zip(inputs, values.tolist(), strict=True):
         if not one.lower <= value <= one.upper:
             raise ParameterError(
-                f"start: {one.name} = {value:g}: must be in [{one.lower:g}, {one.upper:g}], its bounds"
+                f"{argument('start')}: {one.name} = {value:g}: must be in [{one.lower:g}, {one.upper:g}], its bounds"
             )
     return dict(zip(names, values.tolist(), strict=True))
 
@@ -262,5 +272,9 @@ def require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) 
         if name not in plant.limit_names:
             have = ", ".join(plant.limit_names) or "none"
             raise ParameterError(
-                hinted(f"limits: {name!r} is not measured by the plant, which has {have}", name, plant.limit_names)
+                hinted(
+                    f"{argument('limits')}: {name!r} is not measured by the plant, which has {have}",
+                    name,
+                    plant.limit_names,
+                )
             )

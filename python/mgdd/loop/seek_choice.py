@@ -38,6 +38,10 @@ __all__ = ["SEEKERS", "Choice", "Question", "chosen"]
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
 _PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later
+_OWN_WORDS = (
+    "start", "lower", "upper", "inputs", "limits", "maximize", "seed", "components", "delay_cycles", "lag_cycles",
+    "guide", "curve", "limit_curves", "limit_guides",
+)  # fmt: skip
 _PERIODS = 64  # of a dither: 16 time constants of four periods
 _NEWTON_HOLD_PERIODS = 5  # until gradient and Hessian behind a lag have settled
 _STRIDE = 0.1  # share of the bounds a cycle, so that a limit no guide knows is read before it is reached
@@ -144,12 +148,21 @@ class Question:
         if "seed" in takes:
             known["seed"] = self.seed
         for name in self.settings:
-            if name not in takes:
-                have = ", ".join(takes)
+            if name in _OWN_WORDS:
                 raise ParameterError(
-                    hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {have}", name, list(takes))
+                    f"{argument('settings')}: {name!r} is no setting: the search gives it, leave it out"
                 )
-        return cls(**known | own | dict(self.settings))
+            if name not in takes:
+                have = [each for each in takes if each not in _OWN_WORDS]
+                raise ParameterError(
+                    hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {', '.join(have)}", name, have)
+                )
+        try:
+            return cls(**known | own | dict(self.settings))
+        except ParameterError as error:
+            if error.field not in self.settings:
+                raise
+            raise error.reworded(f"{argument('settings')}: {error}") from error
 
     def budget(self, seeker: Any) -> int:
         """How many cycles a search takes where nobody says."""
