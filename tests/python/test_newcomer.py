@@ -113,7 +113,7 @@ def test_save_and_load_each_result(tmp_path: Path) -> None:
     seeker = mgdd.optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
     run = mgdd.loop.run_seeker(mgdd.loop.EngineBench("puma_single"), seeker, 50)
     run.to_netcdf(tmp_path / "run.nc")
-    assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "timing [°CA aTDC]"
+    assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "soc_cad [°CA aTDC]"
     table = mgdd.maps.CalibrationMap({"fuel_mg": [10, 20]}, [1.0, 2.0], name="soc_cad")
     mgdd.maps.write_map(table, tmp_path / "map.csv")
     assert mgdd.maps.read_map(tmp_path / "map.csv") == table

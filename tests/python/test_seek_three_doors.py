@@ -19,6 +19,7 @@ from mgdd.rig import Experiment, run_experiment
 
 HEAD = 'kind = "experiment"\nformat = 1\ntask = "seek"\nseed = {seed}\n[safety]\nrate_cad = 100.0\n[seek]\n'
 ROUGH = 'scale = { wall_heat_scale = 1.6 }\nguide = "%s"\n'
+BOTH = "limits.imep_gross_bar = [9.5, inf]\nlimits.p_max_bar = [-inf, 100]\n"
 QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
     "nothing said": ({"inputs": {"soc_cad": (-20.0, 5.0)}}, [], "[seek.inputs]\nsoc_cad = [-20, 5]\n"),
     "a limit and a start": (
@@ -52,19 +53,8 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
             "cycles": 80,
             "limits": {"imep_gross_bar": (9.5, None), "p_max_bar": (None, 100.0), "ca50_cad": (5.0, 20.0)},
         },
-        [
-            "--start",
-            "soc_cad=0",
-            "--cycles",
-            "80",
-            "--limit",
-            "imep-gross-bar=9.5:",
-            "--limit",
-            "p_max_bar=:100",
-            "--limit",
-            "ca50_cad=5:20",
-        ],
-        "cycles = 80\nstart.soc_cad = 0\ninputs.soc_cad = [-25, 8]\nlimits = { imep_gross_bar = [9.5, inf], p_max_bar = [-inf, 100], ca50_cad = [5, 20] }\n",  # noqa: E501
+        "--start soc_cad=0 --cycles 80 --limit imep-gross-bar=9.5: --limit p_max_bar=:100 --limit ca50_cad=5:20".split(),  # noqa: E501
+        "cycles = 80\nstart.soc_cad = 0\ninputs.soc_cad = [-25, 8]\nlimits.ca50_cad = [5, 20]\n" + BOTH,
     ),
     "two inputs": (
         {"inputs": {"soc_cad": (-20.0, 5.0), "egr": (0.0, 0.3)}, "cycles": 40, "start": {"soc_cad": 2.0, "egr": 0.1}},
