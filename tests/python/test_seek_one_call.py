@@ -128,6 +128,14 @@ def test_without_a_start_a_search_begins_where_engines_keep_the_limit(name: str)
         assert "start_unknown" not in codes(found)
 
 
+def test_a_limit_that_bends_is_read_before_it_is_reached() -> None:
+    """Late, the pressure is that of compression, and flat; a stride that it allows there ends far above the limit."""
+    for seed in range(4):
+        bench = EngineBench(seed=seed, limits=["p_max_bar"])
+        found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": 95.0}, cycles=40, seed=seed)
+        assert 90.0 < float(found.dataset["noise_free_limits"].max()) < 96.0
+
+
 def test_a_start_that_nobody_knows_to_be_safe_is_a_finding() -> None:
     def bowl(x: float) -> Any:
         return -((x - 3.0) ** 2), {"noise_db": 10.0 * x}
