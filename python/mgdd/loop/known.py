@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tupl
         kept = read & (limits <= uppers).all(axis=1)
         worth = np.where(kept if kept.any() else read, j if asked.maximize else -j, -math.inf)
         best = dict(zip(names, x[int(np.argmax(worth))].tolist(), strict=True))
-        asked = Question(**{**vars(asked), "start": best})
+        asked = replace(asked, start=best)
         choice = chosen(asked, seeker)
     for row, value, measured, fired in zip(x.tolist(), j.tolist(), limits.tolist(), read.tolist(), strict=True):
         choice.seeker.ask()

@@ -25,7 +25,7 @@ from mgdd.optimize.inputs import inputs_of, named_values
 if TYPE_CHECKING:
     from mgdd.optimize import ComponentLag, Input, Limit
 
-__all__ = ["require_cycles", "require_measured", "searched", "seek", "seek_inputs", "started"]
+__all__ = ["plant_of", "require_cycles", "searched", "seek", "seek_inputs", "started"]
 
 _MOST_CYCLES = 2_000_000
 
@@ -154,13 +154,13 @@ def seek(
             lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
             settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
         )  # fmt: skip
-        _require_plant(plant, asked)  # before anything is made
+        plant_of(plant, asked.inputs, asked.limits)  # before anything is made
         choice = chosen(asked, seeker)
         if known is not None:
             asked, choice = tell_known(asked, seeker, choice, known)
     still = stillness(asked, tolerance)
     wanted_cycles = choice.cycles if cycles is None else int(cycles)
-    return searched(_require_plant(plant, asked), choice, asked, wanted_cycles, still)
+    return searched(plant_of(plant, asked.inputs, asked.limits), choice, asked, wanted_cycles, still)
 
 
 def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: Any = None) -> SeekResult:
@@ -193,14 +193,14 @@ def require_cycles(choice: Choice, cycles: int) -> None:
         )
 
 
-def _require_plant(plant: Any, asked: Question) -> Plant:
+def plant_of(plant: Any, inputs: Sequence[Input], limits: Sequence[Limit], values: Sequence[str] = ()) -> Plant:
     """Give the plant of these inputs and limits; ParameterError where it is none, or another."""
-    names, held = [one.name for one in asked.inputs], measured_names(asked.limits)
+    names, held = [one.name for one in inputs], measured_names(limits)
     if isinstance(plant, Plant):
-        require_measured(plant, names, held)
+        _require_measured(plant, names, held)
         return plant
     if callable(plant):
-        return FunctionPlant(plant, names, held)
+        return FunctionPlant(plant, names, held, values=tuple(values))
     raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
 
 
@@ -264,7 +264,7 @@ def started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
+def _require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
     """ParameterError where a plant has other inputs, or does not measure a limit."""
     if set(names) != set(plant.input_names):
         raise ParameterError(f"inputs = {', '.join(names)}: the plant takes {', '.join(plant.input_names)}")

@@ -6,7 +6,7 @@ import inspect
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -237,7 +237,7 @@ def _by_curve(asked: Question, **own: Any) -> Seeker:
     best = {one.name: min(max(curve.best, one.lower), one.upper)}
     if asked.limits and own.get("limit_curves") is None:
         stride = min(one.rate, _STRIDE * (one.upper - one.lower))
-        asked = _with(
+        asked = replace(
             asked, inputs=[Input(one.name, one.lower, one.upper, unit=one.unit, scale=one.scale, rate=stride)]
         )
     begin = asked.start or best | safe_side(asked.inputs, asked.limits)
@@ -271,7 +271,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         raise ParameterError(f"{argument('guide')}: guides soc_cad alone, not {names}: leave it out")
     if point is None:
         raise ParameterError(f"{argument('guide')}: the plant has no operating point: give EngineGuide its point")
-    plain = _with(asked, guide=None)
+    plain = replace(asked, guide=None)
     if isinstance(guide, TimingMap):
         said = guide(point)
         if said is None:
@@ -303,7 +303,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         if drawn is not None:
             own["limit_guides"] = [lambda x, each=each: each(x[one.name]) for each in drawn]
         return plain.made(GaussianProcessSeeking, begin, **own), "one input, late components and a model of each"
-    made = _by_curve(_with(plain, start=begin), curve=curve, limit_curves=drawn)
+    made = _by_curve(replace(plain, start=begin), curve=curve, limit_curves=drawn)
     if guide.kind == "curve":
         return made, "one input and the curve of a model, placed by the readings"
     return (
@@ -328,10 +328,6 @@ def _inner(asked: Question, seeker: Any, best: float) -> Seeker:
 def _inside(one: Input, value: float, scales: float) -> float:
     room = scales * (one.scale or (one.upper - one.lower) / 40.0)
     return min(max(value, one.lower + room), one.upper - room)
-
-
-def _with(asked: Question, **changes: Any) -> Question:
-    return Question(**{**vars(asked), **changes})
 
 
 def _best_of(guide: Any, inputs: Sequence[Input], maximize: bool) -> dict[str, float]:
