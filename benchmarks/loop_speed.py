@@ -74,15 +74,15 @@ def check_agreement(loops: int) -> np.ndarray:
     run = run_seeker(EngineBench(seed=3), loop_seeker(), CYCLES)
     seeker = loop_seeker()
     drive_from_python(EngineBench(seed=3), seeker, CYCLES)
-    if not np.array_equal(run.dataset["estimate_cad"], seeker.history["estimate"][:, 0]):
+    if not np.array_equal(run.dataset["estimate"][:, 0], seeker.history["estimate"][:, 0]):
         sys.exit("the loop in the core and the loop driven from Python differ: nothing timed")
     one, two = (monte_carlo(EngineBench(), loop_seeker(), range(loops), cycles=CYCLES, workers=n) for n in (1, 2))
     if not one.identical(two):
         sys.exit("one thread and two threads give different numbers: nothing timed")
-    if float(one["final_cad"][0, 0, 3]) != run.summary["final_cad"]:
+    if float(one["final_soc_cad"][0, 0, 3]) != run.summary["final_soc_cad"]:
         sys.exit("a loop of monte_carlo and the same loop of run_seeker differ: nothing timed")
     lanes = monte_carlo(EngineBench(), loop_seeker(), range(2 * loops), cycles=CYCLES)
-    if not np.allclose(lanes["final_cad"][0, 0, :loops], one["final_cad"][0, 0], rtol=1e-9, atol=0.0):
+    if not np.allclose(lanes["final_soc_cad"][0, 0, :loops], one["final_soc_cad"][0, 0], rtol=1e-9, atol=0.0):
         sys.exit("loops side by side and loops one by one differ by more than 1e-9: nothing timed")
     return seeker.history["applied"].values[:, 0].copy()
 

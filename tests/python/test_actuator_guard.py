@@ -214,9 +214,9 @@ def test_a_seeker_below_a_guard_keeps_the_bounds_and_learns_from_what_was_applie
         limits=[Limit("p_max_bar", upper)],
     )
     run = run_seeker(SimulatedRig(guard), kind(start=2.0, lower=-30.0, upper=10.0), 600)
-    applied = run.dataset["soc_applied_cad"].to_numpy()
+    applied = run.dataset["applied"][:, 0].to_numpy()
     assert applied.min() >= -7.0
-    asked = run.dataset["soc_requested_cad"].to_numpy()
+    asked = run.dataset["asked"][:, 0].to_numpy()
     changed = [entry.cycle for entry in guard.log if entry.asked != entry.applied]
     assert np.array_equal(np.flatnonzero(asked != applied), changed)
     assert guard.counts["limit"] > 0

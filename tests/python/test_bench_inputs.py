@@ -117,6 +117,18 @@ def test_one_input_is_bounded_by_its_name() -> None:
     assert best.active_limits == ("nox_soft_ppm",)
 
 
+@pytest.mark.parametrize("inputs", [("soc_cad",), ("soc_cad", "egr")], ids="-".join)
+def test_a_lower_limit_of_the_optimum_is_where_a_fine_scan_has_it(inputs: tuple[str, ...]) -> None:
+    bench, pressures = EngineBench(inputs=list(inputs)), np.linspace(-25.0, 5.0, 601)
+    bounds = {"soc_cad": (-25.0, 5.0), "egr": (0.0, 1e-3)}
+    best = bench.find_optimum({"p_max_bar": (130.0, None)}, bounds={name: bounds[name] for name in inputs})
+    steady = bench.steady_map({name: pressures if name == "soc_cad" else [0.0] for name in inputs})
+    kept = steady.isel(soc_cad=steady["p_max_bar"].to_numpy().ravel() >= 130.0)
+    assert best["soc_cad"] == pytest.approx(float(kept["soc_cad"][int(kept["j"].to_numpy().argmax())]), abs=0.1)
+    assert best.active_limits == ("-p_max_bar",)
+    assert best["p_max_bar"] == pytest.approx(130.0, abs=0.2)
+
+
 def test_seekers_of_named_inputs_run_on_it_in_any_order() -> None:
     turned = {name: BOUNDS[name] for name in reversed(BOUNDS)}
     start = {"soc_cad": -6.0, "egr": 0.1, "intake_pressure_kpa": 150.0}

@@ -170,6 +170,8 @@ def test_all_help_can_be_printed(capsys: pytest.CaptureFixture[str]) -> None:
         ("engine optimum --limit p_mx_bar=95", "p_max_bar"),
         ("engine seek --limit p_mx_bar=95", "p_max_bar"),
         ("map design --over soc_cad=-16:4 --points 4 --limit p_mx_bar=130", "p_max_bar"),
+        ("engine seek --method bounded", "--seeker' or '--seeker-set"),
+        ("engine seek --bounds 3", "--input"),
         ("study sensor-dela", "sensor-delay"),
         ("engine simulate --preset puma_sing", "puma_single"),
         ("preset show puma_sing", "puma_single"),

@@ -49,7 +49,7 @@ def options(kind: str, table: Path) -> tuple[str, ...]:
 
 def first_timing(file: Path) -> float:
     with file.open(encoding="utf-8") as stream:
-        return float(next(csv.DictReader(line for line in stream if not line.startswith("#")))["soc_requested_cad"])
+        return float(next(csv.DictReader(line for line in stream if not line.startswith("#")))["asked_soc_cad"])
 
 
 def test_without_a_guide_nothing_is_guided(capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +68,7 @@ def test_every_kind_begins_at_the_guide_and_improves_on_it(
     assert out["guide"] == kind
     assert out["start"]["soc_cad"] == pytest.approx(-9.0 if kind == "map" else -9.87, abs=0.1)
     assert abs(out["start"]["soc_cad"] - OPTIMUM_CAD) > 2.0  # a rough guide, on which the measurements improve
-    assert out["figures"]["final_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.2)
+    assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.2)
     assert out["j_lost"] < 0.1
     if kind in ("curve", "calibrated"):
         assert out["cycles_to"] <= 15
@@ -83,14 +83,14 @@ def test_every_kind_begins_at_the_guide_and_improves_on_it(
 
 def test_a_plain_parabola_guides_as_well(capsys: pytest.CaptureFixture[str]) -> None:
     out = seek(capsys, "--guide", "curve", *ROUGH, "--guide-shape", "parabola", "--cycles", "600")
-    assert out["figures"]["final_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
+    assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
 
 
 def test_another_engine_can_be_the_guide(capsys: pytest.CaptureFixture[str]) -> None:
     out = seek(capsys, "--guide", "curve", "--guide-preset", "hd_diesel_128x144", "--cycles", "600")
     assert out["preset"] == "puma_single"
     assert abs(out["start"]["soc_cad"] - OPTIMUM_CAD) > 0.2
-    assert out["figures"]["final_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
+    assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
 
 
 @pytest.mark.parametrize("kind", ["feed_forward", "curve", "calibrated"])
@@ -102,7 +102,7 @@ def test_a_guided_run_starts_below_the_limit(kind: str, capsys: pytest.CaptureFi
     assert out["start"]["soc_cad"] > LIMITED_CAD
     assert out["figures"]["noise_free_worst_p_max_bar"] < 97.0  # at the guide's own best timing 105.6
     assert out["optimum"]["soc_cad"] == pytest.approx(LIMITED_CAD, abs=0.01)
-    assert -0.1 < out["figures"]["final_cad"] - LIMITED_CAD < 1.25
+    assert -0.1 < out["figures"]["final_soc_cad"] - LIMITED_CAD < 1.25
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -203,7 +203,7 @@ def test_a_run_that_settles_writes_its_timing_back(
     learnt = TimingMap.read_csv(out_file) if ending == "csv" else TimingMap.from_toml(out_file.read_text("utf-8"))
     point = {"speed_rpm": 1500.0, "fuel_mg": 22.0}
     assert learnt(point) == pytest.approx(out["guide_map_cad"], abs=1e-12)
-    assert abs(learnt(point) - out["figures"]["final_cad"]) < 0.5 < abs(-9.0 - out["figures"]["final_cad"])
+    assert abs(learnt(point) - out["figures"]["final_soc_cad"]) < 0.5 < abs(-9.0 - out["figures"]["final_soc_cad"])
     assert learnt.sd_cad.min() < 1.0
     assert learnt.support[1, 1] > learnt.support[1, 2] > learnt.support[0, 0] == 0.0
     text = out_file.read_text(encoding="utf-8")

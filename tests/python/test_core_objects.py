@@ -140,5 +140,5 @@ def test_only_the_seed_of_the_run_counts(seeker: Any, misfires: float) -> None:
     for made in (0, 5):
         start = seeker(start=-2.0, lower=-20.0, upper=10.0, seed=made)
         run = monte_carlo(EngineBench(misfire_probability=misfires), [start], [5], cycles=120)
-        ends.append(float(np.ravel(run["final_cad"].values)[0]))
+        ends.append(float(np.ravel(run["final_soc_cad"].values)[0]))
     assert ends[0] == ends[1]

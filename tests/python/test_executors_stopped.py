@@ -34,7 +34,7 @@ class Dies(work.Dropping):
         return super().submit(fn, *args, **kwargs)
 
 
-@pytest.mark.parametrize(("name", "figure"), [("monte_carlo", "mean_cad"), ("track_many", "mse_deg2")])
+@pytest.mark.parametrize(("name", "figure"), [("monte_carlo", "mean_soc_cad"), ("track_many", "mse_deg2")])
 def test_a_lost_worker_hands_over_what_is_done(name: str, figure: str, monkeypatch: pytest.MonkeyPatch) -> None:
     fixed_chunks(monkeypatch, 4)
     with pytest.raises(WorkerLostError) as lost:
@@ -85,7 +85,7 @@ def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> No
 
         def loops(**how):
             seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
-            return monte_carlo(EngineBench(), seeker, range(20_000), cycles=1000, **how), "mean_cad"
+            return monte_carlo(EngineBench(), seeker, range(20_000), cycles=1000, **how), "mean_soc_cad"
 
         def tracks(**how):
             return track_many({{"pid": Pid()}}, ["step:40:42", "step:4:20"], [Throttle()] * 20_000, **how), "mse_deg2"
@@ -99,7 +99,7 @@ def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> No
             how = {{"executor": executor, "progress": stop}} if executor else {{}}
             if not executor:
                 threading.Timer(float(sys.argv[1]), stop).start()
-            call, figure = {{"monte_carlo": (loops, "mean_cad"), "track_many": (tracks, "mse_deg2")}}[{name!r}]
+            call, figure = {{"monte_carlo": (loops, "mean_soc_cad"), "track_many": (tracks, "mse_deg2")}}[{name!r}]
             try:
                 call(**how)
             except Interrupted as stopped:

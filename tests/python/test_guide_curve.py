@@ -127,10 +127,10 @@ def test_a_rough_model_is_enough(guide: dict[str, float], start: float | None) -
     )
     stays = np.nan_to_num(table["cycles_stays"].to_numpy(), nan=400.0)
     assert np.median(stays) <= 25.0
-    assert float(table["rms_cad"].mean()) < 0.5
+    assert float(table["rms_soc_cad"].mean()) < 0.5
     plain = ExtremumSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0)
     slow = monte_carlo(bench, plain, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5))
-    assert float(table["rms_cad"].mean()) < float(slow["rms_cad"].mean())
+    assert float(table["rms_soc_cad"].mean()) < float(slow["rms_soc_cad"].mean())
 
 
 def test_limits_by_the_guides_curves_are_kept_while_it_arrives() -> None:
@@ -151,7 +151,7 @@ def test_limits_by_the_guides_curves_are_kept_while_it_arrives() -> None:
         run = run_seeker(bench, seeker, 300)
         above.append(run.summary["noise_free_above_fraction_p_max_bar"])
         assert seeker.limit_states == {"p_max_bar": "active"}
-        assert abs(run.summary["final_cad"] - bench.find_optimum({"p_max_bar": 95.0})["soc_cad"]) < 1.0
+        assert abs(run.summary["final_soc_cad"] - bench.find_optimum({"p_max_bar": 95.0})["soc_cad"]) < 1.0
     assert np.mean(above) <= 0.01
 
 
@@ -182,9 +182,9 @@ def test_the_record_says_what_came_from_where() -> None:
     engine = guided(bench)
     run = run_seeker(bench, engine, 60)
     table = run.dataset
-    assert float(table["guide_cad"][0]) == pytest.approx(-1.53, abs=0.05)
-    assert float(table["guide_cad"][-1]) == pytest.approx(PLANT_BEST_CAD, abs=0.3)
-    assert np.allclose(table["feed_forward_cad"] + table["trim_cad"], table["estimate_cad"])
+    assert float(table["guide_optimum"][0, 0]) == pytest.approx(-1.53, abs=0.05)
+    assert float(table["guide_optimum"][-1, 0]) == pytest.approx(PLANT_BEST_CAD, abs=0.3)
+    assert np.allclose(table["feed_forward"][:, 0] + table["trim"][:, 0], table["estimate"][:, 0])
     assert float(engine.cylinder.wall_heat_scale) == pytest.approx(0.5, rel=0.03)
     assert engine.recalibrations > 0
     assert (engine.trust, engine.refusals, engine.calibration_status) == (1.0, 0, "updated")
@@ -203,13 +203,13 @@ def test_a_rig_and_the_bench_go_the_same_way(plain: bool) -> None:
         other.at(same.point)
         cycle = same.step(other.ask()[0])
         other.tell(cycle["j"], pressure_bar=same.pressure()[1], misfire=cycle["misfire"])
-    assert other.history["estimate_cad"].equals(one.history["estimate_cad"])
-    guide = run.dataset["guide_cad"].to_numpy()
+    assert other.history["estimate"][:, 0].equals(one.history["estimate"][:, 0])
+    guide = run.dataset["guide_optimum"][:, 0].to_numpy()
     assert guide[41] < guide[39] - 2.0
     with SimulatedRig(EngineBench(schedule=schedule, seed=4)) as rig:
         third = guided(EngineBench(schedule=schedule), plain=plain)
         run_seeker(rig, third, 90)
-    assert third.history["estimate_cad"].equals(one.history["estimate_cad"])
+    assert third.history["estimate"][:, 0].equals(one.history["estimate"][:, 0])
 
 
 def test_a_guided_engine_is_pickled_and_goes_on() -> None:
@@ -255,7 +255,7 @@ def test_a_guide_that_would_never_be_asked_is_refused() -> None:
         run_seeker(WithoutPoint(), front, 5)
     assert front.cycle == 0
     front.at(20.0)
-    assert run_seeker(WithoutPoint(), front, 5).dataset["estimate_cad"][0] == -6.0
+    assert run_seeker(WithoutPoint(), front, 5).dataset["estimate"][0, 0] == -6.0
 
 
 def test_what_makes_no_guided_engine_is_refused() -> None:
@@ -280,7 +280,7 @@ def test_a_feed_forward_runs_in_the_loop() -> None:
         ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), ModelOptimum(Cylinder(wall_heat_scale=0.65))
     )
     run = run_seeker(bench, front, 300)
-    jump = run.dataset["estimate_cad"].to_numpy()
+    jump = run.dataset["estimate"][:, 0].to_numpy()
     assert jump[155] < jump[149] - 1.0
     assert front.verdict != "wrong"
     assert front.settings["noise_sd"] is None

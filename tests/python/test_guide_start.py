@@ -49,7 +49,7 @@ def test_with_a_kept_start_the_first_point_belongs_to_the_seeker(seeker: type[An
         if guide is None:
             front.restart()  # as the first value of a guide does
         run = run_seeker(EngineBench(schedule=schedule, seed=3), front, 90)
-        runs.append(run.dataset["estimate_cad"].to_numpy())
+        runs.append(run.dataset["estimate"][:, 0].to_numpy())
     plain, guided = runs
     assert plain[0] == START_CAD
     assert np.array_equal(guided[:80], plain[:80])
@@ -85,17 +85,15 @@ def test_a_guided_engine_keeps_the_start_of_its_seeker(kind: str) -> None:
     engine = GuidedEngine(seeker, ROUGH, bench.point, keep_start=True)
     assert engine.settings["keep_start"] is True
     run = run_seeker(bench, engine, 300)
-    first = {
-        name: float(run.dataset[name][0]) for name in ("estimate_cad", "guide_cad", "feed_forward_cad", "trim_cad")
-    }
-    assert first["estimate_cad"] == START_CAD
-    assert first["guide_cad"] == pytest.approx(GUIDE_CAD, abs=0.05)
-    assert first["feed_forward_cad"] == pytest.approx(first["guide_cad"])
-    assert first["trim_cad"] == pytest.approx(START_CAD - first["guide_cad"])
-    asked = run.dataset["soc_requested_cad"].to_numpy()
+    first = {name: float(run.dataset[name][0, 0]) for name in ("estimate", "guide_optimum", "feed_forward", "trim")}
+    assert first["estimate"] == START_CAD
+    assert first["guide_optimum"] == pytest.approx(GUIDE_CAD, abs=0.05)
+    assert first["feed_forward"] == pytest.approx(first["guide_optimum"])
+    assert first["trim"] == pytest.approx(START_CAD - first["guide_optimum"])
+    asked = run.dataset["asked"][:, 0].to_numpy()
     assert asked[0] == pytest.approx(START_CAD, abs=0.0 if kind == "curve" else 1.0)
     assert np.abs(np.diff(asked)).max() <= 2.0 + 1e-9
-    assert run.summary["final_cad"] == pytest.approx(PLANT_BEST_CAD, abs=1.0)
+    assert run.summary["final_soc_cad"] == pytest.approx(PLANT_BEST_CAD, abs=1.0)
 
 
 def test_a_seeker_that_has_run_goes_on_from_where_it_stands() -> None:
@@ -124,9 +122,9 @@ def test_a_kept_start_survives_state_pickle_and_copy(kind: str, cut: int) -> Non
     again.state = json.loads(json.dumps(whole.state))
     others = [again, pickle.loads(pickle.dumps(whole)), copy.copy(whole)]
     benches = [copy.deepcopy(bench) for _ in others]
-    expected = run_seeker(bench, whole, 60).dataset["estimate_cad"]
+    expected = run_seeker(bench, whole, 60).dataset["estimate"][:, 0]
     for other, own in zip(others, benches, strict=True):
-        assert run_seeker(own, other, 60).dataset["estimate_cad"].equals(expected)
+        assert run_seeker(own, other, 60).dataset["estimate"][:, 0].equals(expected)
         assert other.state == whole.state
     assert cut > 0 or float(expected[0]) == START_CAD
 
@@ -148,7 +146,7 @@ def test_the_history_numbers_cycles_as_the_state_does_and_keeps_no_refused_one(k
     assert history["cycle"].to_numpy().tolist() == [10, 11]
     assert history["misfire"].to_numpy().tolist() == [1, 0]
     assert np.array_equal(history["objective"], [np.nan, 50.0], equal_nan=True)
-    applied = history["applied" if kind == "feed-forward" else "applied_cad"].to_numpy().ravel()
+    applied = history["applied"].to_numpy().ravel()
     assert (applied[0] != -17.25, applied[1]) == (True, -17.25)
 
 

@@ -83,10 +83,10 @@ def test_a_loop_has_the_numbers_of_run_seeker(name: str) -> None:
     few = monte_carlo(bench(), SEEKERS[name](), [4, SEED], cycles=CYCLES, criteria=GOAL)
     many = monte_carlo(bench(), SEEKERS[name](), [*range(16), SEED], cycles=CYCLES, criteria=GOAL)
     same_figures(few.isel(bench=0, seeker=0, seed=1), alone.summary, 1e-13)
-    for figure in ("lowest_cad", "highest_cad", "misfires", "cycles_to"):  # no sum that could round
+    for figure in ("lowest_soc_cad", "highest_soc_cad", "misfires", "cycles_to"):  # no sum that could round
         np.testing.assert_equal(float(few[figure][0, 0, 1]), alone.summary[figure])
     same_figures(many.isel(bench=0, seeker=0, seed=-1), alone.summary, 1e-9)
-    assert few["mean_cad"][0, 0, 0] != few["mean_cad"][0, 0, 1]
+    assert few["mean_soc_cad"][0, 0, 0] != few["mean_soc_cad"][0, 0, 1]
 
 
 def test_a_process_with_a_mean_and_late_components_has_them_too() -> None:

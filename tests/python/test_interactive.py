@@ -41,7 +41,7 @@ def test_a_result_draws_itself_by_plotly() -> None:
     seeker = ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0)
     run = run_seeker(EngineBench(seed=1), seeker, 100)
     figure = run.plot(engine="plotly")
-    assert any(np.array_equal(trace.y, run.dataset["estimate_cad"], equal_nan=True) for trace in drawn(figure))
+    assert any(np.array_equal(trace.y, run.dataset["estimate"][:, 0], equal_nan=True) for trace in drawn(figure))
     for wrong in ({"engine": "bokeh"}, {"engine": "plotly", "ax": Figure().add_subplot()}):
         with pytest.raises(ParameterError, match="must be 'matplotlib', or 'plotly' without ax"):
             run.plot(**wrong)

@@ -80,7 +80,7 @@ def test_a_peak_pressure_ten_cycles_late_is_truly_kept(name: str) -> None:
     for seed in range(4):
         run = run_seeker(LatePressure(seed), seekers(limit, seed)[name](), 2000)
         above.append(run.summary["noise_free_judged_above_fraction_p_max_bar"])
-        applied.append(run.summary["mean_applied_cad"])
+        applied.append(run.summary["mean_applied_soc_cad"])
     assert np.mean(above) <= 0.01, above
     assert 0.0 < np.mean(applied) - best < 2.0, applied
 

@@ -143,7 +143,8 @@ def test_a_timing_exactly_at_the_limit_is_above_it_in_half_of_the_cycles() -> No
     bench, soc = EngineBench(limits=["p_max_bar"], seed=2), np.full(4000, -3.0)
     free = bench.noise_free_limits(soc, np.arange(4000))
     dataset = bench.run(soc)
-    dataset["estimate_cad"] = dataset["soc_requested_cad"]
+    over = (("cycle", "input"), soc[:, np.newaxis])
+    dataset = dataset.assign(input=("input", ["soc_cad"]), estimate=over, applied=over)
     dataset["noise_free_limits"] = dataset["limits"].copy(data=free)
     summary = summarize_cycles(dataset, LoopCriteria(limits={"p_max_bar": float(free[0, 0])}))
     four_sigma = 4.0 * math.sqrt(0.25 / 4000)
@@ -192,4 +193,4 @@ def test_a_run_that_ends_before_its_first_cycle_is_interrupted_and_nothing_else(
         run_seeker(Stopping(p_max_bar=[]), seeker(p_max_bar=95.0), 5)
     run = stop.value.partial
     assert (run.interrupted, run.dataset.sizes["cycle"], run.summary["judged_from"]) == (True, 0, 0.0)
-    assert np.isnan(run.summary["final_cad"])
+    assert np.isnan(run.summary["final_soc_cad"])

@@ -44,7 +44,8 @@ def run(name: str, upper: float, chosen: dict[str, object]) -> tuple[float, dict
         criteria=LoopCriteria(exceed_above={name: upper + 3.0 * best[f"scatter_{name}"]}),
     ).isel(bench=0)
     rows = {
-        key: (table["exceeded_fraction"].values[i], table["mean_applied_cad"].values[i]) for i, key in enumerate(chosen)
+        key: (table["exceeded_fraction"].values[i], table["mean_applied_soc_cad"].values[i])
+        for i, key in enumerate(chosen)
     }
     return best["soc_cad"], rows
 
@@ -116,4 +117,4 @@ def test_a_limit_that_cannot_be_kept_holds_the_seeker_at_its_bound_without_compl
         bench = EngineBench(limits=["p_max_bar"])
         seeker = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 60.0)])
         table = monte_carlo(bench, seeker, range(3), cycles=2000)
-    assert np.all(table["highest_cad"].values <= 9.0)
+    assert np.all(table["highest_soc_cad"].values <= 9.0)

@@ -54,18 +54,18 @@ def test_one_run_is_its_pieces_is_ask_and_tell(kind: str) -> None:
     whole = run_seeker(bench(), seeker(kind), 400)
     plant, pieces = bench(), seeker(kind)
     joined = xr.concat([run_seeker(plant, pieces, n).dataset for n in (1, 130, 200, 69)], "cycle")
-    np.testing.assert_array_equal(whole.dataset["estimate_cad"], joined["estimate_cad"])
+    np.testing.assert_array_equal(whole.dataset["estimate"][:, 0], joined["estimate"][:, 0])
     np.testing.assert_array_equal(whole.dataset["j"], joined["j"])
 
     plant, single = bench(), seeker(kind)
     for k in range(400):
         if k == 160:
             single.restart()
-        assert single.estimate[0] == whole.dataset["estimate_cad"][k]
+        assert single.estimate[0] == whole.dataset["estimate"][k, 0]
         cycle = plant.step(single.ask()[0])
         single.tell(cycle["j"], cycle["limits"], misfire=cycle["misfire"])
     assert whole.summary["misfires"] == single.misfires > 0
-    np.testing.assert_array_equal(single.history["applied"].values[:, 0], whole.dataset["soc_requested_cad"])
+    np.testing.assert_array_equal(single.history["applied"].values[:, 0], whole.dataset["asked"][:, 0])
 
 
 def test_labels_and_history_of_a_run() -> None:
@@ -78,8 +78,8 @@ def test_labels_and_history_of_a_run() -> None:
     assert not run.interrupted
     over = (run.dataset["limits"].sel(limit="p_max_bar")[100:] > 110.0).mean()
     assert run.summary["exceeded_fraction"] == pytest.approx(float(over), abs=1e-12)
-    assert run.summary["final_cad"] == pytest.approx(float(run.dataset["estimate_cad"][100:].mean()), abs=1e-12)
-    np.testing.assert_array_equal(it.history["applied"].values[:, 0], run.dataset["soc_requested_cad"])
+    assert run.summary["final_soc_cad"] == pytest.approx(float(run.dataset["estimate"][100:, 0].mean()), abs=1e-12)
+    np.testing.assert_array_equal(it.history["applied"].values[:, 0], run.dataset["asked"][:, 0])
 
 
 def test_limits_are_judged_in_short_runs_too() -> None:
@@ -111,8 +111,8 @@ def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
     alone = run_seeker(
         EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, criteria=LoopCriteria(optimum=-8.5)
     )
-    assert float(one["rms_cad"][1, 1, 4]) == pytest.approx(alone.summary["rms_cad"], rel=1e-9)  # side by side
-    assert float(few["rms_cad"][1, 1, 0]) == alone.summary["rms_cad"]  # one by one
+    assert float(one["rms_soc_cad"][1, 1, 4]) == pytest.approx(alone.summary["rms_soc_cad"], rel=1e-9)  # side by side
+    assert float(few["rms_soc_cad"][1, 1, 0]) == alone.summary["rms_soc_cad"]  # one by one
 
 
 def test_another_thread_runs_while_loops_do() -> None:
@@ -150,7 +150,7 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
     assert plant.cycle == it.cycle == n
     twin = run_seeker(EngineBench(seed=2), ExtremumSeeking(**SPACE), n + 50)
     more = run_seeker(plant, it, 50)
-    np.testing.assert_array_equal(more.dataset["estimate_cad"], twin.dataset["estimate_cad"][n:])
+    np.testing.assert_array_equal(more.dataset["estimate"][:, 0], twin.dataset["estimate"][n:, 0])
 
     for wait_s in (0.3, 10.0):  # under a sanitizer no loop may be through at once
         timer = threading.Timer(wait_s, os.kill, (os.getpid(), signal.SIGINT))
@@ -162,8 +162,8 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
         if finished.any():
             break
     assert 0 < finished.sum() < finished.size
-    assert np.isfinite(table["mean_cad"].values[finished]).all()
-    assert np.isnan(table["mean_cad"].values[~finished]).all()
+    assert np.isfinite(table["mean_soc_cad"].values[finished]).all()
+    assert np.isnan(table["mean_soc_cad"].values[~finished]).all()
 
 
 def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:

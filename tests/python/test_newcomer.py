@@ -83,8 +83,8 @@ def test_plot_a_run_of_a_seeker() -> None:
     seeker = mgdd.optimize.ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0, limits=limits)
     run = mgdd.loop.run_seeker(bench, seeker, 300)
     assert len(mgdd.plot.seeking(run).figure.axes) == len(run.plot().figure.axes)
-    assert run.summary["final_cad"] > -30.0
-    assert "final_cad" in run.summary()
+    assert run.summary["final_soc_cad"] > -30.0
+    assert "final_soc_cad" in run.summary()
 
 
 def test_look_a_map_up_at_a_point() -> None:
@@ -113,7 +113,7 @@ def test_save_and_load_each_result(tmp_path: Path) -> None:
     seeker = mgdd.optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
     run = mgdd.loop.run_seeker(mgdd.loop.EngineBench("puma_single"), seeker, 50)
     run.to_netcdf(tmp_path / "run.nc")
-    assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "timing [°CA aTDC]"
+    assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "soc_cad [°CA aTDC]"
     table = mgdd.maps.CalibrationMap({"fuel_mg": [10, 20]}, [1.0, 2.0], name="soc_cad")
     mgdd.maps.write_map(table, tmp_path / "map.csv")
     assert mgdd.maps.read_map(tmp_path / "map.csv") == table

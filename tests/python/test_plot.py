@@ -77,8 +77,10 @@ NEAR = -6.0 - 9.0 * np.exp(-CYCLE / 40.0)
 def sought():
     return labelled_dataset(
         {
-            "cycle": ("cycle", CYCLE), "estimate_cad": ("cycle", NEAR),
-            "soc_requested_cad": ("cycle", NEAR + np.sin(CYCLE)), "j": ("cycle", 56.0 - 0.02 * (NEAR + 6.0) ** 2),
+            "cycle": ("cycle", CYCLE), "j": ("cycle", 56.0 - 0.02 * (NEAR + 6.0) ** 2),
+            "input": ("input", ["soc_cad"], "-", "input"),
+            "estimate": (("cycle", "input"), NEAR[:, np.newaxis], "unit of the input", "estimate"),
+            "asked": (("cycle", "input"), (NEAR + np.sin(CYCLE))[:, np.newaxis], "unit of the input", "asked for"),
             "nox_soft_ppm": ("cycle", 1500.0 - 30.0 * (NEAR + 6.0)),
             "limit": ("limit", ["p_max_bar", "t_max_k"], "-", "limited quantity"),
             "limit_units": ("limit", ["bar", "K"], "-", "unit of the limit"),
@@ -327,7 +329,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (calibration_overlay, overlay, "residual_bar", "mgdd.identify.fit_cylinder"),
         (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
-        (plot.seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
+        (plot.seeking, sought, "asked", "mgdd.loop.run_seeker"),
         (convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
         (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
@@ -364,11 +366,11 @@ def test_seeking_has_four_panels_in_order():
     ax = plot.seeking(sought(), optimum_cad=-6.0, limit_values=caps)
     panels = ax.figure.axes
     assert [panel.get_ylabel() for panel in panels] == [
-        "timing [°CA aTDC]", "J [unit of J]", "NOx,\nsoft sensor [ppm]", "limited [bar, K]",
+        "soc_cad [°CA aTDC]", "J [unit of J]", "NOx,\nsoft sensor [ppm]", "limited [bar, K]",
     ]  # fmt: skip
     assert all(upper.get_position().y0 > lower.get_position().y1 for upper, lower in itertools.pairwise(panels))
     np.testing.assert_array_equal(line(ax, "estimate").get_data(), [CYCLE, NEAR])
-    np.testing.assert_array_equal(line(ax, "with dither").get_ydata(), sought()["soc_requested_cad"])
+    np.testing.assert_array_equal(line(ax, "with dither").get_ydata(), sought()["asked"][:, 0])
     np.testing.assert_array_equal(line(panels[3], "limit p_max_bar 100").get_ydata(), [100.0, 100.0])
     assert "optimum −6.00" in entries(ax)
     mean = line(panels[1], "mean of 50 cycles").get_ydata()

@@ -197,8 +197,8 @@ def test_a_fit_has_what_its_report_has() -> None:
 
 def test_figures_of_a_run_are_a_mapping_and_a_text() -> None:
     summary = run().summary
-    assert summary["final_cad"] == summary.get("final_cad")
-    assert f"final_cad {summary['final_cad']:.6g} °CA aTDC" in run().summary().replace("\n  ", " ")
+    assert summary["final_soc_cad"] == summary.get("final_soc_cad")
+    assert f"final_soc_cad {summary['final_soc_cad']:.6g} °CA aTDC" in run().summary().replace("\n  ", " ")
 
 
 # Every public figure and two more: a result, or the Dataset that it takes where no class has it; other arguments.

@@ -17,7 +17,7 @@ import pytest
 import xarray as xr
 
 from mgdd._core.loop import tracking_figures
-from mgdd.errors import DataError, ParameterError, RigError
+from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
@@ -58,7 +58,8 @@ def test_bounds_and_start_have_the_names_of_inputs() -> None:
         (TRACK.replace("format = 1", "format = 2"), r"format = 2: must be 1"),
         (TRACK.replace('task = "track"', 'task = "drive"'), r"task = 'drive': must be one of identify, track, seek"),
         (SEEK + "[seek.inputs]\nsoc_cad = [-20]\n", r"seek.inputs.soc_cad = \[-20\]: must be \[lower, upper\]"),
-        (SEEK + "[seek.inputs]\negr = [0, 1]\n", r"seek.inputs.egr = .*must be one of the keys soc_cad"),
+        (SEEK + "[seek.inputs]\negr = [1, 0]\n", r"seek.inputs.egr = .*must be lower < upper, both finite"),
+        (SEEK.replace("110.0", "[1, 2, 3]"), r"seek.limits.p_max_bar = .*\[lower, upper\], one of which"),
         (SEEK + "[seek.inputs]\nsoc_cad = [5, -20]\n", r"seek.inputs.soc_cad = .*must be lower < upper"),
         (SEEK.replace("cycles", 'seeker = "nelder"\ncycles'), r"seek.seeker = 'nelder': must be one of auto, curve_"),
         (TRACK + "speed = 3\n", r"track.speed = 3: must be one of the keys reference"),
@@ -79,6 +80,27 @@ def test_bounds_and_start_have_the_names_of_inputs() -> None:
 def test_a_wrong_key_is_named_with_its_value_and_remedy(text: str, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         Experiment.from_toml(text, origin="file")
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("start = { soc_cad = 50 }", "seek.start: soc_cad = 50: must be in"),
+        ("tolerance = { egr = 1 }", "seek.tolerance has egr: must have one number for each of soc_cad"),
+        ('settings = { memory_cycles = "x" }', "seek.settings: memory_cycles = 'x'"),
+        ("settings = { start = 1 }", "seek.settings: 'start' is no setting"),
+        ("cycles = 1", "seek.cycles = 1: must be >= 2"),
+        ("noise_sd = 0", "seek.noise_sd = 0: must be > 0"),
+        ('model = "nope"', "seek.model = 'nope': no preset"),
+        ("scale = { a = 1 }", "seek.scale = 'a'"),
+        ("inputs = { boost = [0, 1] }", "seek.inputs = 'boost': must be one of soc_cad"),
+        ("limits = { p_mx_bar = [9, inf] }", "seek.limits: 'p_mx_bar' is not measured.*did you mean 'p_max_bar'"),
+    ],
+)
+def test_what_a_search_refuses_is_named_as_its_key(keys: str, said: str) -> None:
+    text = f'kind = "experiment"\nformat = 1\ntask = "seek"\n[seek]\n{keys}\n'
+    with pytest.raises(Error, match=said):
+        check_experiment(experiment(text))
 
 
 def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
@@ -102,7 +124,7 @@ def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
         (
             SEEK.replace("cycles", 'seeker = "golden_section"\ncycles'),
             ParameterError,
-            r"golden_section: needs noise_sd",
+            r"golden_section': needs seek.noise_sd",
         ),
         (TRACK + "[plant.scale]\ncoulomb = 1.2\n", ParameterError, r"plant.scale = 'coulomb': must be a number of"),
         (TRACK + "[plant.scale]\ncoulomb_nm = -1.2\n", ParameterError, r"plant.scale: coulomb_nm = -0.34\d* N m"),
@@ -239,7 +261,7 @@ def test_seeking_stays_inside_its_bounds_and_says_what_guided_it(guide: str) -> 
         )
     )
     check_labels(result.dataset)
-    applied = result.dataset["soc_applied_cad"].to_numpy()
+    applied = result.dataset["applied"][:, 0].to_numpy()
     assert applied.min() >= -12.0
     assert result.figures["guide"] == guide
     assert result.counters["guard"]["bounds"] == 0

@@ -53,8 +53,8 @@ def rms(first: ExperimentResult, other: ExperimentResult, name: str, begin: int 
     [
         (TRACK, "sensed_angle_deg"),
         pytest.param(IDENTIFY, "sensed_angle_deg", marks=pytest.mark.slow),
-        (SEEK, "estimate_cad"),
-        pytest.param(FEED, "estimate_cad", marks=pytest.mark.slow),
+        (SEEK, "estimate"),
+        pytest.param(FEED, "estimate", marks=pytest.mark.slow),
     ],
     ids=["track", "identify", "seek by curve", "seek by feed-forward"],
 )

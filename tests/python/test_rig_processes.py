@@ -77,7 +77,7 @@ def test_seeking_on_the_engine_bench_over_the_bus() -> None:
         over_the_bus = run_seeker(rig, seeker(), 250)
     xr.testing.assert_identical(over_the_bus.dataset, simulated.dataset)
     straight = run_seeker(EngineBench(seed=4), seeker(), 250)
-    assert over_the_bus.summary["final_cad"] == pytest.approx(straight.summary["final_cad"], abs=0.3)
+    assert over_the_bus.summary["final_soc_cad"] == pytest.approx(straight.summary["final_soc_cad"], abs=0.3)
 
 
 def test_a_node_that_cannot_start_says_why() -> None:

@@ -127,8 +127,8 @@ def test_a_run_in_pieces_is_one_run() -> None:
     rig = SimulatedRig(rough_bench())
     pieces = [run_seeker(rig, again, n) for n in (251, 1, 200)]
     last = run_seeker(rig.plant, again, CYCLES - 452)
-    joined = np.concatenate([piece.dataset["estimate_cad"] for piece in (*pieces, last)])
-    np.testing.assert_array_equal(joined, whole.dataset["estimate_cad"])
+    joined = np.concatenate([piece.dataset["estimate"][:, 0] for piece in (*pieces, last)])
+    np.testing.assert_array_equal(joined, whole.dataset["estimate"][:, 0])
     np.testing.assert_array_equal(pieces[2].dataset["cycle"], np.arange(252, 452))
 
 
@@ -143,7 +143,7 @@ def test_the_restart_comes_before_the_cycle() -> None:
 
     deaf = Deaf(rough_bench())
     run = run_seeker(deaf, SEEKERS["batch"](), CYCLES)
-    same = run.dataset["estimate_cad"].to_numpy() == core.dataset["estimate_cad"].to_numpy()
+    same = run.dataset["estimate"][:, 0].to_numpy() == core.dataset["estimate"][:, 0].to_numpy()
     assert same[:252].all()
     assert not same[252:].all()
 
@@ -161,7 +161,7 @@ def test_a_change_that_is_only_measured_costs_one_cycle() -> None:
     assert list(np.flatnonzero(run.dataset["void"])) == [305]
     assert not run.dataset["misfire"].any()
     assert np.isnan(own.history["objective"][305])
-    assert run.summary["final_cad"] == pytest.approx(0.0, abs=0.05)
+    assert run.summary["final_soc_cad"] == pytest.approx(0.0, abs=0.05)
 
     by_hand = seeker()
     for cycle in range(1200):
@@ -203,11 +203,11 @@ def test_ctrl_c_leaves_a_usable_result() -> None:
     run = stop.value.partial
     assert (run.interrupted, run.dataset.attrs["interrupted"]) == (True, 1)
     assert run.dataset.sizes["cycle"] == own.cycle == 120
-    assert np.isfinite(run.summary["final_cad"])
+    assert np.isfinite(run.summary["final_soc_cad"])
     rest = run_seeker(rig, own, 280)
     straight = run_seeker(ScriptedRig(hill), whole, 400)
-    joined = np.concatenate([run.dataset["estimate_cad"], rest.dataset["estimate_cad"]])
-    np.testing.assert_array_equal(joined, straight.dataset["estimate_cad"])
+    joined = np.concatenate([run.dataset["estimate"][:, 0], rest.dataset["estimate"][:, 0]])
+    np.testing.assert_array_equal(joined, straight.dataset["estimate"][:, 0])
     np.testing.assert_array_equal(rest.dataset["cycle"], np.arange(120, 400))
 
 
@@ -237,15 +237,15 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
         run_seeker(broken, own, 20)
     assert own.cycle == 7
     assert own.history.sizes["cycle"] == 7
-    assert run_seeker(ScriptedRig(hill), own, 300).summary["final_cad"] == pytest.approx(-5.6, abs=0.1)
+    assert run_seeker(ScriptedRig(hill), own, 300).summary["final_soc_cad"] == pytest.approx(-5.6, abs=0.1)
 
 
 def test_summary_of_half_a_run() -> None:
     run = run_seeker(EngineBench(seed=2), seeker(), 500, criteria=LoopCriteria(optimum=-5.63))
     part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), LoopCriteria(optimum=-5.63))
-    estimate = run.dataset["estimate_cad"].to_numpy()[:250]
-    assert part["final_cad"] == pytest.approx(estimate[150:].mean())
-    assert part["rms_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))
+    estimate = run.dataset["estimate"][:, 0].to_numpy()[:250]
+    assert part["final_soc_cad"] == pytest.approx(estimate[150:].mean())
+    assert part["rms_soc_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))
     assert np.isnan(part["exceeded_fraction"])
 
 
@@ -263,13 +263,13 @@ def test_a_rig_that_clamps_inside_the_bounds_holds_the_estimate_there(name: str)
     chosen = type(free)(**{**free.settings, "limits": [], "start": [6.0]})
     run = run_seeker(ClampingRig(hill), chosen, 1500)
     check_labels(run.dataset)
-    estimate = run.dataset["estimate_cad"].to_numpy()
+    estimate = run.dataset["estimate"][:, 0].to_numpy()
     assert estimate[300:].min() > -4.0 - 0.2
     assert abs(estimate[-500:].mean() + 4.0) < 1.2
-    asked, applied = (run.dataset[key].to_numpy() for key in ("soc_requested_cad", "soc_applied_cad"))
+    asked, applied = (run.dataset[key].to_numpy()[:, 0] for key in ("asked", "applied"))
     np.testing.assert_array_equal(applied, np.maximum(asked, -4.0))
     np.testing.assert_array_equal(chosen.history["applied"].to_numpy()[:, 0], applied)
-    assert run.summary["mean_applied_cad"] == pytest.approx(applied[750:].mean(), abs=1e-12)
+    assert run.summary["mean_applied_soc_cad"] == pytest.approx(applied[750:].mean(), abs=1e-12)
 
 
 def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
@@ -283,14 +283,14 @@ def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
             run = run_seeker(rig, on_rig, 900)
         low, high = EngineBench().window_cad
         assert core.dataset["clamped"].to_numpy().any()
-        for key in ("soc_applied_cad", "soc_requested_cad", "estimate_cad"):
+        for key in ("applied", "asked", "estimate"):
             np.testing.assert_array_equal(core.dataset[key].to_numpy(), run.dataset[key].to_numpy(), err_msg=key)
         np.testing.assert_array_equal(in_core.history["applied"], on_rig.history["applied"])
         assert in_core.state == on_rig.state
         applied = in_core.history["applied"].to_numpy()
         assert applied.min() >= low
         assert applied.max() <= high
-        ends.append(float(core.dataset["estimate_cad"][-1]))
+        ends.append(float(core.dataset["estimate"][-1, 0]))
     assert all(low - 0.2 <= end <= high + 0.2 for end in ends)  # the worst efficiency lies at an end of the window
 
 

@@ -184,7 +184,7 @@ def test_a_seeker_is_shown_with_its_interval(tmp_path: Path) -> None:
         assert seeker.rows == 40
         assert np.isfinite(seeker.values[: seeker.rows]).all(axis=0).tolist() == [True, has_sd]
         first = source.data.panels()["timing [°CA aTDC]"][0]
-        assert (first.label, first.sd_column) == ("estimate of the best timing", 1)
+        assert (first.label, first.sd_column) == ("start of combustion, estimate", 1)
 
 
 def test_frames_of_a_bus_are_read_by_the_map() -> None:

@@ -102,6 +102,52 @@ def test_a_bench_is_a_plant_and_limits_are_kept() -> None:
     assert "limit_broken" not in codes(found)
 
 
+SIDES: dict[str, tuple[Any, float, float]] = {  # limit, its slope over the timing, where it is safest
+    "p_max_bar": (95.0, -3.0, 10.0), "nox_ppm": (95.0, -3.0, 10.0), "t_evo_k": (55.0, 3.0, -30.0),
+    "ca50_cad": ((95.0, None), 3.0, 10.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SIDES)
+def test_without_a_start_a_search_begins_where_engines_keep_the_limit(name: str) -> None:
+    bound, slope, first = SIDES[name]
+    side = -1.0 if isinstance(bound, tuple) else 1.0
+    upper = -95.0 if side < 0.0 else bound
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+
+        def plant(x: float, rng: Any = rng) -> Any:
+            return 56.0 - 0.03 * (x + 6.0) ** 2 + 0.25 * rng.normal(), {name: 85.0 + slope * x + rng.normal()}
+
+        found = seek(plant, {"soc_cad": (-30.0, 10.0)}, limits={name: bound}, cycles=100, seed=seed)
+        applied = found.dataset["applied"].to_numpy()[:, 0]
+        assert (applied[0], found.start["soc_cad"]) == (first, first)
+        assert (side * (85.0 + slope * applied) > upper + 1.0).mean() <= 0.01
+        away = (found.inputs["soc_cad"] - (bound if side > 0.0 else 95.0) / slope + 85.0 / slope) * slope * side
+        assert -4.5 < away < 0.5
+        assert "start_unknown" not in codes(found)
+
+
+def test_a_limit_that_bends_is_read_before_it_is_reached() -> None:
+    """Late, the pressure is that of compression, and flat; a stride that it allows there ends far above the limit."""
+    for seed in range(4):
+        bench = EngineBench(seed=seed, limits=["p_max_bar"])
+        found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": 95.0}, cycles=40, seed=seed)
+        assert 90.0 < float(found.dataset["noise_free_limits"].max()) < 96.0
+
+
+def test_a_start_that_nobody_knows_to_be_safe_is_a_finding() -> None:
+    def bowl(x: float) -> Any:
+        return -((x - 3.0) ** 2), {"noise_db": 10.0 * x}
+
+    for more, said in (({}, True), ({"start": 1.0}, False)):
+        found = seek(bowl, {"x": (0.0, 10.0)}, limits={"noise_db": 20.0}, cycles=20, **more)
+        assert ("start_unknown" in codes(found)) is said
+    again = seek(bowl, seeker=found.seeker, cycles=20)
+    known = seek(bowl, {"x": (0.0, 10.0)}, limits={"noise_db": 20.0}, cycles=20, known=found.dataset)
+    assert "start_unknown" not in {*codes(again), *codes(known)}
+
+
 def test_a_late_sensor_is_compensated() -> None:
     best, late = {"soc_cad": -6.0, "egr": 0.1}, 6
     path: list[dict[str, float]] = []
@@ -147,7 +193,7 @@ class Drifting:
         ("no_reading", {"cycles": 20}, lambda _: None),
         ("failing_everywhere", {"cycles": 20}, lambda _: None),
         ("unexplained", {"cycles": 100}, Drifting(0.25)),
-        ("start_above_limit", {"cycles": 40, "limits": {"p_max_bar": 80.0}}, limited),
+        ("start_above_limit", {"cycles": 40, "limits": {"p_max_bar": 80.0}, "start": BEST}, limited),
         ("limit_broken", {"cycles": 40, "limits": {"p_max_bar": 50.0}}, limited),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ from mgdd.cli import main
 from mgdd.engine import Cylinder
 from mgdd.loop import EngineBench, seek
 from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop.summary import FIGURES_OF_INPUT
 from mgdd.results.labels import to_jsonable
 from mgdd.rig import Experiment, run_experiment
 
 HEAD = 'kind = "experiment"\nformat = 1\ntask = "seek"\nseed = {seed}\n[safety]\nrate_cad = 100.0\n[seek]\n'
 ROUGH = 'scale = { wall_heat_scale = 1.6 }\nguide = "%s"\n'
+BOTH = "limits.imep_gross_bar = [9.5, inf]\nlimits.p_max_bar = [-inf, 100]\n"
 QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
     "nothing said": ({"inputs": {"soc_cad": (-20.0, 5.0)}}, [], "[seek.inputs]\nsoc_cad = [-20, 5]\n"),
     "a limit and a start": (
@@ -24,10 +27,39 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
         ["--limit", "p_max_bar=95", "--start", "soc_cad=2", "--cycles", "120"],
         "cycles = 120\n[seek.limits]\np_max_bar = 95\n[seek.start]\nsoc_cad = 2\n[seek.inputs]\nsoc_cad = [-25, 8]\n",
     ),
+    "a limit without a start": (
+        {"inputs": {"soc_cad": (-25.0, 8.0)}, "limits": {"p_max_bar": 95.0}},
+        ["--limit", "p_max_bar=95"],
+        "[seek.limits]\np_max_bar = 95\n[seek.inputs]\nsoc_cad = [-25, 8]\n",
+    ),
     "a seeker by name": (
         {"inputs": {"soc_cad": (-20.0, 5.0)}, "seeker": "spsa"},
         ["--seeker", "spsa"],
         'seeker = "spsa"\n[seek.inputs]\nsoc_cad = [-20, 5]\n',
+    ),
+    "a setting": (
+        {
+            "inputs": {"soc_cad": (-20.0, 5.0)},
+            "seeker": "extremum_seeking",
+            "settings": {"form": "washout", "gain": 0.4},
+        },
+        ["--seeker", "extremum_seeking", "--seeker-set", "form=washout", "--seeker-set", "gain=0.4"],
+        'seeker = "extremum_seeking"\nsettings = { form = "washout", gain = 0.4 }\n[seek.inputs]\nsoc_cad = [-20, 5]\n',
+    ),
+    "limits on both sides": (
+        {
+            "inputs": {"soc_cad": (-25.0, 8.0)},
+            "start": {"soc_cad": 0.0},
+            "cycles": 80,
+            "limits": {"imep_gross_bar": (9.5, None), "p_max_bar": (None, 100.0), "ca50_cad": (5.0, 20.0)},
+        },
+        "--start soc_cad=0 --cycles 80 --limit imep-gross-bar=9.5: --limit p_max_bar=:100 --limit ca50_cad=5:20".split(),  # noqa: E501
+        "cycles = 80\nstart.soc_cad = 0\ninputs.soc_cad = [-25, 8]\nlimits.ca50_cad = [5, 20]\n" + BOTH,
+    ),
+    "two inputs": (
+        {"inputs": {"soc_cad": (-20.0, 5.0), "egr": (0.0, 0.3)}, "cycles": 40, "start": {"soc_cad": 2.0, "egr": 0.1}},
+        ["--cycles", "40", "--start", "soc_cad=2", "--start", "egr=0.1"],
+        "cycles = 40\n[seek.start]\nsoc_cad = 2\negr = 0.1\n[seek.inputs]\nsoc_cad = [-20, 5]\negr = [0, 0.3]\n",
     ),
     "a tolerance": (
         {"inputs": {"soc_cad": (-20.0, 5.0)}, "tolerance": {"soc_cad": 1.5}},
@@ -53,15 +85,15 @@ QUESTIONS: dict[str, tuple[dict[str, Any], list[str], str]] = {
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_three_doors_give_the_same_bits(question: str, capsys: pytest.CaptureFixture[str]) -> None:
     asked, options, table = QUESTIONS[question]
-    low, high = asked["inputs"]["soc_cad"]
     given = dict(asked)
     if "guide" in given:
         rough = Cylinder(wall_heat_scale=1.6 * Cylinder().wall_heat_scale)
         given["guide"] = EngineGuide(cylinder=rough, kind=given["guide"])
-    found = seek(EngineBench(seed=3, limits=list(asked.get("limits", ()))), seed=3, **given)
+    bench = EngineBench(seed=3, limits=list(asked.get("limits", ())), inputs=list(asked["inputs"]))
+    found = seek(bench, seed=3, **given)
 
-    bounds = f"soc_cad={low}:{high}"
-    assert main(["engine", "seek", "--input", bounds, *options, "--seed", "3", "--json", "--quiet"]) == 0
+    bounds = [word for name, (low, high) in asked["inputs"].items() for word in ("--input", f"{name}={low}:{high}")]
+    assert main(["engine", "seek", *bounds, *options, "--seed", "3", "--json", "--quiet"]) == 0
     by_command = json.loads(capsys.readouterr().out)
     by_experiment = run_experiment(Experiment.from_toml(HEAD.format(seed=3) + table))
 
@@ -74,16 +106,58 @@ def test_three_doors_give_the_same_bits(question: str, capsys: pytest.CaptureFix
     assert len(shared) > 5
     for name in shared:
         assert by_experiment.figures["figures"][name] == pytest.approx(own["figures"][name], rel=1e-12), name
-    np.testing.assert_array_equal(by_experiment.dataset["soc_applied_cad"], found.dataset["soc_applied_cad"])
+    np.testing.assert_array_equal(by_experiment.dataset["applied"], found.dataset["applied"])
 
 
-def test_one_input_and_two_have_the_same_keys(capsys: pytest.CaptureFixture[str]) -> None:
-    keys = []
+def test_readings_of_before_go_through_every_door(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    options = ["engine", "seek", "--input", "soc_cad=-25:8", "--limit", "t_evo_k=960", "--quiet"]
+    before, after = tmp_path / "before.csv", ["--seed", "4", "--cycles", "30", "--json"]
+    assert main([*options, "--seed", "3", "--cycles", "40", "-o", str(before)]) == 0
+    capsys.readouterr()
+    assert main([*options, *after, "--known", str(before)]) == 0
+    by_command = json.loads(capsys.readouterr().out)
+    asked: dict[str, Any] = {"inputs": {"soc_cad": (-25.0, 8.0)}, "limits": {"t_evo_k": 960.0}}
+    first = seek(EngineBench(seed=3, limits=["t_evo_k"]), seed=3, cycles=40, **asked)
+    found = seek(EngineBench(seed=4, limits=["t_evo_k"]), seed=4, cycles=30, known=first.dataset, **asked)
+    assert "after 40 readings" in by_command["reason"]
+    table = "cycles = 30\nknown = 'before.csv'\ninputs.soc_cad = [-25, 8]\nlimits.t_evo_k = 960\n"
+    (tmp_path / "known.toml").write_text(HEAD.format(seed=4) + table)
+    by_experiment = run_experiment(Experiment.load(tmp_path / "known.toml"), tmp_path / "run")
+    assert (tmp_path / "run" / "inputs" / "before.csv").read_bytes() == before.read_bytes()
+    for other in (by_command, by_experiment.figures):
+        assert other["inputs"] == pytest.approx(found.inputs, abs=1e-9)  # a table has fewer digits than a number
+
+
+def test_one_input_and_two_have_the_same_layout(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    keys, columns = [], []
     for more in ([], ["--input", "egr=0:0.3"]):
         options = ["--input", "soc_cad=-20:5", *more, "--cycles", "12", "--json", "--quiet"]
-        assert main(["engine", "seek", *options]) == 0
-        keys.append(set(json.loads(capsys.readouterr().out)))
+        assert main(["engine", "seek", *options, "-o", str(tmp_path / "run.csv")]) == 0
+        out = json.loads(capsys.readouterr().out)
+        keys.append([set(own) - {f"{name}_egr" for name in FIGURES_OF_INPUT} for own in (out, out["figures"])])
+        names = (tmp_path / "run.csv").read_text().splitlines()
+        columns.append(set(next(line for line in names if not line.startswith("#")).split(",")))
     assert keys[0] == keys[1]
+    steered = {f"{what}_soc_cad" for what in ("estimate", "asked", "applied")}
+    assert all(steered <= own for own in columns)
+
+
+@pytest.mark.parametrize("inputs", [("soc_cad",), ("soc_cad", "egr"), ("x",), ("x", "y")], ids="-".join)
+def test_the_cycles_of_every_plant_have_one_layout(inputs: tuple[str, ...]) -> None:
+    bounds = {name: (-20.0, 5.0) if name == "soc_cad" else (0.0, 0.3) for name in inputs}
+
+    def linear(x: Any) -> float:
+        return -sum(x[name] for name in inputs)
+
+    found = seek(linear if "x" in inputs else EngineBench(inputs=list(inputs), seed=1), bounds, cycles=12)
+    for name in ("estimate", "asked", "applied"):
+        assert found.dataset[name].dims == ("cycle", "input")
+        assert found.dataset[name].sel(input=list(inputs)).shape == (12, len(inputs))
+    assert found.dataset["void"].dims == ("cycle",)
+    for name in inputs:
+        mean = float(found.dataset["estimate"].sel(input=name).mean())
+        assert found.run.summary[f"final_{name}"] == pytest.approx(mean)
+    assert not {"estimate_cad", "soc_requested_cad", "soc_applied_cad"} & set(found.dataset.variables)
 
 
 def test_gains_do_not_come_from_the_truth_of_the_plant() -> None:

@@ -45,7 +45,7 @@ def test_golden_section_finds_its_width_again() -> None:
     best = bench.find_optimum()
     seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
     table = monte_carlo(bench, seeker, range(200), cycles=2000, criteria=LoopCriteria(optimum=best["soc_cad"]))
-    assert np.abs(table["final_cad"].values - best["soc_cad"]).max() < 1.5
+    assert np.abs(table["final_soc_cad"].values - best["soc_cad"]).max() < 1.5
 
 
 def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
@@ -55,7 +55,7 @@ def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
     limits = [Limit("cov_imep_percent", 0.6)]
     seekers = [ExtremumSeeking(**space, limits=limits), NewtonSeeking(**space, limits=limits)]
     table = monte_carlo(bench, seekers, range(10), cycles=3000)
-    assert np.abs(table["final_cad"].values + 5.63).max() < 3.0
+    assert np.abs(table["final_soc_cad"].values + 5.63).max() < 3.0
 
 
 @pytest.mark.parametrize(

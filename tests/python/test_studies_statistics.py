@@ -54,7 +54,7 @@ def test_rms_and_bands() -> None:
     variables = band_variables("x_{}_cad", ("run", "cycle"), [found], "°CA", with_quantiles("x"))
     assert list(variables) == ["x_median_cad", "x_low_cad", "x_high_cad"]
     (middle,), (low,), (high,) = (values for _, values, *_ in variables.values())
-    runs = np.stack([run_seeker(*make(seed), 120).dataset["estimate_cad"].to_numpy() for seed in range(11)])
+    runs = np.stack([run_seeker(*make(seed), 120).dataset["estimate"][:, 0].to_numpy() for seed in range(11)])
     np.testing.assert_array_equal(middle, np.median(runs, axis=0))
     np.testing.assert_array_equal(low, np.sort(runs, axis=0)[1])
     np.testing.assert_array_equal(high, np.sort(runs, axis=0)[9])
@@ -81,4 +81,4 @@ def test_loops_are_those_of_the_monte_carlo_over_seeds_alone() -> None:
     table = loops(EngineBench(), seeker, range(3), cycles=50)
     assert dict(table.sizes) == {"seed": 3}
     whole = monte_carlo(EngineBench(), seeker, range(3), cycles=50)
-    np.testing.assert_array_equal(table["mean_cad"], whole["mean_cad"][0, 0])
+    np.testing.assert_array_equal(table["mean_soc_cad"], whole["mean_soc_cad"][0, 0])

@@ -64,6 +64,11 @@ _ENCODER = Options(
     Encoder, column="encoder", teeth="encoder_teeth", missing_teeth="encoder_missing_teeth",
     index_column="encoder_index", falling="encoder_falling", level="encoder_level",
 )  # fmt: skip
+# What other libraries of optimisation call an option.
+_OTHERWISE = {
+    "--method": "--seeker", "--optimizer": "--seeker", "--algorithm": "--seeker", "--bounds": "--input",
+    "--x0": "--start", "--iterations": "--cycles", "--options": "--seeker-set", "--constraint": "--limit",
+}  # fmt: skip
 CYLINDER_CHOICES = {
     "burn": "burn_shape",
     "gamma": "gamma_model",
@@ -95,6 +100,7 @@ class Parser(argparse.ArgumentParser):
         if extra:
             known = re.findall(r"--[a-z-]+", found.parser.format_usage())
             strange = next((word.partition("=")[0] for word in extra if word.startswith("--")), "")
+            strange = _OTHERWISE.get(strange, strange)
             found.parser.error(hinted(f"unrecognized arguments: {' '.join(extra)}", strange, known))
         return found
 

@@ -13,10 +13,11 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["add_over", "bounds_of", "factors_of", "grid_of"]
+__all__ = ["add_over", "bounds_of", "factors_of", "grid_of", "limits_given"]
 
 _FORM = "write NAME=LOW:HIGH:N, for example soc_cad=-20:5:51, or NAME=VALUE,VALUE"
 _FACTOR_FORM = "write NAME=LOW:HIGH, for example fuel_mg=6:36, NAME=LOW:HIGH:N or NAME=VALUE,VALUE"
+_LIMIT_FORM = "write NAME=X, or NAME=LOW:HIGH, LOW < HIGH, of which one may be left out, as imep_gross_bar=9:"
 _INPUT_FORM = "write NAME=LOW:HIGH, for example soc_cad=-20:5"
 
 
@@ -75,6 +76,22 @@ def bounds_of(given: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise ParameterError(f"--input {item}: LOW and HIGH must be finite and LOW < HIGH; {_INPUT_FORM}")
         bounds[name] = (low, high)
     return bounds
+
+
+def limits_given(given: Sequence[str]) -> dict[str, float | tuple[float, float]]:
+    """Read limits, repeated ``--limit``: an upper value, or a lower and an upper one, infinite where it is left out."""
+    limits: dict[str, float | tuple[float, float]] = {}
+    for item in given:
+        name, span = _split(item, limits, _LIMIT_FORM, "--limit")
+        low, colon, high = (part.strip() for part in span.partition(":"))
+        try:
+            sides = (float(low or -math.inf), float(high or math.inf)) if colon else float(low)
+            if isinstance(sides, tuple) and (not sides[0] < sides[1] or sides == (-math.inf, math.inf)):
+                raise ValueError
+        except ValueError:
+            raise ParameterError(f"--limit {item}: {_LIMIT_FORM}") from None
+        limits[name] = sides
+    return limits
 
 
 def _split(item: str, known: Any, form: str, option: str = "--over") -> tuple[str, str]:

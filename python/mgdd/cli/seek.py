@@ -11,17 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
 from mgdd.cli.options import add_command, add_engine, assignments, engine_of, number_pairs
 from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
-from mgdd.cli.ranges import bounds_of
+from mgdd.cli.ranges import bounds_of, limits_given
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
+from mgdd.io.point_table import read_points
 from mgdd.loop import EngineBench, seek
 from mgdd.loop.limit_figures import FIGURES, NOISE_FREE
+from mgdd.loop.lower_limits import plain_name
 from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize import ComponentLag
@@ -32,7 +35,6 @@ from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
 __all__ = ["add_seek"]
 
@@ -46,8 +48,9 @@ _NEAR = 40.0  # arrived: within a fortieth of the bounds, the scale that an inpu
 _COV = "cov_imep_percent"  # has no steady value
 # Arguments of the library and the options that set them.
 _NAMES = {**_BENCH.options, **_SEARCH.options, "start": "start", "limits": "limit", "nox_sensor": "sensor",
-          "tolerance": "tolerance", "guide_cylinder": "guide_set", "guide_table": "guide_map",
-          "settings": "seeker_set"}  # fmt: skip
+          "tolerance": "tolerance", "known": "known", "inputs": "input", "guide_cylinder": "guide_set",
+          "guide_table": "guide_map",
+          "settings": "seeker_set", **{name: name for name in OperatingPoint.fields()}}  # fmt: skip
 
 
 def add_seek(verbs: Any) -> None:
@@ -79,7 +82,8 @@ def add_seek(verbs: Any) -> None:
         action="append",
         default=[],
         metavar="NAME=X",
-        help="first value of an input, repeatable; left out: the best of the guide, or the middle of the bounds",
+        help="first value of an input, repeatable; left out: the best of the guide, or the "
+        "middle of the bounds, under limits the safe side of the timing",
     )
     _SEARCH.add(parser)
     parser.add_argument(
@@ -91,8 +95,12 @@ def add_seek(verbs: Any) -> None:
     )
     parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
-        help=f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X; repeatable",
+        help=f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X, or with NAME=LOW:HIGH between two, of "
+        "which one may be left out; repeatable",
     )  # fmt: skip
+    parser.add_argument(
+        "--known", metavar="FILE.csv", help="readings of before, as -o writes them: they are told to the seeker first"
+    )
     parser.add_argument("--figure", metavar="FILE", help="draw the run (.png, .svg or .pdf)")
     group = parser.add_argument_group("bench")
     group.add_argument(
@@ -108,7 +116,8 @@ def _seek(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
     check_guide(args)
-    limits, start = number_pairs(args.limit, "--limit"), number_pairs(args.start, "--start")
+    limits, start = limits_given(args.limit), number_pairs(args.start, "--start")
+    known = None if args.known is None else read_points(args.known)
     with _option_names():
         given = bounds_of(args.input)
         bench, preset = _bench(args, limits, given)
@@ -119,7 +128,7 @@ def _seek(args: argparse.Namespace) -> None:
             found: SeekResult = seek(
                 bench, bounds, seeker=args.seeker, start=start or None, limits=limits,
                 tolerance=number_pairs(args.tolerance, "--tolerance") or None, components=_lags(bench),
-                guide=guide, settings=assignments(args.seeker_set, {}, "--seeker-set"), seed=bench.seed,
+                guide=guide, known=known, settings=assignments(args.seeker_set, {}, "--seeker-set"), seed=bench.seed,
                 **_SEARCH.given(args),
             )  # fmt: skip
         except Interrupted as stop:
@@ -133,19 +142,17 @@ def _seek(args: argparse.Namespace) -> None:
         _LOG.warning("%s", doubt)
     payload = found.to_dict() | {"preset": preset, "sensor": args.sensor, "seed": bench.seed}
     payload |= _judged(bench, best, found) | _guided(args, found, guide) | learnt | {"warnings": doubts}
-    emit(args, payload, text=_text(payload, found, list(limits)), traces=_table(run.dataset))
+    emit(args, payload, text=_text(payload, found), traces=_table(run.dataset))
     if args.figure:
         from mgdd import plot
 
-        how: dict[str, Any] = {"limit_values": limits}
-        if len(best.inputs) == 1:
-            how["optimum_cad"] = best["soc_cad"]
+        how = {"optimum_cad": best["soc_cad"]} if len(best.inputs) == 1 else {}
         save_figure(drawn(plot.seeking, run.dataset, size=(8.0, 7.0), **how), args.figure)
     if run.interrupted:
         raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 
 
-def _bench(args: argparse.Namespace, limits: Mapping[str, float], inputs: Mapping[str, Any]) -> tuple[EngineBench, str]:
+def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[EngineBench, str]:
     for name in inputs:
         if name not in bench_inputs:
             raise ParameterError(hinted(f"--input {name}: the bench has {', '.join(bench_inputs)}", name, bench_inputs))
@@ -183,7 +190,8 @@ def _lags(bench: EngineBench) -> list[ComponentLag] | None:
 def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, Any]:
     """Judge by the noise-free bench, which the search does not know."""
     steady = bench.steady_map({name: [value] for name, value in found.inputs.items()}, cycle=max(bench.cycle - 1, 0))
-    estimates, aim = _estimates(found), np.array(list(best.inputs.values()))
+    names, aim = list(best.inputs), np.array(list(best.inputs.values()))
+    estimates = found.run.dataset["estimate"].sel(input=names).to_numpy()
     width = np.array([high - low for low, high in best.bounds.values()])
     near = (np.abs(estimates - aim) <= width / _NEAR).all(axis=1)
     late = (estimates - aim)[len(estimates) // 2 :]
@@ -195,15 +203,6 @@ def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, A
         "cycles_to": int(near.argmax()) if near.any() else None,
         "rms": dict(zip(best.inputs, np.sqrt(np.mean(late**2, axis=0)).tolist(), strict=True)) if late.size else None,
     }
-
-
-def _estimates(found: SeekResult) -> NDArray[np.float64]:
-    """Give the estimate before every cycle, per input."""
-    cycles = found.run.dataset
-    if "estimate_cad" in cycles:
-        return cycles["estimate_cad"].to_numpy()[:, None]
-    table: NDArray[np.float64] = cycles["estimate"].sel(input=list(found.inputs)).to_numpy()
-    return table
 
 
 def _guided(args: argparse.Namespace, found: SeekResult, guide: Any) -> dict[str, Any]:
@@ -218,7 +217,7 @@ def _guided(args: argparse.Namespace, found: SeekResult, guide: Any) -> dict[str
     return out
 
 
-def _text(payload: Mapping[str, Any], found: SeekResult, limits: list[str]) -> list[str]:
+def _text(payload: Mapping[str, Any], found: SeekResult) -> list[str]:
     plain = to_jsonable(payload)
     text = [
         lines(plain | plain["figures"]),
@@ -229,18 +228,20 @@ def _text(payload: Mapping[str, Any], found: SeekResult, limits: list[str]) -> l
     ]
     summary = found.run.summary
     judged_from = int(summary["judged_from"])
-    for name in limits:
+    for limit in found.asked.limits:
         for prefix, how in (("", "as measured"), (NOISE_FREE, "noise-free at what was applied")):
-            own = {figure: summary.get(f"{prefix}{figure}_{name}") for figure in FIGURES}
-            own["limit"] = summary.get(f"limit_{name}")
+            own = {figure: summary.get(f"{prefix}{figure}_{limit.name}") for figure in FIGURES}
+            own["limit"] = limit.upper
             if own["worst"] is not None and math.isfinite(own["worst"]):
-                text.append(f"{name} {how}: {_kept(own, judged_from)}")
+                name, side = plain_name(limit.name)
+                text.append(f"{name} {how}: {_kept(own, side, judged_from)}")
     return text
 
 
-def _kept(own: Mapping[str, Any], judged_from: int) -> str:
+def _kept(own: Mapping[str, Any], side: float, judged_from: int) -> str:
     return (
-        f"worst {own['worst']:.6g} in cycle {own['worst_cycle']:.0f}; above {own['limit']:g} in "
+        f"worst {side * own['worst']:.6g} in cycle {own['worst_cycle']:.0f}; "
+        f"{'above' if side > 0.0 else 'below'} {side * own['limit']:g} in "
         f"{own['above_cycles']:.0f} cycles ({_percent(own['above_fraction'])}), from cycle {judged_from} on in "
         f"{own['judged_above_cycles']:.0f} ({_percent(own['judged_above_fraction'])})"
     )
@@ -251,14 +252,15 @@ def _percent(share: float) -> str:
 
 
 def _table(cycles: xr.Dataset) -> xr.Dataset:
-    """Leave the columns over cycles, those of several inputs by name; COV is added."""
+    """Leave the columns over cycles, those of the inputs by name; limits that are no indicator are added."""
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
-    for name in cycles["input"].to_numpy().tolist() if "input" in cycles.dims else []:
-        for kind in ("estimate", "asked"):
+    for name in cycles["input"].to_numpy().tolist():
+        for kind in ("estimate", "asked", "applied"):
             table[f"{kind}_{name}"] = cycles[kind].sel(input=name, drop=True)
-    if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
-        cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
-        table[_COV] = cov.assign_attrs(unit_attributes(*VARIABLES[_COV]))
+    for name in cycles["limit"].to_numpy().tolist() if "limit" in cycles.dims else []:
+        if name not in table and name == plain_name(name)[0]:
+            column = cycles["limits"].sel(limit=name, drop=True).drop_vars("limit_units", errors="ignore")
+            table[name] = column.assign_attrs(unit_attributes(*VARIABLES[name]))
     return table
 
 

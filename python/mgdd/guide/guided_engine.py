@@ -78,19 +78,19 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
     >>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
     >>> guided = GuidedEngine(seeker, model, bench.point, calibration=OnlineCalibration(rough))
     >>> run = run_seeker(bench, guided, 80)
-    >>> round(guided.cylinder.wall_heat_scale, 1), abs(run.summary["final_cad"] + 5.63) < 1.0
+    >>> round(guided.cylinder.wall_heat_scale, 1), abs(run.summary["final_soc_cad"] + 5.63) < 1.0
     (0.5, True)
     """
 
     _columns = MappingProxyType({
-        "guide_cad": Column(_CAD, "best timing by the guide"),
-        "feed_forward_cad": Column(_CAD, "feed-forward in force"),
-        "trim_cad": Column("°CA", "trim, estimate less feed-forward"),
-        "estimate_cad": Column(_CAD, "estimate of the best timing"),
-        "estimate_sd_cad": Column("°CA", "standard deviation of the estimate as stated"),
+        "guide_optimum": Column(_CAD, "best timing by the guide", per_input=True),
+        "feed_forward": Column(_CAD, "feed-forward in force", per_input=True),
+        "trim": Column("°CA", "trim, estimate less feed-forward", per_input=True),
+        "estimate": Column(_CAD, "estimate of the best timing", per_input=True),
+        "estimate_sd": Column("°CA", "standard deviation of the estimate as stated", per_input=True),
         "trust": Column("-", "trust in the guide"),
         "wall_heat_scale": Column("-", "wall-heat scale of the guide"),
-        "applied_cad": Column(_CAD, "applied timing"),
+        "applied": Column(_CAD, "applied timing", per_input=True),
         **TOLD,
     })  # fmt: skip
     _shown = ("recalibrations", "refusals", "calibration_status")
@@ -131,7 +131,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
         self._rows = []
 
     def _standing(self) -> dict[str, Any]:
-        return dict(self._now())
+        return dict(zip(self._columns, self._now().values(), strict=False))  # in the order of the core
 
     def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
         return self._made_of
@@ -193,9 +193,9 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
     def history(self) -> xr.Dataset:
         """What came from the guide, what from the trim, and the trust, cycle by cycle.
 
-        Over ``cycle``, before the result of each: ``guide_cad``, ``feed_forward_cad``, ``trim_cad``, ``estimate_cad``,
-        ``estimate_sd_cad`` (NaN where the seeker states none), ``trust``, ``wall_heat_scale`` of the guide; in the
-        cycle ``applied_cad``, ``objective`` (NaN where it misfired) and ``misfire`` (0 or 1). Built anew on every
-        access.
+        As that of a `FeedForward`, over ``cycle`` and ``input``, before the result of each: ``guide_optimum``,
+        ``feed_forward``, ``trim``, ``estimate``, ``estimate_sd`` (NaN where the seeker states none), over ``cycle``
+        ``trust`` and ``wall_heat_scale`` of the guide; in the cycle ``applied``, ``objective`` (NaN where it misfired)
+        and ``misfire`` (0 or 1). Built anew on every access.
         """
         return self._told()

@@ -14,6 +14,7 @@ from mgdd._core.loop import SensorDynamics
 from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError, hinted
 from mgdd.loop.bench_record import cycles_to_dataset
+from mgdd.loop.lower_limits import measured_names
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.loop.steady import find_optimum, limits_to_keep, split_inputs, steady_map
 from mgdd.optimize import Limit
@@ -307,7 +308,7 @@ class EngineBench(_core.loop.EngineBench):
 
     def find_optimum(
         self,
-        limits: Mapping[str, float] | Sequence[Limit] | None = None,
+        limits: Mapping[str, float | tuple[float | None, float | None]] | Sequence[Limit] | None = None,
         *,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         cycle: int = 0,
@@ -316,9 +317,9 @@ class EngineBench(_core.loop.EngineBench):
 
         Parameters
         ----------
-        limits : mapping of str to float, or sequence of Limit, optional
-            Upper limits on what the bench can limit, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is
-            kept. NOx of any sensor is the true steady one.
+        limits : mapping of str to float or (float, float), or sequence of Limit, optional
+            Upper limits on what the bench can limit, or lower and upper ones, as in `seek`, for example
+            ``{"p_max_bar": 95.0}``; the margin of a `Limit` is kept. NOx of any sensor is the true steady one.
         bounds : mapping of str to (float, float), optional
             Searched ranges by input; those left out are `input_bounds`, of the timing -30 to 10 °CA aTDC.
         cycle : int
@@ -348,7 +349,7 @@ class EngineBench(_core.loop.EngineBench):
         kept = limits_to_keep(limits)
         split_inputs(self.input_names, bounds or {}, None)
         searched = self.input_bounds | {"soc_cad": _SEARCHED_CAD} | dict(bounds or {})
-        quiet = self._quiet(cycle, limits=[limit.name for limit in kept])
+        quiet = self._quiet(cycle, limits=measured_names(kept))
         return find_optimum(quiet, kept, searched, float(self.settings["soc_scatter_cad"]))
 
     def _quiet(self, cycle: int, **changes: Any) -> EngineBench:

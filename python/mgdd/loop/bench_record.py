@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
@@ -13,7 +13,7 @@ from mgdd.results.labels import VARIABLES, labelled_dataset
 if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 __all__ = ["FLAGS", "OWN_LABELS", "cycles_to_dataset"]
 
@@ -32,13 +32,12 @@ def cycles_to_dataset(
     columns: dict[str, Any],
     *,
     noise_free_limits: NDArray[np.float64] | None = None,
-    **more: ArrayLike,
+    more: Mapping[str, tuple[Any, ...]] = {},
 ) -> xr.Dataset:
-    """Label the columns of a run, with further columns of names that `VARIABLES` knows."""
+    """Label the columns of a run, with further ones that are labelled already."""
     settings = bench.settings
     terms = _unique([term.signal for term in settings["performance"].terms])
-    variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle"))}
-    variables |= {name: ("cycle", values) for name, values in more.items()}
+    variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle")), **more}
     components, limits = columns.pop("components"), columns.pop("limits")
     for name, values in columns.items():
         flag = ("-", FLAGS[name]) if name in FLAGS and name not in VARIABLES else ()

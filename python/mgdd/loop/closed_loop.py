@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mgdd import _core
 from mgdd.errors import hand_over, or_partial
 from mgdd.guide import FeedForward, GuidedEngine
@@ -12,6 +14,8 @@ from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
+from mgdd.loop.plant_record import VOID, steered
+from mgdd.loop.summary import of_first_input
 from mgdd.optimize import Seeker
 from mgdd.optimize.seeker_findings import findings_of
 from mgdd.results.result import Figures
@@ -92,10 +96,13 @@ def run_seeker(
     run_loop: Any = _core.loop.run_loop  # one overload for each class of seeker
     raw, stop = or_partial(lambda: run_loop(plant, seeker, cycles, **goal))
     columns, names = raw["columns"], plant.limit_names
-    known = plant.noise_free_limits(columns["soc_requested_cad"], columns["cycle"])
-    dataset = cycles_to_dataset(plant, columns, estimate_cad=raw["estimate_cad"], noise_free_limits=known)
+    asked, applied = columns.pop("soc_requested_cad"), columns.pop("soc_applied_cad")
+    known = plant.noise_free_limits(asked, columns["cycle"])
+    own = steered(plant.input_names, *(each[:, np.newaxis] for each in (raw["estimate_cad"], asked, applied)))
+    own["void"] = ("cycle", columns["misfire"] | columns["unphysical"], "-", VOID)
+    dataset = cycles_to_dataset(plant, columns, more=own, noise_free_limits=known)
     dataset.attrs["interrupted"] = int(raw["interrupted"])
-    summary = Figures(with_a_limit(raw["summary"], names))
+    summary = Figures(with_a_limit(of_first_input(raw["summary"], plant.input_names), names))
     summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
     uppers = criteria.limits_of(names, seeker)
     dataset.attrs |= criteria.attributes(names, uppers)

@@ -27,11 +27,11 @@ class LoopCriteria:
     Parameters
     ----------
     optimum : float, optional
-        Where the estimate should go [unit of the input]; without it arrival and distance are not judged.
+        Where the estimate of the first input should go [its unit]; without it arrival and distance are not judged.
     arrival : float
         Distance to the optimum that counts as arrived [unit of the input].
     tail_cycles : int
-        Cycles behind ``final_cad``.
+        Cycles behind ``final_INPUT``.
     exceed_from : int, optional
         First cycle that counts for ``exceeded_fraction`` and the figures ``judged_...``; by default 1000, or the middle
         of a run of fewer than 2000 cycles. The summary repeats it as ``judged_from``.

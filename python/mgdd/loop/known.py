@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,11 @@ from mgdd.optimize import GaussianProcessSeeking
 __all__ = ["tell_known"]
 
 
-def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> Choice:
+def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tuple[Question, Choice]:
     """Tell the readings, in their order, to a seeker that begins at the best of them where no start is given."""
     if not isinstance(choice.seeker, CurveSeeking | GaussianProcessSeeking):
         raise ParameterError(
-            f"known: goes to curve_seeking or gaussian_process_seeking, not to {argument('seeker')} "
+            f"{argument('known')}: goes to curve_seeking or gaussian_process_seeking, not to "
             f"{type(choice.seeker).__name__}, which asks for the readings that it needs: leave it out"
         )
     names, held = [one.name for one in asked.inputs], [limit.name for limit in asked.limits]
@@ -29,14 +30,17 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> Choi
     limits = np.column_stack([_column(known, name, "limits", "limit") for name in held] or [np.empty((j.size, 0))])
     for at, one in enumerate(asked.inputs):
         if outside := [value for value in x[:, at].tolist() if not one.lower <= value <= one.upper]:
-            raise ParameterError(f"known: {one.name} = {outside[0]:g}: must be in [{one.lower:g}, {one.upper:g}]")
+            raise ParameterError(
+                f"{argument('known')}: {one.name} = {outside[0]:g}: must be in [{one.lower:g}, {one.upper:g}]"
+            )
     read = np.isfinite(j) & np.isfinite(limits).all(axis=1)
     if asked.start is None and asked.late_cycles == 0.0 and read.any():
         uppers = np.array([limit.upper for limit in asked.limits])
         kept = read & (limits <= uppers).all(axis=1)
         worth = np.where(kept if kept.any() else read, j if asked.maximize else -j, -math.inf)
         best = dict(zip(names, x[int(np.argmax(worth))].tolist(), strict=True))
-        choice = chosen(Question(**{**vars(asked), "start": best}), seeker)
+        asked = replace(asked, start=best)
+        choice = chosen(asked, seeker)
     for row, value, measured, fired in zip(x.tolist(), j.tolist(), limits.tolist(), read.tolist(), strict=True):
         choice.seeker.ask()
         applied = dict(zip(names, row, strict=True))
@@ -44,27 +48,33 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> Choi
             choice.seeker.tell(value, measured or None, applied=applied)
         else:
             choice.seeker.tell(math.nan, misfire=True, applied=applied)
-    return choice._replace(reason=f"{choice.reason}, after {j.size} readings of before", first_cycles=1)
+    return asked, choice._replace(reason=f"{choice.reason}, after {j.size} readings of before", first_cycles=1)
 
 
 def _column(known: Any, name: str, table: str, over: str | None) -> Any:
     """Take a column by its name, or from the table that results of ours have."""
     there = known if isinstance(known, Mapping) else getattr(known, "variables", getattr(known, "columns", None))
     if there is None:
-        raise ParameterError(f"known = {type(known).__name__}: must be a table with columns by name")
-    if over is not None and table in there and name not in there and name in known.coords[over].to_numpy():
+        raise ParameterError(f"{argument('known')} = {type(known).__name__}: must be a table with columns by name")
+    if over is not None and table in there and name in known.coords[over].to_numpy():
         values = known[table].sel({over: name})
-    elif name == "soc_cad" and name not in there and "soc_applied_cad" in there:
-        values = known["soc_applied_cad"]
+    elif f"{table}_{name}" in there:  # of a table that the command wrote
+        values = known[f"{table}_{name}"]
     elif name in there:
         values = known[name]
     elif over is None and table in there:
         values = known[table]
     else:
-        raise ParameterError(hinted(f"known: has no column {name!r}", name, [str(each) for each in there]))
+        raise ParameterError(
+            hinted(
+                f"{argument('known')}: has no column {name!r}, but {', '.join(map(str, there))}",
+                name,
+                [str(each) for each in there],
+            )
+        )
     column = np.asarray(values, np.float64)
     if column.ndim != 1:
-        raise ParameterError(f"known: {name} has shape {column.shape}: must be a column")
+        raise ParameterError(f"{argument('known')}: {name} has shape {column.shape}: must be a column")
     if table == "applied" and not np.isfinite(column).all():
-        raise ParameterError(f"known: {name} must be finite in every row")
+        raise ParameterError(f"{argument('known')}: {name} must be finite in every row")
     return column

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, argument
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import limits_of
@@ -18,7 +18,7 @@ _LOWER = "-"
 
 
 def both_sides(limits: Any) -> tuple[Limit, ...]:
-    """Read limits as `limits_of` does, and pairs (lower, upper) by name, of which one may be None."""
+    """Read limits as `limits_of` does, and pairs (lower, upper) by name, of which one may be None or infinite."""
     if not isinstance(limits, Mapping):
         return limits_of(limits)
     sides = dict[str, Any]()
@@ -26,12 +26,18 @@ def both_sides(limits: Any) -> tuple[Limit, ...]:
         if not isinstance(value, Sequence) or isinstance(value, str):
             sides[name] = value
             continue
-        low, high = value if len(value) == 2 else (None, None)
-        if (low is None and high is None) or (low is not None and high is not None and not low < high):
-            raise ParameterError(f"limits: {name} = {value!r}: must be (lower, upper), lower < upper, one may be None")
+        low, high = (None if _open(each) else each for each in value) if len(value) == 2 else (None, None)
+        if not (-math.inf if low is None else low) < (math.inf if high is None else high) or low is high is None:
+            raise ParameterError(
+                f"{argument('limits')}: {name} = {value!r}: must be (lower, upper), lower < upper, one may be None"
+            )
         sides |= {} if low is None else {f"{_LOWER}{name}": -low}
         sides |= {} if high is None else {name: high}
     return limits_of(sides)
+
+
+def _open(value: Any) -> bool:
+    return isinstance(value, float) and math.isinf(value)
 
 
 def plain_name(name: str) -> tuple[str, float]:

@@ -18,10 +18,11 @@ from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.limit_figures import limit_label, with_a_limit
 from mgdd.loop.plant_loop import require_inputs_of, require_point_for
+from mgdd.loop.summary import FIGURES_OF_INPUT, of_first_input
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.parallel.rows import pieces
-from mgdd.results.labels import labelled_dataset
+from mgdd.results.labels import labelled_dataset, said_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,20 +36,13 @@ if TYPE_CHECKING:
 
 __all__ = ["monte_carlo"]
 
-_CAD = "°CA aTDC"
 _SUMMARY = {
-    "final_cad": (_CAD, "mean estimate of the last cycles"),
-    "mean_cad": (_CAD, "mean estimate, second half"),
-    "rms_cad": ("°CA", "rms distance of the estimate to the optimum, second half"),
     "cycles_to": ("cycle", "first cycle at which the estimate has arrived"),
     "cycles_stays": ("cycle", "cycle from which the estimate stays"),
     "exceeded_fraction": ("-", "share of the cycles from judged_from on above a threshold exceed_above_..."),
-    "mean_applied_cad": (_CAD, "mean applied timing, second half"),
     "mean_j": ("unit of J", "mean performance, second half"),
     "mean_efficiency_percent": ("%", "mean gross efficiency, second half"),
     "mean_nox_ppm": ("ppm", "mean true NOx, second half"),
-    "lowest_cad": (_CAD, "lowest estimate"),
-    "highest_cad": (_CAD, "highest estimate"),
     "misfires": ("-", "misfired cycles"),
     "judged_from": ("cycle", "first cycle of exceeded_fraction and of the figures judged_..."),
 }
@@ -74,7 +68,7 @@ def monte_carlo(
     the numbers do not depend on executor, workers or chunks. Sixteen loops and more run side by side and have the
     numbers of `run_seeker` to rounding; fewer, and those with a gamma of temperature, several inputs or a limit on
     ``t_evo_k``, have its bits; means of a seeker with a guide are summed in another order. Of several inputs the
-    figures of the estimate are those of ``soc_cad``.
+    figures of the first alone are there.
 
     Parameters
     ----------
@@ -99,8 +93,7 @@ def monte_carlo(
     -------
     xarray.Dataset
         Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker` without its noise-free figures, which would
-        double the work, and ``finished``, true everywhere. Of functions without figures of an engine, and where the
-        first input is not an angle (``..._cad``) figures of it are named without ``_cad``, in its unit.
+        double the work, and ``finished``, true everywhere. Of functions without figures of an engine.
 
     Raises
     ------
@@ -164,13 +157,14 @@ def monte_carlo(
         "finished": (dims, finished, "-", "whether the loop ran to its end"),
     }
     names = bench_list[0].limit_names
-    plain = bool(functions) and not functions[0].input_names[0].endswith("_cad")
-    for name, values in with_a_limit(raw, names).items():
+    inputs = bench_list[0].input_names
+    of_input = {f"{figure}_{inputs[0]}": text for figure, text in FIGURES_OF_INPUT.items()}
+    for name, values in with_a_limit(of_first_input(raw, inputs), names).items():
         if functions and name in _OF_AN_ENGINE:
             continue
-        label = _SUMMARY.get(name) or limit_label(name, names)
-        if plain and name.endswith("_cad") and name in _SUMMARY:
-            name, label = name.removesuffix("_cad"), ("unit of the input", label[1].replace("timing", "input"))  # noqa: PLW2901
+        label = (
+            (said_unit(name), of_input[name]) if name in of_input else _SUMMARY.get(name) or limit_label(name, names)
+        )
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *label)
     for name in dict.fromkeys(name for own in given for name in own.exceed_above):
         above = [float(own.exceed_above.get(name, np.nan)) for own in given]

@@ -20,6 +20,7 @@ from mgdd.loop.plant_record import Cycles, Row, cycles_told, dataset_of
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import Seeker
 from mgdd.results.finding import Finding
+from mgdd.results.labels import label_of
 from mgdd.results.result import Figures, Result
 
 if TYPE_CHECKING:
@@ -40,13 +41,13 @@ class LoopRun(Result):
     Parameters
     ----------
     dataset : xarray.Dataset
-        Over ``cycle``: ``estimate_cad`` before the cycle and everything that the plant measured of it. A plant whose
-        one input is not ``soc_cad`` has ``estimate``, ``asked`` and ``applied`` over ``cycle`` and ``input`` instead.
+        Over ``cycle`` and ``input``: ``estimate`` before the cycle, what was ``asked`` for and what was ``applied``;
+        over ``cycle`` everything that the plant measured of it.
     summary : Figures
-        By name, and as a text where it is called, ``run.summary()``: ``final_cad`` (mean estimate of the last 100
-        cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to`` and ``cycles_stays`` (NaN: never), means of
-        J, efficiency and true NOx over the second half, extremes of the estimate, misfires. Of several inputs, or one
-        that is not an angle, only what does not need the estimate.
+        By name, and as a text where it is called, ``run.summary()``: for every input ``final_INPUT`` (mean
+        estimate of the last 100 cycles), ``mean_INPUT``, ``rms_INPUT`` and ``mean_applied_INPUT`` (second half),
+        ``lowest_INPUT`` and ``highest_INPUT`` of the estimate; ``cycles_to`` and ``cycles_stays`` (NaN: never), means
+        of J, efficiency and true NOx over the second half, misfires. What an optimum judges is of the first input.
         For every limit, as measured and without any margin: ``limit_NAME``, ``worst_NAME`` and ``worst_cycle_NAME``,
         ``above_cycles_NAME`` and ``above_fraction_NAME`` from the first cycle on, ``judged_above_cycles_NAME`` and
         ``judged_above_fraction_NAME`` from cycle ``judged_from`` on. The same with ``noise_free_`` in front, where the
@@ -62,7 +63,7 @@ class LoopRun(Result):
     >>> from mgdd.loop import EngineBench, run_seeker
     >>> from mgdd.optimize import ExtremumSeeking
     >>> run = run_seeker(EngineBench(seed=1), ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), 600)
-    >>> abs(run.summary["final_cad"] + 5.63) < 2.0
+    >>> abs(run.summary["final_soc_cad"] + 5.63) < 2.0
     True
     """
 
@@ -233,6 +234,5 @@ def _guided(seeker: Seeker | FeedForward | GuidedEngine, cycles: int) -> dict[st
     if not isinstance(seeker, GuidedEngine) or not cycles:
         return {}
     last = seeker.history.isel(cycle=slice(-cycles, None))
-    names = ("guide_cad", "feed_forward_cad", "trim_cad", "estimate_sd_cad", "trust", "wall_heat_scale")
-    labels = {name: (last[name].attrs["units"], last[name].attrs["long_name"]) for name in names}
-    return {name: ("cycle", last[name].to_numpy(), *labels[name]) for name in names}
+    own = ("guide_optimum", "feed_forward", "trim", "estimate_sd", "trust", "wall_heat_scale")
+    return {name: (last[name].dims, last[name].to_numpy(), *label_of(last[name])) for name in own}

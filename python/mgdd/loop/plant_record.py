@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-__all__ = ["Cycles", "Row", "cycles_told", "dataset_of"]
+__all__ = ["VOID", "Cycles", "Row", "cycles_told", "dataset_of", "steered"]
 
 _UNKNOWN = "not given by the plant"
-_OWN = ("estimate_cad", "soc_requested_cad", "soc_applied_cad", "j", "misfire")  # columns that the loop itself knows
+VOID = "cycle that the seeker did not use"
+_OWN = ("soc_requested_cad", "soc_applied_cad", "j", "misfire")  # columns that the loop itself knows
 
 
 class Row(NamedTuple):
@@ -94,20 +95,16 @@ def cycles_told(seeker: Seeker, count: int) -> Cycles:
     )  # fmt: skip
 
 
-def _steered(cycles: Cycles, inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
-    """Label what the seeker thought and asked for."""
-    if inputs == ("soc_cad",):
-        return {
-            "estimate_cad": ("cycle", cycles.estimate[:, 0]),
-            "soc_requested_cad": ("cycle", cycles.asked[:, 0]),
-            "soc_applied_cad": ("cycle", cycles.applied[:, 0]),
-        }
+def steered(
+    inputs: tuple[str, ...], estimate: NDArray[np.float64], asked: NDArray[np.float64], applied: NDArray[np.float64]
+) -> dict[str, tuple[Any, ...]]:
+    """Label what a seeker thought and asked for, and what was applied, each a column per input."""
     over, unit = ("cycle", "input"), "unit of the input"
     return {
         "input": ("input", list(inputs), "-", "input of the plant"),
-        "estimate": (over, cycles.estimate, unit, "estimate of the best input"),
-        "asked": (over, cycles.asked, unit, "input that was asked for"),
-        "applied": (over, cycles.applied, unit, "input that the plant applied"),
+        "estimate": (over, estimate, unit, "estimate of the best input"),
+        "asked": (over, asked, unit, "input that was asked for"),
+        "applied": (over, applied, unit, "input that the plant applied"),
     }
 
 
@@ -120,10 +117,10 @@ def dataset_of(
     cycle = np.arange(first, first + cycles.j.size) if count is None or not np.isfinite(count).all() else count
     variables: dict[str, tuple[Any, ...]] = {
         "cycle": ("cycle", cycle.astype(np.int64)),
-        **_steered(cycles, inputs),
+        **steered(inputs, cycles.estimate, cycles.asked, cycles.applied),
         "j": ("cycle", cycles.j),
         "misfire": ("cycle", cycles.misfire, "-", FLAGS["misfire"]),
-        "void": ("cycle", cycles.void, "-", "cycle that the seeker did not use"),
+        "void": ("cycle", cycles.void, "-", VOID),
         **guided,
     }
     for name, values in columns.items():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError, ShapeError, hinted
+from mgdd.errors import Interrupted, ParameterError, ShapeError, argument, hinted
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.function_plant import FunctionPlant
@@ -25,7 +25,7 @@ from mgdd.optimize.inputs import inputs_of, named_values
 if TYPE_CHECKING:
     from mgdd.optimize import ComponentLag, Input, Limit
 
-__all__ = ["require_measured", "searched", "seek", "seek_inputs", "started"]
+__all__ = ["plant_of", "require_cycles", "searched", "seek", "seek_inputs", "started"]
 
 _MOST_CYCLES = 2_000_000
 
@@ -68,7 +68,9 @@ def seek(
         ``bounded_seeking``, ``spsa``, ``gradient_descent``, ``golden_section``. Or a seeker, as that of an earlier
         result, which goes on where it stands and changes.
     start : mapping of str to float, or float for one input, optional
-        First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle.
+        First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle; with
+        limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where nobody knows one
+        it is the middle, with a finding.
     cycles : int, optional
         How many; the first readings to every side at least. Left out: 200, and 25 more per cycle that J is late; of a
         seeker that dithers 2000, or 64 of its periods.
@@ -152,21 +154,19 @@ def seek(
             lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
             settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
         )  # fmt: skip
-        _require_plant(plant, asked)  # before anything is made
+        plant_of(plant, asked.inputs, asked.limits)  # before anything is made
         choice = chosen(asked, seeker)
         if known is not None:
-            choice = tell_known(asked, seeker, choice, known)
+            asked, choice = tell_known(asked, seeker, choice, known)
     still = stillness(asked, tolerance)
     wanted_cycles = choice.cycles if cycles is None else int(cycles)
-    return searched(_require_plant(plant, asked), choice, asked, wanted_cycles, still)
+    return searched(plant_of(plant, asked.inputs, asked.limits), choice, asked, wanted_cycles, still)
 
 
 def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: Any = None) -> SeekResult:
     """Let a seeker that was chosen run on a plant of its inputs; errors as those of `seek`."""
-    if cycles < choice.first_cycles:
-        raise ParameterError.of("cycles", cycles, f">= {choice.first_cycles}, one reading to the side of every input")
-    if cycles > _MOST_CYCLES:
-        raise ParameterError.of("cycles", cycles, f"<= {_MOST_CYCLES}; go on with seeker=found.seeker")
+    require_cycles(choice, cycles)
+    plant = with_lower_sides(plant, asked.limits)
     begun = dict(zip([one.name for one in asked.inputs], choice.seeker.estimate.tolist(), strict=True))
 
     def result(run: LoopRun) -> SeekResult:
@@ -183,14 +183,24 @@ def searched(plant: Plant, choice: Choice, asked: Question, cycles: int, still: 
         raise
 
 
-def _require_plant(plant: Any, asked: Question) -> Plant:
+def require_cycles(choice: Choice, cycles: int) -> None:
+    """ParameterError for fewer than look to every side, or more than one search takes."""
+    if cycles < choice.first_cycles:
+        raise ParameterError.of("cycles", cycles, f">= {choice.first_cycles}, one reading to the side of every input")
+    if cycles > _MOST_CYCLES:
+        raise ParameterError.of(
+            "cycles", cycles, f"<= {_MOST_CYCLES}; go on in another search, with {argument('known')}"
+        )
+
+
+def plant_of(plant: Any, inputs: Sequence[Input], limits: Sequence[Limit], values: Sequence[str] = ()) -> Plant:
     """Give the plant of these inputs and limits; ParameterError where it is none, or another."""
-    names, held = [one.name for one in asked.inputs], measured_names(asked.limits)
+    names, held = [one.name for one in inputs], measured_names(limits)
     if isinstance(plant, Plant):
-        require_measured(plant, names, held)
-        return with_lower_sides(plant, asked.limits)
+        _require_measured(plant, names, held)
+        return plant
     if callable(plant):
-        return with_lower_sides(FunctionPlant(plant, names, held), asked.limits)
+        return FunctionPlant(plant, names, held, values=tuple(values))
     raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
 
 
@@ -217,8 +227,9 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
     if limits and {one.name: one.upper for one in limits} != {one.name: one.upper for one in held}:
         said = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
         raise ParameterError(f"limits: the seeker given has {said}: leave them out")
+    begun = dict(zip([one.name for one in there], seeker.estimate.tolist(), strict=True))
     return Question(
-        inputs=there, limits=held, components=own.get("components"), maximize=own["maximize"],
+        inputs=there, start=begun, limits=held, components=own.get("components"), maximize=own["maximize"],
         delay_cycles=float(own.get("delay_cycles", 0.0)), lag_cycles=float(own.get("lag_cycles", 0.0)),
         guide=own.get("guide") or (True if isinstance(seeker, FeedForward | GuidedEngine) else None),
     )  # fmt: skip
@@ -240,18 +251,20 @@ def started(start: Any, inputs: Sequence[Input]) -> dict[str, float] | None:
     if start is None:
         return None
     names = [one.name for one in inputs]
-    values = np.atleast_1d(np.asarray(named_values("start", start, names), np.float64))
+    values = np.atleast_1d(np.asarray(named_values(argument("start"), start, names), np.float64))
     if values.shape != (len(names),):
-        raise ShapeError(f"start has {values.size} entries: must have one number for each of {', '.join(names)}")
+        raise ShapeError(
+            f"{argument('start')} has {values.size} entries: must have one number for each of {', '.join(names)}"
+        )
     for one, value in zip(inputs, values.tolist(), strict=True):
         if not one.lower <= value <= one.upper:
             raise ParameterError(
-                f"start: {one.name} = {value:g}: must be in [{one.lower:g}, {one.upper:g}], its bounds"
+                f"{argument('start')}: {one.name} = {value:g}: must be in [{one.lower:g}, {one.upper:g}], its bounds"
             )
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
+def _require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) -> None:
     """ParameterError where a plant has other inputs, or does not measure a limit."""
     if set(names) != set(plant.input_names):
         raise ParameterError(f"inputs = {', '.join(names)}: the plant takes {', '.join(plant.input_names)}")
@@ -259,5 +272,9 @@ def require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str]) 
         if name not in plant.limit_names:
             have = ", ".join(plant.limit_names) or "none"
             raise ParameterError(
-                hinted(f"limits: {name!r} is not measured by the plant, which has {have}", name, plant.limit_names)
+                hinted(
+                    f"{argument('limits')}: {name!r} is not measured by the plant, which has {have}",
+                    name,
+                    plant.limit_names,
+                )
             )

@@ -6,7 +6,7 @@ import inspect
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from mgdd.errors import ParameterError, argument, hinted
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop.safe_start import middle_of, safe_side
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -37,8 +38,14 @@ __all__ = ["SEEKERS", "Choice", "Question", "chosen"]
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
 _PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later
+_OWN_WORDS = (
+    "start", "lower", "upper", "inputs", "limits", "maximize", "seed", "components", "delay_cycles", "lag_cycles",
+    "guide", "curve", "limit_curves", "limit_guides",
+)  # fmt: skip
 _PERIODS = 64  # of a dither: 16 time constants of four periods
 _NEWTON_HOLD_PERIODS = 5  # until gradient and Hessian behind a lag have settled
+_STRIDE = 0.1  # share of the bounds a cycle, so that a limit no guide knows is read before it is reached
+_DITHER = 2.0  # scales of an input: the widest dither of the defaults
 _FIRST = (CurveSeeking, GaussianProcessSeeking)
 SEEKERS: Mapping[str, type[Seeker]] = {
     re.sub(r"(?<!^)(?=[A-Z])", "_", cls.kind).lower(): cls
@@ -87,12 +94,25 @@ class Question:
         delay, lag = max(each.delay_cycles for each in lags), max(each.lag_cycles for each in lags)
         return math.ceil(delay) + (len(self.inputs) + 1) * max(1, math.ceil(2.0 * lag))
 
+    @property
+    def started_blindly(self) -> bool:
+        """Whether nobody says that the limits hold where it begins."""
+        told = self.start is not None or isinstance(self.guide, EngineGuide)
+        return bool(self.limits) and not told and not safe_side(self.inputs, self.limits)
+
+    def first(self, scales: float = 0.0) -> dict[str, float]:
+        """Give where to begin: the start, else the safe side less so many scales of the input, else the middle."""
+        if self.start is not None:
+            return dict(self.start)
+        at = middle_of(self.inputs) | safe_side(self.inputs, self.limits)
+        return {one.name: _inside(one, at[one.name], scales) for one in self.inputs}
+
     def made(self, cls: type[Seeker], start: Mapping[str, float] | None, **own: Any) -> Seeker:
         """Make a seeker of that class; ParameterError for what is known that it cannot know."""
         takes = inspect.signature(cls).parameters
         known: dict[str, Any] = {
             "inputs": list(self.inputs), "maximize": self.maximize, "limits": list(self.limits),
-            "start": start or {one.name: 0.5 * (one.lower + one.upper) for one in self.inputs},
+            "start": start or self.first(0.0 if cls in _FIRST else _DITHER),
         }  # fmt: skip
         lags = None if self.components is None else list(self.components)
         late = {"delay_cycles": self.delay_cycles, "lag_cycles": self.lag_cycles}
@@ -128,12 +148,21 @@ class Question:
         if "seed" in takes:
             known["seed"] = self.seed
         for name in self.settings:
-            if name not in takes:
-                have = ", ".join(takes)
+            if name in _OWN_WORDS:
                 raise ParameterError(
-                    hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {have}", name, list(takes))
+                    f"{argument('settings')}: {name!r} is no setting: the search gives it, leave it out"
                 )
-        return cls(**known | own | dict(self.settings))
+            if name not in takes:
+                have = [each for each in takes if each not in _OWN_WORDS]
+                raise ParameterError(
+                    hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {', '.join(have)}", name, have)
+                )
+        try:
+            return cls(**known | own | dict(self.settings))
+        except ParameterError as error:
+            if error.field not in self.settings:
+                raise
+            raise error.reworded(f"{argument('settings')}: {error}") from error
 
     def budget(self, seeker: Any) -> int:
         """How many cycles a search takes where nobody says."""
@@ -206,7 +235,13 @@ def _by_curve(asked: Question, **own: Any) -> Seeker:
     (one,) = asked.inputs
     curve = asked.guide if isinstance(asked.guide, Curve) else own.pop("curve", None) or _parabola(one)
     best = {one.name: min(max(curve.best, one.lower), one.upper)}
-    return asked.made(CurveSeeking, asked.start or best, curve=curve, **own)
+    if asked.limits and own.get("limit_curves") is None:
+        stride = min(one.rate, _STRIDE * (one.upper - one.lower))
+        asked = replace(
+            asked, inputs=[Input(one.name, one.lower, one.upper, unit=one.unit, scale=one.scale, rate=stride)]
+        )
+    begin = asked.start or best | safe_side(asked.inputs, asked.limits)
+    return asked.made(CurveSeeking, begin, curve=curve, **own)
 
 
 def _automatic(asked: Question) -> tuple[Seeker, str]:
@@ -215,10 +250,9 @@ def _automatic(asked: Question) -> tuple[Seeker, str]:
     if asked.components is None and (isinstance(guide, Curve) or (guide is None and len(inputs) == 1)):
         told = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
         return _by_curve(asked), f"{told}, placed by the readings"
-    middle = {one.name: 0.5 * (one.lower + one.upper) for one in inputs}
     start = asked.start
     if start is None and guide is not None and not asked.limits and asked.components is None:
-        start = _best_of(guide, inputs, middle, asked.maximize)
+        start = _best_of(guide, inputs, asked.maximize)
     guided: dict[str, Any] = {} if guide is None else {"guide": guide}
     count = "one input" if len(inputs) == 1 else f"{len(inputs)} inputs"
     kept = f", {', '.join(limit.name for limit in asked.limits)} to keep" if asked.limits else ""
@@ -237,7 +271,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         raise ParameterError(f"{argument('guide')}: guides soc_cad alone, not {names}: leave it out")
     if point is None:
         raise ParameterError(f"{argument('guide')}: the plant has no operating point: give EngineGuide its point")
-    plain = _with(asked, guide=None)
+    plain = replace(asked, guide=None)
     if isinstance(guide, TimingMap):
         said = guide(point)
         if said is None:
@@ -269,7 +303,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         if drawn is not None:
             own["limit_guides"] = [lambda x, each=each: each(x[one.name]) for each in drawn]
         return plain.made(GaussianProcessSeeking, begin, **own), "one input, late components and a model of each"
-    made = _by_curve(_with(plain, start=begin), curve=curve, limit_curves=drawn)
+    made = _by_curve(replace(plain, start=begin), curve=curve, limit_curves=drawn)
     if guide.kind == "curve":
         return made, "one input and the curve of a model, placed by the readings"
     return (
@@ -288,17 +322,17 @@ def _inner(asked: Question, seeker: Any, best: float) -> Seeker:
     (one,) = asked.inputs
     if asked.start is not None:
         return asked.made(cls, asked.start)
-    room = (one.scale or (one.upper - one.lower) / 40.0) * 2.0  # the widest dither of their defaults
-    return asked.made(cls, {one.name: min(max(best, one.lower + room), one.upper - room)})
+    return asked.made(cls, {one.name: _inside(one, best, _DITHER)})
 
 
-def _with(asked: Question, **changes: Any) -> Question:
-    return Question(**{**vars(asked), **changes})
+def _inside(one: Input, value: float, scales: float) -> float:
+    room = scales * (one.scale or (one.upper - one.lower) / 40.0)
+    return min(max(value, one.lower + room), one.upper - room)
 
 
-def _best_of(guide: Any, inputs: Sequence[Input], middle: Mapping[str, float], maximize: bool) -> dict[str, float]:
+def _best_of(guide: Any, inputs: Sequence[Input], maximize: bool) -> dict[str, float]:
     """Return where a guide of several inputs is best: without limits a search begins there."""
-    (surface,) = GaussianProcessSeeking(start=middle, inputs=list(inputs), guide=guide).settings["guide"]
+    (surface,) = GaussianProcessSeeking(start=middle_of(inputs), inputs=list(inputs), guide=guide).settings["guide"]
     values = surface.values if maximize else -surface.values
     at = np.unravel_index(int(np.argmax(values)), values.shape)
     return {one.name: axis[k] for one, axis, k in zip(inputs, surface.axes, at, strict=True)}

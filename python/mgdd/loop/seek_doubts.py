@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mgdd.loop.lower_limits import plain_name
+from mgdd.errors import argument
+from mgdd.loop.lower_limits import measured_names, plain_name
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from mgdd.loop.plant_loop import LoopRun
     from mgdd.loop.seek_choice import Question
-    from mgdd.optimize import Input, Limit
+    from mgdd.optimize import Input
 
 __all__ = ["Mean", "Readings", "doubts_about"]
 
@@ -44,14 +45,12 @@ class Readings:
     ) -> None:
         self._data, self._estimate, self._noise_sd = data, estimate, noise_sd
         names = [one.name for one in inputs]
-        one = "estimate_cad" in data
-        self.estimates = _per_input(data, "estimate_cad" if one else "estimate", names)
-        self.applied = _per_input(data, "soc_applied_cad" if one else "applied", names)
+        self.estimates, self.applied = (data[name].sel(input=names).to_numpy() for name in ("estimate", "applied"))
         bounds = np.array([(each.lower, each.upper) for each in inputs])
         tried = np.maximum(np.ptp(self.applied, axis=0), 1e-300) if len(self.applied) else np.ones(len(names))
         width = bounds[:, 1] - bounds[:, 0]
         self.width = np.where(np.isfinite(width), width, tried)
-        self.counts = ~data["void" if "void" in data else "misfire"].to_numpy().astype(bool)
+        self.counts = ~data["void"].to_numpy().astype(bool)
         self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
 
     def limit(self, name: str) -> NDArray[np.float64]:
@@ -82,14 +81,6 @@ class Readings:
         return Mean(float(last.mean() - first[0]), noise * math.sqrt(1.0 + 1.0 / last.size))
 
 
-def _per_input(data: xr.Dataset, name: str, names: Sequence[str]) -> NDArray[np.float64]:
-    values = data[name]
-    table: NDArray[np.float64] = (
-        values.sel(input=list(names)).to_numpy() if "input" in values.dims else values.to_numpy()[:, None]
-    )
-    return table
-
-
 def _mean(values: NDArray[np.float64]) -> Mean:
     if not values.size:
         return Mean(math.nan, math.nan)
@@ -103,7 +94,7 @@ def doubts_about(
     """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
     return [
         *_about_run(run, readings, asked.inputs, gain),
-        *_about_limits(readings, asked.limits, kept),
+        *_about_limits(readings, asked, kept),
         *_about_seeker(seeker, asked, readings.j.size, seen=gain.value > _SURE * gain.sd),
     ]
 
@@ -136,8 +127,12 @@ def _about_run(run: LoopRun, readings: Readings, inputs: Sequence[Input], gain: 
         yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
 
 
-def _about_limits(readings: Readings, limits: Sequence[Limit], kept: Mapping[str, Mean]) -> Iterator[Finding]:
-    for limit in limits:
+def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean]) -> Iterator[Finding]:
+    if asked.started_blindly:
+        names = tuple(measured_names(asked.limits))
+        text = f"no start was given, and nobody knows where {', '.join(names)} would hold: it began where that was open"
+        yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
+    for limit in asked.limits:
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
         mean = kept[limit.name]

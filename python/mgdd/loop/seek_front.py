@@ -11,9 +11,9 @@ import numpy as np
 
 from mgdd.errors import DataError, Interrupted, ParameterError, hinted
 from mgdd.loop.front_result import FrontResult, front_of
-from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.plant import Measurement, Plant
-from mgdd.loop.seek import require_measured, seek_inputs, started
+from mgdd.loop.safe_start import middle_of
+from mgdd.loop.seek import plant_of, seek_inputs, started
 from mgdd.optimize import GaussianProcessSeeking
 from mgdd.optimize.optimum import limits_of
 
@@ -121,13 +121,8 @@ def seek_front(
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
             upper = f" and <= {high}" if math.isfinite(high) else ""
             raise ParameterError.of(name, value, f"a whole number >= {low}{upper}")
-    if isinstance(plant, Plant):
-        require_measured(plant, names, held)
-    elif callable(plant):
-        plant = FunctionPlant(plant, names, held, values=tuple(signs))
-    else:
-        raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
-    begin = started(start, given) or {one.name: 0.5 * (one.lower + one.upper) for one in given}
+    plant = plant_of(plant, given, wanted, list(signs))
+    begin = started(start, given) or middle_of(given)
 
     def seeker() -> GaussianProcessSeeking:
         return GaussianProcessSeeking(

@@ -13,7 +13,8 @@ from mgdd._core.loop import EngineBench, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
 from mgdd.loop.bench_record import OWN_LABELS
-from mgdd.optimize.optimum import Optimum, limits_of
+from mgdd.loop.lower_limits import both_sides, measured_names, plain_name
+from mgdd.optimize.optimum import Optimum
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -75,10 +76,10 @@ def steady_map(quiet: EngineBench, inputs: ArrayLike | Mapping[str, ArrayLike]) 
     return labelled_dataset(variables)
 
 
-def limits_to_keep(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Limit, ...]:
-    """Read limits that have a steady value."""
-    kept = limits_of(limits)
-    check_request(OBJECTIVES[0], [limit.name for limit in kept], bench_limits)
+def limits_to_keep(limits: Any) -> tuple[Limit, ...]:
+    """Read limits that have a steady value, lower ones as upper ones of the negated quantity."""
+    kept = both_sides(limits)
+    check_request(OBJECTIVES[0], measured_names(kept), bench_limits)
     return kept
 
 
@@ -97,9 +98,10 @@ def find_optimum(
     search = _best_timing if len(bounds) == 1 else _best_of_several
     best, free, curvature = search(quiet, caps, bounds)
     at, limited = _settled(quiet, best), _limited(quiet, best)
+    sides = _sides(limited, caps)
     early, late = (_limited(quiet, (best[0] + shift, *best[1:])) for shift in (-0.05, 0.05))
     numbers = {name: float(value) for name, value in at.items() if isinstance(value, float) and name not in bounds}
-    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter_cad for name in caps}
+    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter_cad for name in limited}
     edges = [min(x - low, high - x) / (1.0 if name == "soc_cad" else high - low)
              for x, (name, (low, high)) in zip(best, bounds.items(), strict=True)]  # fmt: skip
     return Optimum(
@@ -108,7 +110,7 @@ def find_optimum(
         value=float(at["j"]),
         values={**numbers, **limited, **spread},
         limits=kept,
-        active_limits=tuple(name for name, cap in caps.items() if limited[name] > cap - 1e-3 * max(1.0, abs(cap))),
+        active_limits=tuple(name for name, cap in caps.items() if sides[name] > cap - 1e-3 * max(1.0, abs(cap))),
         at_bound=min(edges) < 1e-3,
         bounds=dict(bounds),
         curvature=curvature,
@@ -128,7 +130,7 @@ def _best_timing(
         return float(_settled(quiet, (soc,))["j"])
 
     def excess(soc: float) -> float:
-        now = _limited(quiet, (soc,))
+        now = _sides(_limited(quiet, (soc,)), caps)
         return max((now[name] - limit for name, limit in caps.items()), default=-1.0)
 
     def peak(a: float, b: float) -> float:
@@ -142,7 +144,7 @@ def _best_timing(
     if excess(free) > 0.0:
         kept = np.array([excess(x) <= 0.0 for x in grid])
         if not kept.any():
-            raise ConvergenceError(f"no soc_cad in [{low:g}, {high:g}] keeps {caps}: raise a limit")
+            raise ConvergenceError(f"no soc_cad in [{low:g}, {high:g}] keeps {_said(caps)}: move a limit")
         best = int(np.argmax(np.where(kept, values, -np.inf)))
         step = 1 if grid[best] < free else -1
         outside = grid[best + step] if abs(grid[best + step] - grid[best]) < abs(free - grid[best]) else free
@@ -163,7 +165,7 @@ def _best_of_several(
 
     def room(z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Room below each limit, as a share of it."""
-        now = np.array(list(_limited(quiet, low + z * span).values()))
+        now = np.array(list(_sides(_limited(quiet, low + z * span), caps).values()))
         return (uppers - now) / np.maximum(1.0, np.abs(uppers))  # type: ignore[no-any-return]
 
     grid = np.array(list(itertools.product(np.linspace(0.0, 1.0, _SCAN_POINTS[low.size]), repeat=low.size)))
@@ -176,7 +178,7 @@ def _best_of_several(
     best = _climbed(j, room, starts)
     if room(best).min() < -_EDGE:
         asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
-        raise ConvergenceError(f"no {asked} keeps {dict(caps)}: raise a limit")
+        raise ConvergenceError(f"no {asked} keeps {_said(caps)}: move a limit")
     return low + best * span, low + free * span, math.nan
 
 
@@ -204,6 +206,17 @@ def _settled(quiet: EngineBench, inputs: Point) -> dict[str, Any]:
     quiet.reset()
     first, *further = map(float, inputs)
     return quiet.step(first, further)
+
+
+def _said(caps: Mapping[str, float]) -> str:
+    """Write limits as they were given."""
+    sides = [(*plain_name(name), cap) for name, cap in caps.items()]
+    return ", ".join(f"{name} {'<=' if side > 0.0 else '>='} {side * cap:g}" for name, side, cap in sides)
+
+
+def _sides(limited: Mapping[str, float], caps: Mapping[str, float]) -> dict[str, float]:
+    """Give what each limit is of, as an upper one."""
+    return {cap: side * limited[name] for cap in caps for name, side in [plain_name(cap)]}
 
 
 def _limited(quiet: EngineBench, inputs: Point) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,22 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["summarize_cycles"]
+__all__ = ["FIGURES_OF_INPUT", "of_first_input", "summarize_cycles"]
+
+FIGURES_OF_INPUT = {
+    "final": "mean estimate of the last cycles",
+    "mean": "mean estimate, second half",
+    "rms": "rms distance of the estimate to the optimum, second half",
+    "mean_applied": "mean applied input, second half",
+    "lowest": "lowest estimate",
+    "highest": "highest estimate",
+}
+
+
+def of_first_input(figures: Mapping[str, Any], inputs: Sequence[str]) -> dict[str, Any]:
+    """Name the figures that the core has of the first input alone, as angles, as FIGURE_INPUT."""
+    known = {f"{figure}_cad": f"{figure}_{inputs[0]}" for figure in FIGURES_OF_INPUT}
+    return {known.get(name, name): value for name, value in figures.items()}
 
 
 def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -> dict[str, float]:
@@ -24,9 +39,8 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     Parameters
     ----------
     cycles : xarray.Dataset
-        Over ``cycle``: ``misfire`` and ``j``, and ``estimate_cad`` and ``soc_requested_cad`` or, over ``input`` as
-        well, ``estimate`` and ``applied``; where known also
-        ``soc_applied_cad``, ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``,
+        Over ``cycle``: ``misfire`` and ``j``, and over ``input`` as well ``estimate`` and ``applied``; where known also
+        ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``,
         ``limits`` and ``noise_free_limits`` over ``limit``.
     criteria : LoopCriteria, optional
         As in `run_seeker`; cycles are counted from the first row. No seeker is at hand, so ``limits`` must be named for
@@ -36,7 +50,7 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     -------
     dict
         The summary of `run_seeker`, to rounding, with the halves and the tail of the cycles at hand. NaN where nothing
-        was measured, and for figures of the estimate where it is not one angle.
+        was measured.
 
     Raises
     ------
@@ -60,8 +74,7 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     if cycles.sizes["cycle"]:  # a run that was interrupted before its first cycle has measured nothing
         criteria.thresholds(measured)
         uppers = criteria.limits_of(measured)
-    estimate, applied = _one_angle(cycles)
-    n = estimate.size
+    n = cycles.sizes["cycle"]
     half = np.arange(n) >= n // 2
     misfire = cycles["misfire"].to_numpy().astype(bool)
     void = misfire | cycles["unphysical"].to_numpy().astype(bool) if "unphysical" in cycles else misfire
@@ -70,18 +83,13 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
         return factor * _mean(cycles[name].to_numpy()[half & ~void]) if name in cycles else math.nan
 
     out = {
-        "final_cad": _mean(estimate[max(n - criteria.tail_cycles, 0) :]),
-        "mean_cad": _mean(estimate[half]),
-        "rms_cad": math.nan,
+        **_of_inputs(cycles, half, criteria.tail_cycles),
         "cycles_to": math.nan,
         "cycles_stays": math.nan,
         "exceeded_fraction": _exceeded(cycles, criteria.counted_from(n), criteria.exceed_above),
-        "mean_applied_cad": _mean(applied[half]),
         "mean_j": fired("j"),
         "mean_efficiency_percent": fired("efficiency_gross", 100.0),
         "mean_nox_ppm": fired("nox_true_ppm"),
-        "lowest_cad": float(np.min(estimate, initial=math.inf)),
-        "highest_cad": float(np.max(estimate, initial=-math.inf)),
         "misfires": float(misfire.sum()),
         "judged_from": float(criteria.counted_from(n)),
         **{f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()},
@@ -89,8 +97,8 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     }
     if criteria.optimum is None:
         return out
-    away = np.asarray(estimate - criteria.optimum, dtype=np.float64)
-    out["rms_cad"] = math.sqrt(_mean(away[half] ** 2))
+    away = np.asarray(cycles["estimate"].to_numpy()[:, 0] - criteria.optimum, dtype=np.float64)
+    out[f"rms_{cycles['input'].to_numpy()[0]}"] = math.sqrt(_mean(away[half] ** 2))
     near = np.abs(away) <= criteria.arrival
     if near.any():
         out["cycles_to"] = float(np.argmax(near))
@@ -109,15 +117,23 @@ def _of_limits(cycles: xr.Dataset, uppers: Sequence[float], judged_from: int) ->
     return out
 
 
-def _one_angle(cycles: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give estimate and applied timing [°CA aTDC]; NaN for several inputs or one that is not an angle."""
-    if "estimate_cad" in cycles:
-        applied = cycles["soc_applied_cad" if "soc_applied_cad" in cycles else "soc_requested_cad"]
-        return cycles["estimate_cad"].to_numpy(), applied.to_numpy()
-    if cycles.sizes["input"] == 1 and str(cycles["input"].to_numpy()[0]).endswith("_cad"):
-        return cycles["estimate"].to_numpy()[:, 0], cycles["applied"].to_numpy()[:, 0]
-    nothing = np.full(cycles.sizes["cycle"], math.nan)
-    return nothing, nothing
+def _of_inputs(cycles: xr.Dataset, half: NDArray[np.bool_], tail_cycles: int) -> dict[str, float]:
+    """Give the figures of every input; the distance to an optimum is NaN as yet."""
+    out: dict[str, float] = {}
+    columns = zip(
+        cycles["input"].to_numpy(), cycles["estimate"].to_numpy().T, cycles["applied"].to_numpy().T, strict=True
+    )
+    for name, estimate, applied in columns:
+        own = {
+            "final": _mean(estimate[max(estimate.size - tail_cycles, 0) :]),
+            "mean": _mean(estimate[half]),
+            "rms": math.nan,
+            "mean_applied": _mean(applied[half]),
+            "lowest": float(np.min(estimate, initial=math.inf)),
+            "highest": float(np.max(estimate, initial=-math.inf)),
+        }
+        out |= {f"{figure}_{name}": value for figure, value in own.items()}
+    return out
 
 
 def _exceeded(cycles: xr.Dataset, first: int, above: Mapping[str, float]) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError
+from mgdd.errors import Interrupted, ParameterError, argument
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant_loop import LoopRun
@@ -32,10 +32,10 @@ def stillness(asked: Question, tolerance: Any) -> NDArray[np.float64] | None:
     if tolerance is None:
         return None
     still = np.atleast_1d(
-        np.asarray(named_values("tolerance", tolerance, [one.name for one in asked.inputs]), np.float64)
+        np.asarray(named_values(argument("tolerance"), tolerance, [one.name for one in asked.inputs]), np.float64)
     )
     if still.shape != (len(asked.inputs),) or not (np.isfinite(still) & (still > 0.0)).all():
-        raise ParameterError.of("tolerance", tolerance, "> 0, one number for each input")
+        raise ParameterError(f"{argument('tolerance')} = {tolerance}: must be > 0, one number for each input")
     return still
 
 

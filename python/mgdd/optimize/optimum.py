@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mgdd._core.optimize import Limit
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, argument
 from mgdd.results.finding import Finding
 from mgdd.results.labels import to_jsonable
 from mgdd.results.result import NumbersResult
@@ -148,7 +148,7 @@ def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Lim
     if isinstance(limits, Mapping):
         for name, value in limits.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise ParameterError(f"limits: {name} = {value!r}: must be a finite number")
+                raise ParameterError(f"{argument('limits')}: {name} = {value!r}: must be a finite number")
         return tuple(Limit(str(name), float(value)) for name, value in limits.items())
     if isinstance(limits, Sequence) and all(isinstance(limit, Limit) for limit in limits):
         names = [limit.name for limit in limits]

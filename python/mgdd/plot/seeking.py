@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["seeking"]
 
-_NEEDED = ("cycle", "estimate_cad", "soc_requested_cad", "j")
+_NEEDED = ("cycle", "asked", "estimate", "j")
 _MADE_BY = "mgdd.loop.run_seeker"
 _SLOPE = "gradient_per_cad"
 
@@ -44,10 +44,9 @@ def seeking(
     Parameters
     ----------
     run : xarray.Dataset or Result
-        ``estimate_cad``, ``soc_requested_cad`` [°CA aTDC] and ``j`` over ``cycle``, as `mgdd.loop.run_seeker` gives; of
-        several inputs ``estimate`` and ``asked`` over ``cycle`` and ``input``, each in a panel of its own;
-        optional are ``gradient_per_cad`` [unit of J per °CA], NOx of the sensor that ``attrs["nox_sensor"]`` names, and
-        ``limits`` over ``limit``.
+        ``estimate`` and ``asked`` over ``cycle`` and ``input``, each input in a panel of its own, and ``j`` over
+        ``cycle``, as `mgdd.loop.run_seeker` gives; optional are ``gradient_per_cad`` [unit of J per °CA], NOx of the
+        sensor that ``attrs["nox_sensor"]`` names, and ``limits`` over ``limit``.
     optimum_cad : float, optional
         Where the estimate should go [°CA aTDC]; ``attrs["optimum"]`` if left out, which the criteria of a run give.
     limit_values : mapping of str to float, optional
@@ -74,14 +73,17 @@ def seeking(
     >>> from mgdd.optimize import ExtremumSeeking
     >>> run = run_seeker(EngineBench(nox_sensor="none"), ExtremumSeeking(start=-16.0), 60).dataset
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
-    ['timing [°CA aTDC]', 'J [unit of J]']
+    ['soc_cad [°CA aTDC]', 'J [unit of J]']
     """
     run = require("run", run, (), _MADE_BY)
     sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")
     third = _SLOPE if _SLOPE in run else sensor if sensor in run else None
     limited = [str(name) for name in run["limit"].to_numpy()] if "limits" in run else []
-    inputs, needed = _inputs(run)
-    require("run", run, (*needed, *([third] if third else []), *(["limits"] if limited else [])), _MADE_BY)
+    require("run", run, (*_NEEDED, *([third] if third else []), *(["limits"] if limited else [])), _MADE_BY)
+    inputs = [
+        (f"{name} [{unit_of(str(name))}]", run["asked"][:, k], run["estimate"][:, k])
+        for k, name in enumerate(run["input"].to_numpy())
+    ]
     optimum_cad = run.attrs.get("optimum") if optimum_cad is None else optimum_cad
     if limit_values is None:
         limit_values = {name: run.attrs[f"limit_{name}"] for name in limited if f"limit_{name}" in run.attrs}
@@ -129,16 +131,6 @@ def seeking(
     ax.figure.align_ylabels(panels)
     legend(ax, handles, columns=3)
     return ax
-
-
-def _inputs(run: xr.Dataset) -> tuple[list[tuple[str, xr.DataArray, xr.DataArray]], tuple[str, ...]]:
-    """Give label, asked value and estimate of every input, and the variables that a run must have."""
-    if "input" not in run.dims:
-        named = [run[name] for name in _NEEDED[1:3]] if set(_NEEDED) <= set(run.variables) else []
-        return ([("timing [°CA aTDC]", named[1], named[0])] if named else []), _NEEDED
-    names = [str(name) for name in run["input"].to_numpy()]
-    made = [(f"{name} [{unit_of(name)}]", run["asked"][:, k], run["estimate"][:, k]) for k, name in enumerate(names)]
-    return made, ("cycle", "asked", "estimate", "j")
 
 
 def _short(run: xr.Dataset, name: str) -> str:

@@ -128,7 +128,6 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "work_gross_j": Label("J", "gross work (-180 to 180 °CA)"),
         "ringing_intensity_mw_per_m2": Label("MW/m²", "ringing intensity"),
         "soc_cad": Label(_CAD, "start of combustion"),
-        "estimate_cad": Label(_CAD, "estimate of the best timing"),
         "intake_pressure_kpa": Label("kPa", "intake pressure"),
         "second_fraction": Label("-", "share of the heat in the second Wiebe law"),
         "intake_o2_fraction": Label("-", "oxygen of the charge by volume"),

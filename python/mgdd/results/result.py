@@ -32,9 +32,9 @@ class Figures(dict[str, Any]):
     Examples
     --------
     >>> from mgdd.results.result import Figures
-    >>> figures = Figures({"final_cad": -5.6})
-    >>> figures["final_cad"], figures()
-    (-5.6, 'figures\n  final_cad -5.6 °CA aTDC')
+    >>> figures = Figures({"final_soc_cad": -5.6})
+    >>> figures["final_soc_cad"], figures()
+    (-5.6, 'figures\n  final_soc_cad -5.6 °CA aTDC')
     """
 
     def __call__(self) -> str:

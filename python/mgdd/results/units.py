@@ -127,7 +127,8 @@ def unit_of(name: str) -> str:
     ('N m/rad', '-')
     """
     whole = f"_{name}" if len(name) > 1 else name
-    return next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
+    unit = next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
+    return "°CA" if unit == "°CA aTDC" and name.startswith("rms_") else unit  # a distance, not an angle
 
 
 def without_unit(name: str) -> str:

@@ -143,7 +143,7 @@ def _begun(recipe: Recipe, start_cad: float, point: OperatingPoint) -> GuidedEng
 
 def _run(bench: EngineBench, engine: GuidedEngine, cycles: int) -> GuidedRun:
     found = run_seeker(bench, engine, cycles).dataset
-    return GuidedRun(*(found[name].to_numpy() for name in ("estimate_cad", "guide_cad", "soc_requested_cad")))
+    return GuidedRun(*(found[name].to_numpy()[:, 0] for name in ("estimate", "guide_optimum", "asked")))
 
 
 def guided_run(bench: EngineBench, recipe: Recipe, start_cad: float, cycles: int) -> GuidedRun:
@@ -179,7 +179,7 @@ def refits_of(bench: EngineBench, recipe: Recipe, start_cad: float, cycles: int)
             twin.state = asked
             twin.tell(j)
             found.append((k, float(twin.estimate[0]), float(engine.estimate[0])))
-    said = engine.history["guide_cad"].to_numpy()  # before each cycle
+    said = engine.history["guide_optimum"].to_numpy()[:, 0]  # before each cycle
     return [Refit(k, without, with_it, float(said[k + 1])) for k, without, with_it in found]
 
 

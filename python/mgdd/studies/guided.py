@@ -251,11 +251,8 @@ def _run(engine: _Engine, case: str, seeds: int) -> Runs:
     start = float(engine.seeker(case).estimate[0])
     for seed in range(seeds):
         cycles = run_seeker(engine.plant(seed, start), engine.seeker(case), _CYCLES).dataset
-        if "estimate_cad" in cycles:
-            estimate[seed], applied = cycles["estimate_cad"], cycles["soc_applied_cad"].to_numpy()
-        else:
-            estimate[seed], applied = cycles["estimate"][:, 0], cycles["applied"][:, 0].to_numpy()
-        lost[seed] = engine.best_j - np.interp(applied, engine.grid_cad, engine.steady_j)
+        estimate[seed] = cycles["estimate"][:, 0]
+        lost[seed] = engine.best_j - np.interp(cycles["applied"][:, 0], engine.grid_cad, engine.steady_j)
     return Runs(case=case, start_cad=start, best_cad=engine.best_cad, estimate=estimate, lost=lost)
 
 

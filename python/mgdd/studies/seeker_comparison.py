@@ -216,8 +216,8 @@ def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
         "settings": contender.settings,
         **with_interval("cycles_to_1_cad", table["cycles_to"]),
         "share_arrived": float(np.isfinite(table["cycles_to"]).mean()),
-        "rms_cad": rms(table["rms_cad"]),
-        **with_interval("final_cad", table["final_cad"]),
+        "rms_cad": rms(table["rms_soc_cad"]),
+        **with_interval("final_cad", table["final_soc_cad"]),
         **with_interval("j_lost", best.value - table["mean_j"]),
     }
     return _Outcome(row=row, runs=estimates(make, range(min(seeds, _BAND_SEEDS)), _SHOWN), table=table)
@@ -237,8 +237,8 @@ def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum
         "cycle": ("cycle", np.arange(_SHOWN)),
         **band_variables("estimate_{}_cad", ("seeker", "cycle"), [outcome.runs for outcome in done], cad, OVER_SEEDS),
         "cycles_to": (own, by_seed("cycles_to"), "-", "first cycle within 1 °CA of the optimum"),
-        "rms_cad": (own, by_seed("rms_cad"), "°CA", "rms error of the estimate, second half"),
-        "final_cad": (own, by_seed("final_cad"), cad, "mean estimate of the last 100 cycles"),
+        "rms_cad": (own, by_seed("rms_soc_cad"), "°CA", "rms error of the estimate, second half"),
+        "final_cad": (own, by_seed("final_soc_cad"), cad, "mean estimate of the last 100 cycles"),
         "mean_j": (own, by_seed("mean_j"), "%", "mean J, second half"),
         "optimum_cad": ((), best["soc_cad"], cad, "optimum"),
     }

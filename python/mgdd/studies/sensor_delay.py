@@ -146,9 +146,9 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
         "phase_deg": case.lag.response(period=case.period)[1] % 360.0,
         "step_sign": int(np.sign(slope * EARLY_CAD)),  # the optimum lies EARLY_CAD later than the frozen estimate
         "cycles_stays": int(stays) if math.isfinite(stays) else None,
-        "final_cad": run.summary["final_cad"],
+        "final_cad": run.summary["final_soc_cad"],
     }
-    return row, slope, run.dataset["estimate_cad"].to_numpy()
+    return row, slope, run.dataset["estimate"].to_numpy()[:, 0]
 
 
 def _seeker(
@@ -192,8 +192,8 @@ def _component_wise(
         "period_cycles": period,
         "time_constant_cycles": time_constant,
         "nox_gain": _ANALYSER.response(period=period)[0],
-        "rms_cad": rms(table["rms_cad"]),
-        **with_interval("final_cad", table["mean_cad"]),
+        "rms_cad": rms(table["rms_soc_cad"]),
+        **with_interval("final_cad", table["mean_soc_cad"]),
     }
     return row, estimates(make, range(min(seeds, 20)), CYCLES)
 

@@ -179,7 +179,7 @@ OVER_SEEDS = quantiles_of("estimate over seeds", "estimate of the best timing")
 
 def estimates(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], cycles: int) -> NDArray[np.float64]:
     """Run a seeker on a bench for each seed, and give its estimates, shape (seeds, cycles) [°CA aTDC]."""
-    return np.stack([run_seeker(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds])
+    return np.stack([run_seeker(*make(seed), cycles).dataset["estimate"].to_numpy()[:, 0] for seed in seeds])
 
 
 def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:

@@ -214,11 +214,13 @@ def _record_of(experiment: Experiment) -> Path | None:
 def _require_acting(experiment: Experiment) -> None:
     """Refuse what would guard another plant: a limit that does not act must not pass for one."""
     is_engine, default = isinstance(experiment.plant, EnginePlant), SafetySettings()
-    for name in ("envelope",) if is_engine else ("rate_cad", "limits"):
+    for name in ("envelope",) if is_engine else ("rate_cad", "rates", "limits"):
         value = getattr(experiment.safety, name)
         if value != getattr(default, name):
             why = (
-                "for an engine: rate_cad and limits guard it" if is_engine else "for a throttle: its envelope guards it"
+                "for an engine: rate_cad, rates and limits guard it"
+                if is_engine
+                else "for a throttle: its envelope guards it"
             )
             raise ParameterError.of(f"safety.{name}", value, f"left out {why}")
 
@@ -270,12 +272,18 @@ def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: S
     """Make the plant of ``simulate``, or of a node of our own."""
     plant, folder = experiment.plant, experiment.folder
     if isinstance(plant, EnginePlant):
-        engine = engine_named(plant.preset, folder)
-        return EngineBench(
-            scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
-            soc_scatter_cad=plant.soc_scatter_cad, efficiency_noise_percent=plant.efficiency_noise_percent,
-            seed=experiment.seed,
-        )  # fmt: skip
+        engine, steered = engine_named(plant.preset, folder), getattr(experiment.settings, "inputs", ("soc_cad",))
+        try:
+            return EngineBench(
+                scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
+                inputs=list(steered), soc_scatter_cad=plant.soc_scatter_cad,
+                efficiency_noise_percent=plant.efficiency_noise_percent, seed=experiment.seed,
+            )  # fmt: skip
+        except ParameterError as error:
+            if error.field not in ("inputs", "limits"):
+                raise
+            table = "safety" if error.value in experiment.safety.limits else "seek"
+            raise error.reworded(f"{table}.{error}") from error
     return VirtualThrottle(
         scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
         sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
@@ -286,7 +294,7 @@ def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:
     """Refuse a map without what the task applies and measures."""
     experiment = checked.experiment
     seeks = experiment.task == "seek"
-    inputs = ("soc_cad",) if seeks else ("duty",)
+    inputs = tuple(experiment.settings.inputs) if isinstance(experiment.settings, SeekTask) else ("duty",)
     needed = experiment.limit_names if seeks else ("sensed_angle_deg", "first_v", "second_v")
     if signal_map.input_names != inputs:
         raise ParameterError.of(

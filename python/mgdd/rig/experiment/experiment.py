@@ -35,8 +35,8 @@ _TASK_OF: Mapping[str, type[IdentifyTask | TrackTask | SeekTask]] = {
 }  # fmt: skip
 # Keys that may name a file, in the records of an experiment.
 _FILES = {
-    "settings": ("reference", "model", "prior"), "plant": ("preset",), "safety": ("envelope",), "bus": ("map",),
-    "replay": ("record",),
+    "settings": ("reference", "model", "prior", "known"), "plant": ("preset",), "safety": ("envelope",),
+    "bus": ("map",), "replay": ("record",),
 }  # fmt: skip
 _HEAD = ("kind", "format", "task", "mode", "seed", "plant", "bus", "safety", "replay")
 

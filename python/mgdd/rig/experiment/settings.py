@@ -53,11 +53,8 @@ class Settings:
         values: dict[str, Any] = {}
         for own in dataclasses.fields(cls):  # type: ignore[arg-type]
             facts = own.metadata
-            if facts["form"] == "scales":
-                values[own.name] = _numbers(table.table(own.name))
-                continue
-            if facts["form"] == "bounds":
-                values[own.name] = _bounds(table.table(own.name)) or dict(_BOUNDS_CAD)
+            if facts["form"] in _TABLES:
+                values[own.name] = _TABLES[facts["form"]](table.table(own.name))
                 continue
             value = table.take(own.name, facts["form"], own.default)
             if value is not None:
@@ -72,14 +69,34 @@ class Settings:
 
 
 def _bounds(table: TomlTable) -> dict[str, tuple[float, float]]:
-    table.only(("soc_cad",))  # what an engine of an experiment is steered by
     found = table.items()
     for name, value in found.items():
-        if not (isinstance(value, list) and len(value) == 2 and all(fits(one, "number") for one in value)):
-            raise table.error(name, value, "[lower, upper], two numbers")
-        if not -60.0 <= value[0] < value[1] <= 60.0:
+        low, high = _pair(table, name, value, "[lower, upper], two numbers")
+        if not -math.inf < low < high < math.inf:
+            raise table.error(name, value, "lower < upper, both finite")
+        if name.endswith("_cad") and not -60.0 <= low < high <= 60.0:
             raise table.error(name, value, "lower < upper, in [-60, 60]")
-    return {name: (float(value[0]), float(value[1])) for name, value in found.items()}
+    return {name: (float(value[0]), float(value[1])) for name, value in found.items()} or dict(_BOUNDS_CAD)
+
+
+def _limits(table: TomlTable) -> dict[str, Any]:
+    """Take upper values, and pairs of a lower and an upper one, of which one may be infinite."""
+    found, form = table.items(), "a finite number, or [lower, upper], one of which may be -inf or inf"
+    for name, value in found.items():
+        if fits(value, "number"):
+            if not math.isfinite(value):
+                raise table.error(name, value, form)
+            continue
+        low, high = _pair(table, name, value, form)
+        if not low < high or (math.isinf(low) and math.isinf(high)):
+            raise table.error(name, value, f"lower < upper: {form}")
+    return {name: [float(one) for one in value] if isinstance(value, list) else value for name, value in found.items()}
+
+
+def _pair(table: TomlTable, name: str, value: Any, form: str) -> tuple[float, float]:
+    if not (isinstance(value, list) and len(value) == 2 and all(fits(one, "number") for one in value)):
+        raise table.error(name, value, form)
+    return float(value[0]), float(value[1])
 
 
 def _numbers(table: TomlTable) -> dict[str, float]:
@@ -88,6 +105,9 @@ def _numbers(table: TomlTable) -> dict[str, float]:
         if not (fits(value, "number") and math.isfinite(value)):
             raise table.error(name, value, "a finite number")
     return {name: float(value) for name, value in found.items()}
+
+
+_TABLES = {"scales": _numbers, "bounds": _bounds, "limits": _limits, "any": TomlTable.items}
 
 
 def _require(table: TomlTable, name: str, value: Any, facts: Mapping[str, Any]) -> None:
@@ -136,6 +156,7 @@ class SafetySettings(Settings):
 
     envelope: str = _key("text", "etb")
     rate_cad: float = _key("number", 5.0, low=1e-3)
+    rates: Mapping[str, float] = _key("scales", {})
     limits: Mapping[str, float] = _key("scales", {})
 
 
@@ -183,7 +204,11 @@ class SeekTask(Settings):
     cycles: int | None = _key("integer", low=1, high=2_000_000)
     tolerance: Mapping[str, float] = _key("scales", {})
     noise_sd: float | None = _key("number", low=0.0)
-    limits: Mapping[str, float] = _key("scales", {})
+    delay_cycles: float | None = _key("number", low=0.0)
+    lag_cycles: float | None = _key("number", low=0.0)
+    limits: Mapping[str, Any] = _key("limits", {})
+    settings: Mapping[str, Any] = _key("any", {})
+    known: str | None = _key("text")
 
 
 def beside(folder: Path, name: str) -> Path | str:

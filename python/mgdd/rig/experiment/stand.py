@@ -158,7 +158,7 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
         recorded,
         start=plan.start,
         bounds=dict(plan.task.inputs),
-        rates={"soc_cad": safety.rate_cad},
+        rates={"soc_cad": safety.rate_cad, **safety.rates} if "soc_cad" in plan.start else safety.rates,
         limits=[Limit(name, upper) for name, upper in safety.limits.items()],
     )
     told = 0
@@ -176,6 +176,6 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
         plant=guard,
         counters=lambda: {**counters(), "guard": guard.counts},
         events=new_events,
-        start=lambda: plan.start["soc_cad"],
+        start=lambda: next(iter(plan.start.values())),
         left=left,
     )

@@ -12,19 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core, identify, presets
-from mgdd.errors import Interrupted, ParameterError
+from mgdd.errors import Error, Interrupted, ParameterError, arguments_written
 from mgdd.io import throttle_log
+from mgdd.io.point_table import read_points
 from mgdd.loop import Plant, Reference
 from mgdd.loop.controller_families import groups_of
 from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.seek import searched, seek_inputs, started
+from mgdd.loop.known import tell_known
+from mgdd.loop.lower_limits import both_sides
+from mgdd.loop.seek import require_cycles, searched, seek_inputs, started
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
 from mgdd.loop.until_still import stillness
 from mgdd.optimize import FitOptions
-from mgdd.optimize.optimum import limits_of
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
 from mgdd.results.labels import labelled_dataset
@@ -258,28 +260,49 @@ class SeekPlan:
 
     def __init__(self, task: SeekTask, *, folder: Path, seed: int) -> None:
         self.task = task
-        known = engine_named(task.model, folder)
-        guide = None
+        try:
+            with arguments_written(_key):
+                self._prepare(task, folder, seed)
+        except ParameterError as error:
+            if error.field not in task.__dataclass_fields__:
+                raise
+            raise error.reworded(f"seek.{error}") from error
+
+    def _prepare(self, task: SeekTask, folder: Path, seed: int) -> None:
+        try:
+            known = engine_named(task.model, folder)
+        except Error as error:
+            raise error.reworded(f"seek.model = {task.model!r}: {error}") from error
+        guide, cylinder = None, scaled(known.cylinder, task.scale, "seek")
         if task.guide != "none":
-            cylinder = scaled(known.cylinder, task.scale, "seek")
             guide = EngineGuide(cylinder=cylinder, kind=task.guide, point=known.point)
         inputs = seek_inputs(task.inputs)
         self._asked = Question(
-            inputs=inputs, start=started(task.start or None, inputs), limits=limits_of(task.limits),
-            noise_sd=task.noise_sd, guide=guide, seed=seed, point=known.point,
+            inputs=inputs, start=started(task.start or None, inputs), limits=both_sides(task.limits),
+            noise_sd=task.noise_sd, delay_cycles=task.delay_cycles or 0.0, lag_cycles=task.lag_cycles or 0.0,
+            guide=guide, seed=seed, point=known.point, settings=dict(task.settings),
         )  # fmt: skip
+        self._known = None if task.known is None else read_points(beside(folder, task.known))
         self._still = stillness(self._asked, task.tolerance or None)
         choice = self._chosen()
         self.samples = choice.cycles if task.cycles is None else task.cycles
+        require_cycles(choice, self.samples)
         self.start = dict(zip(task.inputs, choice.seeker.estimate.tolist(), strict=True))
 
     def _chosen(self) -> Choice:
-        return chosen(self._asked, self.task.seeker)
+        choice = chosen(self._asked, self.task.seeker)
+        if self._known is None:
+            return choice
+        return tell_known(self._asked, self.task.seeker, choice, self._known)[1]
 
     def estimate(self) -> dict[str, float]:
-        """Give what the running seeker takes for the best timing, and its standard deviation: NaN where it has none."""
-        sd = getattr(self._running, "estimate_sd", math.nan)
-        return {"estimate_cad": float(self._running.estimate[0]), "estimate_sd_cad": float(np.ravel(sd)[0])}
+        """Give what the running seeker takes for the best inputs, and standard deviations: NaN where it has none."""
+        best = self._running.estimate.tolist()
+        sds = np.broadcast_to(getattr(self._running, "estimate_sd", math.nan), len(best)).tolist()
+        named = zip(self.task.inputs, best, sds, strict=True)
+        return {
+            f"{what}.{name}": own[at] for name, *own in named for at, what in enumerate(("estimate", "estimate_sd"))
+        }
 
     def run(self, plant: Plant, _first_cad: float, most: int | None = None) -> Outcome:
         """Run it on a plant, for at most so many cycles."""
@@ -295,11 +318,16 @@ class SeekPlan:
             figures=found.to_dict() | {"guide": self.task.guide},
             dataset=found.run.dataset,
             interrupted=found.interrupted,
-            drawings={"seek": partial(_draw, found.run.dataset, dict(self.task.limits))},
+            drawings={"seek": partial(_draw, found.run.dataset)},
         )
 
 
-def _draw(cycles: xr.Dataset, limits: dict[str, float]) -> Figure:
+def _key(name: str, text: str | None = None) -> str:
+    """Write an argument of the library as the key that sets it."""
+    return f"seek.{name}" if text is None else f"seek.{name} = {text!r}"
+
+
+def _draw(cycles: xr.Dataset) -> Figure:
     from mgdd import plot
 
-    return drawn(plot.seeking, cycles, size=(8.0, 7.0), limit_values=limits)
+    return drawn(plot.seeking, cycles, size=(8.0, 7.0))

@@ -25,10 +25,10 @@ EDGES_US = np.logspace(-1, 7, 65)  # eight bins per decade, as the loop of the c
 _MOST_ROWS = 1 << 19
 _MOST_PANELS, _MOST_LINES = 8, 6
 _STATES, _REASONS = tuple(_core.rig.safety_states), tuple(_core.rig.safety_reasons)
-_OF_PARTS = {"input": "asked", "applied": "applied", "limit": "limited"}
+_OF_PARTS = {"input": "asked", "applied": "applied", "limit": "limited", "estimate": "estimate"}
 _HIDDEN = frozenset(
     "cycle missed mode cause send_result bus_state request good_frames bad_frames fresh bridge_open lateness_us "
-    "compute_us age_us misfire estimate_sd_cad".split()
+    "compute_us age_us misfire".split()
 )
 _DUTIES = {"duty": "duty", "asked_duty": "duty of the controller", "applied_duty": "duty of the node"}
 _QUANTITIES = {
@@ -197,10 +197,10 @@ class LiveData:
                 part, dot, own = column.partition(".")
                 base = own if dot and part in {*_OF_PARTS, "value", "component"} else column
                 double = part == "value" and own in limited
-                if not given[place] or base in _HIDDEN or part == "noise_free" or double:
+                if not given[place] or base in _HIDDEN or part in ("noise_free", "estimate_sd") or double:
                     continue
                 axis, label = _axis(part, base)
-                sd = columns.index("estimate_sd_cad") if column == "estimate_cad" else None
+                sd = columns.index(f"estimate_sd.{own}") if part == "estimate" else None
                 lines = panels.get(axis)
                 if lines is None and len(panels) < _MOST_PANELS:
                     lines = panels[axis] = []
@@ -220,7 +220,7 @@ def _axis(part: str, base: str) -> tuple[str, str]:
         return "duty [-]", _DUTIES[base]
     if known.units in ("-", ""):
         return f"{base} [-]", long
-    if known.units == "°CA aTDC" and (part in _OF_PARTS or base == "estimate_cad"):
+    if known.units == "°CA aTDC" and part in _OF_PARTS:
         return "timing [°CA aTDC]", long
     if base.startswith("imep_"):
         return "IMEP [bar]", long
