@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mgdd.guide import FeedForward
-from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, Limit, NewtonSeeking, Spsa
+from mgdd.optimize import ExtremumSeeking, GoldenSection, GradientDescent, Limit, Spsa
 from mgdd.optimize.optimum import Optimum
 
 SPACE: dict[str, Any] = {"start": -20.0, "lower": -30.0, "upper": 10.0}
@@ -21,8 +21,6 @@ SEEKERS: dict[str, Callable[..., Any]] = {
     "batch": lambda **k: ExtremumSeeking(**SPACE, **k),
     "moving average": lambda **k: ExtremumSeeking(form="moving_average", **SPACE, **k),
     "washout": lambda **k: ExtremumSeeking(form="washout", **SPACE, **k),
-    "newton": lambda **k: NewtonSeeking(amplitude=2.0, **SPACE, **k),
-    "bounded": lambda **k: BoundedSeeking(**SPACE, **k),
     "spsa": lambda **k: Spsa(seed=3, **SPACE, **k),
     "second order": lambda **k: Spsa(form="second_order", seed=4, **SPACE, **k),
     "one measurement": lambda **k: Spsa(form="one_measurement", seed=5, **SPACE, **k),

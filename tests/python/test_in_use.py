@@ -18,12 +18,10 @@ from mgdd.errors import Error, InUseError, ParameterError
 from mgdd.identify import OnlineUpdate
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
     GoldenSection,
     GradientDescent,
     IterativeLearning,
-    NewtonSeeking,
     Spsa,
 )
 from mgdd.throttle import PseudoWiener
@@ -31,8 +29,6 @@ from mgdd.throttle import PseudoWiener
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
 SEEKERS: dict[str, Callable[[], Any]] = {
     "extremum": lambda: ExtremumSeeking(**SPACE),
-    "newton": lambda: NewtonSeeking(**SPACE),
-    "bounded": lambda: BoundedSeeking(**SPACE),
     "spsa": lambda: Spsa(**SPACE),
     "descent": lambda: GradientDescent(**SPACE),
     "golden": lambda: GoldenSection(**SPACE, noise_sd=0.25),

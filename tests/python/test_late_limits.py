@@ -16,13 +16,11 @@ import pytest
 from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, Measurement, run_seeker
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
     GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Limit,
-    NewtonSeeking,
     Seeker,
     Spsa,
 )
@@ -63,8 +61,6 @@ def seekers(limit: Limit, seed: int) -> dict[str, Callable[[], Any]]:
         "batch": lambda: ExtremumSeeking(**common),
         "moving_average": lambda: ExtremumSeeking(**common, form="moving_average"),
         "washout": lambda: ExtremumSeeking(**common, form="washout"),
-        "newton": lambda: NewtonSeeking(**common),
-        "bounded": lambda: BoundedSeeking(**common),
         "spsa": lambda: Spsa(**common, seed=seed),
         "spsa_second_order": lambda: Spsa(**common, form="second_order", seed=seed),
         "golden": lambda: GoldenSection(**common, noise_sd=0.25),

@@ -14,14 +14,12 @@ from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import Curve, CurveSeeking, FeedForward
 from mgdd.loop import EngineBench, Measurement, monte_carlo, run_seeker
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
     GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Input,
     Limit,
-    NewtonSeeking,
     Seeker,
     Spsa,
 )
@@ -40,9 +38,7 @@ SEVERAL: dict[str, Make] = {
     "gradient descent": GradientDescent,
     "batch": lambda **own: ExtremumSeeking(**DITHER, **own),
     "washout": lambda **own: ExtremumSeeking(form="washout", **DITHER, **own),
-    "newton": lambda **own: NewtonSeeking(time_constant_cycles=120.0, **DITHER, **own),
     "gaussian process": lambda **own: GaussianProcessSeeking(seed=2, **own),
-    "bounded": lambda **own: BoundedSeeking(**DITHER, **own),
 }
 
 
@@ -94,7 +90,6 @@ def test_steps_count_in_scales_and_stay_within_rates() -> None:
     assert GradientDescent(start=start, inputs=own).settings["difference"] == [2.0, 0.5, 1.0]
     dither = {"period": 40, "harmonics": [4, 5, 7], "start": start, "inputs": own}
     assert ExtremumSeeking(**dither).settings["amplitude"] == [2.0, 0.5, 1.0]
-    assert NewtonSeeking(time_constant_cycles=80.0, **dither).settings["amplitude"] == [4.0, 1.0, 2.0]
     assert ExtremumSeeking(**dither).settings["rate"][1] == 0.01
     moved = Spsa(start=start, inputs=own).run(lambda x: 5.0 * x["b"], 100)["estimate"].to_numpy()[:, 1]
     assert 0.0 < np.abs(np.diff(moved)).max() <= 0.01 + 1e-12

@@ -86,8 +86,6 @@ def test_a_bad_reading_does_not_lead_a_seeker_away(name: str, bad: dict[int, flo
 def test_what_an_actuator_really_did_does_not_stop_a_seeker(
     name: str, kind: Callable[[float], Actuator], size: float
 ) -> None:
-    if name == "BoundedSeeking":
-        pytest.skip("J turns the phase of its oscillation, and what is late turns it too")
     assert search(SEEKERS[name](), 900, kind(size))[0] == pytest.approx(BEST, abs=4.5)
 
 

@@ -17,13 +17,11 @@ from hypothesis import strategies as st
 
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import (
-    BoundedSeeking,
     ComponentLag,
     ExtremumSeeking,
     GoldenSection,
     GradientDescent,
     Limit,
-    NewtonSeeking,
     Seeker,
     Spsa,
 )
@@ -37,8 +35,6 @@ MAKERS: dict[str, Any] = {
     "washout": lambda: ExtremumSeeking(start=8.0, form="washout", maximize=False, hold_cycles=3),
     "lagged": lambda: ExtremumSeeking(start=8.0, components=[ComponentLag(), ComponentLag(delay_cycles=3)]),
     "two_inputs": lambda: ExtremumSeeking(**PAIR, period=40, harmonics=[4, 5], limits=LIMITS),
-    "newton": lambda: NewtonSeeking(start=8.0, hold_cycles=20),
-    "bounded": lambda: BoundedSeeking(start=8.0, upper=30.0),
     "spsa": lambda: Spsa(**PAIR, seed=2**63 + 5, blocking=True, noise_sd=0.1),
     "spsa_second_order": lambda: Spsa(start=8.0, form="second_order", limits=LIMITS),
     "spsa_one_measurement": lambda: Spsa(start=8.0, form="one_measurement", schedule="constant"),
@@ -125,8 +121,6 @@ def test_a_misfire_is_counted_and_not_read(make: Any) -> None:
         (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: ExtremumSeeking(start=0.0, form="median"), "form = .median.*batch"),
         (lambda: ExtremumSeeking(start=[0.0] * 9), "at most 8"),
-        (lambda: NewtonSeeking(start=0.0, initial_hessian=1.0), "initial_hessian = 1: must be < 0"),
-        (lambda: BoundedSeeking(start=0.0, kappa=0.0), "kappa = 0: must be > 0"),
         (lambda: Spsa(start=0.0, gain=0.0), "gain = 0.*: must be > 0"),
         (lambda: GoldenSection(start=0.0, lower=-np.inf, upper=1.0), "lower = -inf: must be finite"),
         (lambda: ComponentLag(delay_cycles=-1.0), "delay_cycles = -1"),
@@ -141,7 +135,6 @@ def test_settings_are_refused_by_name(make: Any, message: str) -> None:
     ("make", "name"),
     [
         (ExtremumSeeking, "gain"),
-        (BoundedSeeking, "kappa"),
         (Spsa, "gain"),
         (GradientDescent, "step_size"),
     ],
@@ -316,7 +309,7 @@ def test_a_run_takes_limits_and_misfires_and_stops_cleanly() -> None:
 def test_applied_inputs_stay_within_bounds_whatever_is_told(name: str, answers: list[float]) -> None:
     seeker = MAKERS[name]()
     lower, upper = (np.array(seeker.settings[side]) for side in ("lower", "upper"))
-    reach = np.array(seeker.settings.get("amplitude", [0.0])) if name != "bounded" else 0.0
+    reach = np.array(seeker.settings.get("amplitude", [0.0]))
     for answer in answers:
         x = seeker.ask()
         assert np.all((lower <= x) & (x <= upper))

@@ -15,7 +15,6 @@ from mgdd.errors import ParameterError, argument, hinted
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
 from mgdd.optimize import (
-    BoundedSeeking,
     ComponentLag,
     ExtremumSeeking,
     GaussianProcessSeeking,
@@ -23,7 +22,6 @@ from mgdd.optimize import (
     GradientDescent,
     Input,
     Limit,
-    NewtonSeeking,
     Seeker,
     Spsa,
     tune,
@@ -38,14 +36,11 @@ _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wid
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
 _PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later
 _PERIODS = 64  # of a dither: 16 time constants of four periods
-_NEWTON_HOLD_PERIODS = 5  # until gradient and Hessian behind a lag have settled
 _FIRST = (CurveSeeking, GaussianProcessSeeking)
 SEEKERS: Mapping[str, type[Seeker]] = {
     re.sub(r"(?<!^)(?=[A-Z])", "_", cls.kind).lower(): cls
-    for cls in (
-        *_FIRST, ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection,
-    )
-}  # fmt: skip
+    for cls in (*_FIRST, ExtremumSeeking, Spsa, GradientDescent, GoldenSection)
+}
 
 
 class Choice(NamedTuple):
@@ -114,8 +109,6 @@ class Question:
                     1.0, -1.0, delay_cycles=slowest.delay_cycles, lag_cycles=slowest.lag_cycles
                 )  # whose period does not depend on noise and curvature
                 known["period"] = max(takes["period"].default, slow.period)
-                if cls is NewtonSeeking:
-                    known |= _slowed(takes, known["period"])
         elif lags is not None:
             known["components"] = lags
         if self.noise_sd is not None and "noise_sd" in takes:
@@ -155,14 +148,6 @@ def chosen(asked: Question, seeker: str | type[Seeker] = "auto") -> Choice:
     else:
         made, reason = _named(asked, seeker), "as asked for"
     return Choice(made, reason, asked.first_cycles, asked.budget(made))
-
-
-def _slowed(takes: Mapping[str, inspect.Parameter], period: int) -> dict[str, Any]:
-    """Slow the filters of Newton seeking as much as its dither."""
-    slow = period / takes["period"].default
-    own: dict[str, Any] = {name: takes[name].default / slow for name in ("hessian_rate", "riccati_rate")}
-    own["time_constant_cycles"] = takes["time_constant_cycles"].default * slow
-    return own | {"hold_cycles": _NEWTON_HOLD_PERIODS * period}
 
 
 def _class_of(seeker: Any) -> type[Seeker]:

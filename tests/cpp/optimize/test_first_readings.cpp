@@ -15,12 +15,6 @@ std::vector<std::pair<std::string, Seeker>> own_gains(const SearchSpace& space, 
     s.form = form;
     out.emplace_back(name_of(form), ExtremumSeeking(s));
   }
-  NewtonSeekingSettings newton;
-  newton.space = space;
-  out.emplace_back("newton", NewtonSeeking(newton));
-  BoundedSeekingSettings bounded;
-  bounded.space = space;
-  out.emplace_back("bounded", BoundedSeeking(bounded));
   for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
     SpsaSettings s;
     s.space = space;

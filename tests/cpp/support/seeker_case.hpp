@@ -118,20 +118,6 @@ inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpac
     s.limits = limits;
     out.emplace_back("extremum_seeking_" + std::string(name_of(form)), ExtremumSeeking(s));
   }
-  NewtonSeekingSettings newton;
-  newton.space = space;
-  newton.dither = dither(2.0);
-  newton.initial_hessian = Inputs::Constant(space.size(), bend);
-  newton.initial_inverse = Inputs::Constant(space.size(), 1.0 / bend);
-  if (many) newton.time_constant_cycles = 160.0;
-  newton.limits = limits;
-  out.emplace_back("newton_seeking", NewtonSeeking(newton));
-  BoundedSeekingSettings bounded;
-  bounded.space = space;
-  bounded.dither = dither(1.0);
-  bounded.curvature = bend;
-  bounded.limits = limits;
-  out.emplace_back("bounded_seeking", BoundedSeeking(bounded));
   for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
     SpsaSettings s;
     s.space = space;

@@ -20,7 +20,7 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   s.space = resolved(std::move(s.space));
   s.dither.amplitude = or_scaled(std::move(s.dither.amplitude), 1.0, s.space);
-  validate(s.dither, n, false);
+  validate(s.dither, n);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
   if (s.gain.size() > 0) validate_entries("gain", s.gain, n, 0.0, 1e300);
@@ -76,7 +76,7 @@ std::vector<std::string> ExtremumSeekingSettings::advice() const {
 ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
     : SeekerCore(checked(std::move(settings)),
                  [](const ExtremumSeekingSettings& s) { return limit_memory_windows * s.dither.period; }),
-      dither_(settings_.dither, settings_.components, false),
+      dither_(settings_.dither, settings_.components),
       first_(settings_.dither.amplitude, dither_unseen_bend, settings_.gain.size() == 0, settings_.curvature,
              settings_.components),
       last_(settings_.components, limit_count()),
