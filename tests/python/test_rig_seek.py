@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 import pytest
+from tests.python.support.stepped import stepped
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import DataError, Interrupted, ParameterError, RigError
@@ -17,8 +18,6 @@ from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,
-    GoldenSection,
-    GradientDescent,
     Limit,
     Spsa,
 )
@@ -35,17 +34,9 @@ SPACE: dict[str, Any] = {
     "limits": [Limit("p_max_bar", 120.0), Limit("dp_max_bar_per_cad", 9.0, method="penalty"), Limit(NAMES[2], 40.0)],
 }
 LATE = {"components": [ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25.0)], "period": 60}
-SEEKERS: dict[str, Callable[[], Any]] = {
-    "batch": lambda: ExtremumSeeking(**SPACE),
-    "moving_average": lambda: ExtremumSeeking(form="moving_average", **SPACE),
-    "washout": lambda: ExtremumSeeking(form="washout", **SPACE),
-    "component-wise": lambda: ExtremumSeeking(gain=0.15, **LATE, **SPACE),
-    "spsa": lambda: Spsa(seed=3, **SPACE),
-    "second-order spsa": lambda: Spsa(form="second_order", seed=3, **SPACE),
-    "one-measurement spsa": lambda: Spsa(form="one_measurement", seed=3, **SPACE),
-    "descent": lambda: GradientDescent(step_size=8.0, **SPACE),
-    "golden": lambda: GoldenSection(noise_sd=0.25, **SPACE),
-}
+SEEKERS = stepped(**SPACE)
+SEEKERS["component-wise"] = lambda: ExtremumSeeking(gain=0.15, **LATE, **SPACE)
+BATCH = "ExtremumSeeking batch"
 
 
 def rough_bench(sensor: str = "analyser") -> EngineBench:
@@ -92,8 +83,9 @@ def seeker() -> ExtremumSeeking:
     return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=0.98)
 
 
-@pytest.mark.parametrize("sensor", ["analyser", "soft_corrected"])
-@pytest.mark.parametrize("name", SEEKERS)
+@pytest.mark.parametrize(
+    ("name", "sensor"), [*((name, "analyser") for name in SEEKERS), (BATCH, "soft_corrected")]
+)
 def test_the_simulated_rig_is_the_loop_of_the_core(name: str, sensor: str) -> None:
     in_core, on_rig = SEEKERS[name](), SEEKERS[name]()
     goal = LoopCriteria(optimum=-1.0, arrival=2.0, exceed_from=300, exceed_above={"p_max_bar": 121.0})
@@ -117,8 +109,8 @@ def test_the_simulated_rig_is_the_loop_of_the_core(name: str, sensor: str) -> No
 
 
 def test_a_run_in_pieces_is_one_run() -> None:
-    whole = run_seeker(rough_bench(), SEEKERS["batch"](), CYCLES)
-    again = SEEKERS["batch"]()
+    whole = run_seeker(rough_bench(), SEEKERS[BATCH](), CYCLES)
+    again = SEEKERS[BATCH]()
     rig = SimulatedRig(rough_bench())
     pieces = [run_seeker(rig, again, n) for n in (251, 1, 200)]
     last = run_seeker(rig.plant, again, CYCLES - 452)
@@ -129,7 +121,7 @@ def test_a_run_in_pieces_is_one_run() -> None:
 
 def test_the_restart_comes_before_the_cycle() -> None:
     """Deaf to the announcement, the trajectory differs."""
-    core = run_seeker(rough_bench(), SEEKERS["batch"](), CYCLES)
+    core = run_seeker(rough_bench(), SEEKERS[BATCH](), CYCLES)
 
     class Deaf(SimulatedRig):
         @property
@@ -137,7 +129,7 @@ def test_the_restart_comes_before_the_cycle() -> None:
             return False
 
     deaf = Deaf(rough_bench())
-    run = run_seeker(deaf, SEEKERS["batch"](), CYCLES)
+    run = run_seeker(deaf, SEEKERS[BATCH](), CYCLES)
     same = run.dataset["estimate_cad"].to_numpy() == core.dataset["estimate_cad"].to_numpy()
     assert same[:252].all()
     assert not same[252:].all()
@@ -252,7 +244,7 @@ class ClampingRig(ScriptedRig):
         return Measurement(components=hill(0, applied).components, applied={"soc_cad": applied})
 
 
-@pytest.mark.parametrize("name", [name for name in SEEKERS if name != "component-wise"])
+@pytest.mark.parametrize("name", sorted(SEEKERS.keys() - {"component-wise", "CurveSeeking", "GaussianProcessSeeking"}))
 def test_a_rig_that_clamps_inside_the_bounds_holds_the_estimate_there(name: str) -> None:
     free = SEEKERS[name]()
     chosen = type(free)(**{**free.settings, "limits": [], "start": [6.0]})

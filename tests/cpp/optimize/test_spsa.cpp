@@ -189,15 +189,6 @@ TEST(Spsa, OneMeasurementDoesNotMindAConstantAddedToJ) {
     ASSERT_NEAR(a[k], b[k], 1e-5);
 }
 
-TEST(Spsa, MinimisingIsMaximisingTheNegative) {
-  SpsaSettings s;
-  s.space = space_at(scalar_input(8.0));
-  Spsa up(s);
-  s.maximize = false;
-  Spsa down(s);
-  EXPECT_EQ(search(up, quadratic, 600), search(down, [](double x) { return -quadratic(x); }, 600));
-}
-
 TEST(Spsa, RefusesAndAdvises) {
   const auto refused = [](auto change) {
     SpsaSettings s;

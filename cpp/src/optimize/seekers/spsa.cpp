@@ -168,12 +168,6 @@ const Inputs& Spsa::ask() noexcept {
   return send();
 }
 
-TellStatus Spsa::tell(const Reading& reading) noexcept {
-  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
-  look_back(*this, first_.open());
-  return status;
-}
-
 void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   const bool around = first_.open() || stage_ < std::int64_t{per_gradient()} * settings_.averaging;
@@ -289,7 +283,7 @@ void Spsa::finish_iteration() noexcept {
   const Inputs reach = perturbation_now() * (second ? 2.0 : 1.0), room = widest();
   step = filter_.project(estimate_, step, {settings_.space, room, clamp_.reach(reach), most, most, metric_});
   candidate_ = estimate_;
-  move_within(candidate_, step, settings_.space, room, clamp_, Inputs::Zero(step.size()));
+  move_within(candidate_, step, settings_.space, room, clamp_);
   share_ += perturbation_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 

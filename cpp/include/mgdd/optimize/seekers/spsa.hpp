@@ -76,12 +76,11 @@ inline auto fields_of(const SpsaSettings&) {
   };
 }
 
-class Spsa : public SeekerCore<SpsaSettings> {
+class Spsa : public SeekerCore<Spsa, SpsaSettings> {
  public:
   explicit Spsa(SpsaSettings settings);
 
   const Inputs& ask() noexcept;
-  TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: forget limits and what was measured of this iteration; keep the estimate, begin the gains
   /// anew.
   void restart() noexcept;
@@ -130,6 +129,7 @@ class Spsa : public SeekerCore<SpsaSettings> {
 
  private:
   friend SeekerCore;
+  bool judged_together() const noexcept { return first_.open(); }
   void begin_anew() noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   Inputs gain_now() const noexcept;
