@@ -126,7 +126,7 @@ def test_three_inputs_and_two_limits_end_where_slsqp_ends(name: str) -> None:
     kept = np.abs(PLANES) @ (half * np.array(reach.get(name, amplitude)))
     best = best_of(mixed, lambda x: PLANES @ x - UPPER + kept, [(-9.0, 9.0)] * 3)
     assert (PLANES @ end - UPPER).max() < 0.02
-    # The loss against the solver: next to nothing for steps that use a mean, more for those of one measurement.
+    # The loss against the solver: next to nothing for steps that use a mean, more for those of two.
     allowed = {"spsa": 0.3, "spsa_second_order": 0.3}.get(name, 0.02)
     assert mixed(best) - mixed(end) < allowed, (end, best)
 

@@ -68,7 +68,7 @@ def codes(seeker: Any) -> list[str]:
 
 def test_the_finder_finds_every_kind_of_seeker() -> None:
     assert {SEEKERS[name]().kind for name in SEEKERS} == {one.kind for one in Seeker.__subclasses__()}
-    assert {"Spsa one_measurement", "ExtremumSeeking washout", "CurveSeeking"} <= set(SEEKERS)
+    assert {"Spsa second_order", "ExtremumSeeking washout", "CurveSeeking"} <= set(SEEKERS)
 
 
 @shared

@@ -183,7 +183,6 @@ def _contenders(best: Optimum) -> list[_Contender]:
         _Contender("SPSA, first order", "a 20, c 1.5, decreasing", Spsa(**box, gain=20.0)),
         _Contender("SPSA, tuned", _short(spsa), spsa.seeker(**box)),
         _Contender("SPSA, second order", "a 3, c 1.5, decreasing", Spsa(**box, **bend, form="second_order")),
-        _Contender("SPSA, one measurement", "a 20, c 1.5, decreasing", Spsa(**box, form="one_measurement", gain=20.0)),
         _Contender("two-sided differences", "step size 15, c 1", GradientDescent(**box, step_size=15.0)),
         _Contender("golden section", f"noise {NOISE_PERCENT:g}", GoldenSection(**box, noise_sd=NOISE_PERCENT)),
     ]

@@ -15,7 +15,7 @@ std::vector<std::pair<std::string, Seeker>> own_gains(const SearchSpace& space, 
     s.form = form;
     out.emplace_back(name_of(form), ExtremumSeeking(s));
   }
-  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
+  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order}) {
     SpsaSettings s;
     s.space = space;
     s.form = form;

@@ -99,7 +99,6 @@ TEST(Limits, TwoLimitsInTwoInputs) {
   const std::vector<Limit> limits{{"a", 1.0, 0.0, LimitMethod::switching, 1.0, 10.0},
                                   {"b", 3.0, 0.0, LimitMethod::switching, 1.0, 10.0}};
   for (auto& [name, any] : every_seeker(space_at(inputs({-4.0, -3.0}), 30.0), 0.0, 1, limits)) {
-    if (name == "spsa_one_measurement") continue;  // its steps are as coarse as this corner
     SCOPED_TRACE(name);
     std::visit(
         [&](auto& seeker) {

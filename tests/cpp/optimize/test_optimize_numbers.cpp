@@ -97,11 +97,10 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
     t.perturbation = scalar_input(0.9);
     return Spsa(t).settings();
   };
-  EXPECT_EQ(made(SpsaForm::first_order).gain.size() + made(SpsaForm::one_measurement).gain.size(), 0);
+  EXPECT_EQ(made(SpsaForm::first_order).gain.size(), 0);
   EXPECT_EQ(made(SpsaForm::second_order).gain, scalar_input(3.0));
   EXPECT_DOUBLE_EQ(made(SpsaForm::first_order).step_max[0], 1.2);
   EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max[0], 1.2);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::one_measurement).step_max[0], 0.18);
 }
 
 TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
@@ -137,9 +136,7 @@ TEST(OptimizeNumbers, NamesOfTheOptions) {
   test::expect_names<MeanRemoval>({{MeanRemoval::batch, "batch"},
                                    {MeanRemoval::moving_average, "moving_average"},
                                    {MeanRemoval::washout, "washout"}});
-  test::expect_names<SpsaForm>({{SpsaForm::first_order, "first_order"},
-                                {SpsaForm::second_order, "second_order"},
-                                {SpsaForm::one_measurement, "one_measurement"}});
+  test::expect_names<SpsaForm>({{SpsaForm::first_order, "first_order"}, {SpsaForm::second_order, "second_order"}});
   test::expect_names<GainSchedule>({{GainSchedule::decreasing, "decreasing"}, {GainSchedule::constant, "constant"}});
   test::expect_names<LimitMethod>(
       {{LimitMethod::switching, "switching"}, {LimitMethod::penalty, "penalty"}, {LimitMethod::barrier, "barrier"}});

@@ -5,7 +5,7 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr int forms = 8;
+constexpr int forms = 7;
 
 std::string form_name(std::size_t form) {
   return every_seeker(space_at(scalar_input(0.0), 20.0), 0.25)[form].first;
