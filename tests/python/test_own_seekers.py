@@ -11,6 +11,7 @@ import pytest
 
 import mgdd
 from mgdd.cli import main
+from mgdd.engine import OperatingPoint
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.loop import EngineBench, seek
 from mgdd.optimize import Limit, Seeker, Spsa
@@ -90,9 +91,17 @@ def test_an_object_is_told_what_it_takes() -> None:
     assert found.limits["p"] == pytest.approx(3.0, abs=0.2)
     assert {one["misfire"] for one in walk.told} == {True, False}
     assert walk.told[-1]["j"] < 0.0  # minimised
-    plain = seek(EngineBench(seed=2, limits=["p_max_bar"]), BOUNDS, seeker=Walk(-12.0), limits={"p_max_bar": 500.0})
-    assert plain.run.dataset.sizes["cycle"] == 2000
-    assert plain.seeker.kind == "Walk"
+
+
+def test_a_failed_cycle_is_asked_again_and_a_new_point_is_a_restart(page: dict[str, Any]) -> None:
+    seeker = page["BoundedSeeking"](-12.0, -25.0, 10.0)
+    bench = EngineBench(seed=2, limits=["p_max_bar"], misfire_probability=0.1)
+    found = seek(bench, BOUNDS, seeker=seeker, cycles=500)
+    assert abs(found.inputs["soc_cad"] + 5.63) < 2.0
+    assert 20 < 500 - seeker.k == int(found.run.dataset["misfire"].sum())
+    walk, points = Walk(-12.0), [(0, OperatingPoint()), (20, OperatingPoint(fuel_mg=26.0))]
+    found = seek(EngineBench(schedule=points), BOUNDS, seeker=walk, cycles=30)
+    assert (found.seeker.kind, walk.restarts, found.seeker.own is walk) == ("Walk", 1, True)
 
 
 def test_an_object_that_cannot_seek_is_refused_by_what_it_lacks() -> None:

@@ -83,9 +83,7 @@ def seeker() -> ExtremumSeeking:
     return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=0.98)
 
 
-@pytest.mark.parametrize(
-    ("name", "sensor"), [*((name, "analyser") for name in SEEKERS), (BATCH, "soft_corrected")]
-)
+@pytest.mark.parametrize(("name", "sensor"), [*((name, "analyser") for name in SEEKERS), (BATCH, "soft_corrected")])
 def test_the_simulated_rig_is_the_loop_of_the_core(name: str, sensor: str) -> None:
     in_core, on_rig = SEEKERS[name](), SEEKERS[name]()
     goal = LoopCriteria(optimum=-1.0, arrival=2.0, exceed_from=300, exceed_above={"p_max_bar": 121.0})

@@ -89,6 +89,11 @@ def test_a_refused_value_names_the_cycle_and_changes_nothing(make: Any) -> None:
         seeker.tell([1.0, 2.0, 3.0], limits)
     with pytest.raises(ShapeError, match=r"cycle 25: limits has 3 values|limits: 'p_max_bar' is missing"):
         seeker.tell([1.0] * seeker.component_count, {"other": 1.0} if limits else [1.0, 2.0, 3.0])
+    size = seeker.estimate.size
+    for applied in ([0.0] * (size + 1), [np.nan] * size, [-1e31] * size):
+        for misfire in (False, True):
+            with pytest.raises((DataError, ShapeError), match="cycle 25: applied"):
+                seeker.tell([1.0] * seeker.component_count, limits, applied=applied, misfire=misfire)
     assert seeker.state == before
     assert seeker.history.sizes["cycle"] == 25
     assert run(seeker, 40) == run(untouched, 40)

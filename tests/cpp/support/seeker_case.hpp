@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -99,11 +100,11 @@ inline ExtremumSeekingSettings plain_seeking(double start, double tau_cycles = 4
 /// A seeker as its settings make it, with what a user of `bend` knows; of golden section bounds are finite.
 template <class S, class More>
 void add_seeker(std::vector<std::pair<std::string, Seeker>>& out, std::string name, const SearchSpace& space,
-                const std::vector<Limit>& limits, More more) {
+                const std::vector<Limit>& limits, std::optional<double> curvature, More more) {
   std::remove_cvref_t<decltype(std::declval<S>().settings())> s;
   s.space = space;
   s.limits = limits;
-  if constexpr (requires { s.curvature; }) s.curvature = bend;
+  if constexpr (requires { s.curvature; }) s.curvature = curvature;
   if constexpr (requires { s.dither; }) {
     if (space.size() > 1) {
       s.dither.period = 40;
@@ -119,19 +120,21 @@ void add_seeker(std::vector<std::pair<std::string, Seeker>>& out, std::string na
 /// Every seeker and form but the process, whose searches take long.
 inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpace& space, double noise_sd,
                                                                 std::uint64_t seed = 0,
-                                                                const std::vector<Limit>& limits = {}) {
+                                                                const std::vector<Limit>& limits = {},
+                                                                std::optional<double> curvature = bend) {
   std::vector<std::pair<std::string, Seeker>> out;
   for (const auto& one : names<MeanRemoval>())
-    add_seeker<ExtremumSeeking>(out, "extremum_seeking", space, limits, [&](auto& s) { s.form = one.first; });
+    add_seeker<ExtremumSeeking>(out, "extremum_seeking", space, limits, curvature,
+                                [&](auto& s) { s.form = one.first; });
   for (const auto& one : names<SpsaForm>()) {
-    add_seeker<Spsa>(out, "spsa", space, limits, [&](auto& s) {
+    add_seeker<Spsa>(out, "spsa", space, limits, curvature, [&](auto& s) {
       s.form = one.first;
       s.seed = seed;
     });
   }
-  add_seeker<GradientDescent>(out, "gradient_descent", space, limits, [](auto&) {});
+  add_seeker<GradientDescent>(out, "gradient_descent", space, limits, curvature, [](auto&) {});
   if (space.size() > 1) return out;
-  add_seeker<GoldenSection>(out, "golden_section", space, limits, [&](auto& s) {
+  add_seeker<GoldenSection>(out, "golden_section", space, limits, curvature, [&](auto& s) {
     if (std::isinf(space.lower[0])) s.space.lower[0] = -45.0;
     if (std::isinf(space.upper[0])) s.space.upper[0] = 52.0;
     s.noise_sd = noise_sd;
