@@ -106,17 +106,6 @@ def test_the_simulated_rig_is_the_loop_of_the_core(name: str, sensor: str) -> No
     assert not run.interrupted
 
 
-def test_a_run_in_pieces_is_one_run() -> None:
-    whole = run_seeker(rough_bench(), SEEKERS[BATCH](), CYCLES)
-    again = SEEKERS[BATCH]()
-    rig = SimulatedRig(rough_bench())
-    pieces = [run_seeker(rig, again, n) for n in (251, 1, 200)]
-    last = run_seeker(rig.plant, again, CYCLES - 452)
-    joined = np.concatenate([piece.dataset["estimate_cad"] for piece in (*pieces, last)])
-    np.testing.assert_array_equal(joined, whole.dataset["estimate_cad"])
-    np.testing.assert_array_equal(pieces[2].dataset["cycle"], np.arange(252, 452))
-
-
 def test_the_restart_comes_before_the_cycle() -> None:
     """Deaf to the announcement, the trajectory differs."""
     core = run_seeker(rough_bench(), SEEKERS[BATCH](), CYCLES)
