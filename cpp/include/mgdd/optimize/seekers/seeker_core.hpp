@@ -54,7 +54,8 @@ class SeekerCore {
     return status;
   }
 
- protected:
+ private:
+  friend Self;
   /// `memory` gives how many measurements stand behind what is learnt of the limits.
   SeekerCore(S checked, double (*memory)(const S&))
       : settings_(std::move(checked)),
@@ -65,6 +66,7 @@ class SeekerCore {
         estimate_(settings_.space.start),
         applied_(estimate_) {}
 
+ protected:
   /// What to ask of the plant where `applied_` is wanted.
   const Inputs& send() noexcept { return protocol_.ask(clamp_.stretched(applied_, estimate_, settings_.space)); }
   /// A cycle without a reading: what comes late has moved on, and a dither may go on with it.
