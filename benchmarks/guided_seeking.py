@@ -68,8 +68,6 @@ def rows_for(field: SeekingMap) -> list[Row]:
             Row(f"extremum seeking, {form.replace('_', ' ')}", untouched(optimize.ExtremumSeeking, form=form))
             for form in ("batch", "moving_average", "washout")
         ),
-        Row("Newton seeking", untouched(optimize.NewtonSeeking)),
-        Row("bounded seeking", untouched(optimize.BoundedSeeking)),
         Row("SPSA", untouched(optimize.Spsa)),
         Row("gradient descent", untouched(optimize.GradientDescent)),
         *(

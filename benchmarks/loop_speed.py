@@ -122,8 +122,6 @@ def seekers() -> dict[str, Callable[[], object]]:
     bounds = {"start": 0.0, "lower": LOWER, "upper": UPPER}
     return {
         "ExtremumSeeking": lambda: optimize.ExtremumSeeking(**bounds),
-        "NewtonSeeking": lambda: optimize.NewtonSeeking(**bounds),
-        "BoundedSeeking": lambda: optimize.BoundedSeeking(**bounds),
         "Spsa": lambda: optimize.Spsa(**bounds),
         "GradientDescent": lambda: optimize.GradientDescent(**bounds),
         "GoldenSection": lambda: optimize.GoldenSection(**bounds, noise_sd=0.25),

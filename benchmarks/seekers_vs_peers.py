@@ -153,8 +153,6 @@ def rows() -> list[Row]:
         Row("ours by tune: SPSA", by_tune("spsa")),
         Row("ours: golden section, noise known", golden(noise_known=True)),
         Row("ours untouched: ExtremumSeeking", untouched(optimize.ExtremumSeeking)),
-        Row("ours untouched: NewtonSeeking", untouched(optimize.NewtonSeeking)),
-        Row("ours untouched: BoundedSeeking", untouched(optimize.BoundedSeeking)),
         Row("ours untouched: Spsa", untouched(optimize.Spsa)),
         Row("ours untouched: GradientDescent", untouched(optimize.GradientDescent)),
         Row("ours untouched: GoldenSection", golden(noise_known=False)),

@@ -44,10 +44,6 @@ S make(int inputs, bool with_limits) {
     if (own.size() > 0) own = Inputs::Constant(inputs, own[0]);  // empty: the seeker makes its own
   };
   if constexpr (requires { s.gain.size(); }) for_every_input(s.gain);
-  if constexpr (std::is_same_v<S, NewtonSeeking>) {
-    for_every_input(s.initial_hessian);
-    for_every_input(s.initial_inverse);
-  }
   if constexpr (std::is_same_v<S, GoldenSection>) s.noise_sd = 0.25;  // goes on around the vertex of a parabola
   return S(s);
 }
@@ -86,8 +82,7 @@ bool add(const std::string& name, int most_inputs = 3) {
 }
 
 [[maybe_unused]] const bool registered =
-    add<ExtremumSeeking>("extremum_seeking") && add<NewtonSeeking>("newton_seeking") &&
-    add<BoundedSeeking>("bounded_seeking") && add<Spsa>("spsa") && add<GradientDescent>("gradient_descent") &&
+    add<ExtremumSeeking>("extremum_seeking") && add<Spsa>("spsa") && add<GradientDescent>("gradient_descent") &&
     add<GoldenSection>("golden_section", 1) && add<GaussianProcessSeeking>("gaussian_process");
 
 }  // namespace

@@ -13,7 +13,7 @@ Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA 
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
+from typing import Any
 
 from mgdd._core import __version__
 
@@ -44,9 +44,11 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> Any:
     if name in __all__:
         return importlib.import_module(f"mgdd.{name}")
+    if name in ("BoundedSeeking", "NewtonSeeking"):
+        return getattr(importlib.import_module("mgdd.optimize"), name)  # which says what to take
     raise AttributeError(f"module 'mgdd' has no attribute {name!r}")
 
 

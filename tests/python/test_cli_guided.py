@@ -115,7 +115,7 @@ def test_the_start_is_that_of_the_user(
     assert first_timing(file) == pytest.approx(-18.0, abs=1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("seeker", ["newton_seeking", "bounded_seeking", "spsa"])
+@pytest.mark.parametrize("seeker", ["gradient_descent", "spsa"])
 def test_a_seeker_of_any_kind_begins_there(
     seeker: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
 ) -> None:

@@ -172,7 +172,7 @@ def test_many_loops_have_the_numbers_of_run_seeker(library: ctypes.CDLL) -> None
     seekers = [
         SEEKERS["ExtremumSeeking batch"](),
         optimize.Spsa(**SPACE, seed=5),
-        FeedForward(SEEKERS["NewtonSeeking"]()),
+        FeedForward(SEEKERS["GradientDescent"]()),
     ]
     data = np.array([0.05, -7.0])
     plants = [of(library, noise_sd=0.2), of(library, noise_sd=0.1, user_data=data)]

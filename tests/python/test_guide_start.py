@@ -14,7 +14,7 @@ from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
 from mgdd.loop import EngineBench, run_seeker
-from mgdd.optimize import ExtremumSeeking, NewtonSeeking, Seeker, Spsa
+from mgdd.optimize import ExtremumSeeking, Seeker, Spsa
 from mgdd.optimize.optimum import Optimum
 
 START_CAD, GUIDE_CAD, PLANT_BEST_CAD = -18.0, -1.53, -5.63
@@ -40,7 +40,7 @@ def test_by_itself_a_run_begins_at_the_best_of_the_guide() -> None:
         assert GuidedEngine(seeker, ROUGH, OperatingPoint()).estimate[0] == pytest.approx(GUIDE_CAD, abs=0.05)
 
 
-@pytest.mark.parametrize("seeker", [ExtremumSeeking, NewtonSeeking, Spsa])
+@pytest.mark.parametrize("seeker", [ExtremumSeeking, Spsa])
 def test_with_a_kept_start_the_first_point_belongs_to_the_seeker(seeker: type[Any]) -> None:
     schedule = [(0, OperatingPoint(fuel_mg=12.0)), (80, OperatingPoint(fuel_mg=26.0))]
     runs = []

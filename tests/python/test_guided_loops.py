@@ -16,7 +16,7 @@ from mgdd.engine import Cylinder, OperatingPoint, Performance
 from mgdd.errors import ParameterError
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
 from mgdd.loop import EngineBench, LoopCriteria, monte_carlo, run_seeker
-from mgdd.optimize import ComponentLag, ExtremumSeeking, GaussianProcessSeeking, Limit, NewtonSeeking, Spsa
+from mgdd.optimize import ComponentLag, ExtremumSeeking, GaussianProcessSeeking, GradientDescent, Limit, Spsa
 
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
 GOAL = LoopCriteria(optimum=-6.0, arrival=2.0)
@@ -58,7 +58,7 @@ SEEKERS: dict[str, Callable[[], Any]] = {
     "feed-forward": lambda: FeedForward(ExtremumSeeking(**SPACE), by_fuel),
     "one whose trust alone decides": lambda: FeedForward(ExtremumSeeking(**SPACE), by_fuel, probe_cycles=0),
     "one that has run": begun,
-    "one that keeps its start": lambda: FeedForward(NewtonSeeking(**SPACE), by_fuel, keep_start=True),
+    "one that keeps its start": lambda: FeedForward(GradientDescent(**SPACE), by_fuel, keep_start=True),
     "one that draws": lambda: FeedForward(Spsa(**SPACE, seed=SEED), by_fuel),
     "one without a guide": lambda: FeedForward(ExtremumSeeking(**SPACE)),
     "a guide that fails": lambda: FeedForward(ExtremumSeeking(**SPACE), lambda _: 1.0 / 0.0),

@@ -12,31 +12,20 @@ from typing import Any, Self
 
 import numpy as np
 import pytest
+from tests.python.support.stepped import stepped
 
 from mgdd import presets
 from mgdd.errors import Error, InUseError, ParameterError
 from mgdd.identify import OnlineUpdate
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
-    GoldenSection,
-    GradientDescent,
     IterativeLearning,
-    NewtonSeeking,
-    Spsa,
 )
 from mgdd.throttle import PseudoWiener
 
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
-SEEKERS: dict[str, Callable[[], Any]] = {
-    "extremum": lambda: ExtremumSeeking(**SPACE),
-    "newton": lambda: NewtonSeeking(**SPACE),
-    "bounded": lambda: BoundedSeeking(**SPACE),
-    "spsa": lambda: Spsa(**SPACE),
-    "descent": lambda: GradientDescent(**SPACE),
-    "golden": lambda: GoldenSection(**SPACE, noise_sd=0.25),
-}
+SEEKERS = stepped(**SPACE)
 
 
 def together(*calls: Callable[[], Any]) -> list[Any]:

@@ -21,7 +21,7 @@ from mgdd.loop import (
     run_seeker,
 )
 from mgdd.loop.summary import summarize_cycles
-from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
+from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, Spsa
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 
@@ -42,14 +42,12 @@ def bench(**more: Any) -> EngineBench:
 
 def seeker(kind: str) -> Any:
     limits = [Limit("p_max_bar", 120.0)]
-    if kind == "newton":
-        return NewtonSeeking(**SPACE, limits=limits)
     if kind == "spsa":
         return Spsa(**SPACE, limits=limits, seed=3)
     return ExtremumSeeking(**SPACE, limits=limits, form=kind)
 
 
-@pytest.mark.parametrize("kind", ["batch", "moving_average", "newton", "spsa"])
+@pytest.mark.parametrize("kind", ["batch", "moving_average", "spsa"])
 def test_one_run_is_its_pieces_is_ask_and_tell(kind: str) -> None:
     whole = run_seeker(bench(), seeker(kind), 400)
     plant, pieces = bench(), seeker(kind)
@@ -220,7 +218,7 @@ def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:
 
 
 def test_a_refused_run_moves_neither_bench_nor_seeker() -> None:
-    plant, it = EngineBench(), NewtonSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
+    plant, it = EngineBench(), Spsa(**SPACE, limits=[Limit("p_max_bar", 95.0)])
     state = it.state
     with pytest.raises(ParameterError):
         run_seeker(plant, it, 10)

@@ -9,19 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.python.support.stepped import stepped
 
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import Curve, CurveSeeking, FeedForward
 from mgdd.loop import EngineBench, Measurement, monte_carlo, run_seeker
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
-    GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Input,
     Limit,
-    NewtonSeeking,
     Seeker,
     Spsa,
 )
@@ -32,18 +30,7 @@ START = {"egr": 0.3, "soc_cad": 8.0}
 DITHER = {"period": 40, "harmonics": [4, 5]}
 
 Make = Callable[..., Seeker]
-SEVERAL: dict[str, Make] = {
-    "spsa": Spsa,
-    "spsa constant": lambda **own: Spsa(schedule="constant", gain=None, seed=3, **own),
-    "spsa second order": lambda **own: Spsa(form="second_order", **own),
-    "spsa one measurement": lambda **own: Spsa(form="one_measurement", **own),
-    "gradient descent": GradientDescent,
-    "batch": lambda **own: ExtremumSeeking(**DITHER, **own),
-    "washout": lambda **own: ExtremumSeeking(form="washout", **DITHER, **own),
-    "newton": lambda **own: NewtonSeeking(time_constant_cycles=120.0, **DITHER, **own),
-    "gaussian process": lambda **own: GaussianProcessSeeking(seed=2, **own),
-    "bounded": lambda **own: BoundedSeeking(**DITHER, **own),
-}
+SEVERAL = list(stepped(start=START, inputs=PAIR))
 
 
 def path(seeker: Seeker, factors: list[float], factor_of_j: float, cycles: int = 320) -> np.ndarray:
@@ -59,14 +46,14 @@ def path(seeker: Seeker, factors: list[float], factor_of_j: float, cycles: int =
 
 
 @pytest.mark.parametrize("limited", [False, True], ids=["free", "limited"])
-@pytest.mark.parametrize("make", SEVERAL.values(), ids=SEVERAL)
-def test_other_units_of_inputs_and_j_lead_along_the_same_path(make: Make, limited: bool) -> None:
+@pytest.mark.parametrize("name", SEVERAL)
+def test_other_units_of_inputs_and_j_lead_along_the_same_path(name: str, limited: bool) -> None:
     limits = [Limit("p", 4.0, scale=1.0)] if limited else []
-    plain = path(make(start=START, inputs=PAIR, limits=limits), [1.0, 1.0], 1.0)
+    plain = path(stepped(start=START, inputs=PAIR, limits=limits)[name](), [1.0, 1.0], 1.0)
     wide = [Input("soc_cad", 50.0 * -25.0, 50.0 * 15.0), Input("egr", 0.0, 0.4e-3)]
     start = {"soc_cad": 50.0 * 8.0, "egr": 0.3e-3}
     limits = [Limit("p", 4.0e-3, scale=1e-3)] if limited else []
-    other = path(make(start=start, inputs=wide, limits=limits), [50.0, 1e-3], 1e-3)
+    other = path(stepped(start=start, inputs=wide, limits=limits)[name](), [50.0, 1e-3], 1e-3)
     np.testing.assert_allclose(other * [1.0, 100.0], plain * [1.0, 100.0], rtol=0.0, atol=1e-5)
     assert np.ptp(plain[:, 0]) > 1.5, "it has not moved"
 
@@ -94,7 +81,6 @@ def test_steps_count_in_scales_and_stay_within_rates() -> None:
     assert GradientDescent(start=start, inputs=own).settings["difference"] == [2.0, 0.5, 1.0]
     dither = {"period": 40, "harmonics": [4, 5, 7], "start": start, "inputs": own}
     assert ExtremumSeeking(**dither).settings["amplitude"] == [2.0, 0.5, 1.0]
-    assert NewtonSeeking(time_constant_cycles=80.0, **dither).settings["amplitude"] == [4.0, 1.0, 2.0]
     assert ExtremumSeeking(**dither).settings["rate"][1] == 0.01
     moved = Spsa(start=start, inputs=own).run(lambda x: 5.0 * x["b"], 100)["estimate"].to_numpy()[:, 1]
     assert 0.0 < np.abs(np.diff(moved)).max() <= 0.01 + 1e-12

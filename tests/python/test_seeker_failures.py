@@ -14,11 +14,9 @@ from tests.python.support.stepped import stepped
 from mgdd.guide import FeedForward
 from mgdd.loop import Measurement, run_seeker
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
     GaussianProcessSeeking,
     GradientDescent,
-    NewtonSeeking,
     Seeker,
     Spsa,
 )
@@ -146,8 +144,6 @@ def test_two_inputs_of_which_one_fails_or_both_together() -> None:
     two: dict[str, Any] = {"start": [-5.0, -5.0], "lower": -20.0, "upper": 20.0}
     makers: list[Callable[[], Any]] = [
         lambda: ExtremumSeeking(**two, period=40, harmonics=[4, 5]),
-        lambda: NewtonSeeking(**two, period=40, harmonics=[4, 5], time_constant_cycles=160.0),
-        lambda: BoundedSeeking(**two, period=40, harmonics=[4, 5]),
         lambda: Spsa(**two),
         lambda: GradientDescent(**two),
     ]

@@ -14,9 +14,8 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace guide;
-using AnySeeker =
-    std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking, optimize::Spsa,
-                 optimize::GradientDescent, optimize::GoldenSection, optimize::GaussianProcessSeeking, CurveSeeking>;
+using AnySeeker = std::variant<optimize::ExtremumSeeking, optimize::Spsa, optimize::GradientDescent,
+                               optimize::GoldenSection, optimize::GaussianProcessSeeking, CurveSeeking>;
 
 GuidedEngine::Seeking seeking_of(const py::object& seeker, const FeedForwardSettings& settings) {
   AnySeeker any = seeker_of<AnySeeker>(seeker, "seeker");

@@ -6,6 +6,7 @@
 
 #include "binding.hpp"
 #include "guarded.hpp"
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/learning/iterative_learning.hpp"
 

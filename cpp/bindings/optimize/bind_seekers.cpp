@@ -1,5 +1,11 @@
-// Binds include/mgdd/optimize: the dithering seekers (extremum seeking, Newton, bounded).
+// Binds include/mgdd/optimize: extremum seeking, SPSA, gradient descent, golden section, and the tuner.
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "mgdd/optimize/seekers/tuner.hpp"
 #include "optimize/seeker_binding.hpp"
 #include "optimize/seeker_settings.hpp"
 
@@ -22,36 +28,209 @@ void bind_extremum_seeking(py::module_& m) {
   bind_gradient(cls);
 }
 
-void bind_newton(py::module_& m) {
-  using B = BoundSeeker<NewtonSeeking>;
-  py::class_<B> cls(m, "NewtonSeeking", "Newton extremum seeking; see mgdd.optimize.NewtonSeeking.");
-  bind_settings<NewtonSeeking>(cls, "NewtonSeeking");
+void bind_spsa(py::module_& m) {
+  using B = BoundSeeker<Spsa>;
+  py::class_<B> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
+  bind_settings<Spsa>(cls, "Spsa");
   cls.def_property_readonly(
          "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
-         "Filtered Hessian of the maximised objective, shape (inputs, inputs).")
+         "Averaged Hessian of the second-order form, shape (inputs, inputs).")
       .def_property_readonly(
-          "inverse_hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().inverse_hessian()); },
-          "State of the Riccati filter, which tends to the inverse Hessian.");
+          "iteration", [](const B& b) { return b.use()->seeker().iteration(); },
+          "Iterations since the start or restart.")
+      .def_property_readonly(
+          "gain", [](const B& b) { return list_or_none(b.use()->seeker().gain()); },
+          "Gain in use, per input; None while the first readings are taken.")
+      .def_property_readonly(
+          "blocked", [](const B& b) { return b.use()->seeker().blocked(); }, "Steps that blocking refused.")
+      .def_property_readonly(
+          "measurements_per_iteration", [](const B& b) { return b.constant().seeker().measurements_per_iteration(); },
+          "Cycles that one iteration takes.");
   bind_seeking(cls);
   bind_gradient(cls);
 }
 
-void bind_bounded(py::module_& m) {
-  using B = BoundSeeker<BoundedSeeking>;
-  py::class_<B> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
-  bind_settings<BoundedSeeking>(cls, "BoundedSeeking");
+void bind_gradient_descent(py::module_& m) {
+  using B = BoundSeeker<GradientDescent>;
+  py::class_<B> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
+  bind_settings<GradientDescent>(cls, "GradientDescent");
   cls.def_property_readonly(
-      "kappa", [](const B& b) { return b.use()->seeker().kappa(); },
-      "Phase per unit of J in use; None while the first readings are taken.");
+         "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
+      .def_property_readonly(
+          "step_size", [](const B& b) { return list_or_none(b.use()->seeker().step_size()); },
+          "Step size in use, per input; None while the first readings are taken.")
+      .def_property_readonly(
+          "converged_at",
+          [](const B& b) {
+            const std::int64_t at = b.use()->seeker().converged_at();
+            return at < 0 ? std::nullopt : std::optional(at);
+          },
+          "Step at which the tolerance was met first, or None.");
   bind_seeking(cls);
+  bind_gradient(cls);
+}
+
+void bind_golden_section(py::module_& m) {
+  using B = BoundSeeker<GoldenSection>;
+  py::class_<B> cls(m, "GoldenSection", "Golden-section search; see mgdd.optimize.GoldenSection.");
+  bind_settings<GoldenSection>(cls, "GoldenSection");
+  cls.def_property_readonly(
+         "bracket",
+         [](const B& b) {
+           const auto r = b.use();
+           return std::pair(r->seeker().lower(), r->seeker().upper());
+         },
+         "Present bracket, lower and upper end.")
+      .def_property_readonly(
+          "converged", [](const B& b) { return b.use()->seeker().converged(); },
+          "Whether the bracket is as small as tolerance or noise allow.");
+  bind_seeking(cls);
+}
+
+std::vector<std::vector<double>> axes_from(const py::sequence& given) {
+  std::vector<std::vector<double>> axes;
+  for (const py::handle& axis : given)
+    axes.push_back(to_column(axis.cast<InputArray>(), "axes[" + std::to_string(axes.size()) + "]"));
+  return axes;
+}
+
+void bind_surface(py::module_& m) {
+  py::class_<Surface>(m, "Surface", "Behind guide= of mgdd.optimize.GaussianProcessSeeking: a table over a grid.")
+      .def(py::init([](const py::sequence& axes, const InputArray& values) {
+             return Surface(axes_from(axes), {values.data(), values.data() + values.size()});
+           }),
+           py::arg("axes"), py::arg("values"))
+      .def(
+          "__call__",
+          [](const Surface& s, const InputArray& at) {
+            const auto n = static_cast<Eigen::Index>(s.axes().size());
+            if (at.size() != n) throw ShapeError("at has " + std::to_string(at.size()) + " entries: one per axis");
+            return s(Inputs(Eigen::Map<const Eigen::VectorXd>(at.data(), n)));
+          },
+          py::arg("at"), "Value at one point; the edge holds outside of the grid.")
+      .def_property_readonly("axes", &Surface::axes, "Of the grid, one per input.")
+      .def_property_readonly(
+          "values",
+          [](const Surface& s) {
+            std::vector<py::ssize_t> shape;
+            for (const auto& axis : s.axes())
+              shape.push_back(static_cast<py::ssize_t>(axis.size()));
+            return py::array_t<double>(shape, s.values().data());
+          },
+          "At its nodes, shape of the axes.")
+      .def("__eq__",
+           [](const Surface& s, const py::object& other) {
+             return py::isinstance<Surface>(other) && s == other.cast<const Surface&>();
+           })
+      .def(py::pickle([](const Surface& s) { return py::make_tuple(1, s.axes(), s.values()); },
+                      [](const py::tuple& state) {
+                        require_pickle_version(state);
+                        return Surface(state[1].cast<std::vector<std::vector<double>>>(),
+                                       state[2].cast<std::vector<double>>());
+                      }));
+}
+
+void bind_gaussian_process(py::module_& m) {
+  using B = BoundSeeker<GaussianProcessSeeking>;
+  py::class_<B> cls(m, "GaussianProcessSeeking", "By Gaussian processes; see mgdd.optimize.GaussianProcessSeeking.");
+  bind_settings<GaussianProcessSeeking>(cls, "GaussianProcessSeeking");
+  cls.def_property_readonly(
+         "noise_sd", [](const B& b) { return b.use()->seeker().noise_sd(); },
+         "Standard deviation of one reading of J, as learnt.")
+      .def_property_readonly(
+          "expected", [](const B& b) { return b.use()->seeker().expected(); },
+          "J that is expected at the estimate; 0 before there are readings enough.")
+      .def_property_readonly(
+          "expected_sd", [](const B& b) { return b.use()->seeker().expected_sd(); },
+          "Standard deviation of that expectation, without the noise of a reading.")
+      .def_property_readonly(
+          "doubts", [](const B& b) { return b.use()->seeker().doubts(); },
+          "How often the readings were not what the process expects, and what was known was aged.")
+      .def_property_readonly(
+          "trust", [](const B& b) { return b.use()->seeker().trust(); },
+          "Least share of the bends of J that a guide holds, as learnt: above 0.5 where it helps, towards 0 where it "
+          "says nothing; 1 without a guide.")
+      .def_property_readonly(
+          "guide_factor",
+          [](const B& b) {
+            const auto r = b.use();
+            py::list out;
+            const auto& guides = b.constant().settings().guide;
+            for (std::size_t i = 0; i < guides.size(); ++i) {
+              if (guides[i].empty()) out.append(py::none());
+              if (!guides[i].empty()) out.append(r->seeker().guide_factor(i));
+            }
+            return out;
+          },
+          "What the guide of each component is multiplied by, as learnt: about 1 where it is right, towards 0 where it "
+          "says nothing.")
+      .def_property_readonly(
+          "delay_cycles",
+          [](const B& b) -> py::object {
+            const auto r = b.use();
+            if (r->component_count() == 1) return py::float_(r->seeker().delay_cycles());
+            py::list out;
+            for (std::size_t i = 0; i < r->component_count(); ++i)
+              out.append(r->seeker().delay_cycles(i));
+            return out;
+          },
+          "Cycles between input and reading of J that explain the readings best; of several components a list.");
+  bind_seeking(cls);
+}
+
+void bind_tuner(py::module_& m) {
+  m.def(
+      "tune",
+      [](double noise_sd, double curvature, const std::string& method, double delay_cycles, double lag_cycles,
+         bool compensated, std::optional<double> delay_uncertainty, std::optional<double> rms,
+         std::optional<double> cycles, std::optional<double> distance, std::optional<double> arrival,
+         std::optional<double> amplitude_max) {
+        TuningSpec w;
+        w.method = parse_name<TunedMethod>("method", method);
+        w.noise_sd = noise_sd;
+        w.curvature = curvature;
+        w.lag = {delay_cycles, lag_cycles};
+        w.compensated = compensated;
+        w.delay_uncertainty = delay_uncertainty;
+        w.rms = rms;
+        w.cycles = cycles;
+        w.distance = distance;
+        w.arrival = arrival;
+        w.amplitude_max = amplitude_max;
+        const Tuning t = tune(w);
+        py::dict out;
+        out["method"] = std::string(name_of(t.method));
+        out["amplitude"] = t.amplitude;
+        out["period"] = t.period;
+        out["gain"] = t.gain;
+        out["rate"] = t.rate;
+        out["time_constant_cycles"] = t.time_constant_cycles;
+        out["rms"] = t.rms;
+        out["cycles"] = t.cycles;
+        out["dither_cost"] = t.dither_cost;
+        out["jitter_cost"] = t.jitter_cost;
+        out["sensor_gain"] = t.sensor_gain;
+        out["sensor_phase_deg"] = t.sensor_phase_rad * 180.0 / std::numbers::pi;
+        out["delay_uncertainty"] = t.delay_uncertainty;
+        out["met"] = t.met;
+        out["reasons"] = t.reasons;
+        return out;
+      },
+      py::kw_only(), py::arg("noise_sd"), py::arg("curvature"), py::arg("method"), py::arg("delay_cycles"),
+      py::arg("lag_cycles"), py::arg("compensated"), py::arg("delay_uncertainty"), py::arg("rms"), py::arg("cycles"),
+      py::arg("distance"), py::arg("arrival"), py::arg("amplitude_max"), "Behind mgdd.optimize.tune.");
 }
 
 }  // namespace
 
 void bind_seekers(py::module_& m) {
   bind_extremum_seeking(m);
-  bind_newton(m);
-  bind_bounded(m);
+  bind_spsa(m);
+  bind_gradient_descent(m);
+  bind_golden_section(m);
+  bind_surface(m);
+  bind_gaussian_process(m);
+  bind_tuner(m);
 }
 
 }  // namespace mgdd::bindings

@@ -341,16 +341,6 @@ def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.ExtremumSeeki
     Run a seeker on a function without the GIL: how many cycles were run.
     """
 @typing.overload
-def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
-    """
-    Run a seeker on a function without the GIL: how many cycles were run.
-    """
-@typing.overload
-def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
-    """
-    Run a seeker on a function without the GIL: how many cycles were run.
-    """
-@typing.overload
 def run_function(plant: FunctionPlant, seeker: mgdd._core.optimize.Spsa, cycles: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     Run a seeker on a function without the GIL: how many cycles were run.
@@ -377,16 +367,6 @@ def run_function(plant: FunctionPlant, seeker: mgdd._core.guide.CurveSeeking, cy
     """
 @typing.overload
 def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
-    """
-    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
-    """
-@typing.overload
-def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
-    """
-    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
-    """
-@typing.overload
-def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """

@@ -87,8 +87,8 @@ def run_seeker(
     if (
         not isinstance(plant, EngineBench)
         or len(plant.input_names) > 1
-        or isinstance(seeker, FeedForward | GuidedEngine)
-        or (isinstance(seeker, Seeker) and tuple(seeker.limit_names) != plant.limit_names)  # the core wants the same
+        or not isinstance(seeker, Seeker)
+        or tuple(seeker.limit_names) != plant.limit_names  # the core wants the same
     ):
         return steer(plant, seeker, cycles, criteria)
     require_inputs_of(plant, seeker)

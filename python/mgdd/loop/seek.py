@@ -14,6 +14,7 @@ from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.known import tell_known
 from mgdd.loop.lower_limits import both_sides, measured_names, with_lower_sides
+from mgdd.loop.own_seeker import OwnSeeker
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of
 from mgdd.loop.seek_choice import Choice, Question, chosen
@@ -64,9 +65,9 @@ def seek(
     inputs : mapping of str to (float, float), or sequence of Input, optional
         Bounds of every input, finite, in its unit; one to eight. Left out where `seeker` has them.
     seeker : str, class or Seeker
-        ``auto``, or a name: ``curve_seeking``, ``gaussian_process_seeking``, ``extremum_seeking``, ``newton_seeking``,
-        ``bounded_seeking``, ``spsa``, ``gradient_descent``, ``golden_section``. Or a seeker, as that of an earlier
-        result, which goes on where it stands and changes.
+        ``auto``, or a name: ``curve_seeking``, ``gaussian_process_seeking``, ``extremum_seeking``, ``spsa``,
+        ``gradient_descent``, ``golden_section``. Or a seeker, as that of an earlier result or one of your own with
+        `ask`, `tell` and `estimate`, which goes on where it stands and changes.
     start : mapping of str to float, or float for one input, optional
         First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle; with
         limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where nobody knows one
@@ -136,7 +137,10 @@ def seek(
     if cycles is not None and (isinstance(cycles, bool) or not isinstance(cycles, int | np.integer)):
         raise ParameterError.of("cycles", cycles, "a whole number")
     wanted = both_sides(limits)
-    if isinstance(seeker, Seeker | FeedForward | GuidedEngine):
+    own = Seeker | FeedForward | GuidedEngine | OwnSeeker
+    if not isinstance(seeker, own) and OwnSeeker.is_one(seeker):
+        seeker = OwnSeeker(seeker, seek_inputs(inputs), wanted, maximize=maximize)
+    if isinstance(seeker, own):
         left_out = {
             "start": start is None, "noise_sd": noise_sd is None, "delay_cycles": not delay_cycles,
             "lag_cycles": not lag_cycles, "components": components is None, "guide": guide is None,

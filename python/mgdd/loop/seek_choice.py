@@ -16,7 +16,6 @@ from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.safe_start import middle_of, safe_side
 from mgdd.optimize import (
-    BoundedSeeking,
     ComponentLag,
     ExtremumSeeking,
     GaussianProcessSeeking,
@@ -24,7 +23,6 @@ from mgdd.optimize import (
     GradientDescent,
     Input,
     Limit,
-    NewtonSeeking,
     Seeker,
     Spsa,
     tune,
@@ -43,16 +41,12 @@ _OWN_WORDS = (
     "guide", "curve", "limit_curves", "limit_guides",
 )  # fmt: skip
 _PERIODS = 64  # of a dither: 16 time constants of four periods
-_NEWTON_HOLD_PERIODS = 5  # until gradient and Hessian behind a lag have settled
 _STRIDE = 0.1  # share of the bounds a cycle, so that a limit no guide knows is read before it is reached
-_DITHER = 2.0  # scales of an input: the widest dither of the defaults
 _FIRST = (CurveSeeking, GaussianProcessSeeking)
 SEEKERS: Mapping[str, type[Seeker]] = {
     re.sub(r"(?<!^)(?=[A-Z])", "_", cls.kind).lower(): cls
-    for cls in (
-        *_FIRST, ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection,
-    )
-}  # fmt: skip
+    for cls in (*_FIRST, ExtremumSeeking, Spsa, GradientDescent, GoldenSection)
+}
 
 
 class Choice(NamedTuple):
@@ -134,8 +128,6 @@ class Question:
                     1.0, -1.0, delay_cycles=slowest.delay_cycles, lag_cycles=slowest.lag_cycles
                 )  # whose period does not depend on noise and curvature
                 known["period"] = max(takes["period"].default, slow.period)
-                if cls is NewtonSeeking:
-                    known |= _slowed(takes, known["period"])
         elif lags is not None:
             known["components"] = lags
         if self.noise_sd is not None and "noise_sd" in takes:
@@ -184,14 +176,6 @@ def chosen(asked: Question, seeker: str | type[Seeker] = "auto") -> Choice:
     else:
         made, reason = _named(asked, seeker), "as asked for"
     return Choice(made, reason, asked.first_cycles, asked.budget(made))
-
-
-def _slowed(takes: Mapping[str, inspect.Parameter], period: int) -> dict[str, Any]:
-    """Slow the filters of Newton seeking as much as its dither."""
-    slow = period / takes["period"].default
-    own: dict[str, Any] = {name: takes[name].default / slow for name in ("hessian_rate", "riccati_rate")}
-    own["time_constant_cycles"] = takes["time_constant_cycles"].default * slow
-    return own | {"hold_cycles": _NEWTON_HOLD_PERIODS * period}
 
 
 def _class_of(seeker: Any) -> type[Seeker]:

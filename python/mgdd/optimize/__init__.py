@@ -31,9 +31,12 @@ np.True_
 
 from __future__ import annotations
 
+from typing import Any
+
 from mgdd._core.optimize import ComponentLag, Input, Limit
+from mgdd.errors import former_seeker
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
-from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
+from mgdd.optimize.dither_seekers import ExtremumSeeking
 from mgdd.optimize.fit_options import FitOptions
 from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import least_squares
@@ -43,7 +46,6 @@ from mgdd.optimize.seeker import Seeker
 from mgdd.optimize.tuning import tune
 
 __all__ = [
-    "BoundedSeeking",
     "ComponentLag",
     "ExtremumSeeking",
     "FitOptions",
@@ -53,13 +55,18 @@ __all__ = [
     "Input",
     "IterativeLearning",
     "Limit",
-    "NewtonSeeking",
     "Seeker",
     "Spsa",
     "least_squares",
     "measure_map",
     "tune",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if instead := former_seeker(name):
+        raise ImportError(f"{name}: {instead}")  # of an AttributeError `from ... import` would drop the text
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -26,8 +26,8 @@ class Spsa(Seeker, _core.optimize.Spsa):
     lower, upper : float or array_like
         Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
         inside by the perturbation (twice that in the second-order form).
-    form : {"first_order", "second_order", "one_measurement"}
-        Two measurements per gradient; four, with the Hessian; or one, with the trend of J taken off.
+    form : {"first_order", "second_order"}
+        Two measurements per gradient, or four, with the Hessian.
     schedule : {"decreasing", "constant"}
         Decreasing gains settle; constant gains go on tracking.
     gain : float or array_like, optional
@@ -40,8 +40,7 @@ class Spsa(Seeker, _core.optimize.Spsa):
     perturbation : float or array_like, optional
         c, per input, in its unit, > 0; 1.5 times its scale.
     step_max : float or array_like, optional
-        Largest change of the estimate per iteration, per input; 4/3 perturbation, or 1/5 of it with one
-        measurement.
+        Largest change of the estimate per iteration, per input; 4/3 perturbation without.
     averaging : int
         Gradients per iteration.
     blocking : bool
@@ -74,7 +73,7 @@ class Spsa(Seeker, _core.optimize.Spsa):
     References
     ----------
     Spall (1992), Multivariate stochastic approximation using a simultaneous perturbation gradient
-    approximation; (1998), implementation; (1997), one-measurement form; (2000), second-order form.
+    approximation; (1998), implementation; (2000), second-order form.
 
     Examples
     --------

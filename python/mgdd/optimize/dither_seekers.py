@@ -1,4 +1,4 @@
-"""Seekers that dither their input: extremum seeking, its Newton form and its bounded form."""
+"""Extremum seeking: a seeker that dithers its input."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
-__all__ = ["BoundedSeeking", "ExtremumSeeking", "NewtonSeeking"]
+__all__ = ["ExtremumSeeking"]
 
 
 class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
@@ -97,129 +97,3 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     """
 
     kind: ClassVar[str] = "ExtremumSeeking"
-
-
-class NewtonSeeking(Seeker, _core.optimize.NewtonSeeking):
-    """Newton extremum seeking: the rate of approach does not depend on the curvature of J.
-
-    Gradient and Hessian are demodulated from the same dither, and a Riccati filter tends to the inverse of the
-    Hessian. The estimate is held until both have settled. All arguments are keywords.
-
-    Parameters
-    ----------
-    start : float or array_like, shape (inputs,), or mapping
-        First estimate, in the unit of the input; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
-    lower, upper : float or array_like
-        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
-        inside by `amplitude`.
-    amplitude : float or array_like, optional
-        Of the dither, per input, in its unit, > 0; twice its scale.
-    period : int
-        Cycles of the window that all inputs share, >= 4.
-    harmonics : sequence of int, optional
-        Oscillations per window, one per input; sums and differences must be distinct too.
-    time_constant_cycles : float
-        Of the approach [cycles].
-    hessian_rate, riccati_rate : float
-        Low-pass of the Hessian and rate of the Riccati filter, per cycle, in (0, 1] [-].
-    initial_hessian : float or array_like, optional
-        Diagonal to begin with, < 0 [unit of J per squared unit of the input]; without, of first readings as those of
-        `ExtremumSeeking`.
-    initial_inverse : float or array_like, optional
-        Diagonal of the inverse to begin with, < 0 [squared unit of the input per unit of J]; that of the Hessian
-        without.
-    largest_inverse : float, optional
-        Bound of the norm of the inverse, > 0, same unit; five times the largest to begin with.
-    hold_cycles : int
-        Cycles that the estimate is held at the start, at least one period; `restart` holds one period.
-    rate : float or array_like, optional
-        Largest change of the estimate per cycle; 3 amplitude/period without.
-    components : sequence of ComponentLag, optional
-        Delay and lag of each component of J; one immediate component without.
-    limit_amplitude : float
-        Share of the dither while a limit holds the estimate back [-].
-    maximize : bool
-        False to minimise J; Hessians here are those of the maximised objective.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A value outside its domain, bounds that exclude the start, harmonics that mix.
-    mgdd.errors.ShapeError
-        Entries that are not one per input.
-
-    References
-    ----------
-    Ghaffari, Krstic and Nesic (2012), Multivariable Newton-based extremum seeking.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import NewtonSeeking
-    >>> seeker = NewtonSeeking(start=6.0)
-    >>> for _ in range(600):
-    ...     seeker.tell(-0.5 * 0.02 * seeker.ask()[0] ** 2)
-    >>> abs(seeker.hessian[0, 0] + 0.02) < 0.001, abs(seeker.estimate[0]) < 0.1
-    (np.True_, np.True_)
-    """
-
-    kind: ClassVar[str] = "NewtonSeeking"
-
-
-class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
-    """Bounded extremum seeking: J enters only the phase, so no step is larger than amplitude times omega.
-
-    With omega = 2 pi harmonic/period the mean input drifts at kappa amplitude^2 omega/2 times the slope of J.
-    All arguments are keywords.
-
-    Parameters
-    ----------
-    start : float or array_like, shape (inputs,)
-        First input, in its unit; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
-    lower, upper : float or array_like
-        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none.
-    amplitude : float or array_like, optional
-        Of the oscillation, per input, in its unit, > 0; its scale.
-    period : int
-        Cycles of the window that all inputs share, >= 4.
-    harmonics : sequence of int, optional
-        Oscillations per window, one per input; [1] for one input.
-    kappa : float, optional
-        Phase per unit of J, > 0 [rad per unit of J]; without, made of `curvature` or of first readings as the gain of
-        `ExtremumSeeking`, for an approach in about ten periods.
-    maximize : bool
-        False to minimise J.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep. The oscillation is the search itself: single steps are held back, and while nothing
-        is known of a late limit yet, the search goes on where other seekers wait.
-    curvature : float, optional
-        J'' if known: makes kappa, or, where a kappa above the bound of averaging is given, a UserWarning with that
-        bound.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A value outside its domain, bounds that exclude the start, harmonics that mix.
-    mgdd.errors.ShapeError
-        Entries that are not one per input.
-
-    References
-    ----------
-    Scheinker and Krstic (2014), Extremum seeking with bounded update rates.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import BoundedSeeking
-    >>> seeker = BoundedSeeking(start=8.0)
-    >>> for _ in range(600):
-    ...     seeker.tell(-0.0255 * seeker.ask()[0] ** 2)
-    >>> abs(seeker.estimate[0]) < 0.2
-    np.True_
-    """
-
-    kind: ClassVar[str] = "BoundedSeeking"

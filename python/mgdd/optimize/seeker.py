@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, Error, Interrupted, ParameterError
+from mgdd.errors import DataError, Error, Interrupted, ParameterError, hinted
 from mgdd.io.files import parsed, read_plain_text, write_whole_text
 from mgdd.optimize.inputs import unit_of_input, with_inputs
 from mgdd.optimize.optimum import limits_of
@@ -257,7 +257,7 @@ class Seeker(SeekerFindings, _CoreSeeker):
         kind, settings, state = _read(path)
         known = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
         if kind not in known:
-            raise DataError(f"{Path(path)}: holds a {kind}, not a {' or '.join(known)}")
+            raise DataError(hinted(f"{Path(path)}: holds a {kind}, not a {' or '.join(known)}", kind, known))
         try:
             seeker: Self = rebuilt(known[kind], settings, state, None)
         except (Error, TypeError, KeyError) as error:

@@ -14,12 +14,10 @@ import numpy as np
 from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import (
-    BoundedSeeking,
     ExtremumSeeking,
     GoldenSection,
     GradientDescent,
     IterativeLearning,
-    NewtonSeeking,
     Spsa,
     tune,
 )
@@ -172,7 +170,6 @@ def _contenders(best: Optimum) -> list[_Contender]:
     dither = "amplitude 1, period 10, gain 0.98"
     bend: dict[str, Any] = {"initial_hessian": -0.051}
     vanishing = ExtremumSeeking(**box, gain=0.98, amplitude_floor=0.3, full_gradient=0.2)
-    newton = NewtonSeeking(**box, **bend, initial_inverse=-20.0, largest_inverse=100.0)
     return [
         _Contender("extremum seeking, batch", dither, ExtremumSeeking(**box, gain=0.98)),
         _Contender("extremum seeking, batch, tuned", _short(batch), batch.seeker(**box)),
@@ -183,12 +180,9 @@ def _contenders(best: Optimum) -> list[_Contender]:
         _Contender(
             "extremum seeking, washout", f"{dither}, pole 0.9", ExtremumSeeking(**box, gain=0.98, form="washout")
         ),
-        _Contender("Newton extremum seeking", "amplitude 2, period 10, time constant 40, held 300", newton),
-        _Contender("bounded extremum seeking", "amplitude 1, period 10, kappa 1", BoundedSeeking(**box, kappa=1.0)),
         _Contender("SPSA, first order", "a 20, c 1.5, decreasing", Spsa(**box, gain=20.0)),
         _Contender("SPSA, tuned", _short(spsa), spsa.seeker(**box)),
         _Contender("SPSA, second order", "a 3, c 1.5, decreasing", Spsa(**box, **bend, form="second_order")),
-        _Contender("SPSA, one measurement", "a 20, c 1.5, decreasing", Spsa(**box, form="one_measurement", gain=20.0)),
         _Contender("two-sided differences", "step size 15, c 1", GradientDescent(**box, step_size=15.0)),
         _Contender("golden section", f"noise {NOISE_PERCENT:g}", GoldenSection(**box, noise_sd=NOISE_PERCENT)),
     ]

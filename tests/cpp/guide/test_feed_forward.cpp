@@ -1,15 +1,12 @@
-// Feed-forward with a learnt trim: nothing without a guide, whole moves at a new point, no bump at a calibration,
-// guides that cannot be used, and a run that is cut in two.
+// Feed-forward with a learnt trim: whole moves at a new point, no bump at a calibration, guides that cannot be used.
 #include "mgdd/guide/feed_forward.hpp"
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <vector>
 
-#include "mgdd/optimize/seekers/seeker_history.hpp"
 #include "mgdd/optimize/seekers/variant_seeker.hpp"
 #include "support/guided_case.hpp"
 
@@ -17,46 +14,6 @@ namespace mgdd::guide {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// Columns as bits: a misfired cycle has no J.
-std::vector<std::uint64_t> bits_of(const StateColumns& columns) {
-  std::vector<std::uint64_t> bits;
-  for (const auto& [name, values] : columns) {
-    for (const double x : values)
-      bits.push_back(std::bit_cast<std::uint64_t>(x));
-  }
-  return bits;
-}
-
-TEST(FeedForward, WithoutAGuideIsTheSeekerBitForBit) {
-  const std::vector<Limit> limits{{"p_max_bar", 150.0, 1.0}, {"rise", 4.0, 0.0, LimitMethod::penalty}};
-  for (const SearchSpace& space : {space_at(scalar_input(8.0), 40.0), space_at(inputs({8.0, -6.0, 4.0}), 40.0)}) {
-    for (auto& [name, any] : every_seeker(space, 0.25, 3, limits)) {
-      SCOPED_TRACE(name + ", inputs " + std::to_string(space.size()));
-      RecordedSeeker<VariantSeeker> plain{VariantSeeker(any)};
-      FeedForward<RecordedSeeker<VariantSeeker>> guided(RecordedSeeker<VariantSeeker>{VariantSeeker(any)});
-      const StateColumns start = save_state(plain);
-      for (int k = 0; k < 700; ++k) {
-        const Inputs x = plain.ask();
-        ASSERT_EQ(guided.ask(), x);
-        const double j[] = {0.5 * bend * x.squaredNorm() + 0.25 * random::normal(5, 1, static_cast<std::uint64_t>(k))};
-        const double values[] = {148.0 + 0.3 * x[0], 2.0 - 0.1 * x[0]};
-        const double unread[] = {nan};
-        ASSERT_EQ(guided.tell({unread, values, false}), TellStatus::not_a_reading);
-        const Reading reading{j, values, k % 50 == 7};
-        ASSERT_EQ(guided.tell(reading), plain.tell(reading));
-        if (k == 400) plain.restart();
-        if (k == 400) guided.restart();
-      }
-      EXPECT_NE(save_state(plain), start);
-      EXPECT_EQ(save_state(guided.seeker()), save_state(plain));
-      EXPECT_EQ(bits_of(guided.seeker().history().save()), bits_of(plain.history().save()));
-      EXPECT_EQ(guided.protocol().cycle, plain.protocol().cycle);
-      EXPECT_EQ(guided.estimate(), plain.estimate());
-      EXPECT_FALSE(guided.path().known());
-    }
-  }
-}
 
 TEST(FeedForward, StartsAtTheOptimumOfTheGuide) {
   FeedForward<ExtremumSeeking> seeker = guided();
@@ -223,43 +180,6 @@ TEST(FeedForward, HoldsAtAPointThatTheGuideDoesNotKnow) {
 }
 
 // A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.
-TEST(FeedForward, MovesSeveralInputsAtOnce) {
-  ExtremumSeekingSettings s;
-  s.space = space_at(inputs({8.0, -6.0}), 40.0);
-  s.dither = {.amplitude = inputs({1.0, 0.5}), .period = 20, .harmonics = {2, 3}};
-  s.gain = inputs({0.4, 0.4});
-  FeedForward<ExtremumSeeking> seeker(ExtremumSeeking(s), {.trust = {.noise_sd = 0.1}});
-  const Inputs curvature = inputs({-0.05, -0.2});
-  seeker.offer({inputs({2.0, 1.0}), curvature}, GuideCause::new_point);
-  EXPECT_LT((seeker.estimate() - inputs({2.0, 1.0})).norm(), 1e-12);
-  seeker.offer({inputs({-4.0, 3.5}), curvature}, GuideCause::new_point);
-  for (int k = 0; k < 2; ++k) {
-    const Inputs away = seeker.ask() - inputs({-4.0, 3.5});
-    const double j[] = {0.5 * (curvature.array() * away.array().square()).sum()};
-    seeker.tell({j, {}, false});
-  }
-  EXPECT_LT((seeker.estimate() - inputs({-4.0, 3.5})).norm(), 0.2);
-}
-
-TEST(FeedForward, GoesOnBitForBitFromItsState) {
-  for (const int cut : {1, 2, 40, 301, 302, 350}) {  // within both tests, between them, in the middle of a window
-    const auto play = [](auto& seeker, int from, int to) {
-      for (int k = from; k < to; ++k) {
-        if (k == 0) seeker.offer(at(-12.0), GuideCause::new_point);
-        if (k == 100) seeker.offer(at(-9.5), GuideCause::calibration);
-        if (k == 300) seeker.offer(at(-19.0), GuideCause::new_point);
-        run(seeker, k < 300 ? -4.2 : -10.7, 1, 0.25);
-      }
-    };
-    FeedForward<ExtremumSeeking> whole = guided(-20.0, {}), first = whole, second = whole;
-    play(whole, 0, 500);
-    play(first, 0, cut);
-    restore_state(second, save_state(first));
-    play(second, cut, 500);
-    EXPECT_EQ(save_state(second), save_state(whole)) << cut;
-  }
-}
-
 TEST(FeedForward, AskTellAndOfferAreNoexceptAndDoNotAllocate) {
   for (auto& [name, any] : every_seeker(space_at(scalar_input(8.0), 40.0), 0.25, 3)) {
     SCOPED_TRACE(name);

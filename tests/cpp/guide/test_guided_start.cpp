@@ -9,25 +9,6 @@
 namespace mgdd::guide {
 namespace {
 
-// The guide's optimum is -1.5 CAD: by itself a run begins there, wherever the seeker's own start is.
-TEST(GuidedEngine, BeginsAtTheStartOfItsSeekerWhereThatIsKept) {
-  const OperatingPoint point;
-  CurveSeekingSettings s = curve_settings(rough_model(), point);
-  s.space.start = scalar_input(-22.0);
-  for (const auto& seeking : {GuidedEngine::Seeking(CurveSeeking(s)), GuidedEngine::Seeking(trimmed(-22.0))}) {
-    const GuidedEngine plain(seeking, rough_model(), std::nullopt, point);
-    EXPECT_NEAR(plain.now().estimate_cad, -1.5, 0.2);
-    GuidedEngine kept(seeking, rough_model(), std::nullopt, point, {.keep_start = true});
-    const GuidedCycle first = kept.now();
-    EXPECT_EQ(first.estimate_cad, -22.0);
-    EXPECT_EQ(first.guide_cad, plain.now().guide_cad);
-    EXPECT_NEAR(first.feed_forward_cad, plain.now().feed_forward_cad, 1e-12);
-    EXPECT_NEAR(first.trim_cad, -22.0 - first.guide_cad, 1e-12);
-    kept.at(point);
-    EXPECT_NEAR(kept.ask()[0], -22.0, 1.0);  // the dither of extremum seeking
-  }
-}
-
 // By a curve the guide's optimum is what the seeker believes beforehand: it is the second input, and no jump goes
 // there.
 TEST(GuidedEngine, WithAKeptStartItIsTheCurveGuidedSeekerItself) {
@@ -61,24 +42,6 @@ TEST(GuidedEngine, WithAKeptStartItIsTheCurveGuidedSeekerItself) {
       alone.tell({components, limits, c.misfire});
     }
     EXPECT_LT(guided.estimate()[0], with_curves ? plant_best_cad + 1.5 : 8.0);
-  }
-}
-
-TEST(GuidedEngine, ASeekerThatHasRunIsNotSentBackToItsStart) {
-  const OperatingPoint point;
-  auto bench = bench_at({{0, point}}, 4);
-  CurveSeeking by_curve = curve_seeking(rough_model(), point);
-  auto by_dither = trimmed(-8.0);
-  for (int k = 0; k < 60; ++k) {
-    const double j[] = {bench.step(by_curve.ask()[0]).j}, same[] = {bench.step(by_dither.ask()[0]).j};
-    by_curve.tell({j, {}, false});
-    by_dither.tell({same, {}, false});
-  }
-  for (const auto& seeking : {GuidedEngine::Seeking(by_curve), GuidedEngine::Seeking(by_dither)}) {
-    const double learnt = std::visit([](const auto& s) { return s.estimate()[0]; }, seeking);
-    const GuidedEngine guided(seeking, rough_model(), std::nullopt, point, {.keep_start = true});
-    EXPECT_NEAR(guided.estimate()[0], learnt, 1e-9);
-    EXPECT_EQ(guided.protocol().cycle, std::visit([](const auto& s) { return s.protocol().cycle; }, seeking));
   }
 }
 

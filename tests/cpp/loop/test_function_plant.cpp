@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
-#include "mgdd/loop/monte_carlo.hpp"
 #include "mgdd/loop/run_loop.hpp"
+#include "mgdd/optimize/seekers/seeker_history.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::loop {
@@ -90,34 +90,6 @@ TEST(FunctionPlant, AStepAllocatesNothing) {
   for (int k = 0; k < 100; ++k)
     loop_step(plant, seeker);
   EXPECT_EQ(counter.count(), 0u);
-}
-
-TEST(FunctionPlant, ManyLoopsAreThoseThatRunAlone) {
-  Hill other{0.05, -9.0};
-  MonteCarloPlanOf<FunctionPlant> plan;
-  plan.benches = {FunctionPlant(&hill, &of_the_tests(), {.noise_sd = 0.2}),
-                  FunctionPlant(&hill, &other, {.noise_sd = 0.1})};
-  plan.criteria = {{.optimum_cad = -4.0}, {.optimum_cad = -9.0}};
-  optimize::GoldenSectionSettings golden;
-  golden.space = drawing().settings().space;
-  plan.seekers = {optimize::GoldenSection(golden), drawing()};
-  plan.seeds = {7, 2, 9};
-  plan.cycles = 120;
-  plan.threads = 2;
-  const MonteCarloResult loops = monte_carlo(plan, {});
-  ASSERT_EQ(loops.loops.size(), 12u);
-  FunctionPlant plant(&hill, &other, {.noise_sd = 0.1, .seed = 2});
-  optimize::Spsa seeker = drawing();
-  seeker.reseed(2);
-  LoopStatistics alone(plan.criteria[1], plan.cycles);
-  for (int k = 0; k < plan.cycles; ++k)
-    alone.add(loop_step(plant, seeker));
-  const LoopSummary &one = loops.loops[10], two = alone.summary();
-  EXPECT_EQ(one.mean_cad, two.mean_cad);
-  EXPECT_EQ(one.mean_j, two.mean_j);
-  EXPECT_EQ(one.cycles_to, two.cycles_to);
-  EXPECT_EQ(one.lowest_cad, two.lowest_cad);
-  EXPECT_TRUE(std::isnan(one.mean_nox_ppm));
 }
 
 TEST(FunctionPlant, ARunStandsInTheHistoryOfTheSeeker) {

@@ -98,16 +98,6 @@ TEST(ExtremumSeeking, FinalMeanDoesNotDependOnTheGain) {
   }
 }
 
-TEST(ExtremumSeeking, MinimisingIsMaximisingTheNegative) {
-  ExtremumSeekingSettings s = plain_seeking(8.0);
-  ExtremumSeeking up(s);
-  s.maximize = false;
-  ExtremumSeeking down(s);
-  const std::vector<double> a = search(up, [](double x) { return quadratic(x); }, 500);
-  const std::vector<double> b = search(down, [](double x) { return -quadratic(x); }, 500);
-  EXPECT_EQ(a, b);
-}
-
 // --- figures of the default engine --------------------------------------------------------------------------
 
 TEST(ExtremumSeeking, CyclesFromTwelveToOne) {

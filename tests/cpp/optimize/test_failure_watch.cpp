@@ -165,28 +165,5 @@ TEST(FailureWatch, ARestartVoidsTheEdgesAndKeepsSomewhereToGo) {
   EXPECT_LE(cycle_at(watch, 8.0, 3.0), 3.0);
 }
 
-// J is best at 8, and above 3 the plant fails.
-TEST(FailureWatch, NoSeekerAsksForFailuresForEver) {
-  for (auto& [name, any] : every_seeker(space_at(scalar_input(-5.0), 30.0), 0.25, 1)) {
-    std::visit(
-        [&, &who = name](auto& seeker) {
-          int failed = 0;
-          const test_support::AllocationCounter counter;
-          for (int k = 0; k < 600; ++k) {
-            const double x = seeker.ask()[0];
-            const double j[] = {quadratic(x - 8.0) + 0.25 * random::normal(1, 1, static_cast<std::uint64_t>(k))};
-            seeker.tell({j, {}, x > 3.0});
-            if (k >= 200 && x > 3.0) ++failed;
-          }
-          EXPECT_EQ(counter.count(), 0U) << who;
-          EXPECT_LE(failed, 20) << who;
-          EXPECT_GT(seeker.protocol().failures.failing_above()[0], 3.0) << who;
-          EXPECT_LT(seeker.protocol().failures.failing_above()[0], 12.0) << who;
-          EXPECT_LE(seeker.estimate()[0], 3.0) << who;
-        },
-        any);
-  }
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

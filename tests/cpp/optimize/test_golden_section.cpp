@@ -95,14 +95,6 @@ TEST(GoldenSection, ABrokenLimitDecidesBeforeJ) {
   EXPECT_NEAR(seeker.estimate()[0], -4.0, 0.05);
 }
 
-TEST(GoldenSection, MinimisingIsMaximisingTheNegative) {
-  GoldenSectionSettings s = between(-30.0, 10.0);
-  GoldenSection up(s);
-  s.maximize = false;
-  GoldenSection down(s);
-  EXPECT_EQ(search(up, quadratic, 60), search(down, [](double x) { return -quadratic(x); }, 60));
-}
-
 TEST(GoldenSection, RefusesSettingsByName) {
   const auto refused = [](auto change) {
     GoldenSectionSettings s = between(-10.0, 10.0);

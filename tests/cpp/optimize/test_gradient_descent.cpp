@@ -71,14 +71,6 @@ TEST(GradientDescent, RateClipsEveryStep) {
   EXPECT_NEAR(search(seeker, quadratic, 10).back(), 20.0, 1e-12);
 }
 
-TEST(GradientDescent, MinimisingIsMaximisingTheNegative) {
-  GradientDescentSettings s = from(8.0, 10.0);
-  GradientDescent up(s);
-  s.maximize = false;
-  GradientDescent down(s);
-  EXPECT_EQ(search(up, quadratic, 60), search(down, [](double x) { return -quadratic(x); }, 60));
-}
-
 TEST(GradientDescent, RefusesAndAdvises) {
   const auto refused = [](auto change) {
     GradientDescentSettings s;

@@ -163,7 +163,7 @@ TEST(LateLimits, TheEstimateWaitsForTheFirstReading) {
   Limit limit{"p", 104.0};
   limit.lag = {30.0, 0.0};
   for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0), 20.0), 0.25, 1, {limit})) {
-    if (name == "bounded_seeking" || name == "golden_section") continue;  // their search is their dither
+    if (name == "golden_section") continue;  // its search is its dither
     std::visit(
         [&, &who = name](auto& seeker) {
           for (int begin = 0; begin < 2; ++begin) {

@@ -94,29 +94,5 @@ TEST(Limits, ASeekerThatStartsOverALimitLeavesIt) {
   }
 }
 
-// Two limits at once in two inputs: J rises to the upper right, x0 <= 1 and x0 + x1 <= 3 hold it back.
-TEST(Limits, TwoLimitsInTwoInputs) {
-  const std::vector<Limit> limits{{"a", 1.0, 0.0, LimitMethod::switching, 1.0, 10.0},
-                                  {"b", 3.0, 0.0, LimitMethod::switching, 1.0, 10.0}};
-  for (auto& [name, any] : every_seeker(space_at(inputs({-4.0, -3.0}), 30.0), 0.0, 1, limits)) {
-    if (name == "spsa_one_measurement") continue;  // its steps are as coarse as this corner
-    SCOPED_TRACE(name);
-    std::visit(
-        [&](auto& seeker) {
-          double worst = 0.0;
-          for (int k = 0; k < 8000; ++k) {
-            const Inputs x = seeker.ask();
-            const double j[] = {quadratic(x[0] - 6.0) + quadratic(x[1] - 6.0)}, values[] = {x[0], x[0] + x[1]};
-            seeker.tell({j, values, false});
-            if (k > 4000) worst = std::max({worst, values[0] - 1.0, values[1] - 3.0});
-          }
-          EXPECT_LE(worst, 0.5);
-          EXPECT_GT(seeker.estimate().sum(), -3.0);
-          EXPECT_LT(seeker.estimate().sum(), 3.0);
-        },
-        any);
-  }
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

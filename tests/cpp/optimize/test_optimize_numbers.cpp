@@ -57,20 +57,6 @@ TEST(OptimizeNumbers, DefaultsOfTheSeekers) {
   EXPECT_EQ(e.full_gradient, 0.0);
   EXPECT_EQ(e.limit_amplitude, 0.5);
   EXPECT_TRUE(e.maximize);
-  const NewtonSeekingSettings n;
-  expect_dither(NewtonSeeking(n).settings().dither, 2.0);
-  EXPECT_EQ(n.time_constant_cycles, 40.0);
-  EXPECT_EQ(n.hessian_rate, 0.03);
-  EXPECT_EQ(n.riccati_rate, 0.02);
-  EXPECT_EQ(n.initial_hessian.size() + n.initial_inverse.size(), 0);
-  EXPECT_FALSE(n.largest_inverse);
-  EXPECT_EQ(n.hold_cycles, 300);
-  EXPECT_EQ(n.limit_amplitude, 0.5);
-  EXPECT_TRUE(n.maximize);
-  const BoundedSeekingSettings b;
-  expect_dither(BoundedSeeking(b).settings().dither, 1.0);
-  EXPECT_FALSE(b.kappa || b.curvature);
-  EXPECT_TRUE(b.maximize);
   const GradientDescentSettings g;
   EXPECT_FALSE(g.curvature);
   EXPECT_EQ(g.step_size.size(), 0);
@@ -111,11 +97,10 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
     t.perturbation = scalar_input(0.9);
     return Spsa(t).settings();
   };
-  EXPECT_EQ(made(SpsaForm::first_order).gain.size() + made(SpsaForm::one_measurement).gain.size(), 0);
+  EXPECT_EQ(made(SpsaForm::first_order).gain.size(), 0);
   EXPECT_EQ(made(SpsaForm::second_order).gain, scalar_input(3.0));
   EXPECT_DOUBLE_EQ(made(SpsaForm::first_order).step_max[0], 1.2);
   EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max[0], 1.2);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::one_measurement).step_max[0], 0.18);
 }
 
 TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
@@ -151,9 +136,7 @@ TEST(OptimizeNumbers, NamesOfTheOptions) {
   test::expect_names<MeanRemoval>({{MeanRemoval::batch, "batch"},
                                    {MeanRemoval::moving_average, "moving_average"},
                                    {MeanRemoval::washout, "washout"}});
-  test::expect_names<SpsaForm>({{SpsaForm::first_order, "first_order"},
-                                {SpsaForm::second_order, "second_order"},
-                                {SpsaForm::one_measurement, "one_measurement"}});
+  test::expect_names<SpsaForm>({{SpsaForm::first_order, "first_order"}, {SpsaForm::second_order, "second_order"}});
   test::expect_names<GainSchedule>({{GainSchedule::decreasing, "decreasing"}, {GainSchedule::constant, "constant"}});
   test::expect_names<LimitMethod>(
       {{LimitMethod::switching, "switching"}, {LimitMethod::penalty, "penalty"}, {LimitMethod::barrier, "barrier"}});

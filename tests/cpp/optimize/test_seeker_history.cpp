@@ -20,40 +20,6 @@ RecordedSeeker<Spsa> two_inputs() {
   return RecordedSeeker<Spsa>(Spsa(settings));
 }
 
-TEST(SeekerHistory, KeepsWhatWasToldAndNothingElse) {
-  RecordedSeeker<Spsa> seeker = two_inputs();
-  Spsa plain = seeker.seeker();
-  EXPECT_EQ(seeker.tell({}), TellStatus::not_asked);
-  EXPECT_EQ(seeker.history().size(), 0u);
-  for (int k = 0; k < 30; ++k) {
-    const Inputs asked = seeker.ask();
-    EXPECT_EQ(asked, plain.ask());
-    const Inputs before = seeker.estimate();
-    const double j[] = {-0.02 * asked[0] * asked[0] - 0.03 * asked[1] * asked[1]};
-    const double useless[] = {std::nan("")};
-    EXPECT_EQ(seeker.tell({useless, {}, false}), TellStatus::not_a_reading);
-    const bool misfire = k % 7 == 3;
-    EXPECT_EQ(seeker.tell({j, {}, misfire}), misfire ? TellStatus::misfire : TellStatus::accepted);
-    plain.tell({j, {}, misfire});
-    const StateColumns columns = seeker.history().save();
-    ASSERT_EQ(seeker.history().size(), static_cast<std::size_t>(k) + 1);
-    EXPECT_EQ(columns.at("cycle").back(), k);
-    EXPECT_EQ(columns.at("misfire").back(), misfire ? 1.0 : 0.0);
-    if (misfire) {
-      EXPECT_TRUE(std::isnan(columns.at("objective").back()));
-    } else {
-      EXPECT_EQ(columns.at("objective").back(), j[0]);
-    }
-    EXPECT_EQ(columns.at("applied").back(), asked[1]);
-    EXPECT_EQ(*(columns.at("applied").end() - 2), asked[0]);
-    EXPECT_EQ(columns.at("estimate").back(), before[1]);
-    EXPECT_EQ(*(columns.at("estimate").end() - 2), before[0]);
-  }
-  EXPECT_EQ(save_state(seeker.seeker()), save_state(plain));
-  seeker.history().clear();
-  EXPECT_EQ(seeker.history().size(), 0u);
-}
-
 TEST(SeekerHistory, RoomThatWasMadeIsNotAllocatedAgain) {
   RecordedSeeker<Spsa> seeker = two_inputs();
   seeker.history().make_room(200);

@@ -1,11 +1,11 @@
-// What holds for every seeker and form: the search on a noisy quadratic from far away, and the protocol of ask and
-// tell.
+// What holds for every seeker and form and is not seen from Python, whose contract test has the rest: the search on a
+// noisy quadratic from far away, and that ask and tell allocate nothing.
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
-constexpr int forms = 10;
+constexpr int forms = 7;
 
 std::string form_name(std::size_t form) {
   return every_seeker(space_at(scalar_input(0.0), 20.0), 0.25)[form].first;
@@ -19,7 +19,6 @@ TEST_P(FarStart, ArrivesOnceStaysAndHasNoBias) {
   const auto form = static_cast<std::size_t>(std::get<0>(GetParam()));
   const double start = std::get<1>(GetParam());
   const std::uint64_t seeds = 1000;
-  const int latest = form_name(form) == "newton_seeking" ? 900 : 700;
   double mean = 0.0;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     Seeker any = every_seeker(space_at(scalar_input(start)), 0.25, seed)[form].second;
@@ -29,7 +28,7 @@ TEST_P(FarStart, ArrivesOnceStaysAndHasNoBias) {
       ASSERT_LE(std::abs(x), 41.0) << form_name(form) << " seed " << seed;
     const int arrival = first_within(path, 1.0);
     ASSERT_GE(arrival, 0) << form_name(form) << " seed " << seed;
-    ASSERT_LT(arrival, latest) << form_name(form) << " seed " << seed;
+    ASSERT_LT(arrival, 700) << form_name(form) << " seed " << seed;
     mean += mean_of(path, 1000, 2000) / static_cast<double>(seeds);
   }
   EXPECT_LE(std::abs(mean), 0.03) << form_name(form);
@@ -104,15 +103,6 @@ TEST(EverySeeker, AskAndTellAreNoexceptAndDoNotAllocate) {
   });
 }
 
-TEST(EverySeeker, AskingAgainGivesTheSame) {
-  on_every_seeker([](auto& seeker, const Scene& scene) {
-    run(seeker, scene, 33);
-    const Inputs first = seeker.ask();
-    EXPECT_EQ(first, seeker.ask());
-    EXPECT_EQ(first, seeker.applied());
-  });
-}
-
 TEST(EverySeeker, AMisfireOnlyCounts) {
   on_every_seeker([](auto& seeker, const Scene& scene) {
     run(seeker, scene, 57);
@@ -134,75 +124,6 @@ TEST(EverySeeker, AMisfireOnlyCounts) {
   });
 }
 
-TEST(EverySeeker, ARefusedReadingChangesNothing) {
-  on_every_seeker([](auto& seeker, const Scene& scene) {
-    run(seeker, scene, 41);
-    auto untouched = seeker;
-    const double good[] = {1.0};
-    const std::vector<double> limits = limit_values(scene, scene.space.start);
-    EXPECT_EQ(seeker.tell({good, limits, false}), TellStatus::not_asked);
-    EXPECT_EQ(seeker.tell({good, limits, true}), TellStatus::not_asked);
-    EXPECT_EQ(save_state(seeker), save_state(untouched));
-    seeker.ask();
-    untouched.ask();
-    for (const double bad : {std::nan(""), unlimited, -unlimited, 1e308, -1e308, 1.001e30, -9.9e37}) {
-      const double j[] = {bad};
-      const Reading reading{j, limits, false};
-      EXPECT_EQ(seeker.tell(reading), TellStatus::not_a_reading);
-      try {
-        require(TellStatus::not_a_reading, seeker.protocol(), reading, 1, limits.size(), scene.space.size());
-        FAIL();
-      } catch (const DataError& e) {
-        EXPECT_NE(std::string(e.what()).find("cycle 41: J = "), std::string::npos) << e.what();
-        EXPECT_EQ(e.field, "J");
-      }
-    }
-    const double two[] = {1.0, 2.0};
-    EXPECT_EQ(seeker.tell({two, limits, false}), TellStatus::wrong_component_count);
-    EXPECT_EQ(seeker.tell({good, two, false}), TellStatus::wrong_limit_count);
-    if (!limits.empty()) {
-      std::vector<double> broken = limits;
-      for (const double bad : {std::nan(""), 1e308}) {
-        broken[1] = bad;
-        EXPECT_EQ(seeker.tell({good, broken, false}), TellStatus::not_a_reading);
-      }
-    }
-    EXPECT_EQ(save_state(seeker), save_state(untouched));
-    run(seeker, scene, 60, 41);
-    run(untouched, scene, 60, 41);
-    EXPECT_EQ(save_state(seeker), save_state(untouched));
-    const double j[] = {1.0};
-    EXPECT_EQ(seeker.tell({j, limits, false}), TellStatus::not_asked) << "twice";
-  });
-}
-
-bool all_finite(const StateColumns& columns) {
-  for (const auto& [name, column] : columns) {
-    for (const double value : column) {
-      if (!std::isfinite(value)) return false;
-    }
-  }
-  return true;
-}
-
-TEST(EverySeeker, StaysFiniteWhateverReadingsItTakes) {
-  // Alternating signs are the worst case of every difference: 1e308 - -1e308 is not finite.
-  for (const double size : {1e308, 1e200, 1e100, largest_reading, 1e25, 1e8}) {
-    on_every_seeker([&](auto& seeker, const Scene& scene) {
-      for (int k = 0; k < 600; ++k) {
-        const double sign = random::bits(3, 1, static_cast<std::uint64_t>(k)) >> 63 ? 1.0 : -1.0;
-        ASSERT_TRUE(seeker.ask().allFinite());
-        const double j[] = {sign * size};
-        std::vector<double> limits = limit_values(scene, scene.space.start);
-        for (double& value : limits)
-          value = k % 3 == 0 ? -sign * size : value;
-        seeker.tell({j, limits, false});
-        ASSERT_TRUE(all_finite(save_state(seeker))) << size << ", cycle " << k;
-      }
-    });
-  }
-}
-
 TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
   on_every_seeker([](auto& seeker, const Scene& scene) {
     const StateColumns fresh = save_state(seeker);
@@ -217,100 +138,6 @@ TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
       EXPECT_EQ(column, fresh.at(name)) << name;
     }
   });
-}
-
-// --- bounds -------------------------------------------------------------------------------------------------
-
-TEST(EverySeeker, StaysWithinTightBoundsWhateverItIsTold) {
-  for (const double bound : {6.0, 9.0}) {
-    for (auto& [name, any] : every_seeker(space_at(scalar_input(1.0), bound), 0.25)) {
-      SCOPED_TRACE(name);
-      std::visit(
-          [&](auto& seeker) {
-            for (int k = 0; k < 400; ++k) {
-              const double x = seeker.ask()[0];
-              ASSERT_LE(std::abs(x), bound * (1.0 + 1e-15));
-              const double j[] = {1e3 * random::normal(9, 2, static_cast<std::uint64_t>(k)) + 50.0 * x};
-              seeker.tell({j, {}, false});
-            }
-          },
-          any);
-    }
-  }
-}
-
-TEST(EverySeeker, RefusesAStartOutsideItsBounds) {
-  for (const double start : {30.0, -30.0, 20.5, std::nan("")})
-    EXPECT_THROW(every_seeker(space_at(scalar_input(start), 20.0), 0.25), ParameterError) << start;
-  SearchSpace space = space_at(scalar_input(0.0), 20.0);
-  space.upper[0] = -21.0;
-  EXPECT_THROW(every_seeker(space, 0.25), ParameterError);
-  space.upper = inputs({1.0, 2.0});
-  EXPECT_THROW(every_seeker(space, 0.25), ShapeError);
-  space.start = Inputs(0);
-  EXPECT_THROW(every_seeker(space, 0.25), ShapeError);
-}
-
-// --- state --------------------------------------------------------------------------------------------------
-
-TEST(EverySeeker, AStateInTheMiddleContinuesToTheLastBit) {
-  on_every_seeker([](auto& seeker, const Scene& scene) {
-    auto fresh = seeker;
-    for (const int middle : {1, 38, 133}) {
-      run(seeker, scene, middle);
-      seeker.ask();
-      const StateColumns saved = save_state(seeker);
-      restore_state(fresh, saved);
-      EXPECT_EQ(save_state(fresh), saved);
-      EXPECT_EQ(fresh.applied(), seeker.applied());
-      auto ahead = seeker;
-      run(ahead, scene, 200, 1000);
-      run(fresh, scene, 200, 1000);
-      EXPECT_EQ(save_state(fresh), save_state(ahead));
-    }
-  });
-}
-
-TEST(EverySeeker, AStateOfAnotherKindOrSizeIsRefusedAndChangesNothing) {
-  const std::vector<Scene> all = scenes();
-  const auto one = every_seeker(all[0].space, 0.25), three = every_seeker(all[3].space, 0.25, 3, all[3].limits);
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    Seeker any = one[i].second;
-    std::visit(
-        [&](auto& seeker) {
-          run(seeker, all[0], 15);
-          const StateColumns before = save_state(seeker);
-          const auto refused = [&](const StateColumns& other) {
-            EXPECT_THROW(restore_state(seeker, other), ParameterError) << one[i].first;
-            EXPECT_EQ(save_state(seeker), before);
-          };
-          if (i < three.size()) {
-            std::visit([&](const auto& other) { refused(save_state(other)); }, three[i].second);
-          }
-          const std::size_t kind = i < 3 ? 3 : 0;  // the forms of one kind differ in their windows only
-          std::visit([&](const auto& other) { refused(save_state(other)); }, one[kind].second);
-          StateColumns changed = before;
-          changed.erase("cycle");
-          refused(changed);
-          changed = before;
-          changed["unheard_of"] = {1.0};
-          refused(changed);
-          changed = before;
-          changed["cycle"] = {1.5};
-          refused(changed);
-          changed["cycle"] = {unlimited};
-          refused(changed);
-          for (const char* const index : {"phase", "stage", "turn"}) {
-            if (!before.contains(index)) continue;
-            for (const double value : {-1.0, 1e6}) {
-              changed = before;
-              changed[index] = {value};
-              refused(changed);
-            }
-          }
-        },
-        any);
-  }
 }
 
 }  // namespace

@@ -80,16 +80,15 @@ TEST(Spsa, AveragingDividesTheVarianceOfTheGradient) {
 }
 
 TEST(Spsa, EveryFormFindsTheOptimumOfTwoToFiveInputs) {
-  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
+  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order}) {
     for (const bool blocking : {false, true}) {
-      if (blocking && form == SpsaForm::one_measurement) continue;
       for (Eigen::Index n = 2; n <= 5; ++n) {
         double worst = 0.0;
         for (std::uint64_t seed = 0; seed < 10; ++seed) {
           SpsaSettings s;
           s.space = space_at(somewhere(n));
           s.form = form;
-          s.averaging = form == SpsaForm::one_measurement ? 1 : 2;
+          s.averaging = 2;
           s.blocking = blocking;
           s.noise_sd = 0.1;
           s.seed = seed;
@@ -102,8 +101,7 @@ TEST(Spsa, EveryFormFindsTheOptimumOfTwoToFiveInputs) {
           worst = std::max(worst, seeker.estimate().cwiseAbs().maxCoeff());
           EXPECT_TRUE(blocking || seeker.blocked() == 0);
         }
-        EXPECT_LT(worst, form == SpsaForm::one_measurement ? 2.5 : 1.0)
-            << name_of(form) << (blocking ? " blocking, " : ", ") << n << " inputs";
+        EXPECT_LT(worst, 1.0) << name_of(form) << (blocking ? " blocking, " : ", ") << n << " inputs";
       }
     }
   }
@@ -176,26 +174,6 @@ TEST(Spsa, ASeedRepeatsARunAndAnotherDoesNot) {
   };
   EXPECT_EQ(path(1), path(1));
   EXPECT_NE(path(1), path(2));
-}
-
-TEST(Spsa, OneMeasurementDoesNotMindAConstantAddedToJ) {
-  SpsaSettings s;
-  s.space = space_at(scalar_input(6.0));
-  s.form = SpsaForm::one_measurement;
-  Spsa plain(s), lifted(s);
-  const std::vector<double> a = search(plain, quadratic, 800);
-  const std::vector<double> b = search(lifted, [](double x) { return quadratic(x) + 1e6; }, 800);
-  for (std::size_t k = 0; k < a.size(); ++k)
-    ASSERT_NEAR(a[k], b[k], 1e-5);
-}
-
-TEST(Spsa, MinimisingIsMaximisingTheNegative) {
-  SpsaSettings s;
-  s.space = space_at(scalar_input(8.0));
-  Spsa up(s);
-  s.maximize = false;
-  Spsa down(s);
-  EXPECT_EQ(search(up, quadratic, 600), search(down, [](double x) { return -quadratic(x); }, 600));
 }
 
 TEST(Spsa, RefusesAndAdvises) {

@@ -40,27 +40,6 @@ Seeker seeker_of(const Tuning& t, double start, std::uint64_t seed, const Compon
   return ExtremumSeeking(s);
 }
 
-TEST(Tuner, PredictionsAreTheClosedForms) {
-  for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average, TunedMethod::spsa}) {
-    const Tuning t = tune(default_wish(method));
-    const double a = std::abs(bend);
-    if (method == TunedMethod::spsa) {
-      const double q = t.gain * a;
-      EXPECT_NEAR(t.rms, sigma / (t.amplitude * a) * std::sqrt(q / (2.0 * (2.0 - q))), 1e-12);
-      EXPECT_NEAR(t.dither_cost, 0.5 * a * t.amplitude * t.amplitude, 1e-12);
-    } else {
-      const double tau = 2.0 / (t.gain * t.amplitude * a);
-      const double batch = method == TunedMethod::batch ? std::sqrt(1.0 - t.period / (2.0 * tau)) : 1.0;
-      EXPECT_NEAR(t.time_constant_cycles, tau, 1e-9);
-      EXPECT_NEAR(t.rms, sigma / (t.amplitude * a * std::sqrt(tau) * batch), 1e-12);
-      EXPECT_NEAR(t.dither_cost, 0.25 * a * t.amplitude * t.amplitude, 1e-12);
-      EXPECT_GE(tau, 2.0 * t.period);
-    }
-    EXPECT_NEAR(t.jitter_cost, 0.5 * a * t.rms * t.rms, 1e-12);
-    EXPECT_EQ(t.met, t.reasons.empty());
-  }
-}
-
 TEST(Tuner, WhatItPredictsHappens) {
   for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average, TunedMethod::spsa}) {
     TuningSpec w = default_wish(method);

@@ -6,12 +6,15 @@
 #include <cstdint>
 #include <initializer_list>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
@@ -94,67 +97,48 @@ inline ExtremumSeekingSettings plain_seeking(double start, double tau_cycles = 4
   return s;
 }
 
-/// Every seeker and form with the gain that suits `bend`; golden section knows the noise and never has infinite bounds.
+/// A seeker as its settings make it, with what a user of `bend` knows; of golden section bounds are finite.
+template <class S, class More>
+void add_seeker(std::vector<std::pair<std::string, Seeker>>& out, std::string name, const SearchSpace& space,
+                const std::vector<Limit>& limits, std::optional<double> curvature, More more) {
+  std::remove_cvref_t<decltype(std::declval<S>().settings())> s;
+  s.space = space;
+  s.limits = limits;
+  if constexpr (requires { s.curvature; }) s.curvature = curvature;
+  if constexpr (requires { s.dither; }) {
+    if (space.size() > 1) {
+      s.dither.period = 40;
+      const std::vector<int> three{4, 5, 7};
+      s.dither.harmonics.assign(three.begin(), three.begin() + space.size());
+    }
+  }
+  more(s);
+  if constexpr (requires { s.form; }) name += "_" + std::string(name_of(s.form));
+  out.emplace_back(std::move(name), S(std::move(s)));
+}
+
+/// Every seeker and form but the process, whose searches take long.
 inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpace& space, double noise_sd,
                                                                 std::uint64_t seed = 0,
-                                                                const std::vector<Limit>& limits = {}) {
+                                                                const std::vector<Limit>& limits = {},
+                                                                std::optional<double> curvature = bend) {
   std::vector<std::pair<std::string, Seeker>> out;
-  const std::vector<int> three{4, 5, 7};
-  const bool many = space.size() > 1;
-  const auto dither = [&](double amplitude) {
-    DitherSettings d{.amplitude = Inputs::Constant(space.size(), amplitude), .period = 10, .harmonics = {1}};
-    if (many) {
-      d.period = 40;
-      d.harmonics.assign(three.begin(), three.begin() + space.size());
-    }
-    return d;
-  };
-  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average, MeanRemoval::washout}) {
-    ExtremumSeekingSettings s;
-    s.space = space;
-    s.dither = dither(1.0);
-    s.form = form;
-    s.gain = Inputs::Constant(space.size(), many ? 0.245 : 0.98);
-    s.limits = limits;
-    out.emplace_back("extremum_seeking_" + std::string(name_of(form)), ExtremumSeeking(s));
+  for (const auto& one : names<MeanRemoval>())
+    add_seeker<ExtremumSeeking>(out, "extremum_seeking", space, limits, curvature,
+                                [&](auto& s) { s.form = one.first; });
+  for (const auto& one : names<SpsaForm>()) {
+    add_seeker<Spsa>(out, "spsa", space, limits, curvature, [&](auto& s) {
+      s.form = one.first;
+      s.seed = seed;
+    });
   }
-  NewtonSeekingSettings newton;
-  newton.space = space;
-  newton.dither = dither(2.0);
-  newton.initial_hessian = Inputs::Constant(space.size(), bend);
-  newton.initial_inverse = Inputs::Constant(space.size(), 1.0 / bend);
-  if (many) newton.time_constant_cycles = 160.0;
-  newton.limits = limits;
-  out.emplace_back("newton_seeking", NewtonSeeking(newton));
-  BoundedSeekingSettings bounded;
-  bounded.space = space;
-  bounded.dither = dither(1.0);
-  bounded.curvature = bend;
-  bounded.limits = limits;
-  out.emplace_back("bounded_seeking", BoundedSeeking(bounded));
-  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
-    SpsaSettings s;
-    s.space = space;
-    s.form = form;
-    s.seed = seed;
-    s.curvature = bend;
-    s.limits = limits;
-    out.emplace_back("spsa_" + std::string(name_of(form)), Spsa(s));
-  }
-  GradientDescentSettings descent;
-  descent.space = space;
-  descent.curvature = bend;
-  descent.limits = limits;
-  out.emplace_back("gradient_descent", GradientDescent(descent));
-  if (!many) {
-    GoldenSectionSettings golden;
-    golden.space = space;
-    if (std::isinf(space.lower[0])) golden.space.lower[0] = -45.0;
-    if (std::isinf(space.upper[0])) golden.space.upper[0] = 52.0;
-    golden.noise_sd = noise_sd;
-    golden.limits = limits;
-    out.emplace_back("golden_section", GoldenSection(golden));
-  }
+  add_seeker<GradientDescent>(out, "gradient_descent", space, limits, curvature, [](auto&) {});
+  if (space.size() > 1) return out;
+  add_seeker<GoldenSection>(out, "golden_section", space, limits, curvature, [&](auto& s) {
+    if (std::isinf(space.lower[0])) s.space.lower[0] = -45.0;
+    if (std::isinf(space.upper[0])) s.space.upper[0] = 52.0;
+    s.noise_sd = noise_sd;
+  });
   return out;
 }
 

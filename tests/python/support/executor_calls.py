@@ -24,7 +24,7 @@ from mgdd.loop import (
     tuned_controller,
 )
 from mgdd.loop.tune import draw_throttles
-from mgdd.optimize import ExtremumSeeking, FitOptions, Limit, NewtonSeeking, Spsa
+from mgdd.optimize import ExtremumSeeking, FitOptions, GradientDescent, Limit, Spsa
 from mgdd.parallel.plan import Plan
 from mgdd.results import Fit
 from mgdd.throttle import Throttle
@@ -42,7 +42,7 @@ def loops(**how: Any) -> xr.Dataset:
     for k in range(30):
         moved.ask()
         moved.tell(45.0 - 0.1 * k, limits=[80.0, 4.0])
-    seekers = [moved, NewtonSeeking(**SPACE, limits=caps), Spsa(**SPACE, seed=3, limits=caps)]
+    seekers = [moved, GradientDescent(**SPACE, limits=caps), Spsa(**SPACE, seed=3, limits=caps)]
     goals = [
         LoopCriteria(optimum=-5.6, exceed_above={"p_max_bar": 90.0}),
         LoopCriteria(optimum=-8.5, limits={"p_max_bar": 120.0}),

@@ -22,7 +22,7 @@ from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import read_conditions, read_points
 from mgdd.loop import Reference
 from mgdd.maps import CalibrationMap, read_dcm, read_map, write_map
-from mgdd.optimize import BoundedSeeking, Limit, Seeker
+from mgdd.optimize import GradientDescent, Limit, Seeker
 from mgdd.rig import (  # fmt: skip
     Experiment,
     Recorder,
@@ -91,7 +91,7 @@ def _log(path: Path) -> None:
 
 def _seeker(path: Path) -> None:
     limit = Limit(name="p_max_bar", upper=110.0)
-    seeker = BoundedSeeking(start=-6.0, lower=-20.0, upper=10.0, limits=[limit])
+    seeker = GradientDescent(start=-6.0, lower=-20.0, upper=10.0, limits=[limit])
     for _ in range(5):
         u = float(seeker.ask()[0])
         seeker.tell(0.0 - 0.01 * u * u, limits={"p_max_bar": 90.0 - u})

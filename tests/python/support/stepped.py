@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
+
+import numpy as np
 
 import mgdd.guide
 import mgdd.optimize
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import Curve
 from mgdd.optimize import Seeker
 
@@ -42,10 +44,20 @@ def forms_of(cls: type[Any], settings: dict[str, Any]) -> Iterator[dict[str, Any
 
 
 def stepped(**space: Any) -> dict[str, Callable[[], Any]]:
-    """Make one of each class and form over this space."""
+    """Make one of each class and form over this space; of several inputs, of those that seek several."""
     out: dict[str, Callable[[], Any]] = {}
+    n = len(space["start"]) if isinstance(space["start"], Mapping) else np.size(space["start"])
     for name, cls in classes().items():
         own = {NEEDS[name]: GIVEN[NEEDS[name]]} if name in NEEDS else {}
+        takes = inspect.signature(cls).parameters
+        if n > 1 and "harmonics" in takes:
+            own |= {"period": 40, "harmonics": [4, 5, 7][:n]}
+        try:
+            cls(**space, **own)
+        except ShapeError as refusal:
+            if n == 1 or "one input" not in str(refusal):
+                raise
+            continue
         for settings in forms_of(cls, {**space, **own}):
             label = f"{name} {settings.get('form', '')}".strip()
             out[label] = lambda cls=cls, settings=settings: cls(**settings)

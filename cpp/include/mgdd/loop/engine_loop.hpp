@@ -22,9 +22,8 @@
 namespace mgdd::loop {
 
 /// Every seeker that a loop of the core steers.
-using Seeker = std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking,
-                            optimize::Spsa, optimize::GradientDescent, optimize::GoldenSection,
-                            optimize::GaussianProcessSeeking, guide::CurveSeeking>;
+using Seeker = std::variant<optimize::ExtremumSeeking, optimize::Spsa, optimize::GradientDescent,
+                            optimize::GoldenSection, optimize::GaussianProcessSeeking, guide::CurveSeeking>;
 
 /// One cycle of a run: what the bench gave, and the estimate that stood before it.
 struct LoopCycle {

@@ -78,7 +78,6 @@ void ClampWatch::judge(Eigen::Index i) noexcept {
   const double before = arriving_[i];
   arriving_[i] = arrived / asked;
   if (arriving_[i] < arriving_share) {
-    distorted_ = true;
     const double above = asked_high_[i] - applied_high_[i], below = applied_low_[i] - asked_low_[i];
     const bool rests = std::abs(applied_high_[i] - before_high_[i]) <= standing * asked;
     const bool lies = std::abs(applied_low_[i] - before_low_[i]) <= standing * asked;
@@ -98,7 +97,6 @@ void ClampWatch::judge(Eigen::Index i) noexcept {
 void ClampWatch::close_window(const Inputs& power) noexcept {
   if (!watching_) return;
   const bool differed = differs_;
-  distorted_ = (stretch_.array() > 1.0).any();
   if (!differed) arriving_.setOnes();
   for (Eigen::Index i = 0; differed && i < lost_.size(); ++i)
     judge(i);
@@ -124,7 +122,7 @@ Inputs ClampWatch::step_factor() const noexcept {
 
 void ClampWatch::forget() noexcept {
   begin_window();
-  watching_ = distorted_ = false;
+  watching_ = false;
   waited_ = vain_ = in_vain_ = 0;
   ceiling_ = Inputs::Constant(lost_.size(), largest_reading);
   floor_ = before_low_ = -ceiling_;

@@ -4,7 +4,6 @@
 #include <complex>
 #include <cstdlib>
 #include <numbers>
-#include <set>
 #include <string>
 
 #include "mgdd/common/text.hpp"
@@ -21,7 +20,7 @@ constexpr int longest_period = 1'000'000;
 
 }  // namespace
 
-void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian) {
+void validate(const DitherSettings& settings, Eigen::Index inputs) {
   validate_entries("amplitude", settings.amplitude, inputs, 0.0, 1e12);
   if (settings.period < 4 || settings.period > longest_period) {
     throw ParameterError("period", settings.period,
@@ -58,24 +57,6 @@ void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian)
       }
     }
   }
-  if (!hessian) return;
-  std::set<int> seen;
-  const auto claim = [&](int frequency) {
-    int folded = frequency % settings.period;
-    if (2 * folded > settings.period) folded = settings.period - folded;
-    if (2 * folded == settings.period || !seen.insert(folded).second) {
-      refuse_harmonics("two entries of the Hessian fall on frequency " + std::to_string(folded) + " of period " +
-                       std::to_string(settings.period));
-    }
-  };
-  for (std::size_t i = 0; i < n.size(); ++i) {
-    claim(n[i]);
-    claim(2 * n[i]);
-    for (std::size_t j = i + 1; j < n.size(); ++j) {
-      claim(n[i] + n[j]);
-      claim(std::abs(n[i] - n[j]));
-    }
-  }
 }
 
 void validate(const std::vector<ComponentLag>& components) {
@@ -103,34 +84,21 @@ SensorResponse sensor_response(const ComponentLag& lag, int harmonic, int period
   return out;
 }
 
-Dither::Dither(const DitherSettings& settings, const std::vector<ComponentLag>& components, bool hessian)
+Dither::Dither(const DitherSettings& settings, const std::vector<ComponentLag>& components)
     : period_(settings.period), inputs_(settings.harmonics.size()), components_(components.size()) {
   const auto steps = static_cast<std::size_t>(period_);
   sine_.resize(steps * inputs_);
   echo_.resize(steps * components_ * inputs_);
-  if (hessian) bend_.resize(steps * components_ * inputs_ * inputs_);
   for (std::size_t k = 0; k < steps; ++k) {
     const double angle = turn * static_cast<double>(k) / period_;
     for (std::size_t i = 0; i < inputs_; ++i)
       sine_[k * inputs_ + i] = std::sin(angle * settings.harmonics[i]);
     for (std::size_t c = 0; c < components_; ++c) {
       const std::size_t row = k * components_ + c;
-      // Cosine at n cycles per window as this component shows it, turned back and scaled up.
-      const auto cosine = [&](int n) {
-        if (n == 0) return 1.0;
-        const SensorResponse r = sensor_response(components[c], n, period_);
-        return std::cos(angle * n - r.phase_rad) / r.gain;
-      };
       for (std::size_t i = 0; i < inputs_; ++i) {
         const int ni = settings.harmonics[i];
         const SensorResponse r = sensor_response(components[c], ni, period_);
         echo_[row * inputs_ + i] = std::sin(angle * ni - r.phase_rad) / r.gain;
-        if (!hessian) continue;
-        for (std::size_t j = 0; j < inputs_; ++j) {  // Ghaffari 2012: 16 (d^2 - 1/2) and 4 d_i d_j, for amplitude one
-          const int nj = settings.harmonics[j];
-          bend_[(row * inputs_ + i) * inputs_ + j] =
-              i == j ? -8.0 * cosine(2 * ni) : 2.0 * (cosine(std::abs(ni - nj)) - cosine(ni + nj));
-        }
       }
     }
   }

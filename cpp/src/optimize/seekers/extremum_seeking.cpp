@@ -20,7 +20,7 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   s.space = resolved(std::move(s.space));
   s.dither.amplitude = or_scaled(std::move(s.dither.amplitude), 1.0, s.space);
-  validate(s.dither, n, false);
+  validate(s.dither, n);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
   if (s.gain.size() > 0) validate_entries("gain", s.gain, n, 0.0, 1e300);
@@ -43,9 +43,10 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   inside("low_pass", s.low_pass, 0.0, 1.0);
   inside("amplitude_floor", s.amplitude_floor, 0.0, 1.0);
   inside("limit_amplitude", s.limit_amplitude, 0.0, 1.0);
-  if (s.amplitude_floor < 1.0 && !(s.full_gradient > 0.0 && std::isfinite(s.full_gradient))) {
-    throw ParameterError("full_gradient", s.full_gradient,
-                         "must be > 0 where amplitude_floor is below 1: the slope at which the dither is full");
+  if (!std::isfinite(s.full_gradient) || (s.amplitude_floor < 1.0 && !(s.full_gradient > 0.0))) {
+    throw ParameterError(
+        "full_gradient", s.full_gradient,
+        "must be finite, and > 0 where amplitude_floor is below 1: the slope at which the dither is full");
   }
   if (!s.hold_cycles) s.hold_cycles = s.dither.period;
   if (*s.hold_cycles < 0) {
@@ -76,7 +77,7 @@ std::vector<std::string> ExtremumSeekingSettings::advice() const {
 ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
     : SeekerCore(checked(std::move(settings)),
                  [](const ExtremumSeekingSettings& s) { return limit_memory_windows * s.dither.period; }),
-      dither_(settings_.dither, settings_.components, false),
+      dither_(settings_.dither, settings_.components),
       first_(settings_.dither.amplitude, dither_unseen_bend, settings_.gain.size() == 0, settings_.curvature,
              settings_.components),
       last_(settings_.components, limit_count()),
@@ -109,13 +110,6 @@ const Inputs& ExtremumSeeking::ask() noexcept {
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
   }
   return send();
-}
-
-TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status =
-      take_late(reading, first_, last_, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
-  look_back(*this, first_.open());
-  return status;
 }
 
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.
@@ -154,10 +148,10 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
       estimate_, step,
       {settings_.space, a, clamp_.reach(a * share_), rate, settings_.recovery_rate, InputMatrix(metric.asDiagonal())});
   if (filter_.active()) ++limited_cycles_;
-  move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
+  move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_);
 }
 
-void ExtremumSeeking::learn(const Reading& reading, const Inputs& applied) noexcept {
+void ExtremumSeeking::learn_from(const Reading& reading, const Inputs& applied) noexcept {
   if (first_.open()) {
     double j = filter_.shaping(applied, reading.limits);
     for (const double c : reading.components)

@@ -73,12 +73,6 @@ const Inputs& GoldenSection::ask() noexcept {
   return send();
 }
 
-TellStatus GoldenSection::tell(const Reading& reading) noexcept {
-  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
-  look_back(*this, false);
-  return status;
-}
-
 void GoldenSection::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
@@ -254,7 +248,7 @@ void GoldenSection::refine() noexcept {
   clip_each(step, scalar_input(0.25 * reach));
   const Inputs none = scalar_input(0.0), side = scalar_input(reach);
   step = filter_.project(estimate_, step, {settings_.space, none, side, side, side, InputMatrix::Ones(1, 1)});
-  move_within(estimate_, step, settings_.space, scalar_input(0.0), clamp_, Inputs::Zero(step.size()));
+  move_within(estimate_, step, settings_.space, scalar_input(0.0), clamp_);
   const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);
   const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : most;
   width_ += width_rate * (std::clamp(wide, settings_.tolerance, most) - width_);

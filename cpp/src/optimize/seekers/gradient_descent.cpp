@@ -66,12 +66,6 @@ const Inputs& GradientDescent::ask() noexcept {
   return send();
 }
 
-TellStatus GradientDescent::tell(const Reading& reading) noexcept {
-  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
-  look_back(*this, true);
-  return status;
-}
-
 void GradientDescent::learn(const Reading& reading, const Inputs& applied) noexcept {
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   if (!clamp_.arrived(applied_, applied, estimate_)) return;
@@ -105,7 +99,7 @@ bool GradientDescent::move(Inputs step) noexcept {
   const Inputs& reach = settings_.difference;
   step = filter_.project(estimate_, step,
                          {settings_.space, reach, clamp_.reach(reach), settings_.rate, settings_.rate, metric_});
-  move_within(estimate_, step, settings_.space, reach, clamp_, Inputs::Zero(step.size()));
+  move_within(estimate_, step, settings_.space, reach, clamp_);
   return (step.array().abs() < settings_.tolerance.array()).all();
 }
 

@@ -13,8 +13,7 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr double memory = 10.0;              // measurements behind the trend and the limits
-constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
+constexpr double memory = 10.0;  // measurements behind the limits, half of them
 constexpr double blocking_errors = 2.0;
 constexpr int clamp_window = 6;             // measurements, at least, before a clamp is judged
 constexpr double even_perturbation = 0.25;  // of the perturbation: what is applied unevenly by more has no bend
@@ -34,8 +33,7 @@ SpsaSettings checked(SpsaSettings s) {
     s.initial_hessian = Inputs::Constant(n, -std::abs(*s.curvature));
   s.perturbation = or_scaled(std::move(s.perturbation), own_perturbation, s.space);
   validate_entries("perturbation", s.perturbation, n, 0.0, largest_reading);
-  if (s.step_max.size() == 0)
-    s.step_max = s.perturbation * (s.form == SpsaForm::one_measurement ? 1.0 / 5.0 : 4.0 / 3.0);
+  if (s.step_max.size() == 0) s.step_max = s.perturbation * (4.0 / 3.0);
   if (s.gain.size() > 0) validate_entries("gain", s.gain, n, 0.0, largest_reading);
   validate_entries("step_max", s.step_max, n, 0.0);
   s.step_max = within_rates(std::move(s.step_max), s.space);
@@ -90,7 +88,6 @@ std::vector<std::string> SpsaSettings::advice() const {
 
 Spsa::Spsa(SpsaSettings settings)
     : SeekerCore(checked(std::move(settings)), [](const SpsaSettings&) { return 2.0 * memory; }),
-      trend_(settings_.space.size(), memory),
       first_(settings_.perturbation, spsa_unseen_bend,
              (settings_.form == SpsaForm::second_order ? settings_.initial_hessian : settings_.gain).size() == 0,
              settings_.curvature),
@@ -106,15 +103,7 @@ Spsa::Spsa(SpsaSettings settings)
 }
 
 int Spsa::per_gradient() const noexcept {
-  switch (settings_.form) {
-    case SpsaForm::one_measurement:
-      return 1;
-    case SpsaForm::second_order:
-      return 4;
-    case SpsaForm::first_order:
-      break;
-  }
-  return 2;
+  return settings_.form == SpsaForm::second_order ? 4 : 2;
 }
 
 int Spsa::measurements_per_iteration() const noexcept {
@@ -166,12 +155,6 @@ const Inputs& Spsa::ask() noexcept {
     }
   }
   return send();
-}
-
-TellStatus Spsa::tell(const Reading& reading) noexcept {
-  const TellStatus status = take(reading, [&](const Reading& read, const Inputs& applied) { learn(read, applied); });
-  look_back(*this, first_.open());
-  return status;
 }
 
 void Spsa::learn(const Reading& reading, const Inputs& applied) noexcept {
@@ -229,14 +212,6 @@ void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   const Inputs c = perturbation_now();
   measured_[within] = j;
   missed_.col(static_cast<Eigen::Index>(within)) = applied - applied_;
-  if (settings_.form == SpsaForm::one_measurement) {
-    const bool ready = trend_.cycles() >= one_measurement_start;
-    const double surprise = j - trend_.predict(estimate_);
-    trend_.record(applied, j);
-    if (ready) add_slope(surprise, c, missed_.col(0));
-    ++draw_;
-    return;
-  }
   if (within + 1 < static_cast<std::size_t>(per)) return;
   add_slope(measured_[0] - measured_[1], 2.0 * c, missed_.col(0) - missed_.col(1));
   const InputMatrix uneven = missed_.colwise() - missed_.col(0);  // an offset common to all four does not matter
@@ -289,7 +264,7 @@ void Spsa::finish_iteration() noexcept {
   const Inputs reach = perturbation_now() * (second ? 2.0 : 1.0), room = widest();
   step = filter_.project(estimate_, step, {settings_.space, room, clamp_.reach(reach), most, most, metric_});
   candidate_ = estimate_;
-  move_within(candidate_, step, settings_.space, room, clamp_, Inputs::Zero(step.size()));
+  move_within(candidate_, step, settings_.space, room, clamp_);
   share_ += perturbation_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 
@@ -310,7 +285,6 @@ void Spsa::restart() noexcept {
   around_j_ = 0.0;
   share_ = 1.0;
   watched_ = 0;
-  trend_.forget();
   first_.restart();
   forget();
 }

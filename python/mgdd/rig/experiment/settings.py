@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, hinted
 from mgdd.identify.throttle.excitation_design import EXCITATIONS
 from mgdd.identify.throttle.fits import CHOICES
 from mgdd.io.parameters import fits
@@ -113,7 +113,7 @@ _TABLES = {"scales": _numbers, "bounds": _bounds, "limits": _limits, "any": Toml
 def _require(table: TomlTable, name: str, value: Any, facts: Mapping[str, Any]) -> None:
     among, low, high = facts["among"], facts["low"], facts["high"]
     if among is not None and value not in among:
-        raise table.error(name, value, f"one of {', '.join(among)}")
+        raise table.error(name, value, hinted(f"one of {', '.join(among)}", str(value), among))
     if facts["form"] in ("number", "integer"):
         bounds = f"in [{-math.inf if low is None else low:g}, {math.inf if high is None else high:g}]"
         if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):

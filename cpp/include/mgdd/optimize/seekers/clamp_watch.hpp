@@ -49,25 +49,14 @@ class ClampWatch {
   /// `reach` of the dither, or of what arrived of it in the last window where that is more.
   Inputs reach(const Inputs& reach) const noexcept { return reach.cwiseProduct(arriving_.cwiseMax(1.0)); }
 
-  /// The estimate, no further out than `slack` from where the plant is clamped.
-  Inputs keep(const Inputs& estimate, const Inputs& slack) const noexcept {
-    return estimate.cwiseMin(ceiling_ + slack).cwiseMax(floor_ - slack);
-  }
-  /// True where less than 0.7 of the spread of an input arrived in the last window, or no more only since it is
-  /// stretched: what is measured then says nothing of a bend.
-  bool distorted() const noexcept { return distorted_; }
-  /// By how much the dither is stretched, per input, >= 1.
-  const Inputs& stretch() const noexcept { return stretch_; }
-  /// Beyond which input the plant has not gone of late, per input; infinite: none.
-  Inputs clamped_above() const noexcept { return limit_of(ceiling_); }
-  Inputs clamped_below() const noexcept { return -limit_of(-floor_); }
+  /// The estimate, no further out than where the plant is clamped.
+  Inputs keep(const Inputs& estimate) const noexcept { return estimate.cwiseMin(ceiling_).cwiseMax(floor_); }
   void forget() noexcept;
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     v("clamp_watching", self.watching_);
     v("clamp_differs", self.differs_);
-    v("clamp_distorted", self.distorted_);
     v("clamp_stretching", self.stretching_);
     v("clamp_asked_low", self.asked_low_);
     v("clamp_asked_high", self.asked_high_);
@@ -93,13 +82,9 @@ class ClampWatch {
   bool on_the_spot(const Inputs& wanted, const Inputs& applied, const Inputs& centre) noexcept;
   void judge(Eigen::Index i) noexcept;
   void begin_window() noexcept;
-  static Inputs limit_of(const Inputs& ceiling) noexcept {
-    return (ceiling.array() < largest_reading).select(ceiling, Inputs::Constant(ceiling.size(), unlimited));
-  }
 
-  bool watching_ = false;  // since an input was applied otherwise than asked, until it is as if that had never been
-  bool differs_ = false;   // within this window
-  bool distorted_ = false;
+  bool watching_ = false;    // since an input was applied otherwise than asked, until it is as if that had never been
+  bool differs_ = false;     // within this window
   bool stretching_ = false;  // in what was asked last
   Inputs asked_low_, asked_high_, applied_low_, applied_high_, before_low_, before_high_, lost_, ceiling_, floor_;
   Inputs stretch_, arriving_, response_, sent_;
@@ -112,11 +97,10 @@ class ClampWatch {
 /// on too little of it fades with it.
 double slope_between(double rise, double distance, double asked) noexcept;
 
-/// Moves as `move_within` does, and no further out than `slack` from where the plant is clamped. A seeker whose dither
-/// looks beyond its estimate needs no slack; another would never learn that the clamp is gone.
+/// Moves as `move_within` does, and no further out than where the plant is clamped.
 inline void move_within(Inputs& estimate, const Inputs& step, const SearchSpace& space, const Inputs& reach,
-                        const ClampWatch& clamp, const Inputs& slack) noexcept {
-  estimate = clamp.keep(estimate + step, slack);
+                        const ClampWatch& clamp) noexcept {
+  estimate = clamp.keep(estimate + step);
   move_within(estimate, Inputs::Zero(step.size()), space, reach);
 }
 

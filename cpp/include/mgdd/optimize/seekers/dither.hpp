@@ -29,7 +29,7 @@ constexpr auto fields_of(const ComponentLag&) {
 }
 
 struct DitherSettings {
-  Inputs amplitude{};             ///< per input, in its unit, > 0; empty: its scale, twice that in the Newton form
+  Inputs amplitude{};             ///< per input, in its unit, > 0; empty: its scale
   int period = 10;                ///< M, cycles of the common window, >= 4
   std::vector<int> harmonics{1};  ///< n_i, one per input
 };
@@ -43,9 +43,8 @@ constexpr auto dither_fields() {
       field<place, &D::harmonics>("harmonics", "oscillations per window, one per input", DefaultForm::none)};
 }
 
-/// ParameterError for a period below 4, or for harmonics that mix: n_i = n_j, 2 n_j or n_j +- n_k, or 2 n_i >= M. A
-/// `hessian` also needs sums and differences of two harmonics to be distinct.
-void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian);
+/// ParameterError for a period below 4, or for harmonics that mix: n_i = n_j, 2 n_j or n_j +- n_k, or 2 n_i >= M.
+void validate(const DitherSettings& settings, Eigen::Index inputs);
 void validate(const std::vector<ComponentLag>& components);
 /// ParameterError whose message has `at` in front.
 void validate(const ComponentLag& lag, const std::string& at);
@@ -91,7 +90,7 @@ SensorResponse sensor_response(const ComponentLag& lag, int harmonic, int period
 /// Tables of the perturbation and of the demodulating signals; constant after construction, free of allocation in use.
 class Dither {
  public:
-  Dither(const DitherSettings& settings, const std::vector<ComponentLag>& components, bool hessian);
+  Dither(const DitherSettings& settings, const std::vector<ComponentLag>& components);
 
   int period() const noexcept { return period_; }
   std::size_t components() const noexcept { return components_; }
@@ -105,16 +104,11 @@ class Dither {
     const std::size_t row = static_cast<std::size_t>(phase) * components_ + component;
     return echo_[row * inputs_ + static_cast<std::size_t>(input)];
   }
-  /// Averaged with the reading it gives J''_ij, for amplitudes of one; only where `hessian` was asked for.
-  double curvature_demodulation(int phase, std::size_t component, Eigen::Index i, Eigen::Index j) const noexcept {
-    const std::size_t row = static_cast<std::size_t>(phase) * components_ + component;
-    return bend_[(row * inputs_ + static_cast<std::size_t>(i)) * inputs_ + static_cast<std::size_t>(j)];
-  }
 
  private:
   int period_;
   std::size_t inputs_, components_;
-  std::vector<double> sine_, echo_, bend_;
+  std::vector<double> sine_, echo_;
 };
 
 }  // namespace mgdd::optimize

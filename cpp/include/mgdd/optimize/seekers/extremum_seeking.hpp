@@ -67,14 +67,13 @@ inline auto fields_of(const ExtremumSeekingSettings&) {
   };
 }
 
-class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
+class ExtremumSeeking : public SeekerCore<ExtremumSeeking, ExtremumSeekingSettings> {
  public:
   /// Throws ParameterError or ShapeError naming the field.
   explicit ExtremumSeeking(ExtremumSeekingSettings settings);
 
   /// The input to apply in this cycle. Asking again before tell gives the same.
   const Inputs& ask() noexcept;
-  TellStatus tell(const Reading& reading) noexcept;
 
   /// The operating point has changed: forget window and limits, keep the estimate, hold it again.
   void restart() noexcept;
@@ -118,8 +117,20 @@ class ExtremumSeeking : public SeekerCore<ExtremumSeekingSettings> {
 
  private:
   friend SeekerCore;
+  bool judged_together() const noexcept { return first_.open(); }
   void begin_anew() noexcept { restart(); }
-  void learn(const Reading& reading, const Inputs& applied) noexcept;
+  void learn(const Reading& reading, const Inputs& applied) noexcept {
+    last_.keep(reading);
+    learn_from(reading, applied);
+  }
+  void miss(const Inputs& applied) noexcept {
+    if (first_.open()) {
+      first_.skip(applied);
+    } else if (last_.stands_in()) {
+      learn_from(last_.reading(), applied);
+    }
+  }
+  void learn_from(const Reading& reading, const Inputs& applied) noexcept;
   bool remove_mean(const Reading& reading, const Inputs& applied) noexcept;
   void move(Inputs step, const Inputs& rate) noexcept;
   void end_of_window() noexcept;

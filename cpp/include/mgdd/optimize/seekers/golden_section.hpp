@@ -36,12 +36,11 @@ inline auto fields_of(const GoldenSectionSettings&) {
   };
 }
 
-class GoldenSection : public SeekerCore<GoldenSectionSettings> {
+class GoldenSection : public SeekerCore<GoldenSection, GoldenSectionSettings> {
  public:
   explicit GoldenSection(GoldenSectionSettings settings);
 
   const Inputs& ask() noexcept;
-  TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: back to the whole bracket, the estimate stays until the next decision.
   void restart() noexcept;
 
@@ -84,6 +83,7 @@ class GoldenSection : public SeekerCore<GoldenSectionSettings> {
 
  private:
   friend SeekerCore;
+  bool judged_together() const noexcept { return false; }
   void begin_anew() noexcept {
     restart();
     estimate_ = settings_.space.start;

@@ -45,12 +45,11 @@ inline auto fields_of(const GradientDescentSettings&) {
   };
 }
 
-class GradientDescent : public SeekerCore<GradientDescentSettings> {
+class GradientDescent : public SeekerCore<GradientDescent, GradientDescentSettings> {
  public:
   explicit GradientDescent(GradientDescentSettings settings);
 
   const Inputs& ask() noexcept;
-  TellStatus tell(const Reading& reading) noexcept;
   void restart() noexcept;
 
   const Inputs& gradient() const noexcept { return gradient_; }
@@ -83,6 +82,7 @@ class GradientDescent : public SeekerCore<GradientDescentSettings> {
 
  private:
   friend SeekerCore;
+  bool judged_together() const noexcept { return true; }
   void begin_anew() noexcept { restart(); }
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   bool move(Inputs step) noexcept;

@@ -4,12 +4,10 @@
 #include <concepts>
 #include <variant>
 
-#include "mgdd/optimize/seekers/bounded_seeking.hpp"
 #include "mgdd/optimize/seekers/extremum_seeking.hpp"
 #include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
 #include "mgdd/optimize/seekers/golden_section.hpp"
 #include "mgdd/optimize/seekers/gradient_descent.hpp"
-#include "mgdd/optimize/seekers/newton_seeking.hpp"
 #include "mgdd/optimize/seekers/spsa.hpp"
 
 namespace mgdd::optimize {
@@ -29,10 +27,9 @@ concept AnySeeker = requires(S seeker, const S constant, const Reading& reading,
   { constant.limit_count() } noexcept -> std::same_as<std::size_t>;
 };
 
-using Seeker = std::variant<ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection,
-                            GaussianProcessSeeking>;
+using Seeker = std::variant<ExtremumSeeking, Spsa, GradientDescent, GoldenSection, GaussianProcessSeeking>;
 
-static_assert(AnySeeker<ExtremumSeeking> && AnySeeker<NewtonSeeking> && AnySeeker<BoundedSeeking> && AnySeeker<Spsa> &&
-              AnySeeker<GradientDescent> && AnySeeker<GoldenSection> && AnySeeker<GaussianProcessSeeking>);
+static_assert(AnySeeker<ExtremumSeeking> && AnySeeker<Spsa> && AnySeeker<GradientDescent> && AnySeeker<GoldenSection> &&
+              AnySeeker<GaussianProcessSeeking>);
 
 }  // namespace mgdd::optimize

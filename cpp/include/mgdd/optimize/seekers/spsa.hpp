@@ -1,7 +1,7 @@
 // Simultaneous perturbation stochastic approximation: the slope in every direction from two measurements, whatever the
-// number of inputs (Spall 1992, gains after Spall 1998); one-measurement form (Spall 1997) with the trend of J taken
-// off; second-order form with four measurements (Spall 2000). One engine cycle per measurement. All randomness is a
-// function of (seed, iteration). ask and tell are noexcept and allocation-free.
+// number of inputs (Spall 1992, gains after Spall 1998); second-order form with four measurements (Spall 2000). One
+// engine cycle per measurement. All randomness is a function of (seed, iteration). ask and tell are noexcept and
+// allocation-free.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,11 @@
 #include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/first_readings.hpp"
-#include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/seeker_core.hpp"
 
 namespace mgdd::optimize {
 
-enum class SpsaForm { first_order, second_order, one_measurement };
+enum class SpsaForm { first_order, second_order };
 
 /// decreasing: a_k = a/(k + 1 + A)^alpha, c_k = c/(k + 1)^gamma; constant: a_k = a, c_k = c, which goes on tracking.
 enum class GainSchedule { decreasing, constant };
@@ -36,7 +35,7 @@ struct SpsaSettings {
   double gain_exponent = 0.602;          ///< alpha
   Inputs perturbation{};                 ///< c per input, in its unit, > 0; empty: 1.5 scales
   double perturbation_exponent = 0.101;  ///< gamma
-  Inputs step_max{};                     ///< largest change per iteration; empty: 4/3 c, one measurement c/5
+  Inputs step_max{};                     ///< largest change per iteration; empty: 4/3 c
   int averaging = 1;                     ///< gradients per iteration
   bool blocking =
       false;  ///< accept a step only if J there is not below its mean around the old estimate less 2 noise_sd
@@ -76,12 +75,11 @@ inline auto fields_of(const SpsaSettings&) {
   };
 }
 
-class Spsa : public SeekerCore<SpsaSettings> {
+class Spsa : public SeekerCore<Spsa, SpsaSettings> {
  public:
   explicit Spsa(SpsaSettings settings);
 
   const Inputs& ask() noexcept;
-  TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: forget limits and what was measured of this iteration; keep the estimate, begin the gains
   /// anew.
   void restart() noexcept;
@@ -124,12 +122,12 @@ class Spsa : public SeekerCore<SpsaSettings> {
     v("watched", self.watched_, counts_end);
     v("share", self.share_);
     v("around_j", self.around_j_);
-    LocalModel::visit(self.trend_, v, "trend");
     FirstReadings::visit(self.first_, v);
   }
 
  private:
   friend SeekerCore;
+  bool judged_together() const noexcept { return first_.open(); }
   void begin_anew() noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   Inputs gain_now() const noexcept;
@@ -143,7 +141,6 @@ class Spsa : public SeekerCore<SpsaSettings> {
   void finish_iteration() noexcept;
   InputMatrix bent_down() noexcept;
 
-  LocalModel trend_;
   FirstReadings first_;
   Inputs candidate_, gradient_, sum_;
   InputMatrix hessian_, hessian_sum_;
