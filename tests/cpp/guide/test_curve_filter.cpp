@@ -204,6 +204,8 @@ TEST(CurveFilter, ADoubtThrowsNothingAwayButSeesAMove) {
     EXPECT_NEAR(filter.readings(), 49.0, 1.0) << "fading with 143 alone";
     told(60, 72, -8.0 + moved);
     EXPECT_NEAR(filter.mean(), -8.0 + moved, 1.0);
+    told(72, 172, -8.0 + moved);
+    EXPECT_LT(filter.spread(), 0.2) << "the readings of before are given up, those of after count for long";
   }
 }
 
