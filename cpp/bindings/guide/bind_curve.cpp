@@ -105,7 +105,8 @@ void bind_curve_seeking(py::module_& m) {
           "Curvature of the plant's J over that of the guide, as learnt.")
       .def_property_readonly(
           "trust", [](const B& b) { return b.use()->seeker().trust(); },
-          "Between 0 and 1: how much of what the curve leaves unexplained is noise; 0 after a hand-over.")
+          "Share of what the curve leaves that is noise, times the smaller of `scale` and its inverse; 0 after a "
+          "hand-over.")
       .def_property_readonly(
           "doubts", [](const B& b) { return b.use()->seeker().doubts(); }, "How often the readings were doubted.")
       .def_property_readonly(

@@ -20,29 +20,25 @@ constexpr double curvature_reach = 0.3;  // of the prior's sd: second difference
 
 constexpr double slow_level = 0.2;  // of a lag: behind a slow sensor a level moves no faster than what it shows
 
-// Every delay has one bank of each, or the delay whose assumption on the level is the least wrong would be believed.
+// The first two are those of every delay: under one alone the delay whose level errs the least would be believed. The
+// others are of short memory, and stand for a place that moves.
 struct Assumption {
   double memory_share, drift, slope, prior;
 };
-constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.75},
-                                                 {1.0, 0.05, 0.0, 0.05},
-                                                 {1.0, 0.4, 0.0, 0.04},
-                                                 {1.0, 2.0, 0.0, 0.02},
-                                                 {0.25, 0.01, 0.1, 0.1},
-                                                 {0.1, 0.05, 0.0, 0.04}}};
-constexpr std::size_t begins_anew = 4;                         // the one of these whose memory the others take over
-constexpr std::int64_t doubt_lasts = 60, recent_in_doubt = 6;  // cycles after it in which it is settled
-constexpr double believed_anew = 0.8;
-constexpr double shortest_memory = 8.0;
-constexpr double little = 0.03;  // weight of a bank whose posterior follows its readings only now and then
-constexpr std::int64_t early = 40, seldom = 8;
-constexpr double told_prior = 0.8;  // probability that the delay is as told
-constexpr double change = 0.0002;   // ... that another one is right from one cycle to the next
-constexpr double assumption_change = 0.005;
-constexpr double most_said = 0.7;  // by one reading for or against a delay, a logarithm
+constexpr std::array<Assumption, 4> assumptions{
+    {{1.0, 2e-4, 0.03, 0.8}, {1.0, 0.5, 0.0, 0.06}, {0.25, 0.01, 0.1, 0.1}, {0.1, 0.05, 0.0, 0.04}}};
+constexpr double shortest_memory = 8.0;  // below it a parabola has hardly more readings than unknowns
+constexpr double refuted = 0.9;          // weight of short memory at which a long one is given up
+// Banks and delays of less weight than these follow the readings in turn: together they move the estimate by little.
+constexpr double little = 0.02, hardly = 0.005;
+constexpr std::int64_t in_turn = 10;
+constexpr double told_prior = 0.8;                          // probability that the delay is as told
+constexpr double change = 2e-4, assumption_change = 0.005;  // ... that another one is right from one cycle to the next
+constexpr double most_said = 1.0;                           // by one reading for or against a delay, a logarithm
 // A reading may be an outlier: as likely anywhere within twenty standard deviations, under every assumption.
 constexpr double outliers = 0.02, outlier_reach = 20.0;
-constexpr double heard_whole = 4.0, heard_scale = 5.0;  // squared distance up to which a reading counts in full
+// Squared distance at which it is as likely one as not, 2 ln((1 - outliers) reach / (outliers sqrt(2 pi))).
+constexpr double heard_whole = 11.9;
 
 }  // namespace
 
@@ -63,19 +59,19 @@ CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve
       per_lag_(settings.lag_cycles > 0.0 ? -std::expm1(-1.0 / settings.lag_cycles) : 1.0),
       fading_(std::exp(-1.0 / settings.memory_cycles)),
       delays_(static_cast<std::size_t>(settings.earlier + settings.later) + 1),
-      ring_(delays_ + recent, Column::Zero()),
+      ring_(delays_, Column::Zero()),
       delay_weights_(delays_),
-      bank_weights_(delays_ * assumptions.size()),
+      assumption_weights_(assumptions.size()),
       leader_(settings.earlier) {
   lagged_.setZero();
-  for (std::size_t d = 0; d < delays_; ++d) {
+  for (std::size_t d = 0; d < delays_; ++d)
     delay_weights_[d] = delay_prior(d);
-    const double slowly = 1.0 / (1.0 + slow_level * settings.lag_cycles);
-    for (const Assumption& a : assumptions) {
-      const double memory = std::max(shortest_memory, a.memory_share * settings.memory_cycles);
-      banks_.emplace_back(CurveBank::Assumed{a.memory_share < 1.0 ? memory : settings.memory_cycles,
-                                             slowly * slowly * a.drift, slowly * a.slope});
-    }
+  const double slowly = 1.0 / (1.0 + slow_level * settings.lag_cycles);
+  for (std::size_t i = 0; i < shared() + assumptions.size() - common; ++i) {
+    const Assumption& a = assumptions[assumption_of(i)];
+    const double memory =
+        std::max(a.memory_share * settings.memory_cycles, std::min(shortest_memory, settings.memory_cycles));
+    banks_.emplace_back(CurveBank::Assumed{memory, slowly * slowly * a.drift, slowly * a.slope});
   }
   foretold_.resize(banks_.size());
   prior_.first = settings.lower;
@@ -112,11 +108,10 @@ void CurveFilter::place_prior() noexcept {
 
 void CurveFilter::restart(const Curve& curve, double mean, double sd) noexcept {
   expect(curve, mean, sd);
-  recent_count_ = 0;
-  cycles_ = doubted_ = 0;
+  cycles_ = 0;
   started_ = false;
-  for (std::size_t i = 0; i < banks_.size(); ++i)
-    bank_weights_[i] = assumptions[i % assumptions.size()].prior;
+  for (std::size_t a = 0; a < assumptions.size(); ++a)
+    assumption_weights_[a] = assumptions[a].prior;
   for (CurveBank& bank : banks_)
     bank.restart(prior_);
   mix();
@@ -170,40 +165,50 @@ double CurveFilter::learn(double input, double j) noexcept {
   double surprise = std::numeric_limits<double>::quiet_NaN(), heard = 1.0;
   if (readings() > 0.0) {
     for (std::size_t i = 0; i < banks_.size(); ++i)
-      foretold_[i] = banks_[i].foretell(prior_, drops_at(cycles_ - 1, delay_of(i)), j);
+      if (compared(delay_of(i))) foretold_[i] = banks_[i].foretell(prior_, drops_at(cycles_ - 1, delay_of(i)), j);
     const Prediction whole = expected();
     surprise = (j - whole.mean) * (j - whole.mean) / whole.variance;
-    heard = std::min(1.0, (heard_whole + heard_scale) / (heard_scale + surprise));
-    weigh();
+    heard = std::min(1.0, heard_whole / surprise);
   }
   for (std::size_t i = 0; i < banks_.size(); ++i) {
-    const bool turn = recent_count_ < early || (cycles_ + static_cast<std::int64_t>(i)) % seldom == 0;
     banks_[i].add(prior_, drops_at(cycles_ - 1, delay_of(i)), j, heard);
-    if (turn || weight_of(i) > little) banks_[i].judge(prior_);
+    if (weight_of(i) > little || is_turn_of(i)) banks_[i].judge(prior_);
   }
-  const auto at = static_cast<std::size_t>(recent_count_++) % recent;
-  recent_at_[at] = cycles_ - 1;
-  recent_j_[at] = j;
-  settle_doubt();
+  if (std::isfinite(surprise)) weigh();
+  give_up_the_refuted();
   mix();
   return surprise;
 }
 
-// Where the banks that began anew foretell the readings better by far, the others go on from what these know.
-void CurveFilter::settle_doubt() noexcept {
-  if (doubted_ == 0) return;
-  --doubted_;
-  if (doubted_ > doubt_lasts - recent_in_doubt) return;
-  const std::size_t first = leader() * per_delay();
+// Where short memory foretells the readings better by far, all go on from what the best of its banks knows.
+void CurveFilter::give_up_the_refuted() noexcept {
   double anew = 0.0;
-  for (std::size_t a = 0; a < per_delay(); ++a)
-    anew += assumptions[a].memory_share < 1.0 ? bank_weights_[first + a] : 0.0;
-  if (anew < believed_anew) return;
-  doubted_ = 0;
-  for (std::size_t b = 0; b < banks_.size(); ++b) {
-    if (assumptions[b % per_delay()].memory_share < 1.0) continue;
-    banks_[b].take_over(banks_[delay_of(b) * per_delay() + begins_anew]);
+  std::size_t best = assumptions.size() - 1;
+  for (std::size_t a = common; a < assumptions.size(); ++a) {
+    anew += assumption_weights_[a];
+    if (assumption_weights_[a] > assumption_weights_[best]) best = a;
   }
+  if (anew < refuted) return;
+  const CurveBank& known = banks_[shared() + best - common];
+  for (CurveBank& bank : banks_)
+    if (&bank != &known) bank.take_over(known);
+  for (std::size_t a = 0; a < assumptions.size(); ++a)
+    assumption_weights_[a] = assumptions[a].prior;
+}
+
+// Of the leader's by all assumptions, of another delay's by those that it has.
+double CurveFilter::weight_of(std::size_t bank) const noexcept {
+  const double own = delay_weights_[delay_of(bank)] * assumption_weights_[assumption_of(bank)];
+  return delay_of(bank) == leader() ? own : own / (assumption_weights_[0] + assumption_weights_[1]);
+}
+
+bool CurveFilter::is_turn_of(std::size_t i) const noexcept {
+  return (cycles_ + static_cast<std::int64_t>(i)) % in_turn == 0;
+}
+
+// A delay that is hardly believed is held against every few readings only.
+bool CurveFilter::compared(std::size_t delay) const noexcept {
+  return delay == leader() || offset_of(delay) == 0 || delay_weights_[delay] > hardly || is_turn_of(delay);
 }
 
 double CurveFilter::delay_prior(std::size_t delay) const noexcept {
@@ -212,39 +217,51 @@ double CurveFilter::delay_prior(std::size_t delay) const noexcept {
 }
 
 CurveFilter::Prediction CurveFilter::expected() const noexcept {
-  const double about = foretold_[leader() * per_delay()].reading.mean;  // or the squares would lose all digits
-  double mean = 0.0, square = 0.0;
+  const double about = foretold_[leader() * common].reading.mean;  // or the squares would lose all digits
+  double sum = 0.0, mean = 0.0, square = 0.0;
   for (std::size_t i = 0; i < banks_.size(); ++i) {
+    if (!compared(delay_of(i))) continue;
     const auto& [own, variance] = foretold_[i].reading;
-    mean += weight_of(i) * (own - about);
-    square += weight_of(i) * (variance + (own - about) * (own - about));
+    const double weight = weight_of(i);
+    sum += weight;
+    mean += weight * (own - about);
+    square += weight * (variance + (own - about) * (own - about));
   }
-  return {about + mean, square - mean * mean};
+  mean /= sum;
+  return {about + mean, square / sum - mean * mean};
 }
 
 void CurveFilter::weigh() noexcept {
   const double anywhere = outliers / (outlier_reach * noise_sd());
-  const auto evidence = [&](std::size_t delay) {  // and the weights of its banks
-    double sum = 0.0;
-    for (std::size_t i = delay * per_delay(); i < (delay + 1) * per_delay(); ++i) {
-      bank_weights_[i] += assumption_change * (assumptions[i % per_delay()].prior - bank_weights_[i]);
-      sum += bank_weights_[i] *= (1.0 - outliers) * foretold_[i].density + anywhere;
-    }
-    for (std::size_t i = delay * per_delay(); i < (delay + 1) * per_delay(); ++i)
-      bank_weights_[i] /= sum;
-    return std::log(sum);
+  const auto likely = [&](std::size_t bank) { return (1.0 - outliers) * foretold_[bank].density + anywhere; };
+  // As far as neither of the common assumptions holds, a reading says nothing of the delay.
+  const double held = assumption_weights_[0] + assumption_weights_[1], slow = assumption_weights_[0] / held;
+  const auto evidence = [&](std::size_t d) {
+    return std::log(slow * likely(d * common) + (1.0 - slow) * likely(d * common + 1));
   };
-  const auto told = static_cast<std::size_t>(settings_.earlier);
-  const double of_told = evidence(told);
   double sum = 0.0;
+  std::array<double, assumptions.size()> own;
+  for (std::size_t a = 0; a < own.size(); ++a) {
+    const std::size_t bank = a < common ? leader() * common + a : shared() + a - common;
+    own[a] = assumption_weights_[a] + assumption_change * (assumptions[a].prior - assumption_weights_[a]);
+    sum += own[a] *= likely(bank);
+  }
+  const double of_told = evidence(static_cast<std::size_t>(settings_.earlier));
+  double total = 0.0;
   for (std::size_t d = 0; d < delays_; ++d) {
-    const double said = d == told ? 0.0 : std::clamp(evidence(d) - of_told, -most_said, most_said);
+    const double said = compared(d) ? held * std::clamp(evidence(d) - of_told, -most_said, most_said) : 0.0;
     delay_weights_[d] += change * (delay_prior(d) - delay_weights_[d]);
-    sum += delay_weights_[d] *= std::exp(said);
+    total += delay_weights_[d] *= std::exp(said);
   }
   for (double& weight : delay_weights_)
-    weight /= sum;
-  leader_ = std::max_element(delay_weights_.begin(), delay_weights_.end()) - delay_weights_.begin();
+    weight /= total;
+  for (std::size_t a = 0; a < own.size(); ++a)
+    assumption_weights_[a] = own[a] / sum;
+  const auto best = std::max_element(delay_weights_.begin(), delay_weights_.end()) - delay_weights_.begin();
+  if (best == leader_) return;
+  leader_ = best;
+  for (std::size_t i = shared(); i < banks_.size(); ++i)
+    banks_[i].take_over(banks_[leader() * common]);
 }
 
 void CurveFilter::mix() noexcept {
@@ -271,24 +288,13 @@ void CurveFilter::mix() noexcept {
 
 // What is known stays: the banks of short memory begin anew with half of all weight, and the readings to come decide.
 void CurveFilter::doubt(double kept) noexcept {
-  const auto known = std::min<std::int64_t>(recent_count_, recent);
-  doubted_ = doubt_lasts;
   double anew = 0.0;
-  for (const Assumption& a : assumptions)
-    anew += a.memory_share < 1.0 ? a.prior : 0.0;
-  for (std::size_t b = 0; b < banks_.size(); ++b) {
-    const Assumption& own = assumptions[b % per_delay()];
-    bank_weights_[b] *= 0.5;
-    if (!(own.memory_share < 1.0)) continue;
-    bank_weights_[b] += 0.5 * own.prior / anew;
+  for (std::size_t a = common; a < assumptions.size(); ++a)
+    anew += assumptions[a].prior;
+  for (std::size_t a = 0; a < assumptions.size(); ++a)
+    assumption_weights_[a] = 0.5 * (assumption_weights_[a] + (a < common ? 0.0 : assumptions[a].prior / anew));
+  for (std::size_t b = shared(); b < banks_.size(); ++b) {
     banks_[b].fade(kept);
-    for (std::int64_t i = recent_count_ - known; i < recent_count_; ++i) {
-      const auto at = static_cast<std::size_t>(i) % recent;
-      const std::int64_t cycle = recent_at_[at];
-      if (cycles_ - cycle <= static_cast<std::int64_t>(recent)) {
-        banks_[b].add(prior_, drops_at(cycle, delay_of(b)), recent_j_[at], 1.0);
-      }
-    }
     banks_[b].judge(prior_);
   }
   mix();
@@ -300,7 +306,7 @@ CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {
   fill_drops(input, drops);
   if (per_lag_ < 1.0) drops = (lagged_ + per_lag_ * (drops - lagged_)).eval();
   double mean = 0.0, square = 0.0;
-  const double about = banks_[leader() * per_delay()].predict(prior_, drops).mean;
+  const double about = banks_[leader() * common].predict(prior_, drops).mean;
   for (std::size_t i = 0; i < banks_.size(); ++i) {
     const std::size_t delay = delay_of(i);
     const Prediction own = banks_[i].predict(prior_, delay == 0 ? drops : drops_at(cycles_, delay));

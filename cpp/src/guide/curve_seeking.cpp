@@ -268,7 +268,7 @@ void CurveSeeking::learn(double cause, double j) noexcept {
     ++doubts_;
   }
   estimate_[0] = allowed_mean();
-  const bool misfit = repeats_ >= fewest_repeats && !(trust() > 0.0);
+  const bool misfit = repeats_ >= fewest_repeats && !(explained() > 0.0);
   if (settings_.hand_over && (doubt_rate_ > doubt_rate_limit || misfit)) take_over();
 }
 
@@ -359,7 +359,11 @@ bool CurveSeeking::answered() const noexcept {
 }
 
 double CurveSeeking::trust() const noexcept {
-  if (plain_at_work_) return 0.0;
+  const double scale = filter_.scale();
+  return plain_at_work_ ? 0.0 : explained() * std::min(scale, 1.0 / scale);
+}
+
+double CurveSeeking::explained() const noexcept {
   if (repeats_ < fewest_repeats / 2) return 1.0;
   const double little = little_share * filter_.small_variance();  // what a noise-free plant leaves is not a misfit
   const double ratio = (repeat_variance_ + little) / (filter_.unexplained_variance() + little);

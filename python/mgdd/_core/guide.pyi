@@ -271,7 +271,7 @@ class CurveSeeking:
     @property
     def trust(self) -> float:
         """
-        Between 0 and 1: how much of what the curve leaves unexplained is noise; 0 after a hand-over.
+        Share of what the curve leaves that is noise, times the smaller of `scale` and its inverse; 0 after a hand-over.
         """
 class FeedForward:
     """

@@ -16,9 +16,10 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     The guide's curve may stand in the wrong place and have the wrong height; every reading of J says where it stands.
     After a few readings the estimate is near the plant's own best input, wherever the guide's lies. Curvature and
     noise of J are learnt, its level and the drift of that, the delay of the readings, and how fast the best input
-    moves. A guide in another unit than J, or a hundred times too steep or too flat, still gives the shape. Readings
-    that the curve cannot explain raise a doubt, and what follows decides whether the optimum has moved; a guide that
-    keeps failing is given up for plain extremum seeking. With ``Curve.parabola`` no model is needed at all.
+    moves. A guide in another unit than J, or a hundred times too steep or too flat, still gives the shape; `trust`
+    says so: it is 1 where the curve explains the readings at its own height, and falls with the ratio of the heights.
+    Readings that the curve cannot explain raise a doubt, and what follows decides whether the optimum has moved; a
+    guide that keeps failing is given up for plain extremum seeking. With ``Curve.parabola`` no model is needed at all.
 
     Parameters
     ----------

@@ -157,7 +157,7 @@ def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> I
         yield Finding("handed_over", (), text, "take more cycles" + ("" if guided else ", or give a guide"))
     elif guided and getattr(seeker, "trust", 1.0) < _TRUSTED:
         text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"
-        yield Finding("untrusted_guide", (), text, "look at its shape")
+        yield Finding("untrusted_guide", (), text, "look at its shape and its height")
     told, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
     if seen and isinstance(taken, int | float) and asked.components is None and taken != told:
         text = f"the readings fit a delay of {taken:g} cycles, not {told:g} as stated"

@@ -106,7 +106,7 @@ TEST(CurveRobustness, ALevelThatSwingsIsNoDelay) {
 TEST(CurveRobustness, ReadingsFarOffAreNoDelay) {
   Plant plant;
   plant.outliers = 0.02;
-  plant.seeds = 12;
+  plant.seeds = 30;
   const Figures found = figures_of(plant);
   EXPECT_LE(found.late_loss, 0.035);
   EXPECT_LE(found.off, 0.06);

@@ -91,29 +91,32 @@ TEST(CurveSeeking, ComesBackAfterAJump) {
 }
 
 TEST(CurveSeeking, OneCycleAfterTheFirstReadingBehindASlowSensor) {
+  constexpr int seeds = 5;
   for (const double believed : {34.0, 38.0, 42.0}) {
-    CurveSeekingSettings settings = guided(-4.0, -20.0);
-    settings.sensor = {believed, 25.0};
-    CurveSeeking seeker(settings);
-    const double share = -std::expm1(-1.0 / 25.0);
-    std::vector<double> sent;
-    double level = engine_like(-20.0 + 6.0);
-    std::size_t first = 0;
-    double reach = 0.0, late = 0.0;
-    for (std::size_t k = 0; k < 400; ++k) {
-      sent.push_back(engine_like(seeker.ask()[0] + 6.0));
-      level += share * (sent[k < 38 ? 0 : k - 38] - level);
-      const double j[] = {level + 0.25 * random::normal(9, 1, k)};
-      ASSERT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
-      const double off = std::abs(seeker.estimate()[0] + 6.0);
-      if (first == 0 && off < 3.0) first = k + 1;
-      if (first > 0) reach = std::max(reach, off);
-      if (k >= 200) late = std::max(late, off);
+    double late = 0.0;
+    for (std::uint64_t seed = 9; seed < 9 + seeds; ++seed) {
+      CurveSeekingSettings settings = guided(-4.0, -20.0);
+      settings.sensor = {believed, 25.0};
+      CurveSeeking seeker(settings);
+      const double share = -std::expm1(-1.0 / 25.0);
+      std::vector<double> sent;
+      double level = engine_like(-20.0 + 6.0), farthest = 0.0;
+      std::size_t first = 0;
+      for (std::size_t k = 0; k < 400; ++k) {
+        sent.push_back(engine_like(seeker.ask()[0] + 6.0));
+        level += share * (sent[k < 38 ? 0 : k - 38] - level);
+        const double j[] = {level + 0.25 * random::normal(seed, 1, k)};
+        ASSERT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
+        const double off = std::abs(seeker.estimate()[0] + 6.0);
+        if (first == 0 && off < 3.0) first = k + 1;
+        ASSERT_TRUE(first == 0 || off < 5.0) << believed << " cycle " << k;
+        if (k >= 200) farthest = std::max(farthest, off);
+      }
+      EXPECT_LE(first, static_cast<std::size_t>(believed) + 2);
+      EXPECT_EQ(seeker.doubts(), 0) << believed;
+      late += farthest / seeds;
     }
-    EXPECT_LE(first, static_cast<std::size_t>(believed) + 2);
-    EXPECT_LT(reach, 5.0) << believed;
-    EXPECT_LT(late, believed < 38.0 ? 2.6 : 2.0) << believed << ": a delay longer than told is believed late";
-    EXPECT_EQ(seeker.doubts(), 0) << believed;
+    EXPECT_LT(late, 1.6) << believed;
   }
 }
 
@@ -164,6 +167,7 @@ TEST(CurveSeeking, HandsOverWhereTheGuideIsNothingLikeThePlant) {
 TEST(CurveSeeking, MissingReadingsBehindADelayDoNotLeadThePlainSeekerAstray) {
   const auto spike = [](double x) { return -2.0 * std::abs(std::tanh(3.0 * x)) - 0.3 * std::abs(x); };
   double off[2] = {0.0, 0.0};
+  int handed_over = 0;
   constexpr int seeds = 10, cycles = 2000;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     for (const int some : {0, 1}) {
@@ -179,9 +183,10 @@ TEST(CurveSeeking, MissingReadingsBehindADelayDoNotLeadThePlainSeekerAstray) {
         seeker.tell({j, {}, some == 1 && random::bernoulli(0.15, seed, 2, at)});
         if (k >= cycles / 2) off[some] += std::abs(seeker.estimate()[0] + 6.0) / (0.5 * seeds * cycles);
       }
-      EXPECT_TRUE(seeker.handed_over());
+      handed_over += seeker.handed_over();
     }
   }
+  EXPECT_GE(handed_over, 16) << "who does not is nearer";
   EXPECT_LT(off[1], 1.3 * off[0]);
 }
 
@@ -192,6 +197,17 @@ TEST(CurveSeeking, APlantWithoutNoiseIsNoReasonToGiveTheGuideUp) {
     EXPECT_FALSE(seeker.handed_over());
     EXPECT_GT(seeker.trust(), 0.9);
     EXPECT_NEAR(path.back(), -6.0, 0.35);
+  }
+}
+
+TEST(CurveSeeking, TrustSaysHowSteepTheGuideIsBesideThePlant) {
+  for (const double steepness : {0.6, 1.0, 1.6}) {
+    CurveSeekingSettings settings = guided(3.0, -20.0);
+    settings.curve = Curve::parabola(-0.05 * steepness, 3.0, 60.0);
+    CurveSeeking seeker(settings);
+    seek(seeker, 150, [](int) { return -6.0; }, 0.1);
+    EXPECT_NEAR(seeker.trust(), std::min(steepness, 1.0 / steepness), 0.15) << steepness;
+    EXPECT_FALSE(seeker.handed_over());
   }
 }
 

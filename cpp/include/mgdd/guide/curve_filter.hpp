@@ -1,7 +1,8 @@
-// Where a known curve stands, from noisy readings of J at any inputs: a mixture of filters (`CurveBank`), one for every
-// delay between input and reading and every assumption of memory and of the drift of J's level. Their weights follow
+// Where a known curve stands, from noisy readings of J at any inputs: a mixture of filters (`CurveBank`), each with a
+// delay between input and reading and an assumption of memory and of the drift of J's level. Their weights follow
 // from how well each foretold the readings, with a small chance that another one is right from now on (dynamic model
-// averaging: Raftery, Karny and Ettler 2010). A reading far off counts for less, and for or against no delay much.
+// averaging: Raftery, Karny and Ettler 2010). Delays are compared under the same assumptions, a level that hardly moves
+// and one that does; the most probable delay has all of them. A reading far off counts for less, for no delay much.
 // Shapes: as the guide says, and steep on one side, which is what a knock limit or a cliff looks like.
 // A first-order lag of the sensor is part of every hypothesis. noexcept and allocation-free after construction.
 #pragma once
@@ -51,8 +52,8 @@ class CurveFilter {
   /// Reading as it is expected next, and its variance, where `input` follows at the shortest delay.
   Prediction predict(double input) const noexcept;
 
-  /// Readings were not as expected: banks of short memory keep this share of theirs, and the last few in full, and
-  /// have half of all weight from now on. What the others know stays.
+  /// Readings were not as expected: banks of short memory keep this share of theirs and have half of all weight from
+  /// now on. What the others know stays until these foretell better.
   void doubt(double kept) noexcept;
   /// Another curve at the same operating point, T known to `sd` about its best input: the readings stand.
   void believe(const Curve& curve, double sd) noexcept;
@@ -71,7 +72,7 @@ class CurveFilter {
   double curvature() const noexcept;  ///< J'' of the curve as scaled, < 0
   double scale() const noexcept { return scale_; }
   /// Logarithm of how much likelier the readings have made it that J answers the input; >= 0.
-  double answer_evidence() const noexcept { return -banks_[leader() * per_delay()].remembered_flat(); }
+  double answer_evidence() const noexcept { return -banks_[leader() * common].remembered_flat(); }
   double readings() const noexcept { return banks_[0].readings(); }  ///< that count now
   /// Cycles that the most probable delay is longer than told.
   int delay_error() const noexcept { return offset_of(leader()); }
@@ -90,12 +91,8 @@ class CurveFilter {
     v("filter_cycles", self.cycles_, counts_end);
     for (std::size_t i = 0; i < self.ring_.size(); ++i)
       v("filter_ring" + std::to_string(i), self.ring_[i]);
-    v("filter_recent_j", self.recent_j_);
-    v("filter_recent_at", self.recent_at_, counts_end);
-    v("filter_recent_count", self.recent_count_, counts_end);
     v("filter_delays", self.delay_weights_, self.delay_weights_.size());
-    v("filter_assumptions", self.bank_weights_, self.bank_weights_.size());
-    v("filter_doubted", self.doubted_, counts_end);
+    v("filter_assumptions", self.assumption_weights_, self.assumption_weights_.size());
     v("filter_leader", self.leader_, static_cast<std::int64_t>(self.delays_));
     for (std::size_t i = 0; i < self.banks_.size(); ++i) {
       const std::string name = "bank" + std::to_string(i) + "_";
@@ -107,7 +104,7 @@ class CurveFilter {
   }
 
  private:
-  static constexpr std::size_t recent = 3;  // readings that survive a doubt
+  static constexpr std::size_t common = 2;  // assumptions that every delay has a bank of
   template <class Self>
   static auto mixed(Self& self) {
     using Place = decltype(&self.mean_);
@@ -121,15 +118,20 @@ class CurveFilter {
   }
   std::size_t leader() const noexcept { return static_cast<std::size_t>(leader_); }
   int offset_of(std::size_t delay) const noexcept { return static_cast<int>(delay) - settings_.earlier; }
-  std::size_t per_delay() const noexcept { return banks_.size() / delays_; }
-  std::size_t delay_of(std::size_t bank) const noexcept { return bank / per_delay(); }
-  double weight_of(std::size_t bank) const noexcept { return delay_weights_[delay_of(bank)] * bank_weights_[bank]; }
+  std::size_t shared() const noexcept { return delays_ * common; }
+  std::size_t delay_of(std::size_t bank) const noexcept { return bank < shared() ? bank / common : leader(); }
+  std::size_t assumption_of(std::size_t bank) const noexcept {
+    return bank < shared() ? bank % common : bank - shared() + common;
+  }
+  double weight_of(std::size_t bank) const noexcept;
+  bool is_turn_of(std::size_t i) const noexcept;
+  bool compared(std::size_t delay) const noexcept;
   double delay_prior(std::size_t delay) const noexcept;
   Prediction expected() const noexcept;
   const Column& drops_at(std::int64_t cycle, std::size_t delay) const noexcept;
   void fill_drops(double input, Column& drops) const noexcept;
   void weigh() noexcept;
-  void settle_doubt() noexcept;
+  void give_up_the_refuted() noexcept;
   void mix() noexcept;
   void expect(const Curve& curve, double mean, double sd) noexcept;
   void place_prior() noexcept;
@@ -145,15 +147,12 @@ class CurveFilter {
   double prior_mean_ = 0.0, prior_extra_ = 0.0;  // precision of the prior beyond that of `prior_sd`; it fades
   bool started_ = false;                         // the lag has an input
   Column lagged_;
-  std::vector<Column> ring_;                      // drops behind the lag, of the last cycles
-  std::int64_t cycles_ = 0;                       // since the start
-  std::array<double, recent> recent_j_{};         // readings, a ring
-  std::array<std::int64_t, recent> recent_at_{};  // their cycles
-  std::int64_t recent_count_ = 0;
-  std::vector<CurveBank> banks_;                      // one per delay and assumption; those of a delay stand together
-  std::vector<CurveBank::Foretold> foretold_;         // the latest reading, by bank: a working place
-  std::vector<double> delay_weights_, bank_weights_;  // the latter within a delay
-  std::int64_t leader_ = 0, doubted_ = 0;             // the latter: cycles left in which a doubt is settled
+  std::vector<Column> ring_;                   // drops behind the lag, of the last cycles
+  std::int64_t cycles_ = 0;                    // since the start
+  std::vector<CurveBank> banks_;               // `common` ones of every delay in turn, then the leader's others
+  std::vector<CurveBank::Foretold> foretold_;  // the latest reading, by bank: a working place
+  std::vector<double> delay_weights_, assumption_weights_;
+  std::int64_t leader_ = 0;
   double mean_ = 0.0, spread_ = 0.0, search_sd_ = 0.0, stated_sd_ = 0.0;
   double variance_ = 0.0, scale_ = 1.0, unexplained_ = 0.0;
 };

@@ -1,6 +1,6 @@
 // Curve-guided seeking of one input: the guide's whole curve gives the shape, the measurements give the place. A filter
 // over the place of the curve (`CurveFilter`) takes every reading; the next input lies one standard deviation of the
-// place to one side of its mean or the other, at least as far as keeping track costs least, every fourth time at it.
+// place to one side of its mean or the other, at least as far as keeping track costs least, every eighth time at it.
 // Kin: self-tuning extremum control (Wellstead and Zarrop 1991). The sides have no period and the delay of the readings
 // is learnt about the one told. Readings that the curve cannot explain raise a doubt: banks of short memory begin anew,
 // the others keep what they know until these foretell better. A guide that keeps failing hands over to plain extremum
@@ -105,7 +105,8 @@ class CurveSeeking {
   }
   /// False where enough readings were told and J has not been seen to answer the input: the estimate is the guide's.
   bool answered() const noexcept;
-  /// 1: what the curve leaves unexplained is noise; towards 0: it is not; 0 after a hand-over.
+  /// 1: what the curve leaves unexplained is noise, and J is as steep as it says; towards 0: it is not, or J is not, by
+  /// the ratio of the two; 0 after a hand-over.
   double trust() const noexcept;
   std::int64_t doubts() const noexcept { return doubts_; }
   bool handed_over() const noexcept { return plain_at_work_; }
@@ -159,6 +160,7 @@ class CurveSeeking {
   double amplitude() const noexcept;
   double within_limits(double wanted) noexcept;
   double allowed_mean() noexcept;
+  double explained() const noexcept;
   void learn(double applied, double j) noexcept;
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double surprise) noexcept;
