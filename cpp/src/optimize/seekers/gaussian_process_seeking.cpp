@@ -16,6 +16,7 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr double surprise_rate = 0.1, most_surprise = 3.0;
+constexpr double most_odd = 12.0;         // so that no single reading raises a doubt, but two in a row
 constexpr std::int64_t calm_cycles = 10;  // after a doubt
 constexpr double doubt_age = 10.0;        // memories
 constexpr double least_share = 1e-3;      // of a limit, that a reading counts as at least
@@ -26,7 +27,6 @@ constexpr std::int64_t most_wary = 64;    // cycles that work, after a failure
 constexpr double held_share = 0.7;        // of the longest lag, for which an input is asked
 constexpr double active_room = 0.05;      // scales of a limit
 constexpr double plane_memory = 20.0;     // cycles of the planes that tell the delays from one another
-constexpr double least_noise = 1e-12;
 
 // Of the limits. Lags are taken out of the readings instead (`LagWindow`).
 std::vector<UncertainLag> lags_of_limits(const GaussianProcessSeekingSettings& s) {
@@ -220,9 +220,8 @@ void GaussianProcessSeeking::learn(const Reading& reading, const Inputs& applied
     if (!finder.known()) continue;
     Inputs z = finder.cause();
     if (!windows_[i].take(value, z, hold_)) continue;
-    if (j_[i].wakes_up(value)) begin_anew(i);
-    watch_surprise(i, value, z);
-    j_[i].record(z, value, about);
+    watch_surprise(i, j_[i].record(z, value, about));
+    if (j_[i].wakes_up()) begin_anew(i);
   }
   for (std::size_t i = 0; i < limited_.size(); ++i) {
     double value = reading.limits[i];
@@ -245,19 +244,15 @@ void GaussianProcessSeeking::learn_limit(std::size_t i, const Inputs& z, double 
   const Limit& limit = settings_.limits[i];
   ProcessModel& model = limited_[i];
   const bool was = logarithm_[i] > 0.0, guided = !settings_.limit_guides.empty() && !settings_.limit_guides[i].empty();
-  if (!guided) {
-    double lowest = value, noise = 0.0;
-    if (model.count() > 0) {
-      lowest = std::min(lowest, read_of(limit, was, model.lowest()));
-      noise = model.count() > model.fewest() ? model.noise_sd() * (was ? lowest / limit.upper : 1.0) : 0.0;
-    }
-    const bool now = stands_above_zero(limit, lowest, was ? noise : 2.0 * noise);
-    if (now != was) {
-      model.retell([&](double told) { return learnt_of(limit, now, read_of(limit, was, told)); });
-      logarithm_[i] = now ? 1.0 : 0.0;
-    }
-  }
-  model.record(z, learnt_of(limit, logarithm_[i] > 0.0, value), about);
+  model.record(z, learnt_of(limit, was, value), about);
+  if (guided) return;
+  const double lowest = read_of(limit, was, model.lowest());
+  double noise = 0.0;
+  if (model.count() > model.fewest() + 1) noise = model.noise_sd() * (was ? lowest / limit.upper : 1.0);
+  const bool now = stands_above_zero(limit, lowest, was ? noise : 2.0 * noise);
+  if (now == was) return;
+  model.retell([&](double told) { return learnt_of(limit, now, read_of(limit, was, told)); });
+  logarithm_[i] = now ? 1.0 : 0.0;
 }
 
 // A channel that stood still says no more than where it stood; what it says now has a scale of its own.
@@ -273,18 +268,11 @@ void GaussianProcessSeeking::explore(const Inputs& z) noexcept {
   highest_ = highest_.cwiseMax(z);
 }
 
-// Readings that the process does not explain: what was known before is aged.
-void GaussianProcessSeeking::watch_surprise(std::size_t component, double value, const Inputs& z) noexcept {
-  ProcessModel& model = j_[component];
+// Readings that the process does not explain, three at least: what was known before is aged.
+void GaussianProcessSeeking::watch_surprise(std::size_t component, double odd) noexcept {
   if (component == 0) ++since_doubt_;
-  if (model.count() < 3 * static_cast<int>(z.size()) + 3) return;
-  candidates_.row(0) = z.transpose();
-  model.predict(candidates_, 1);
-  const double noise = std::max(model.noise_sd(), least_noise * std::abs(value));
-  const double variance = std::max(model.covariance(0, 0), 0.0) + noise * noise;
-  const double off = value - model.mean(0);
   double& surprise = surprise_[component];
-  surprise += surprise_rate * (std::min(off * off / std::max(variance, 1e-300), 100.0) - surprise);
+  surprise += surprise_rate * (std::min(odd, most_odd) - surprise);
   if (since_doubt_ >= calm_cycles && surprise >= most_surprise) doubt();
 }
 

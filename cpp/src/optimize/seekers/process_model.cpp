@@ -6,6 +6,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "mgdd/optimize/reading.hpp"
+#include "mgdd/optimize/seekers/outliers.hpp"
 #include "mgdd/optimize/seekers/row_cholesky.hpp"
 
 namespace mgdd::optimize {
@@ -15,6 +17,11 @@ constexpr int settling_readings = 30;
 constexpr double crowd = 0.75;  // share of the readings, those nearest to the estimate, of which the oldest goes
 constexpr int first_trials = 60, more_trials = 20, late_trials = 3;
 constexpr int first_readings = 15;
+constexpr int fewest_weighed = 4;
+constexpr double most_trusted = 81.0;  // of what a variance is multiplied by: nine standard deviations
+constexpr int waking_readings = 3;
+constexpr double waking_rise = 1e3;    // of what all earlier readings span
+constexpr double least_noise = 1e-12;  // of a reading
 
 }  // namespace
 
@@ -24,6 +31,7 @@ ProcessModel::ProcessModel(const Settings& settings)
       points_(InputTable::Zero(settings.kept, kernel_.width())),
       values_(Eigen::VectorXd::Zero(settings.kept)),
       ages_(values_),
+      scatter_(Eigen::VectorXd::Ones(settings.kept)),
       numbers_(Numbers::Zero(5 + settings.inputs + (kernel_.guided() ? 1 : 0))),
       columns_(InputTable::Zero(kernel_.width(), settings.kept)),
       quadratic_(settings.kept, settings.kept),
@@ -42,6 +50,11 @@ ProcessModel::ProcessModel(const Settings& settings)
       kernels_(settings.most_points, settings.kept),
       asked_(InputTable::Zero(settings.most_points, kernel_.width())) {
   now_.inverse_length = Inputs::Ones(settings.inputs);
+}
+
+double ProcessModel::middle() const noexcept {
+  return (values_.head(count_).array() / scatter_.head(count_).array()).sum() /
+         scatter_.head(count_).cwiseInverse().sum();
 }
 
 double ProcessModel::noise_sd() const noexcept {
@@ -103,23 +116,75 @@ int ProcessModel::crowded_reading(const Inputs& about) noexcept {
   return *std::max_element(begin, near, [&](int a, int b) { return ages_[a] < ages_[b]; });
 }
 
-void ProcessModel::record(const Inputs& z, double value, const Inputs& about) noexcept {
+double ProcessModel::record(const Inputs& z, double value, const Inputs& about) noexcept {
+  const double odd = oddness(z, value);
   const int at = count_ < settings_.kept ? static_cast<int>(count_++) : crowded_reading(about);
   ages_.head(count_).array() += 1.0;
   kernel_.describe(z, &points_(at, 0));
   values_[at] = value;
   ages_[at] = 0.0;
+  scatter_[at] = told_ < more_readings ? 1.0 : scatter_of(odd);
   ++told_;
   if (tables_known_) tabulate(at);
   factored_ = false;
+  return odd;
 }
 
-// Bit-equal readings at different inputs: none of them says anything of J.
-bool ProcessModel::stands_still() const noexcept {
-  if (count_ < 2) return false;
-  const auto values = values_.head(count_).array();
-  const auto inputs = points_.topLeftCorner(count_, settings_.inputs);
-  return (values == values[0]).all() && (inputs.rowwise() - inputs.row(0)).cwiseAbs().maxCoeff() > 0.0;
+double ProcessModel::oddness(const Inputs& z, double value) noexcept {
+  if (settings_.labels || !begun_ || count_ < 3 * static_cast<int>(settings_.inputs + 1)) return 1.0;
+  refresh();
+  double* const point = &asked_(0, 0);
+  double* const own = &kernels_(0, 0);
+  kernel_.describe(z, point);
+  kernel_.covariances(point, columns_, count_, now_, own);
+  const double off = value - level_ - kernel_.mean(point, now_) - dot(own, weights_.data(), count_);
+  solve_lower(factor_, count_, own);
+  const double known = kernel_.covariance(point, point, now_) - dot(own, own, count_);
+  const double noise = std::max(noise_sd(), least_noise * std::abs(value));
+  return off * off / std::max(std::max(known, 0.0) + noise * noise, 1e-300);
+}
+
+bool ProcessModel::trusted(std::int64_t reading) const noexcept {
+  return scatter_[reading] <= most_trusted;
+}
+
+double ProcessModel::lowest() const noexcept {
+  double least = values_.head(count_).maxCoeff();
+  for (std::int64_t i = 0; i < count_; ++i) {
+    if (trusted(i)) least = std::min(least, values_[i]);
+  }
+  return least;
+}
+
+// By what is left of each reading: a small part of it where the process follows the others.
+void ProcessModel::weigh() noexcept {
+  if (settings_.labels || told_ < fewest_weighed) return;
+  for (std::int64_t i = 0; i < count_; ++i) {
+    const double left = weights_[i] * scatter_[i];  // over the variance of a reading
+    scatter_[i] = scatter_of(left * left * now_.noise_variance);
+  }
+}
+
+// Three readings in a row, since one may be an outlier.
+bool ProcessModel::wakes_up() const noexcept {
+  constexpr double most = largest_reading;
+  double low = most, high = -most, new_low = most, new_high = -most;
+  int news = 0;
+  const double* first = nullptr;
+  bool elsewhere = false;
+  for (std::int64_t i = 0; i < count_; ++i) {
+    if (ages_[i] < waking_readings) {
+      ++news;
+      new_low = std::min(new_low, values_[i]);
+      new_high = std::max(new_high, values_[i]);
+      continue;
+    }
+    if (first == nullptr) first = &points_(i, 0);
+    elsewhere = elsewhere || !std::equal(first, first + settings_.inputs, &points_(i, 0));
+    low = std::min(low, values_[i]);
+    high = std::max(high, values_[i]);
+  }
+  return elsewhere && news == waking_readings && std::max(new_low - high, low - new_high) > waking_rise * (high - low);
 }
 
 void ProcessModel::age(double cycles) noexcept {
@@ -130,6 +195,7 @@ void ProcessModel::age(double cycles) noexcept {
 void ProcessModel::forget() noexcept {
   count_ = told_ = 0;
   begun_ = factored_ = tables_known_ = false;
+  scatter_.setOnes();
   points_.setZero();
   values_.setZero();
   ages_.setZero();
@@ -162,7 +228,7 @@ void ProcessModel::factor() noexcept {
       factor_(i, j) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern_(i, j), now_) +
                       wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), now_);
     }
-    factor_(i, i) += now_.noise_variance + jitter * now_.bend * now_.bend;
+    factor_(i, i) += now_.noise_variance * scatter_[i] + jitter * now_.bend * now_.bend;
   }
   cholesky(factor_, count_);
   solve_lower(factor_, count_, weights_.data());
@@ -173,24 +239,26 @@ void ProcessModel::factor() noexcept {
 // After a restart in another process, or readings since the last fit.
 void ProcessModel::refresh() noexcept {
   if (factored_) return;
-  level_ = values_.head(count_).mean();
+  level_ = middle();
   now_ = scales_of(numbers_);
   know_tables();
   factor();
 }
 
 void ProcessModel::fit(const Inputs& about) noexcept {
-  level_ = values_.head(count_).mean();
+  level_ = middle();
   const auto enough = kernel_.guided() ? 2 : settings_.inputs + 1;
   if (!begun_ || told_ <= enough) begin_numbers();
   know_tables();
   choose_readings(about);
   if (told_ >= enough) {
+    if (told_ > enough && told_ < more_readings && !settings_.labels) suspect();
     try_numbers(told_ < first_readings ? first_trials : told_ < more_readings ? more_trials : late_trials);
     if (told_ == enough + settling_readings) settled_bend_ = numbers_[0];
   }
   factored_ = false;
   refresh();
+  weigh();
 }
 
 void ProcessModel::predict(const InputTable& at, int points) noexcept {

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "mgdd/common/random.hpp"
+#include "mgdd/optimize/reading.hpp"
 #include "mgdd/optimize/seekers/process_model.hpp"
 #include "mgdd/optimize/seekers/row_cholesky.hpp"
 
@@ -26,6 +27,8 @@ constexpr double wander_sd = 1.0;                          // of their logarithm
 constexpr double coarse_step = 0.8, fine_step = 0.25;
 constexpr double bend_offsets[] = {0.0, -0.7, 0.7, 1.4};  // logarithms; what is learnt first
 constexpr double least_rise = 1e-100;                     // of which the square, with its jitter, is still above 0
+constexpr double rarity = 10.0;                           // of an outlier, logarithm
+constexpr double far_out = 1.0;                           // of the range of all others
 constexpr double lowest_log = -12.0, highest_log = 3.0;
 
 double log_prior(double value, double middle, double sd) noexcept {
@@ -79,7 +82,7 @@ double ProcessModel::evidence(const Numbers& numbers, bool same_lengths) noexcep
       small_(a, b) = kernel_.join({quadratic_(i, j), guide_(i, j)}, matern, s) +
                      wandered(&points_(i, 0), &points_(j, 0), std::min(ages_[i], ages_[j]), s);
     }
-    small_(a, a) += s.noise_variance + jitter * s.bend * s.bend;
+    small_(a, a) += s.noise_variance * scatter_[one] + jitter * s.bend * s.bend;
   }
   cholesky(small_, n);
   solve_lower(small_, n, small_rest_.data());
@@ -195,13 +198,17 @@ double ProcessModel::guide_in_readings() const noexcept {
 
 // The bend that the spread of the readings suggests.
 void ProcessModel::begin_numbers() noexcept {
-  const double spread = values_.head(count_).maxCoeff() - values_.head(count_).minCoeff();
-  const double highest = values_.head(count_).cwiseAbs().maxCoeff();
-  double farthest = 1e-6;
+  double low = largest_reading, high = -low, farthest = 1e-6;
   for (std::int64_t i = 0; i < count_; ++i) {
-    for (std::int64_t j = 0; j < i; ++j)
+    if (!trusted(i)) continue;
+    low = std::min(low, values_[i]);
+    high = std::max(high, values_[i]);
+    for (std::int64_t j = 0; j < i; ++j) {
+      if (!trusted(j)) continue;
       farthest = std::max(farthest, (points_.row(i) - points_.row(j)).head(settings_.inputs).norm());
+    }
   }
+  const double spread = high - low, highest = std::max(std::abs(low), std::abs(high));
   const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), least_rise});
   numbers_[0] = std::log(rise / (0.3 * farthest));
   numbers_[1] = noise_prior;
@@ -214,6 +221,58 @@ void ProcessModel::begin_numbers() noexcept {
     numbers_[1] = noise_prior - guided_bend_prior;
   }
   begun_ = true;
+}
+
+// Of the first readings one that is far out of all others sets the scale of everything, although it may be wrong: what
+// a fresh start makes of all of them, and of the others alone, is held against the numbers in use.
+void ProcessModel::suspect() noexcept {
+  std::int64_t high = -1, low = -1, wrong = -1;
+  double next_high = -largest_reading, next_low = largest_reading;
+  for (std::int64_t i = 0; i < count_; ++i) {
+    if (!trusted(i)) continue;
+    if (high < 0 || values_[i] > values_[high]) {
+      if (high >= 0) next_high = values_[high];
+      high = i;
+    } else {
+      next_high = std::max(next_high, values_[i]);
+    }
+    if (low < 0 || values_[i] < values_[low]) {
+      if (low >= 0) next_low = values_[low];
+      low = i;
+    } else {
+      next_low = std::min(next_low, values_[i]);
+    }
+  }
+  if (high < 0) return;
+  if (values_[high] - next_high > far_out * (next_high - values_[low])) wrong = high;
+  if (next_low - values_[low] > far_out * (values_[high] - next_low)) wrong = low;
+  if (wrong < 0) return;
+  const Numbers known = numbers_;
+  Numbers best = known;
+  double most = evidence(known, true), scatter = 1.0;
+  for (const bool left_out : {false, true}) {
+    if (left_out) scatter_[wrong] = largest_reading;
+    level_ = middle();
+    begin_numbers();
+    numbers_.segment(2, 3 + settings_.inputs) = known.segment(2, 3 + settings_.inputs);
+    if (settings_.bend) {
+      const double shift = std::log(*settings_.bend) - numbers_[0];
+      numbers_[0] += shift;
+      numbers_[1] -= shift;
+    }
+    const double off = values_[wrong] - level_;
+    for (int more = 0; more < 3; ++more, numbers_[1] += noise_prior_sd) {
+      if (left_out) scatter_[wrong] = std::max(1.0, off * off / scales_of(numbers_).noise_variance);
+      const double found = evidence(numbers_, true) - (left_out ? rarity : 0.0);
+      if (found <= most) continue;
+      most = found;
+      best = numbers_;
+      scatter = scatter_[wrong];
+    }
+  }
+  numbers_ = best;
+  scatter_[wrong] = scatter;
+  level_ = middle();
 }
 
 // Numbers drawn from the priors: the evidence has more than one top.

@@ -156,7 +156,7 @@ class GaussianProcessSeeking {
   void fit(const Inputs& about) noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;
   void begin_anew(std::size_t component) noexcept;
-  void watch_surprise(std::size_t component, double value, const Inputs& z) noexcept;
+  void watch_surprise(std::size_t component, double odd) noexcept;
   void doubt() noexcept;
   void take_in(std::size_t component, int points) noexcept;
   double mean(int point) const noexcept;

@@ -20,6 +20,12 @@ namespace mgdd::optimize {
 double median_of(std::span<double> values) noexcept;
 /// How far a reading may lie from the median of its like, by their distances from it, which are put in another order.
 double farthest_of(std::span<double> distances) noexcept;
+/// What the variance of a reading is multiplied by, from the square of its distance in standard deviations: beyond
+/// three of them it pulls the less, the farther out it lies.
+constexpr double scatter_of(double squared) noexcept {
+  const double beyond = squared / 9.0;
+  return beyond > 1.0 ? beyond * beyond : 1.0;
+}
 
 class Outliers {
  public:

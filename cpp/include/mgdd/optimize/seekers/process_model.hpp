@@ -37,8 +37,9 @@ class ProcessModel {
   int count() const noexcept { return static_cast<int>(count_); }
   double noise_sd() const noexcept;
 
-  /// Takes a reading at `z`; where all places are taken, the oldest of those near `about` makes room.
-  void record(const Inputs& z, double value, const Inputs& about) noexcept;
+  /// Takes a reading at `z`; where all places are taken, the oldest of those near `about` makes room. The square of how
+  /// far it lies from what was expected, in standard deviations; 1 where little is known.
+  double record(const Inputs& z, double value, const Inputs& about) noexcept;
   /// Looks for better numbers of the process and makes predictions possible; 2 readings at least, 1 with a guide.
   void fit(const Inputs& about) noexcept;
 
@@ -62,8 +63,8 @@ class ProcessModel {
   /// Knows these readings, the oldest first, in place of its own; its numbers begin anew.
   void replace(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages, int count,
                const Inputs& about) noexcept;
-  /// The least value of a kept reading; one at least.
-  double lowest() const noexcept { return values_.head(count_).minCoeff(); }
+  /// The least value of a kept reading that is no outlier; one at least.
+  double lowest() const noexcept;
   /// Every kept reading as `told` by another measure; the numbers begin anew.
   template <class F>
   void retell(const F& told) noexcept {
@@ -75,8 +76,8 @@ class ProcessModel {
   /// Every reading so far counts as if it were this much older.
   void age(double cycles) noexcept;
   void forget() noexcept;
-  /// All readings are bit-equal although their inputs differ, and `value` is another one.
-  bool wakes_up(double value) const noexcept { return count_ > 0 && value != values_[0] && stands_still(); }
+  /// Whether the newest readings have left what all others said, as good as alike at different inputs.
+  bool wakes_up() const noexcept;
   /// Variance by which its slopes wander per reading, and how much it bends, as of the last fit.
   double slope_wander() const noexcept { return now_.wander_slope; }
   double bend() const noexcept { return kernel_.whole_bend(now_); }
@@ -101,6 +102,7 @@ class ProcessModel {
     v(name + "_points", self.points_);
     v(name + "_values", self.values_);
     v(name + "_ages", self.ages_);
+    v(name + "_scatter", self.scatter_);
     v(name + "_numbers", self.numbers_);
     v(name + "_settled_bend", self.settled_bend_);
     if constexpr (!std::is_const_v<Self>) self.tables_known_ = self.factored_ = false;
@@ -120,6 +122,11 @@ class ProcessModel {
                        const Eigen::VectorXd& ages, int count) noexcept;
   double log_priors(const Numbers& numbers, const Scales& s) const noexcept;
   void begin_numbers() noexcept;
+  void suspect() noexcept;
+  void weigh() noexcept;
+  double oddness(const Inputs& z, double value) noexcept;
+  bool trusted(std::int64_t reading) const noexcept;
+  double middle() const noexcept;
   void try_numbers(int trials) noexcept;
   Numbers anew(std::uint64_t trial) const noexcept;
   double guide_in_readings() const noexcept;
@@ -129,7 +136,6 @@ class ProcessModel {
   double wandered(const double* a, const double* b, double age, const Scales& s) const noexcept;
   void factor() noexcept;
   void refresh() noexcept;
-  bool stands_still() const noexcept;
   int crowded_reading(const Inputs& about) noexcept;
   bool noise_known() const noexcept { return settings_.noise_sd.has_value(); }
 
@@ -139,6 +145,7 @@ class ProcessModel {
   bool begun_ = false;  // the numbers have been made of readings
   InputTable points_;   // as the kernel describes them
   Eigen::VectorXd values_, ages_;
+  Eigen::VectorXd scatter_;  // that the variance of each is multiplied by
   Numbers numbers_;
   std::optional<double> settled_bend_{};  // logarithm, as the first readings gave it
   // Made anew of the above where readings or numbers have changed.
