@@ -72,7 +72,7 @@ def test_a_dither_behind_the_analyser_arrives(capsys: pytest.CaptureFixture[str]
     run = seek(capsys, "--sensor", "analyser", *by("extremum_seeking"))
     assert run["optimum"]["soc_cad"] == bench.find_optimum()["soc_cad"]
     assert run["cycles"] == 16 * 4 * 76  # a period of 76: a fifth of 38 + 25 cycles turns it by 60 deg
-    assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=1.5)
+    assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=2.0)
 
 
 def test_any_setting_of_a_seeker_can_be_said(capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,7 +98,7 @@ def test_the_period_follows_the_lag_of_the_speed(capsys: pytest.CaptureFixture[s
     argv = ("--sensor", "analyser", "--speed-rpm", "4000", "--fuel-mg", "25", "--seed", "2")
     run = seek(capsys, *argv, *by("extremum_seeking"))
     assert run["cycles"] > 8000  # the lag lasts 67 cycles here, 25 at 1500 rpm
-    assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=1.5)
+    assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=2.0)
 
 
 def test_the_soft_sensor_needs_no_patience(capsys: pytest.CaptureFixture[str]) -> None:

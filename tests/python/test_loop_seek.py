@@ -207,7 +207,7 @@ def test_steady_map_is_quiet_and_labelled() -> None:
         ),
         (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),
         (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
-        (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "3.0 is not a seeker"),
+        (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "seeker = 3: must be a seeker, as"),
         (lambda: EngineBench().find_optimum({"nonsense": 1.0}), "'nonsense' is not an indicator"),
         (lambda: EngineBench().find_optimum(bounds={"soc_cad": (5.0, -5.0)}), "must increase"),
     ],

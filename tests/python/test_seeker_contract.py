@@ -37,6 +37,10 @@ def lag(cycles: float) -> Actuator:
     return apply
 
 
+def steps(width: float) -> Actuator:
+    return lambda asked: width * round(asked / width)
+
+
 def j_at(applied: float, rng: np.random.Generator) -> float:
     return float(50.0 - 0.03 * (applied - BEST) ** 2 + rng.normal(0.0, 0.3))
 
@@ -103,7 +107,7 @@ def test_what_an_actuator_really_did_does_not_stop_a_seeker(
     assert search(SEEKERS[name](), 900, kind(size))[0] == pytest.approx(BEST, abs=4.5)
 
 
-@shared
+@every
 @pytest.mark.parametrize("low", [-2.0, 2.0])
 def test_a_start_that_fails_is_left_for_what_works(name: str, low: float) -> None:
     estimate, failed = search(SEEKERS[name](), works=lambda applied: applied > low)

@@ -60,7 +60,7 @@ def test_without_figures_and_with_seeds() -> None:
 # --- seekers ------------------------------------------------------------------------------------------------
 def test_every_form_of_every_seeker_competes_and_arrives(seekers: StudyResult) -> None:
     rows = {row["seeker"]: row for row in seekers.summary["rows"]}
-    assert len(rows) == 13
+    assert len(rows) == 10
     assert all(row["share_arrived"] == 1.0 for row in rows.values())
     best = EngineBench().find_optimum()["soc_cad"]
     assert seekers.summary["optimum_cad"] == pytest.approx(best)

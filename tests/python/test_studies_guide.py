@@ -124,7 +124,7 @@ def test_a_feed_forward_without_a_guide_starts_far_and_with_one_near() -> None:
 def test_a_jump_moves_the_target_and_not_the_height() -> None:
     case = HardCase(name="jump", jump_cad=6.0)
     assert [case.late_by_cad(k) for k in (0, 199, 200, 400)] == [0.0, 0.0, 6.0, 6.0]
-    hard = run_hard(case, 4)
+    hard = run_hard(case, 10)
     assert np.median(hard.error[:, 200]) > 4.0  # the estimate stands where it was, the target lies six earlier
     assert abs(np.median(hard.error[:, -50:])) < 1.0
     assert hard.row["median_back"] <= 10.0

@@ -34,6 +34,7 @@ __all__ = ["FrontResult", "fit_of", "front_of", "undominated"]
 _DEGREES, _MOST_TERMS = (2, 3, 4), 40
 _SLACK = 1.05  # of the left-out error: a higher degree has to be better by more
 _CANDIDATES, _SPREAD = 4096, (0.1, 0.03, 0.01)  # of the range of the readings, round by round
+_ROUNDING = 1e-9  # of what was measured: a polynomial of noise-free readings states less than it can hold
 _SURE = 2.0
 
 
@@ -156,7 +157,8 @@ def front_of(
         data["measured_limits"] = (("cycle", "limit"), measured_limits, own, "limited quantity measured")
     dataset = labelled_dataset(data).set_coords("input_units")
     dataset.attrs |= {f"objective_{name}": "max" if sign > 0.0 else "min" for name, sign in signs.items()}
-    findings = [*_doubts(mean, sd, wanted, len(applied), len(inputs)), *_of_fits(fits)]
+    least = _ROUNDING * (np.nanmax(measured, axis=0) - np.nanmin(measured, axis=0))
+    findings = [*_doubts(mean, np.maximum(sd, least), wanted, len(applied), len(inputs)), *_of_fits(fits)]
     if not kept:
         text = "no input that was tried holds the limits by their models: the front is without them"
         findings.append(Finding("above_limit", tuple(limit.name for limit in limits), text, "widen the bounds"))

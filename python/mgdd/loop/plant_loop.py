@@ -15,6 +15,7 @@ from mgdd.errors import Interrupted, ParameterError, hand_over, hinted, or_parti
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.function_plant import core_of
+from mgdd.loop.own_seeker import OwnSeeker
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.plant_record import Cycles, Row, cycles_told, dataset_of
 from mgdd.loop.summary import summarize_cycles
@@ -153,11 +154,11 @@ def _run_of(
 
 
 def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:
-    """ParameterError where a seeker is a name, or names other inputs than the plant has."""
-    if isinstance(seeker, str):
-        raise ParameterError(
-            f"seeker = {seeker!r}: must be a seeker, as ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0); "
-            "mgdd.loop.seek(plant, inputs, seeker=NAME) makes one by name"
+    """ParameterError where a seeker is none of the package, or names other inputs than the plant has."""
+    if not isinstance(seeker, Seeker | FeedForward | GuidedEngine | OwnSeeker):
+        must = "a seeker, as ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0); mgdd.loop.seek(plant, inputs, "
+        raise ParameterError.of(
+            "seeker", seeker, must + "seeker=...) takes a name, or an object of your own with ask, tell, estimate"
         )
     named = list(getattr(seeker, "input_names", ()))
     if named and set(named) != set(plant.input_names):

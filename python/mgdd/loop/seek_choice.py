@@ -42,6 +42,7 @@ _OWN_WORDS = (
 )  # fmt: skip
 _PERIODS = 64  # of a dither: 16 time constants of four periods
 _STRIDE = 0.1  # share of the bounds a cycle, so that a limit no guide knows is read before it is reached
+_DITHER = 2.0  # scales of an input: the widest dither of the defaults
 _FIRST = (CurveSeeking, GaussianProcessSeeking)
 SEEKERS: Mapping[str, type[Seeker]] = {
     re.sub(r"(?<!^)(?=[A-Z])", "_", cls.kind).lower(): cls

@@ -31,10 +31,8 @@ np.True_
 
 from __future__ import annotations
 
-from typing import Any
-
 from mgdd._core.optimize import ComponentLag, Input, Limit
-from mgdd.errors import former_seeker
+from mgdd.errors import former_seeker as _former_seeker
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import ExtremumSeeking
 from mgdd.optimize.fit_options import FitOptions
@@ -63,8 +61,8 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if instead := former_seeker(name):
+def __getattr__(name: str) -> object:
+    if instead := _former_seeker(name):
         raise ImportError(f"{name}: {instead}")  # of an AttributeError `from ... import` would drop the text
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -75,8 +75,8 @@ const Inputs& FailureWatch::admit(const Inputs& wanted) noexcept {
   if (worked_ && failing_everywhere()) {  // in turn: as wanted, and places between the ends of what has ever worked
     const auto turn = static_cast<std::size_t>(in_a_row_ - hopeless) % (places.size() + 1);
     if (turn > 0) sent_ = places[turn - 1] * sides_[0].farthest - (1.0 - places[turn - 1]) * sides_[1].farthest;
-  } else if (edges_ && failing_everywhere() && start_.size() > 0) {
-    sent_ = (in_a_row_ - hopeless) % 4 == 3 ? wanted : elsewhere(in_a_row_ - hopeless - (in_a_row_ - hopeless) / 4);
+  } else if (edges_ && lost()) {
+    if ((in_a_row_ - hopeless) % 4 < 3) sent_ = elsewhere();
   } else {
     for (Eigen::Index i = 0; i < sent_.size(); ++i) {
       for (std::size_t s = 0; s < 2; ++s) {
@@ -105,7 +105,8 @@ void FailureWatch::roam(const Inputs& start, const Inputs& lower, const Inputs& 
 }
 
 // The start, then one input at a time, an eighth, a quarter, a half and most of the way to each bound, then anywhere.
-Inputs FailureWatch::elsewhere(std::int64_t turn) const noexcept {
+Inputs FailureWatch::elsewhere() const noexcept {
+  const std::int64_t turn = in_a_row_ - hopeless - (in_a_row_ - hopeless) / 4;
   const Eigen::Index n = start_.size();
   const std::int64_t ring = (turn - 1) / (2 * n);
   Inputs out = start_;

@@ -164,8 +164,9 @@ bool GaussianProcessSeeking::guided() const noexcept {
 }
 
 // The start, then one input to the side of it per cycle, towards the middle of the bounds; in turns until all is read,
-// to the other side and nearer where something has failed.
+// to the other side and nearer where something has failed; anywhere where all that has been tried fails.
 void GaussianProcessSeeking::choose_first() noexcept {
+  if (protocol_.failures.lost()) return send(scaled(protocol_.failures.elsewhere()));
   const Eigen::Index n = estimate_.size();
   const std::int64_t turn = ++star_ / (n + 1), side = star_ % (n + 1) - 1;
   Inputs z = middle_;

@@ -174,6 +174,7 @@ Inputs GaussianProcessSeeking::unscaled(const Inputs& z) const noexcept {
 
 TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, j_.size(), limit_count(), applied_.size());
+  const bool lost = protocol_.failures.lost();
   protocol_.count(status, reading);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
@@ -185,6 +186,11 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   since_failure_ = worked ? since_failure_ + 1 : 0;
   if (worked) {
     good_ = scaled(applied);
+    if (lost) {  // the search begins at the first input that works
+      middle_ = lowest_ = highest_ = good_;
+      estimate_ = unscaled(good_);
+      star_ = 0;
+    }
   } else {
     wary_ = std::min(2 * wary_, most_wary);
   }
@@ -246,7 +252,8 @@ void GaussianProcessSeeking::learn_limit(std::size_t i, const Inputs& z, double 
   const bool was = logarithm_[i] > 0.0, guided = !settings_.limit_guides.empty() && !settings_.limit_guides[i].empty();
   model.record(z, learnt_of(limit, was, value), about);
   if (guided) return;
-  const double lowest = read_of(limit, was, model.lowest());
+  // In a logarithm what lies near zero looks like an outlier: there the new reading counts, and is weighed without it.
+  const double lowest = std::min(read_of(limit, was, model.lowest()), was ? value : unlimited);
   double noise = 0.0;
   if (model.count() > model.fewest() + 1) noise = model.noise_sd() * (was ? lowest / limit.upper : 1.0);
   const bool now = stands_above_zero(limit, lowest, was ? noise : 2.0 * noise);

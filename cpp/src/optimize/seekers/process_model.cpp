@@ -32,6 +32,7 @@ ProcessModel::ProcessModel(const Settings& settings)
       values_(Eigen::VectorXd::Zero(settings.kept)),
       ages_(values_),
       scatter_(Eigen::VectorXd::Ones(settings.kept)),
+      weighed_(scatter_),
       numbers_(Numbers::Zero(5 + settings.inputs + (kernel_.guided() ? 1 : 0))),
       columns_(InputTable::Zero(kernel_.width(), settings.kept)),
       quadratic_(settings.kept, settings.kept),
@@ -123,7 +124,7 @@ double ProcessModel::record(const Inputs& z, double value, const Inputs& about) 
   kernel_.describe(z, &points_(at, 0));
   values_[at] = value;
   ages_[at] = 0.0;
-  scatter_[at] = told_ < more_readings ? 1.0 : scatter_of(odd);
+  scatter_[at] = weighed_[at] = told_ < more_readings ? 1.0 : scatter_of(odd);
   ++told_;
   if (tables_known_) tabulate(at);
   factored_ = false;
@@ -151,17 +152,18 @@ bool ProcessModel::trusted(std::int64_t reading) const noexcept {
 double ProcessModel::lowest() const noexcept {
   double least = values_.head(count_).maxCoeff();
   for (std::int64_t i = 0; i < count_; ++i) {
-    if (trusted(i)) least = std::min(least, values_[i]);
+    if (weighed_[i] <= most_trusted) least = std::min(least, values_[i]);
   }
   return least;
 }
 
-// By what is left of each reading: a small part of it where the process follows the others.
+// By what is left of each reading, a small part of it where the process follows the others; counts from the next fit.
 void ProcessModel::weigh() noexcept {
+  weighed_ = scatter_;
   if (settings_.labels || told_ < fewest_weighed) return;
   for (std::int64_t i = 0; i < count_; ++i) {
     const double left = weights_[i] * scatter_[i];  // over the variance of a reading
-    scatter_[i] = scatter_of(left * left * now_.noise_variance);
+    weighed_[i] = scatter_of(left * left * now_.noise_variance);
   }
 }
 
@@ -196,6 +198,7 @@ void ProcessModel::forget() noexcept {
   count_ = told_ = 0;
   begun_ = factored_ = tables_known_ = false;
   scatter_.setOnes();
+  weighed_.setOnes();
   points_.setZero();
   values_.setZero();
   ages_.setZero();
@@ -246,6 +249,7 @@ void ProcessModel::refresh() noexcept {
 }
 
 void ProcessModel::fit(const Inputs& about) noexcept {
+  scatter_ = weighed_;
   level_ = middle();
   const auto enough = kernel_.guided() ? 2 : settings_.inputs + 1;
   if (!begun_ || told_ <= enough) begin_numbers();

@@ -25,6 +25,11 @@ class FailureWatch {
   /// Where else to look while nothing has worked yet: the start first, then ever farther from it within the bounds.
   void roam(const Inputs& start, const Inputs& lower, const Inputs& upper) noexcept;
 
+  /// True where nothing has ever worked in so many cycles that the start is no place to wait at.
+  bool lost() const noexcept { return !worked_ && failing_everywhere() && start_.size() > 0; }
+  /// Where to look then, another place in every cycle.
+  Inputs elsewhere() const noexcept;
+
   /// What to ask of the plant where a seeker wants `wanted`: the same object as long as nothing speaks against it. One
   /// call per cycle.
   const Inputs& admit(const Inputs& wanted) noexcept;
@@ -89,7 +94,6 @@ class FailureWatch {
     Column at;     // input times sign of the side
     Column since;  // the farthest on that side that has worked later
   };
-  Inputs elsewhere(std::int64_t turn) const noexcept;
   Inputs edge(std::size_t side) const noexcept;
   Inputs middle() const noexcept { return 0.5 * (sides_[0].reach - sides_[1].reach); }
   void count_cycle() noexcept;

@@ -5,10 +5,10 @@
 // process, whose factor, place and error are learnt. Nothing is asked farther beyond what was read than a part of its
 // width, with a guide a fifth of the bounds where nothing is limited, nor where a limit holds with less than the stated
 // probability: the safe set grows from the start (Sui et al. 2015), nor where cycles are likely to fail, as one more
-// process knows. Level and place wander; readings that the process cannot explain age all that was known. Where several
-// inputs in a row stay at the estimate, the search is over: a small dither, as large as noise and wandering make it
-// pay, goes on until a doubt. ask and tell are noexcept and allocation-free; all randomness is a function of (seed,
-// cycle).
+// process knows. Level and place wander; readings that the process cannot explain, two in a row, age all that was
+// known. Where several inputs in a row stay at the estimate, the search is over: a small dither, as large as noise and
+// wandering make it pay, goes on until a doubt. ask and tell are noexcept and allocation-free; all randomness is a
+// function of (seed, cycle).
 #pragma once
 
 #include <cstdint>

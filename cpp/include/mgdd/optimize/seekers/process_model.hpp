@@ -103,6 +103,7 @@ class ProcessModel {
     v(name + "_values", self.values_);
     v(name + "_ages", self.ages_);
     v(name + "_scatter", self.scatter_);
+    v(name + "_weighed", self.weighed_);
     v(name + "_numbers", self.numbers_);
     v(name + "_settled_bend", self.settled_bend_);
     if constexpr (!std::is_const_v<Self>) self.tables_known_ = self.factored_ = false;
@@ -146,6 +147,7 @@ class ProcessModel {
   InputTable points_;   // as the kernel describes them
   Eigen::VectorXd values_, ages_;
   Eigen::VectorXd scatter_;  // that the variance of each is multiplied by
+  Eigen::VectorXd weighed_;  // the same by what the last fit left of each, for the next one
   Numbers numbers_;
   std::optional<double> settled_bend_{};  // logarithm, as the first readings gave it
   // Made anew of the above where readings or numbers have changed.

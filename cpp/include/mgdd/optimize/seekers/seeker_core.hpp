@@ -33,7 +33,7 @@ class SeekerCore {
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Counts a reading, takes its limits and learns of it. What the first readings made is void where one of them was
-  /// far out, of J unless they are judged together; where nothing but another input has worked, the search goes on there.
+  /// far out, of J unless judged together; where nothing but another input has worked, the search goes on there.
   TellStatus tell(const Reading& reading) noexcept {
     Self& self = static_cast<Self&>(*this);
     const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
