@@ -153,7 +153,7 @@ def _run_of(
     return LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
 
 
-def require_inputs_of(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine) -> None:
+def require_inputs_of(plant: Plant, seeker: object) -> None:
     """ParameterError where a seeker is none of the package, or names other inputs than the plant has."""
     if not isinstance(seeker, Seeker | FeedForward | GuidedEngine | OwnSeeker):
         must = "a seeker, as ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0); mgdd.loop.seek(plant, inputs, "
