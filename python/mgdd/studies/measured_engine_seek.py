@@ -113,7 +113,7 @@ def run_measured_engine_seek(
     >>> from mgdd.studies.measured_engine_seek import run_measured_engine_seek
     >>> if "h2df_502" in datasets.names():
     ...     result = run_measured_engine_seek(seeds=1, quick=True, figures=False)
-    ...     assert len(result.summary["rows"]) == 12
+    ...     assert len(result.summary["rows"]) == 7
     """
     seeds = check_seeds(seeds, quick=quick, most=_QUICK_SEEDS)
     work = Parts(progress)
