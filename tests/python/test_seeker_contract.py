@@ -84,6 +84,15 @@ def test_a_bad_reading_does_not_lead_a_seeker_away(name: str, bad: dict[int, flo
     assert search(SEEKERS[name](), bad=bad)[0] == pytest.approx(BEST, abs=3.0)
 
 
+@every
+@pytest.mark.parametrize("rest", [0.0, 1e-9])
+@pytest.mark.parametrize("cycles", [4, 8, 30])
+def test_a_channel_that_stands_still_at_first_does_not_set_the_scale(name: str, cycles: int, rest: float) -> None:
+    rng = np.random.default_rng(1)
+    still = {cycle: 48.0 + rest * rng.standard_normal() for cycle in range(cycles)}
+    assert search(SEEKERS[name](), bad=still)[0] == pytest.approx(BEST, abs=3.0)
+
+
 @shared
 @pytest.mark.parametrize("bad", [{0: 1e6}, {2: 1e6}, {2: 0.0}, {60: 1e6}, {60: 0.0}], ids=str)
 def test_a_bad_reading_of_a_limit_neither_breaks_it_nor_holds_a_seeker_back(name: str, bad: dict[int, float]) -> None:

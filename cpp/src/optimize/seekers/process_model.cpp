@@ -1,6 +1,7 @@
 #include "mgdd/optimize/seekers/process_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -167,26 +168,27 @@ void ProcessModel::weigh() noexcept {
   }
 }
 
-// Three readings in a row, since one may be an outlier.
+// Three readings in a row that all lie far off what the others span, since one may be an outlier.
 bool ProcessModel::wakes_up() const noexcept {
-  constexpr double most = largest_reading;
-  double low = most, high = -most, new_low = most, new_high = -most;
-  int news = 0;
+  if (count_ <= waking_readings) return false;
+  std::array<double, waking_readings> youngest{};
+  std::partial_sort_copy(ages_.data(), ages_.data() + count_, youngest.begin(), youngest.end());
+  const double oldest_news = youngest.back();  // a doubt ages all that are known by as much
+  double low = largest_reading, high = -largest_reading;
   const double* first = nullptr;
   bool elsewhere = false;
   for (std::int64_t i = 0; i < count_; ++i) {
-    if (ages_[i] < waking_readings) {
-      ++news;
-      new_low = std::min(new_low, values_[i]);
-      new_high = std::max(new_high, values_[i]);
-      continue;
-    }
+    if (ages_[i] <= oldest_news) continue;
     if (first == nullptr) first = &points_(i, 0);
     elsewhere = elsewhere || !std::equal(first, first + settings_.inputs, &points_(i, 0));
     low = std::min(low, values_[i]);
     high = std::max(high, values_[i]);
   }
-  return elsewhere && news == waking_readings && std::max(new_low - high, low - new_high) > waking_rise * (high - low);
+  const double far = waking_rise * (high - low);
+  std::int64_t news = 0;
+  for (std::int64_t i = 0; i < count_; ++i)
+    news += ages_[i] <= oldest_news && std::max(values_[i] - high, low - values_[i]) > far ? 1 : 0;
+  return elsewhere && news == waking_readings;
 }
 
 void ProcessModel::age(double cycles) noexcept {
