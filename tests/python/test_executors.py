@@ -108,7 +108,7 @@ def test_what_does_not_fit_is_refused_before_any_work() -> None:
     fits = ExtremumSeeking(**SPACE)
     capped = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 90.0)])
     for call, message in (
-        (lambda: loops_of(EngineBench(), [fits, 3.0]), "3.0 is not a seeker"),
+        (lambda: loops_of(EngineBench(), [fits, 3.0]), "seeker = 3: must be a seeker, as"),
         (lambda: loops_of([EngineBench(limits=["p_max_bar"]), EngineBench()], [fits, capped]), "p_max_bar"),
         (lambda: loops_of(EngineBench(), fits, []), "seeds is empty"),
         (lambda: loops_of(EngineBench(), fits, cycles=0), "cycles = 0: must be >= 1"),
