@@ -286,11 +286,20 @@ def two_on(hub: Any) -> Iterator[tuple[CanTransport, CanTransport]]:
         yield one, other
 
 
+def wait_until_through(hub: Any, frames: int) -> None:
+    """However loaded the machine: so many frames have passed the hub."""
+    until = time.monotonic() + 10.0
+    while hub.counts["frames"] < frames:
+        assert time.monotonic() < until
+        time.sleep(0.001)
+
+
 def exchange(faults: list[str], count: int = 200, **settings: Any) -> tuple[list[int], Any]:
     with running_hub(faults, **settings) as hub:
         with two_on(hub) as (one, other):
             for number in range(count):
                 one.send(frame(number))
+            wait_until_through(hub, count)
             got = numbers(other, 3 * count)
         return got, hub
 
@@ -325,10 +334,7 @@ def conversation(faults: list[str], sent: list[tuple[int, Frame]]) -> tuple[list
         clients = [left.enter_context(CanTransport.parse(bus_of(hub))) for _ in range(3)]
         for count, (sender, one) in enumerate(sent, 1):
             clients[sender].send(one)
-            until = time.monotonic() + 10.0
-            while hub.counts["frames"] < count:
-                assert time.monotonic() < until
-                time.sleep(0.001)
+            wait_until_through(hub, count)
         heard: list[Heard] = []
         for patience_s, client in zip((0.25, 0.05, 0.05), clients, strict=True):
             heard.append([])

@@ -128,6 +128,14 @@ def test_without_a_start_a_search_begins_where_engines_keep_the_limit(name: str)
         assert "start_unknown" not in codes(found)
 
 
+def test_of_a_quantity_kept_between_two_values_the_upper_one_says_where_to_begin() -> None:
+    bench = EngineBench(seed=1, limits=["p_max_bar"])
+    found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": (60.0, 95.0)}, cycles=40)
+    assert found.start["soc_cad"] == 10.0
+    assert float(found.dataset["noise_free_limits"].sel(limit="p_max_bar").max()) < 96.0
+    assert "start_above_limit" not in codes(found)
+
+
 def test_a_limit_that_bends_is_read_before_it_is_reached() -> None:
     """Late, the pressure is that of compression, and flat; a stride that it allows there ends far above the limit."""
     for seed in range(4):

@@ -146,6 +146,13 @@ def test_a_channel_that_reads_the_same_at_every_input_is_said(name: str) -> None
     assert str(found).startswith("J read the same to the last bit in ")
 
 
+def test_a_limit_that_moves_again_after_a_floor_is_no_dead_channel() -> None:
+    seeker, rng = Spsa(start=0.0, limits={"p_max_bar": 100.0}), np.random.default_rng(1)
+    for cycle in range(40):
+        seeker.tell(j_at(float(seeker.ask()[0]), rng), [80.0 if cycle < 30 else 80.0 + rng.normal()])
+    assert "frozen" not in codes(seeker)
+
+
 def test_a_limit_that_reads_the_same_is_said_by_its_name() -> None:
     seeker, rng = Spsa(start=0.0, limits={"p_max_bar": 100.0}), np.random.default_rng(1)
     for _ in range(20):

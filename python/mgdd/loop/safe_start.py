@@ -23,8 +23,12 @@ def middle_of(inputs: Sequence[Input]) -> dict[str, float]:
 
 
 def safe_side(inputs: Sequence[Input], limits: Sequence[Limit]) -> dict[str, float]:
-    """Give the bound of the timing at which all limits hold best; nothing where their names do not say one side."""
-    sides = {_side(limit.name) for limit in limits}
+    """Give the bound of the timing at which the limits hold best; empty where their names do not say one side.
+
+    Upper limits decide, which protect the engine; lower ones only where there are no others.
+    """
+    upper = [limit for limit in limits if plain_name(limit.name)[1] > 0.0]
+    sides = {_side(limit.name) for limit in upper or limits}
     if len(sides) != 1 or 0.0 in sides:
         return {}
     late = sides.pop() > 0.0

@@ -58,19 +58,6 @@ TEST(GaussianProcessSeeking, FindsTheBestAfterFirstReadingsThatAreAlike) {
   }
 }
 
-// Nearly alike is no scale either: the last digits of a channel that stands still.
-TEST(GaussianProcessSeeking, FindsTheBestAfterFirstReadingsThatAreNearlyAlike) {
-  for (std::uint64_t seed = 0; seed < 3; ++seed) {
-    GaussianProcessSeeking seeker(two_inputs(seed));
-    for (int k = 0; k < 150; ++k) {
-      const double j[] = {k < 20 ? 49.0 + noise(seed, k, 1e-9) : 50.0 - lost(seeker.ask()) + noise(seed, k)};
-      seeker.ask();
-      seeker.tell({j, {}});
-    }
-    EXPECT_LT(lost(seeker.estimate()), 0.25) << seed;
-  }
-}
-
 // One reading of twenty noises in fifty, on either side; and one wrong by far before anything is known.
 TEST(GaussianProcessSeeking, BearsReadingsThatAreFarOut) {
   constexpr int seeds = 8, cycles = 150;

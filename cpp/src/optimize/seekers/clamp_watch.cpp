@@ -7,7 +7,7 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr double arriving_share = 0.7;  // of the asked spread: less is too little, and more than its inverse too much
-constexpr double other_side = 0.25;     // of what is missed on one side: as much on the other is no clamp
+constexpr double other_side = 0.25;     // of what is missed on one side: a lag misses as much on the other
 constexpr double standing = 0.1;        // of the asked spread: a plant that goes on by more is on its way
 constexpr double wider = 1.5, narrower = 0.9, widest = 8.0;  // quick where nothing is learnt, slow where too much is
 constexpr double helping = 1.1;          // by which more arrives of a wider dither, unless the plant's speed is bounded

@@ -275,7 +275,7 @@ void GaussianProcessSeeking::explore(const Inputs& z) noexcept {
   highest_ = highest_.cwiseMax(z);
 }
 
-// Readings that the process does not explain, three at least: what was known before is aged.
+// Two readings in a row that the process does not explain: what was known before is aged.
 void GaussianProcessSeeking::watch_surprise(std::size_t component, double odd) noexcept {
   if (component == 0) ++since_doubt_;
   double& surprise = surprise_[component];

@@ -9,7 +9,7 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr std::int64_t fewest = 12, room_of_one = 24, room_per_input = 6;  // a strong input among weak ones thrice
-constexpr std::size_t ordinary = 3;                                        // that is no outlier, counted from the top
+constexpr std::size_t ordinary = 3;                                        // from the top: the first that counts
 constexpr double beyond = 3.0;                                             // 4.6 sd of a normal scatter
 constexpr double spoiling = 10.0;  // times that: a first reading that bends what was made of it
 

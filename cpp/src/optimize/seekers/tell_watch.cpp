@@ -19,6 +19,7 @@ void TellWatch::read(std::span<const double> components, std::span<const double>
     const double value = i < components.size() ? components[i] : limits[i - components.size()];
     if (value != last_[i]) {
       alike_[i] = 1.0;
+      if (i >= components.size()) most_alike_[i] = 0.0;
     } else if (moved) {
       most_alike_[i] = std::max(most_alike_[i], ++alike_[i]);
     }

@@ -25,7 +25,7 @@ class FailureWatch {
   /// Where else to look while nothing has worked yet: the start first, then ever farther from it within the bounds.
   void roam(const Inputs& start, const Inputs& lower, const Inputs& upper) noexcept;
 
-  /// True where nothing has ever worked in so many cycles that the start is no place to wait at.
+  /// True where every cycle so far has failed, and twelve have.
   bool lost() const noexcept { return !worked_ && failing_everywhere() && start_.size() > 0; }
   /// Where to look then, another place in every cycle.
   Inputs elsewhere() const noexcept;

@@ -63,7 +63,7 @@ class ProcessModel {
   /// Knows these readings, the oldest first, in place of its own; its numbers begin anew.
   void replace(const InputTable& at, const Eigen::VectorXd& values, const Eigen::VectorXd& ages, int count,
                const Inputs& about) noexcept;
-  /// The least value of a kept reading that is no outlier; one at least.
+  /// Least value among the kept readings, outliers left out; the largest where all are outliers.
   double lowest() const noexcept;
   /// Every kept reading as `told` by another measure; the numbers begin anew.
   template <class F>

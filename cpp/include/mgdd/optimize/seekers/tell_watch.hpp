@@ -30,7 +30,8 @@ class TellWatch {
   /// What the plant says that it applied; looked at from the first time on that it is not what was asked.
   void follow(const Inputs& asked, const Inputs& applied) noexcept;
 
-  /// Most readings in a row, per channel, that were alike to the last bit while the input was not.
+  /// Most readings in a row, per channel, that were alike to the last bit while the input was not. Of a limit those up
+  /// to now: what stands at a floor of the plant, as the pressure of compression, moves again.
   const std::vector<double>& alike() const noexcept { return most_alike_; }
   /// Standard deviation of what was applied of late over that of what was asked, per input; 1 before that is known.
   Inputs applied_share() const noexcept;
