@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
+from functools import lru_cache
 from typing import NamedTuple
 
 from mgdd.errors import DataError
@@ -55,10 +56,11 @@ _WORDS = {
     "angle": "angle crank crankangle cad ca phi theta winkel kurbelwinkel",
     "counter": "sample samples index idx row nr count counter",
 }
+_KINDS = {kind: frozenset(words.split()) for kind, words in _WORDS.items()}
 _SQUARE = re.compile(r"\[([^\[\]]*)\]")
 _BRACKETS = re.compile(r"[\[({]([^\[\](){}]*)[\])}]")
 # Round brackets hold a unit or a remark: these, numbers and the words above are remarks.
-_REMARKS = set(
+_REMARKS = frozenset().union(*_KINDS.values()) | set(
     "abs absolute rel relative gauge mean avg average median min max raw filt filtered smoothed corrected pegged "
     "cyl cylinder zyl zylinder cycle firing fired motored measured model sim plate wanted actual soll ist".split()
 )
@@ -105,7 +107,7 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
     unit = in_row or in_name
     words = _words(_BRACKETS.sub(" ", name))
     quantity = _QUANTITIES.get(unit or "")
-    found = next((kind for kind, known in _WORDS.items() if words & set(known.split())), None)
+    found = next((kind for kind, known in _KINDS.items() if words & known), None)
     if quantity is None or (quantity == "pressure" and found == "other"):
         quantity = found or quantity
     cylinder = _CYLINDER.search(name.lower())
@@ -153,8 +155,7 @@ def _first_strange(texts: list[str]) -> str | None:
 
 def _maybe_units(name: str) -> list[str]:
     """Return what round brackets hold, remarks left out, and a last word with a slash in it."""
-    remarks = _REMARKS | {word for known in _WORDS.values() for word in known.split()}
-    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _known(text) or _words(text) - remarks]
+    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _known(text) or _words(text) - _REMARKS]
     ratio = _ratio(name)
     return [*texts, ratio] if ratio else texts
 
@@ -168,6 +169,7 @@ def _ratio(name: str) -> str | None:
     return below if _known(last) is None and _known(below) is not None else last
 
 
+@lru_cache(maxsize=256)
 def spelled_unit(text: str) -> str | None:
     """Return the unit that a text spells, None where it is none that is known."""
     return _UNITS.get(_without_reference(text)[0].strip().lower())

@@ -30,6 +30,8 @@ _STEP_T, _STEP_SCATTERS, _STEP_SAMPLES, _STEP_CAD = 6.0, 5.0, 0.7, 0.15
 # Share of the standard error of a place that is noise of its own; the rest is the doubt about the charge.
 _OWN = 0.5
 _DEGREE = 7
+_MEAN_CAD = 2.0  # compression bends by less than .1 % within, in all cycles alike
+_TURNS, _SETTLED_CAD = 4, 0.02  # of Gauss-Newton: a step so small leaves some thousandths of it
 # The charge scatters by this share; what a cycle shows beyond is its place or its level.
 _CHARGE, _CHARGE_SCATTERS = (1e-3, 1e-2), 1.2
 _QUIETEST_BAR = 1e-3  # no sensor is quieter; without noise the shift and the factor cannot be parted
@@ -96,17 +98,17 @@ class Phases(NamedTuple):
         if n < 6:
             return None
         late = self._without_odd()
-        fits = []
-        count = np.arange(n) - 0.5 * (n - 1)
-        for k in range(2, n - 1):
-            design = np.column_stack([np.ones(n), count, np.arange(n) >= k])
-            found, *_ = np.linalg.lstsq(design, late)
-            left = late - design @ found
-            fits.append((float(left @ left), k, float(found[2]), left, design))
-        _, k, height, left, design = min(fits, key=lambda fit: fit[0])
+        count = np.arange(n)
+        line, _ = np.linalg.qr(np.column_stack([np.ones(n), count]))
+        later = (count[:, None] >= np.arange(2, n - 1)).astype(np.float64)  # a column for each cycle where it may begin
+        later -= line @ (line.T @ later)
+        rest = late - line @ (line.T @ late)
+        norms, along = (later**2).sum(axis=0), later.T @ rest
+        best = int(np.argmax(along**2 / norms))
+        k, height, unit = best + 2, float(along[best] / norms[best]), float(1.0 / np.sqrt(norms[best]))
+        left = rest - height * later[:, best]
         robust = 1.4826 * float(np.median(np.abs(left - np.median(left)))) * np.sqrt(n / (n - 4.0))
         robust = max(robust, _OWN * self.stderr_cad)
-        unit = float(np.sqrt(np.linalg.inv(design.T @ design)[2, 2]))
         level = robust * np.sqrt(1.0 / k + 1.0 / (n - k))
         enough = abs(height) >= max(_STEP_SAMPLES * step_cad, _STEP_CAD)
         if enough and abs(height) > _STEP_T * robust * unit and abs(height) > _STEP_SCATTERS * level:
@@ -152,15 +154,33 @@ def phases(cad: NDArray[np.float64], pressure: NDArray[np.float64]) -> Phases | 
     """
     if len(pressure) < 2:
         return None
-    found = _placed(cad, pressure, _TO_CAD)
+    cad, pressure = _thinned(cad, pressure)
+    usual = np.median(pressure, axis=0)
+    found = _placed(cad, pressure, usual, _TO_CAD)
     if found is None:
         return None
     for end in _LATER_CAD:
-        longer = _placed(cad, pressure, end)
-        if longer is None or (longer[1] > _AS_QUIET * found[1]).any() or not _agree(found[0], longer[0]):
+        longer = _placed(cad, pressure, usual, end, found.change)
+        if longer is None or (longer.left > _AS_QUIET * found.left).any() or not _agree(found.phases, longer.phases):
             break
         found = longer
-    return found[0]
+    return found.phases
+
+
+def _thinned(
+    cad: NDArray[np.float64], pressure: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the means over as many whole samples as `_MEAN_CAD` holds."""
+    step = float(np.median(np.diff(cad)))
+    size = int(_MEAN_CAD / step + 1e-6) if step > 0.0 else 1
+    if size < 2:
+        return cad, pressure
+    inner = (cad >= _FROM_CAD - _MARGIN_CAD) & (cad <= _LATER_CAD[-1] + _MARGIN_CAD)
+    whole = np.flatnonzero(inner)[: inner.sum() // size * size]
+    return (
+        cad[whole].reshape(-1, size).mean(axis=1),
+        pressure[:, whole].reshape(len(pressure), -1, size).mean(axis=2),
+    )
 
 
 def _agree(one: Phases, better: Phases) -> bool:
@@ -171,16 +191,28 @@ def _agree(one: Phases, better: Phases) -> bool:
     return bool(off.max() <= odd_bound(off.size) * usual)
 
 
+class _Fit(NamedTuple):
+    """Places, what is left of most and of nearly all cycles [bar], and the change of each: level, factor, shift."""
+
+    phases: Phases
+    left: NDArray[np.float64]
+    change: NDArray[np.float64]
+
+
 def _placed(
-    cad: NDArray[np.float64], pressure: NDArray[np.float64], end: float
-) -> tuple[Phases, NDArray[np.float64]] | None:
-    """Fit the cycles from -110 to `end`; with what is left [bar], of most cycles and of nearly all."""
+    cad: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    median: NDArray[np.float64],
+    end: float,
+    start: NDArray[np.float64] | None = None,
+) -> _Fit | None:
+    """Fit the cycles from -110 to `end` to their median, beginning with the change that a shorter part has."""
     around = (cad >= _FROM_CAD - _MARGIN_CAD) & (cad <= end + _MARGIN_CAD)
     inside = (cad >= _FROM_CAD) & (cad <= end)
     angle, part = cad[inside], pressure[:, inside]
     if inside.sum() < 20 or np.ptp(angle) < _LEAST_CAD:
         return None
-    usual = np.median(pressure[:, around], axis=0)
+    usual = median[around]
     lift = max(0.0, 0.3 - float(usual.min()))  # a relative pressure may be below zero
     shape = np.polynomial.Chebyshev.fit(cad[around], np.log(usual + lift), _DEGREE)
     slope = shape.deriv()
@@ -194,31 +226,34 @@ def _placed(
         charge = _CHARGE_SCATTERS * 1.4826 * float(np.median(np.abs(rise / usual_rise - 1.0)))
         charge = float(np.clip(charge, *_CHARGE))
     n = len(part)
-    late, factor, level = np.zeros(n), np.zeros(n), np.zeros(n)
-    noise, error, spread = 1.0, np.zeros(n), np.ones(2)
-    for turn in range(4):
-        at = angle - late[:, None]
+    change = np.zeros((n, 3)) if start is None else start
+    for turn in range(_TURNS):
+        level, factor, late = change.T[:, :, None]
+        at = angle - late
         model = np.exp(shape(at))
-        rate = -(1.0 + factor)[:, None] * model * slope(at)
-        model = model - lift
-        left = part - (1.0 + factor)[:, None] * model - level[:, None]
-        if turn:
+        rate = -(1.0 + factor) * model * slope(at)
+        model -= lift
+        left = part - (1.0 + factor) * model - level
+        noise, known = 1.0, turn > 0 or start is not None
+        if known:
             rest = left - np.median(left, axis=0) if n > 2 else left - left.mean(axis=0)
-            rest = rest - rest.mean(axis=1, keepdims=True)
+            rest -= rest.mean(axis=1, keepdims=True)
             each = np.sqrt((rest**2).mean(axis=1) / (1.0 - 1.0 / n))
-            spread = np.maximum(np.quantile(each, (0.5, 0.9)), _QUIETEST_BAR)
+            spread = np.maximum(np.sort(each)[[n // 2, int(0.9 * n)]], _QUIETEST_BAR)
             noise = float(spread[0])
-        design = np.stack([np.ones_like(model), model, rate], axis=2)
-        normal = np.einsum("ima,imb->iab", design, design)
-        right = np.einsum("ima,im->ia", design, left)
+        design = np.stack([np.ones_like(model), model, rate], axis=1)
+        normal = design @ design.transpose(0, 2, 1)
+        right = (design @ left[:, :, None])[:, :, 0]
         weight = (noise / charge) ** 2
         normal[:, 1, 1] += weight
-        right[:, 1] -= weight * factor
-        change = np.linalg.solve(normal, right[..., None])[..., 0]
-        level, factor = level + change[:, 0], factor + change[:, 1]
-        late = np.clip(late + change[:, 2], -20.0, 20.0)
-        error = noise * np.sqrt(np.linalg.inv(normal)[:, 2, 2])
-    return Phases(late, float(np.median(error))), spread
+        right[:, 1] -= weight * factor[:, 0]
+        step = np.linalg.solve(normal, right[..., None])[..., 0]
+        change = change + step
+        change[:, 2] = np.clip(change[:, 2], -20.0, 20.0)
+        if known and np.abs(step[:, 2]).max() < _SETTLED_CAD:
+            break
+    error = noise * np.sqrt(np.linalg.inv(normal)[:, 2, 2])
+    return _Fit(Phases(change[:, 2], float(np.median(error))), spread, change)
 
 
 def phase_warnings(

@@ -92,8 +92,9 @@ def pressure_of(
     values = table.matrix(columns) if values is None else values
     if how.pressure_column is None and len(columns) > 1:
         _check_alike(table, columns, angle.degrees, values)
+    cycles = angle.cycles
     for index, row in zip(columns, values, strict=True):
-        looks = no_pressure(row, angle.cycles)
+        looks = no_pressure(row, cycles)
         if looks is not None:
             raise DataError(
                 f"{table.source}: {table.called(index)} is not a cylinder pressure: its values are {looks}: name the "

@@ -15,7 +15,7 @@ __all__ = ["no_angle", "no_pressure"]
 
 # Two levels hold at least this share of the samples each, so near to an end of the range, and next to none is between.
 _HELD, _NEAR, _BETWEEN = 0.05, 0.08, 0.01
-_STANDS, _EVEN = 0.2, 0.9
+_STANDS, _EVEN, _SOME = 0.2, 0.9, 101
 # A turn and a cycle in radians, and how far a coarse step may miss them.
 _RADIANS, _MISSED = (2.0 * np.pi, 4.0 * np.pi), 0.05
 # A pressure rises once in a cycle from the lower to the upper level; a wave does so smoothly, at even distances, and is
@@ -58,16 +58,18 @@ def no_pressure(values: NDArray[np.float64], cycles: float) -> str | None:
         return held
     low, high = float(values.min()), float(values.max())
     step = np.diff(values)
-    usual = float(np.median(step))
-    if usual and np.mean(np.abs(step - usual) <= 1e-3 * abs(usual)) >= _EVEN:
+    some = np.sort(step[:: -(-step.size // _SOME)])  # where nearly all are even, the middle of some is
+    usual = float(some[some.size // 2])
+    if usual and np.count_nonzero(np.abs(step - usual) <= 1e-3 * abs(usual)) >= _EVEN * step.size:
         return f"even steps from {low:g} to {high:g}, as an angle, a time or a count"
+    above = np.count_nonzero(values > 0.5 * (low + high)) / values.size
+    if not _ABOVE[0] < above < _ABOVE[1] or np.abs(step).max() >= _SMOOTH * (high - low):
+        return None
     first, last = low + _LEVELS[0] * (high - low), low + _LEVELS[1] * (high - low)
     marks = np.where(values >= last, 1, np.where(values <= first, -1, 0))
     at = np.flatnonzero(marks)
     rises = at[1:][(marks[at[1:]] > 0) & (marks[at[:-1]] < 0)]
-    above = float(np.mean(values > 0.5 * (low + high)))
-    smooth = np.abs(step).max() < _SMOOTH * (high - low) and _ABOVE[0] < above < _ABOVE[1]
-    if rises.size >= max(3.0, _RISES * cycles) and smooth:
+    if rises.size >= max(3.0, _RISES * cycles):
         apart = np.diff(rises)
         if apart.std() <= _REGULAR * apart.mean():
             return f"a wave that rises {rises.size} times in {cycles:.3g} cycle(s) between {low:g} and {high:g}"
@@ -78,8 +80,8 @@ def _held(values: NDArray[np.float64]) -> str | None:
     low, high = float(values.min()), float(values.max())
     if low == high:
         return f"the constant {low:g}"
-    share = (values - low) / (high - low)
-    lower, upper = float(np.mean(share <= _NEAR)), float(np.mean(share >= 1.0 - _NEAR))
+    near = _NEAR * (high - low)
+    lower, upper = (np.count_nonzero(end) / values.size for end in (values <= low + near, values >= high - near))
     if 1.0 - lower - upper < _BETWEEN and min(lower, upper) >= _HELD:
         return f"a square wave between {low:g} and {high:g}, as the marks or pulses of an encoder"
     return None
