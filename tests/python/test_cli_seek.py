@@ -169,7 +169,7 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
             2,
         ),
         (["--input", "soc_cad=5:-25"], ["--input", "soc-cad=-25:5"], "LOW and HIGH must be finite and LOW < HIGH", 2),
-        (["--input", "soc_cad=-25:5:7"], ["--input", "soc_cad=-25:5"], "write NAME=LOW:HIGH", 2),
+        (["--input", "soc_cad=-25:5:31"], ["--input", "soc_cad=-25:5:2"], "STEP must be > 0 and at most HIGH - LOW", 2),
         (["--input", "soc_cad"], ["--input", "soc_cad=-25:5"], "--input soc_cad: write NAME=LOW:HIGH", 2),
         (["--input", "boost=0:9"], ["--input", "soc_cad=-25:5"], "--input boost: the bench has soc_cad, intake_", 2),
         (["--input", "soc=-25:5"], ["--input", "soc_cad=-25:5"], "did you mean 'soc_cad'?", 2),

@@ -157,6 +157,11 @@ def until_it_is_good_enough() -> bool:
     return 40 <= found.dataset.sizes["cycle"] < 300 and abs(found.inputs["soc_cad"] + 4.0) < 2.0
 
 
+def in_steps() -> bool:
+    found = seek(hill, {"soc_cad": (-25.0, 15.0, 0.5), "egr": (0.0, 0.4, 0.05)}, cycles=80)
+    return found.inputs["egr"] == pytest.approx(0.15) and found.inputs["soc_cad"] % 0.5 == 0.0
+
+
 def a_plant_with_noise() -> bool:
     plant = FunctionPlant(lambda x: -((x["x"] - 2.0) ** 2), ["x"], noise_sd=0.1, seed=3)
     return abs(seek(plant, {"x": (-5.0, 5.0)}, cycles=100).inputs["x"] - 2.0) < 0.5

@@ -11,8 +11,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.engine import Cylinder
-from mgdd.loop import EngineBench, seek
-from mgdd.loop.engine_guide import EngineGuide
+from mgdd.loop import EngineBench, EngineGuide, seek
 from mgdd.loop.summary import FIGURES_OF_INPUT
 from mgdd.results.labels import to_jsonable
 from mgdd.rig import Experiment, run_experiment

@@ -30,11 +30,16 @@ scale : float
     0 for a fortieth of the bounds, or 1 where there are none.
 rate : float
     Largest change of the estimate per step of the seeker, in the unit of the input, > 0.
+step : float
+    Resolution in which it is set, in the unit of the input: the lower bound and whole steps above it, or multiples
+    where there is no lower bound; 0 where any value can be set. What a seeker asks for lies on a step, its estimate
+    between them.
 
 Raises
 ------
 mgdd.errors.ParameterError
-    An empty name, bounds that do not enclose anything, a negative scale, or a rate that is not > 0.
+    An empty name, bounds that do not enclose anything, a negative scale, a rate that is not > 0, or a step that is
+    negative or larger than the bounds are apart.
 
 Examples
 --------
@@ -44,6 +49,12 @@ Examples
 ['egr', 'soc_cad']
 )");
   bind_record(cls, "Input", [](const Input& input) { validate(std::vector<Input>{input}); }, 3);
+  cls.def(
+      "nearest",
+      [](const Input& input, double value) {
+        return steps_of({input}).nearest(scalar_input(value), [](const Inputs&) { return 0.0; })[0];
+      },
+      py::arg("value"), "The nearest value that can be set.");
 }
 
 void bind_limit(py::module_& m) {

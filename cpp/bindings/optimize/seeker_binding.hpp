@@ -110,6 +110,14 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
           "estimate", [](const B& b) { return input_array(b.use()->estimate()); },
           "Present estimate of the optimum, shape (inputs,).")
       .def_property_readonly(
+          "settable",
+          [](const B& b) {
+            const auto r = b.use();
+            return input_array(r->protocol().steps.nearest(
+                r->estimate(), [&](const optimize::Inputs& at) { return optimize::excess_of(*r, at); }));
+          },
+          "The estimate in the steps in which its inputs are set, shape (inputs,).")
+      .def_property_readonly(
           "cycle", [](const B& b) { return b.use()->protocol().cycle; }, "Cycles told so far, misfires included.")
       .def_property_readonly(
           "misfires", [](const B& b) { return b.use()->protocol().misfires; }, "Misfired cycles told so far.")

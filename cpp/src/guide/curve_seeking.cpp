@@ -98,6 +98,10 @@ double surprise_share_of(const optimize::ComponentLag& sensor) noexcept {
   return surprise_share / (1.0 + patience * sensor.lag_cycles);
 }
 
+double step_of(const optimize::SearchSpace& space) noexcept {
+  return space.inputs.empty() ? 0.0 : space.inputs[0].step;
+}
+
 int shortest_delay(const CurveSeekingSettings& s) noexcept {
   return std::max(0, static_cast<int>(std::lround(s.sensor.delay_cycles)) - s.delay_uncertainty);
 }
@@ -145,7 +149,7 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(filter_settings(settings_), settings_.curve),
       limits_(settings_.limits, settings_.limit_curves, settings_.space.lower[0], settings_.space.upper[0],
-              limit_reach_share * settings_.prior_sd, settings_.memory_cycles),
+              limit_reach_share * settings_.prior_sd, settings_.memory_cycles, step_of(settings_.space)),
       plain_(plain_settings(settings_)),
       protocol_(settings_.space, 1 + settings_.limits.size()),
       estimate_(settings_.space.start),
@@ -187,7 +191,7 @@ const Inputs& CurveSeeking::ask() noexcept {
     applied_[0] = std::clamp(applied_[0], last - *settings_.rate, last + *settings_.rate);
   }
   applied_[0] = std::clamp(applied_[0], settings_.space.lower[0], settings_.space.upper[0]);
-  return protocol_.ask(applied_);
+  return protocol_.ask(applied_, [this](const Inputs& at) { return excess(at); });
 }
 
 // An input that a limit forbids is taken back: to the other side of the estimate, or to the edge and inside of it.
@@ -195,7 +199,8 @@ double CurveSeeking::within_limits(double wanted) noexcept {
   if (limits_.size() == 0) return wanted;
   const double allowed = limits_.nearest(wanted);
   if (settings_.limit_curves.empty() && limits_.excess(allowed) > 0.0) {
-    return allowed + (upwards_ ? trying_share : -trying_share) * settings_.prior_sd;
+    const double try_by = std::max(trying_share * settings_.prior_sd, step_of(settings_.space));
+    return allowed + (upwards_ ? try_by : -try_by);
   }
   if (allowed == wanted || plain_at_work_) return allowed;
   const double reach = std::min(std::abs(wanted - estimate_[0]), 0.5 * amplitude());

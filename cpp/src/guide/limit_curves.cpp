@@ -25,13 +25,14 @@ double scale_of(const optimize::Limit& limit) noexcept {
 }  // namespace
 
 LimitCurves::LimitCurves(std::vector<optimize::Limit> limits, std::vector<Curve> curves, double lower, double upper,
-                         double reach, double memory_cycles)
+                         double reach, double memory_cycles, double step)
     : limits_(std::move(limits)),
       curves_(std::move(curves)),
       causes_(optimize::lags_of(limits_, memory_cycles), 1),
       lower_(lower),
       upper_(upper),
       reach_(reach),
+      step_(curves_.empty() ? step : 0.0),
       fading_(std::exp(-1.0 / memory_cycles)),
       sums_(limits_.size()),
       states_(limits_.size(), 0.0) {
@@ -115,7 +116,7 @@ double LimitCurves::scaled_excess(std::size_t i, double input, const Line& line)
     return (x + caution * std::sqrt(line.var_a) + limit.margin - limit.upper) / limit.scale;
   }
   const double away = x - line.centre;
-  const double sd = std::sqrt(line.var_a + line.var_b * away * away);
+  const double sd = std::hypot(std::sqrt(line.var_a), std::sqrt(line.var_b) * std::max(0.0, std::abs(away) - step_));
   const double margin = limit.margin + limit.margin_sd * std::sqrt(line.noise);
   return (line.a + line.b * away + caution * sd + margin - limit.upper) / limit.scale;
 }

@@ -255,6 +255,11 @@ class CurveSeeking:
         Curvature of the plant's J over that of the guide, as learnt.
         """
     @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
+        """
+    @property
     def settings(self) -> dict:
         """
         Arguments that make this seeker again.
@@ -413,6 +418,11 @@ class FeedForward:
     def noise_sd(self) -> float:
         """
         Standard deviation of one reading of J, as given or learnt; NaN while it is not known.
+        """
+    @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
         """
     @property
     def testing(self) -> int:
@@ -686,6 +696,11 @@ class GuidedEngine:
     def refusals(self) -> int:
         """
         Answers of the model, and operating points, that could not be used.
+        """
+    @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
         """
     @property
     def state(self) -> dict[str, list[float]]:

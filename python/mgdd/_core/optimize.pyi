@@ -281,11 +281,16 @@ class Input:
         0 for a fortieth of the bounds, or 1 where there are none.
     rate : float
         Largest change of the estimate per step of the seeker, in the unit of the input, > 0.
+    step : float
+        Resolution in which it is set, in the unit of the input: the lower bound and whole steps above it, or multiples
+        where there is no lower bound; 0 where any value can be set. What a seeker asks for lies on a step, its estimate
+        between them.
     
     Raises
     ------
     mgdd.errors.ParameterError
-        An empty name, bounds that do not enclose anything, a negative scale, or a rate that is not > 0.
+        An empty name, bounds that do not enclose anything, a negative scale, a rate that is not > 0, or a step that is
+        negative or larger than the bounds are apart.
     
     Examples
     --------
@@ -305,7 +310,7 @@ class Input:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, name: str, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., *, unit: str = '', scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, rate: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+    def __init__(self, name: str, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., *, unit: str = '', scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, rate: typing.SupportsFloat | typing.SupportsIndex = ..., step: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         name : what is set
         lower : least applied value
@@ -313,11 +318,16 @@ class Input:
         unit : of the input
         scale : what steps are counted in; 0: a fortieth of the bounds, or 1
         rate : largest change of the estimate per step
+        step : whole steps in which it is set; 0: any value
         """
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def nearest(self, value: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        The nearest value that can be set.
+        """
     def replace(self, **kwargs) -> Input:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -345,6 +355,11 @@ class Input:
     def scale(self) -> float:
         """
         what steps are counted in; 0: a fortieth of the bounds, or 1 [-]
+        """
+    @property
+    def step(self) -> float:
+        """
+        whole steps in which it is set; 0: any value [-]
         """
     @property
     def unit(self) -> str:
@@ -692,6 +707,11 @@ class ExtremumSeeking:
         Misfired cycles told so far.
         """
     @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
+        """
+    @property
     def settings(self) -> dict:
         """
         Arguments that make this seeker again.
@@ -862,6 +882,11 @@ class Spsa:
         Misfired cycles told so far.
         """
     @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
+        """
+    @property
     def settings(self) -> dict:
         """
         Arguments that make this seeker again.
@@ -1007,6 +1032,11 @@ class GradientDescent:
         Misfired cycles told so far.
         """
     @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
+        """
+    @property
     def settings(self) -> dict:
         """
         Arguments that make this seeker again.
@@ -1148,6 +1178,11 @@ class GoldenSection:
     def misfires(self) -> int:
         """
         Misfired cycles told so far.
+        """
+    @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
         """
     @property
     def settings(self) -> dict:
@@ -1344,6 +1379,11 @@ class GaussianProcessSeeking:
     def noise_sd(self) -> float:
         """
         Standard deviation of one reading of J, as learnt.
+        """
+    @property
+    def settable(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The estimate in the steps in which its inputs are set, shape (inputs,).
         """
     @property
     def settings(self) -> dict:

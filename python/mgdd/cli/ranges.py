@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,10 +15,12 @@ if TYPE_CHECKING:
 
 __all__ = ["add_over", "bounds_of", "factors_of", "grid_of", "limits_given"]
 
+_Number = TypeVar("_Number", int, float)
+
 _FORM = "write NAME=LOW:HIGH:N, for example soc_cad=-20:5:51, or NAME=VALUE,VALUE"
 _FACTOR_FORM = "write NAME=LOW:HIGH, for example fuel_mg=6:36, NAME=LOW:HIGH:N or NAME=VALUE,VALUE"
 _LIMIT_FORM = "write NAME=X, or NAME=LOW:HIGH, LOW < HIGH, of which one may be left out, as imep_gross_bar=9:"
-_INPUT_FORM = "write NAME=LOW:HIGH, for example soc_cad=-20:5"
+_INPUT_FORM = "write NAME=LOW:HIGH, for example soc_cad=-20:5, or NAME=LOW:HIGH:STEP"
 
 
 def add_over(parser: Any, *, what: str) -> None:
@@ -66,15 +68,17 @@ def factors_of(given: Sequence[str]) -> dict[str, Any]:
     return factors
 
 
-def bounds_of(given: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Read the bounds of inputs, repeated ``--input``."""
-    bounds: dict[str, tuple[float, float]] = {}
+def bounds_of(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Read the bounds of inputs, and behind them the step in which one is set, repeated ``--input``."""
+    bounds: dict[str, tuple[float, ...]] = {}
     for item in given:
         name, span = _split(item, bounds, _INPUT_FORM, "--input")
-        low, high, count = _range(item, span, _INPUT_FORM, "--input")
-        if count is not None or not (math.isfinite(low) and math.isfinite(high) and low < high):
+        low, high, step = _range(item, span, _INPUT_FORM, "--input", third=float)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ParameterError(f"--input {item}: LOW and HIGH must be finite and LOW < HIGH; {_INPUT_FORM}")
-        bounds[name] = (low, high)
+        if step is not None and not 0.0 < step <= high - low:
+            raise ParameterError(f"--input {item}: STEP must be > 0 and at most HIGH - LOW; {_INPUT_FORM}")
+        bounds[name] = (low, high) if step is None else (low, high, step)
     return bounds
 
 
@@ -114,11 +118,13 @@ def _listed(item: str, span: str) -> NDArray[np.float64] | None:
         raise ParameterError(f"--over {item}: the values must be numbers with commas between them") from None
 
 
-def _range(item: str, span: str, form: str, option: str = "--over") -> tuple[float, float, int | None]:
+def _range(
+    item: str, span: str, form: str, option: str = "--over", *, third: type[_Number] = int
+) -> tuple[float, float, _Number | None]:
     parts = span.split(":")
     try:
         low, high = float(parts[0]), float(parts[1])
-        count = int(parts[2]) if len(parts) == 3 else None
+        count = third(parts[2]) if len(parts) == 3 else None
     except (ValueError, IndexError):
         parts = []
     if len(parts) not in (2, 3):

@@ -73,9 +73,9 @@ def add_seek(verbs: Any) -> None:
         help="any setting of the seeker, repeatable, for example form=washout",
     )
     parser.add_argument(
-        "--input", action="append", default=[], metavar="NAME=LOW:HIGH",
-        help=f"bounds of an input of the bench ({', '.join(bench_inputs)}), repeatable: several are sought at once "
-        "(default: soc_cad=-30:10)",
+        "--input", action="append", default=[], metavar="NAME=LOW:HIGH[:STEP]",
+        help=f"bounds of an input of the bench ({', '.join(bench_inputs)}), and the step in which it is set; "
+        "repeatable: several are sought at once (default: soc_cad=-30:10)",
     )  # fmt: skip
     parser.add_argument(
         "--start",
@@ -123,7 +123,10 @@ def _seek(args: argparse.Namespace) -> None:
         bench, preset = _bench(args, limits, given)
         bounds = {name: given.get(name, _BOUNDS_CAD) for name in bench.input_names}
         guide = guide_of(args, bench)
-        best = bench.find_optimum({name: value for name, value in limits.items() if name != _COV}, bounds=bounds)
+        best = bench.find_optimum(
+            {name: value for name, value in limits.items() if name != _COV},
+            bounds={name: (low, high) for name, (low, high, *_) in bounds.items()},
+        )
         try:
             found: SeekResult = seek(
                 bench, bounds, seeker=args.seeker, start=start or None, limits=limits,

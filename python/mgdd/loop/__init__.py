@@ -14,6 +14,7 @@ from mgdd.loop.bench import EngineBench
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.drive import simulate_drive
+from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.many_loops import monte_carlo
 from mgdd.loop.many_tracks import track_many
@@ -30,6 +31,7 @@ from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
     "EngineBench",
+    "EngineGuide",
     "FunctionPlant",
     "LoopCriteria",
     "Measurement",

@@ -27,6 +27,7 @@ class OwnSeeker:
 
     def __init__(self, own: Any, inputs: Sequence[Input], limits: Sequence[Limit], *, maximize: bool) -> None:
         self.own, self.kind, self.cycle = own, type(own).__name__, 0
+        self._inputs = list(inputs)
         self.settings = {"inputs": list(inputs), "limits": list(limits), "maximize": maximize}
         self.input_names, self.limit_names = [one.name for one in inputs], [one.name for one in limits]
         self._takes = set(inspect.signature(own.tell).parameters)
@@ -46,10 +47,19 @@ class OwnSeeker:
         """Where it believes the best, in the order of the inputs."""
         return np.atleast_1d(np.array(self.own.estimate, np.float64))
 
+    @property
+    def settable(self) -> NDArray[np.float64]:
+        """The same in the steps in which its inputs are set."""
+        return self._on_steps(self.estimate)
+
+    def _on_steps(self, values: Any) -> NDArray[np.float64]:
+        numbers = np.atleast_1d(np.asarray(values, np.float64)).tolist()
+        return np.array([one.nearest(value) for one, value in zip(self._inputs, numbers, strict=True)])
+
     def ask(self) -> dict[str, float]:
         """Give the inputs of the next cycle by name."""
-        asked = np.atleast_1d(np.asarray(self.own.ask(), np.float64))
-        return dict(zip(self.input_names, asked.tolist(), strict=True))
+        self._asked = self._on_steps(self.own.ask())
+        return dict(zip(self.input_names, self._asked.tolist(), strict=True))
 
     def tell(
         self,
@@ -64,6 +74,8 @@ class OwnSeeker:
         told: dict[str, Any] = {"limits": limits, "misfire": misfire}
         if applied is not None:
             told["applied"] = np.array([applied[name] for name in self.input_names])
+        elif any(one.step for one in self._inputs):
+            told["applied"] = self._asked
         if not misfire or "misfire" in self._takes:
             j = float(J) if self.settings["maximize"] else -float(J)
             self.own.tell(j, **{name: value for name, value in told.items() if name in self._takes})

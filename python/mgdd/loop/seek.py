@@ -33,7 +33,7 @@ _MOST_CYCLES = 2_000_000
 
 def seek(
     plant: Plant | Callable[[Any], Any],
-    inputs: Mapping[str, tuple[float, float]] | Sequence[Input] | None = None,
+    inputs: Mapping[str, tuple[float, ...]] | Sequence[Input] | None = None,
     *,
     seeker: Any = "auto",
     start: Mapping[str, float] | float | None = None,
@@ -62,8 +62,9 @@ def seek(
         It advances by `cycles`. A function takes the inputs by name, one input also as a number, and gives J, or
         ``(J, {limit: value})`` where there are limits, or None for a failed cycle; a compiled one is as
         `FunctionPlant` takes it.
-    inputs : mapping of str to (float, float), or sequence of Input, optional
-        Bounds of every input, finite, in its unit; one to eight. Left out where `seeker` has them.
+    inputs : mapping of str to (float, float) or (float, float, float), or sequence of Input, optional
+        Bounds of every input, finite, in its unit, and the step in which it is set; one to eight. Left out where
+        `seeker` has them.
     seeker : str, class or Seeker
         ``auto``, or a name: ``curve_seeking``, ``gaussian_process_seeking``, ``extremum_seeking``, ``spsa``,
         ``gradient_descent``, ``golden_section``. Or a seeker, as that of an earlier result or one of your own with

@@ -221,10 +221,8 @@ def _by_curve(asked: Question, **own: Any) -> Seeker:
     curve = asked.guide if isinstance(asked.guide, Curve) else own.pop("curve", None) or _parabola(one)
     best = {one.name: min(max(curve.best, one.lower), one.upper)}
     if asked.limits and own.get("limit_curves") is None:
-        stride = min(one.rate, _STRIDE * (one.upper - one.lower))
-        asked = replace(
-            asked, inputs=[Input(one.name, one.lower, one.upper, unit=one.unit, scale=one.scale, rate=stride)]
-        )
+        stride = min(one.rate, max(_STRIDE * (one.upper - one.lower), one.step))
+        asked = replace(asked, inputs=[one.replace(rate=stride)])
     begin = asked.start or best | safe_side(asked.inputs, asked.limits)
     return asked.made(CurveSeeking, begin, curve=curve, **own)
 

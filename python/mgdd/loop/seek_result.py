@@ -33,7 +33,7 @@ class SeekResult(Result):
     Parameters
     ----------
     inputs : dict of str to float
-        The best inputs by name, in their units.
+        The best inputs by name, in their units, on the steps of those that have some.
     value, value_sd : float
         J expected there, and its standard deviation without the noise of a reading [unit of J]: by the process of the
         seeker where it has one, otherwise by the ten readings nearest to it.
@@ -171,7 +171,7 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     gain = Mean(sign * gained.value, gained.sd)
     doubts = doubts_about(seeker, run, readings, gain, kept, asked)
     return SeekResult(
-        inputs=dict(zip([one.name for one in asked.inputs], seeker.estimate.tolist(), strict=True)),
+        inputs=dict(zip([one.name for one in asked.inputs], seeker.settable.tolist(), strict=True)),
         value=at_best.value,
         value_sd=at_best.sd,
         gain=gain.value,

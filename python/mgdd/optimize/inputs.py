@@ -17,8 +17,8 @@ def inputs_of(inputs: Any) -> tuple[Input, ...]:
 
     Parameters
     ----------
-    inputs : mapping of str to (float, float), or sequence of Input, optional
-        None for none.
+    inputs : mapping of str to (float, float) or (float, float, float), or sequence of Input, optional
+        Bounds, and the step in which an input is set; None for none.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def inputs_of(inputs: Any) -> tuple[Input, ...]:
     Raises
     ------
     ParameterError
-        Neither of the two, a name twice, or bounds that are not two numbers with something between them.
+        Neither of the two, a name twice, or bounds that are not numbers with something between them.
     """
     if inputs is None:
         return ()
@@ -41,9 +41,13 @@ def inputs_of(inputs: Any) -> tuple[Input, ...]:
                 out.append(bounds)
                 continue
             numbers = tuple(bounds) if isinstance(bounds, Sequence) and not isinstance(bounds, str) else ()
-            if len(numbers) != 2 or any(isinstance(n, bool) or not isinstance(n, int | float) for n in numbers):
-                raise ParameterError(f"inputs: {name} = {bounds!r}: must be (lower, upper), two numbers, or an Input")
-            out.append(Input(str(name), float(numbers[0]), float(numbers[1])))
+            plain = all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers)
+            if len(numbers) not in (2, 3) or not plain:
+                raise ParameterError(
+                    f"inputs: {name} = {bounds!r}: must be (lower, upper) or (lower, upper, step), numbers, or an Input"
+                )
+            lower, upper, step = (*map(float, numbers), 0.0)[:3]
+            out.append(Input(str(name), lower, upper, step=step))
         return tuple(out)
     if isinstance(inputs, Sequence) and all(isinstance(one, Input) for one in inputs):
         names = [one.name for one in inputs]

@@ -140,5 +140,22 @@ TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
   });
 }
 
+TEST(Steps, OfTwoBesideALimitTheOneThatKeepsItIsSet) {
+  Input coarse{"a", -1.0, 1.1}, fine{"b"};  // between them 1.1 is no step of a
+  coarse.step = 0.5;
+  fine.step = 0.1;
+  const Steps steps = steps_of({coarse, fine, Input{"c"}});
+  Inputs wanted(3), set(3), below(3);
+  wanted << 1.1, -0.27, 0.123;
+  set << 1.0, -0.3, 0.123;
+  const auto keeps = [](const Inputs&) { return -1.0; };
+  EXPECT_TRUE(steps.nearest(wanted, keeps).isApprox(set, 1e-12)) << steps.nearest(wanted, keeps).transpose();
+  wanted << 0.4, -0.27, 0.123;
+  below << 0.0, -0.3, 0.123;
+  const auto sum = [](const Inputs& at) { return at.sum() - 0.2; };  // over by .123 at the nearest
+  EXPECT_TRUE(steps.nearest(wanted, sum).isApprox(below, 1e-12)) << steps.nearest(wanted, sum).transpose();
+  EXPECT_FALSE(steps_of({Input{"c"}}).any());
+}
+
 }  // namespace
 }  // namespace mgdd::optimize

@@ -96,6 +96,10 @@ class CurveSeeking {
   void shift_estimate(const optimize::Inputs& by) noexcept;
 
   const optimize::Inputs& estimate() const noexcept { return estimate_; }
+  /// By how much an input is expected over a limit, in its scale; at most 0 where all are kept.
+  double excess(const optimize::Inputs& at) const noexcept {
+    return limits_.size() > 0 ? limits_.excess(at[0]) : -optimize::unlimited;
+  }
   double estimate_sd() const noexcept;  ///< of the estimate as stated; NaN after a hand-over
   double noise_sd() const noexcept { return filter_.noise_sd(); }
   double scale() const noexcept { return filter_.scale(); }

@@ -108,6 +108,7 @@ class FeedForward {
   std::size_t limit_count() const noexcept { return seeker_.limit_count(); }
   optimize::LimitState limit_state(std::size_t i) const noexcept { return limit_state_of(seeker_, i); }
   double limit_delay(std::size_t i) const noexcept { return limit_delay_of(seeker_, i); }
+  double excess(const optimize::Inputs& at) const noexcept { return excess_of(seeker_, at); }
   const auto& settings() const noexcept { return seeker_.settings(); }
   const S& seeker() const noexcept { return seeker_; }
   S& seeker() noexcept { return seeker_; }  ///< for its history

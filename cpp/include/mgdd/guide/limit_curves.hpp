@@ -22,9 +22,9 @@ namespace mgdd::guide {
 class LimitCurves {
  public:
   /// One curve per limit, or none at all. Inputs lie in [lower, upper]; `reach` is a distance over which the guide may
-  /// be trusted to know a slope's size.
+  /// be trusted to know a slope's size. `step` is the least that can be tried without a curve.
   LimitCurves(std::vector<optimize::Limit> limits, std::vector<Curve> curves, double lower, double upper, double reach,
-              double memory_cycles);
+              double memory_cycles, double step = 0.0);
 
   std::size_t size() const noexcept { return limits_.size(); }
   /// Takes the values that were read after this input was applied.
@@ -68,7 +68,7 @@ class LimitCurves {
   std::vector<Curve> curves_;  // empty: straight lines
   std::vector<std::string> prefixes_;
   optimize::CausingInputs causes_;
-  double lower_, upper_, reach_, fading_;
+  double lower_, upper_, reach_, step_, fading_;
   std::vector<std::array<double, numbers>> sums_;
   std::vector<double> states_;  // a LimitState each
   std::optional<double> last_;  // input recorded last

@@ -127,6 +127,13 @@ double ConstraintFilter::excess(std::size_t i, const Inputs& at, const Inputs& r
   return models_[i].predict(at) + models_[i].slope().cwiseAbs().dot(reach) + margin(i) - limits_[i].upper;
 }
 
+double ConstraintFilter::worst_excess(const Inputs& at) const noexcept {
+  double worst = -unlimited;
+  for (std::size_t i = 0; i < limits_.size(); ++i)
+    worst = std::max(worst, excess(i, at, Inputs::Zero(at.size())) / limits_[i].scale);
+  return worst;
+}
+
 double ConstraintFilter::margin(std::size_t i) const noexcept {
   const double scatter = limits_[i].margin_sd > 0.0 ? limits_[i].margin_sd * models_[i].scatter() : 0.0;
   return limits_[i].margin + scatter + extra_[i];

@@ -93,6 +93,11 @@ const Inputs& FailureWatch::admit(const Inputs& wanted) noexcept {
       }
     }
   }
+  return settle(Inputs(sent_), wanted);
+}
+
+const Inputs& FailureWatch::settle(const Inputs& input, const Inputs& wanted) noexcept {
+  sent_ = input;
   differs_ = sent_ != wanted;
   return differs_ ? sent_ : wanted;  // NOLINT(bugprone-return-const-ref-from-parameter)
 }
@@ -124,7 +129,7 @@ Inputs FailureWatch::elsewhere() const noexcept {
 }
 
 void FailureWatch::worked() noexcept {
-  found_ = !worked_ && differs_;
+  found_ = !worked_ && differs_ && failing_everywhere();
   good_ = sent_;
   worked_ = true;
   in_a_row_ = 0;

@@ -31,10 +31,15 @@ constexpr double worth_noise = 1e-12;                   // of J, at least
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
   const double wide = growth * (highest_ - lowest_).maxCoeff();
   const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach : 0.5 * settings_.first_step;
-  const double far = std::max(wide, least);
+  const double far = std::max({wide, least, protocol_.steps.any() ? grid().maxCoeff() : 0.0});
   for (Eigen::Index i = 0; i < z.size(); ++i)
     z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));
-  return z;
+  if (!protocol_.steps.any()) return z;
+  return scaled(protocol_.steps.nearest(unscaled(z), [](const Inputs&) { return 0.0; }));
+}
+
+Inputs GaussianProcessSeeking::grid() const noexcept {
+  return protocol_.steps.size.cwiseQuotient(settings_.space.upper - settings_.space.lower);
 }
 
 // Standard normal, another one for each stream and index of this cycle.
@@ -172,7 +177,10 @@ void GaussianProcessSeeking::choose_first() noexcept {
   Inputs z = middle_;
   const double step = settings_.first_step * (limited_.empty() ? 1.0 : 0.5) *
                       (failing_.count_above(0.0) > 0 ? std::pow(turned, static_cast<double>(turn)) : 1.0);
-  if (side >= 0) z[side] += z[side] < 0.5 ? step : -step;
+  if (side >= 0) {
+    const double whole = protocol_.steps.any() ? std::max(std::abs(step), grid()[side]) : std::abs(step);
+    z[side] += std::copysign(whole, z[side] < 0.5 ? step : -step);
+  }
   send(z);
 }
 

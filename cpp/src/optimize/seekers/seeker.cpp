@@ -61,6 +61,13 @@ void validate(const std::vector<Input>& inputs) {
       refuse("scale", one.scale, "must be > 0 and finite, or 0 for a fortieth of the bounds");
     }
     if (!(one.rate > 0.0)) refuse("rate", one.rate, "must be > 0");
+    if (!(one.step >= 0.0 && is_reading(one.step))) {
+      refuse("step", one.step, "must be > 0 and finite, or 0 where any value can be set");
+    }
+    if (!(one.step <= one.rate)) refuse("step", one.step, "must be at most the rate = " + text(one.rate));
+    if (one.step > one.upper - one.lower) {
+      refuse("step", one.step, "must be at most upper - lower = " + text(one.upper - one.lower));
+    }
   }
 }
 
@@ -98,6 +105,18 @@ Inputs scale_of(const SearchSpace& space) noexcept {
     scale[i] = said > 0.0 ? said : width > 0.0 && is_reading(width) ? width / scales_in_bounds : 1.0;
   }
   return scale;
+}
+
+Steps steps_of(const std::vector<Input>& inputs) {
+  const auto n = static_cast<Eigen::Index>(inputs.size());
+  Steps out{Inputs(n), Inputs(n), Inputs(n)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Input& one = inputs[static_cast<std::size_t>(i)];
+    out.size[i] = one.step;
+    out.from[i] = std::isfinite(one.lower) ? one.lower : 0.0;
+    out.to[i] = one.upper;
+  }
+  return out;
 }
 
 Inputs for_each_input(Inputs values, Eigen::Index inputs) {

@@ -68,15 +68,20 @@ class Settings:
         return {name: value for name, value in every.items() if value is not None and value != {}}
 
 
-def _bounds(table: TomlTable) -> dict[str, tuple[float, float]]:
+def _bounds(table: TomlTable) -> dict[str, tuple[float, ...]]:
+    """Take bounds of inputs, and behind them the step in which one is set."""
     found = table.items()
     for name, value in found.items():
-        low, high = _pair(table, name, value, "[lower, upper], two numbers")
+        stepped = isinstance(value, list) and len(value) == 3
+        form = "[lower, upper] or [lower, upper, step], numbers"
+        low, high = _pair(table, name, value[:2] if stepped else value, form)
+        if stepped and not (fits(value[2], "number") and 0.0 < value[2] <= high - low):
+            raise table.error(name, value, f"{form}, with a step > 0 that is at most upper - lower")
         if not -math.inf < low < high < math.inf:
             raise table.error(name, value, "lower < upper, both finite")
         if name.endswith("_cad") and not -60.0 <= low < high <= 60.0:
             raise table.error(name, value, "lower < upper, in [-60, 60]")
-    return {name: (float(value[0]), float(value[1])) for name, value in found.items()} or dict(_BOUNDS_CAD)
+    return {name: tuple(map(float, value)) for name, value in found.items()} or dict(_BOUNDS_CAD)
 
 
 def _limits(table: TomlTable) -> dict[str, Any]:
@@ -197,7 +202,7 @@ class SeekTask(Settings):
     guide: str = _key("text", "none", among=("none", *KINDS))
     model: str = _key("text", "puma_single")
     scale: Mapping[str, float] = _key("scales", {})
-    inputs: Mapping[str, tuple[float, float]] = field(
+    inputs: Mapping[str, tuple[float, ...]] = field(
         default_factory=lambda: dict(_BOUNDS_CAD), metadata={"form": "bounds"}
     )
     start: Mapping[str, float] = _key("scales", {})

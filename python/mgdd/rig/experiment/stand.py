@@ -157,7 +157,7 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
     guard = ActuatorGuard(
         recorded,
         start=plan.start,
-        bounds=dict(plan.task.inputs),
+        bounds={name: (low, high) for name, (low, high, *_) in plan.task.inputs.items()},
         rates={"soc_cad": safety.rate_cad, **safety.rates} if "soc_cad" in plan.start else safety.rates,
         limits=[Limit(name, upper) for name, upper in safety.limits.items()],
     )

@@ -99,6 +99,8 @@ class ConstraintFilter {
 
   /// Predicted excess of the worst point within `reach` of `at` over limit i, in the unit of the limit.
   double excess(std::size_t i, const Inputs& at, const Inputs& reach) const noexcept;
+  /// The largest predicted excess over the limits, in their scales; at most 0 where all are kept.
+  double worst_excess(const Inputs& at) const noexcept;
 
   /// What has been learnt of limit i.
   const LocalModel& model(std::size_t i) const noexcept { return models_[i]; }
@@ -166,6 +168,13 @@ LimitState limit_state_of(const S& seeker, std::size_t i) noexcept {
   } else {
     return seeker.filter().state(i);
   }
+}
+
+/// By how much an input is expected over a limit, in its scale; 0 of a seeker that does not say.
+template <class S>
+double excess_of(const S& seeker, const Inputs& at) noexcept {
+  if constexpr (requires { seeker.excess(at); }) return seeker.excess(at);
+  return 0.0;
 }
 
 /// The delay at which limit i is read, as far as the readings tell [cycles].

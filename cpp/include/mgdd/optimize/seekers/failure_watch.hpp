@@ -35,6 +35,8 @@ class FailureWatch {
   const Inputs& admit(const Inputs& wanted) noexcept;
   /// The same for an input that goes to the plant as it is.
   const Inputs& pass(const Inputs& input) noexcept;
+  /// Another input than `admit` gave, where that cannot be set.
+  const Inputs& settle(const Inputs& input, const Inputs& wanted) noexcept;
   /// What `admit` gave last where it differs from what was wanted; nullptr where it was the same.
   const Inputs* instead() const noexcept { return differs_ ? &sent_ : nullptr; }
   /// What `admit` or `pass` gave last.

@@ -152,6 +152,7 @@ class GaussianProcessSeeking {
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
+  Inputs grid() const noexcept;  // steps of the inputs, scaled
   double draw(std::uint64_t stream, int index) const noexcept;
   void fit(const Inputs& about) noexcept;
   void learn(const Reading& reading, const Inputs& applied) noexcept;

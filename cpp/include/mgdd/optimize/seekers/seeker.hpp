@@ -30,6 +30,7 @@ struct Input {
   std::string unit{};       ///< empty: what the name says
   double scale = 0.0;       ///< > 0: what steps are counted in, unit of the input; 0 = a fortieth of the bounds, or 1
   double rate = unlimited;  ///< largest change of the estimate per step, > 0, unit of the input
+  double step = 0.0;        ///< > 0: set in whole steps above the lower bound, or above 0; 0 = any value
 
   bool operator==(const Input&) const = default;
 };
@@ -40,7 +41,8 @@ constexpr auto fields_of(const Input&) {
                     field<&I::upper>("upper", "largest applied value"),
                     field<&I::unit>("unit", "of the input"),
                     field<&I::scale>("scale", "what steps are counted in; 0: a fortieth of the bounds, or 1"),
-                    field<&I::rate>("rate", "largest change of the estimate per step")};
+                    field<&I::rate>("rate", "largest change of the estimate per step"),
+                    field<&I::step>("step", "whole steps in which it is set; 0: any value")};
 }
 /// ParameterError or ShapeError naming the entry.
 void validate(const std::vector<Input>& inputs);
@@ -66,6 +68,8 @@ Inputs or_scaled(Inputs values, double factor, const SearchSpace& space);
 inline InputMatrix metric_of(const Inputs& lengths) {
   return (lengths / lengths.maxCoeff()).cwiseAbs2().asDiagonal();
 }
+/// What can be set of each input.
+Steps steps_of(const std::vector<Input>& inputs);
 /// The smaller of each entry and the rate that its input says.
 Inputs within_rates(Inputs values, const SearchSpace& space) noexcept;
 
@@ -121,7 +125,7 @@ enum class TellStatus {
 struct Protocol {
   /// `channels`: how many components of J and limits a reading has.
   Protocol(const SearchSpace& space, std::size_t channels, bool failing_edges = true)
-      : failures(space.size(), failing_edges), heard(space.size(), channels) {
+      : failures(space.size(), failing_edges), heard(space.size(), channels), steps(steps_of(space.inputs)) {
     failures.roam(space.start, space.lower, space.upper);
   }
 
@@ -130,12 +134,19 @@ struct Protocol {
   bool asked = false;
   FailureWatch failures;
   TellWatch heard;
+  Steps steps;
 
-  /// What is asked of the plant where the seeker wants `wanted`; the same until it is told.
-  const Inputs& ask(const Inputs& wanted) noexcept {
+  /// What is asked of the plant where the seeker wants `wanted`; the same until it is told. `excess` says by how much
+  /// an input is expected over a limit, at most 0 where all are kept.
+  template <class Excess>
+  const Inputs& ask(const Inputs& wanted, const Excess& excess) noexcept {
     if (asked) return sent(wanted);
     asked = true;
-    return failures.admit(wanted);
+    const Inputs& admitted = failures.admit(wanted);
+    return steps.any() ? failures.settle(steps.nearest(admitted, excess), wanted) : admitted;
+  }
+  const Inputs& ask(const Inputs& wanted) noexcept {
+    return ask(wanted, [](const Inputs&) { return 0.0; });
   }
   /// The same for an input that goes to the plant as it is, since what it comes from has looked already.
   const Inputs& pass(const Inputs& input) noexcept {

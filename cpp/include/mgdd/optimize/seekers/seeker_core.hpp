@@ -31,6 +31,8 @@ class SeekerCore {
   /// What has been learnt of the limits.
   const ConstraintFilter& filter() const noexcept { return filter_; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+  /// By how much an input is expected over a limit, in its scale; at most 0 where all are kept.
+  double excess(const Inputs& at) const noexcept { return filter_.worst_excess(at); }
 
   /// Counts a reading, takes its limits and learns of it. What the first readings made is void where one of them was
   /// far out, of J unless judged together; where nothing but another input has worked, the search goes on there.
@@ -71,7 +73,10 @@ class SeekerCore {
 
  protected:
   /// What to ask of the plant where `applied_` is wanted.
-  const Inputs& send() noexcept { return protocol_.ask(clamp_.stretched(applied_, estimate_, settings_.space)); }
+  const Inputs& send() noexcept {
+    return protocol_.ask(clamp_.stretched(applied_, estimate_, settings_.space),
+                         [this](const Inputs& at) { return excess(at); });
+  }
   /// A cycle without a reading: what comes late has moved on, and a dither may go on with it.
   void miss(const Inputs&) noexcept {}
   /// What a new operating point makes void.

@@ -93,6 +93,7 @@ class RecordedSeeker {
   std::size_t limit_count() const noexcept { return seeker_.limit_count(); }
   LimitState limit_state(std::size_t i) const noexcept { return limit_state_of(seeker_, i); }
   double limit_delay(std::size_t i) const noexcept { return limit_delay_of(seeker_, i); }
+  double excess(const Inputs& at) const noexcept { return excess_of(seeker_, at); }
   decltype(auto) settings() const noexcept { return seeker_.settings(); }
   const S& seeker() const noexcept { return seeker_; }
   SeekerHistory& history() noexcept { return history_; }

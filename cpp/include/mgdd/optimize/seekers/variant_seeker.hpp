@@ -61,6 +61,9 @@ class VariantSeeker {
   double limit_delay(std::size_t i) const noexcept {
     return on(seeker_, [&](const auto& s) { return limit_delay_of(s, i); });
   }
+  double excess(const Inputs& at) const noexcept {
+    return on(seeker_, [&](const auto& s) { return excess_of(s, at); });
+  }
   const Settings& settings() const noexcept { return settings_; }
   const Seeker& variant() const noexcept { return seeker_; }
 
