@@ -56,7 +56,7 @@ def test_standard_errors_are_those_of_the_scatter_over_many_repetitions() -> Non
         ([0, 1, 2, 3, 4], [0, 1, 2, 3, 4], DataError, "bends up|no maximum"),
         ([0, 1, 2, 3, np.nan], [4, 1, 0, 1, 4], DataError, "must be finite; leave misfired cycles out"),
         ([0, 1, 2, 3, 4], [4, 1, 0, 1, np.inf], DataError, "must be finite"),
-        ([0, 1, 1 + 1e-15, 0, 1], [0, 1, 1, 0, 1], DataError, "distinct inputs"),
+        ([0, 1, 1 + 1e-15, 0, 1], [0, 1, 1, 0, 1], DataError, "do not show the curvature of theta; spread them"),
         ([0, 1, 2], [0, 1], ShapeError, r"theta has shape \(3,\), J \(2,\)"),
         ([[0, 1, 2]], [[0, 1, 2]], ShapeError, "in one dimension"),
     ],

@@ -1,11 +1,9 @@
 // Binds include/mgdd/optimize: extremum seeking, SPSA, gradient descent, golden section, and the tuner.
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "mgdd/optimize/seekers/tuner.hpp"
 #include "optimize/seeker_binding.hpp"
 #include "optimize/seeker_settings.hpp"
 
@@ -178,49 +176,6 @@ void bind_gaussian_process(py::module_& m) {
   bind_seeking(cls);
 }
 
-void bind_tuner(py::module_& m) {
-  m.def(
-      "tune",
-      [](double noise_sd, double curvature, const std::string& method, double delay_cycles, double lag_cycles,
-         bool compensated, std::optional<double> delay_uncertainty, std::optional<double> rms,
-         std::optional<double> cycles, std::optional<double> distance, std::optional<double> arrival,
-         std::optional<double> amplitude_max) {
-        TuningSpec w;
-        w.method = parse_name<TunedMethod>("method", method);
-        w.noise_sd = noise_sd;
-        w.curvature = curvature;
-        w.lag = {delay_cycles, lag_cycles};
-        w.compensated = compensated;
-        w.delay_uncertainty = delay_uncertainty;
-        w.rms = rms;
-        w.cycles = cycles;
-        w.distance = distance;
-        w.arrival = arrival;
-        w.amplitude_max = amplitude_max;
-        const Tuning t = tune(w);
-        py::dict out;
-        out["method"] = std::string(name_of(t.method));
-        out["amplitude"] = t.amplitude;
-        out["period"] = t.period;
-        out["gain"] = t.gain;
-        out["rate"] = t.rate;
-        out["time_constant_cycles"] = t.time_constant_cycles;
-        out["rms"] = t.rms;
-        out["cycles"] = t.cycles;
-        out["dither_cost"] = t.dither_cost;
-        out["jitter_cost"] = t.jitter_cost;
-        out["sensor_gain"] = t.sensor_gain;
-        out["sensor_phase_deg"] = t.sensor_phase_rad * 180.0 / std::numbers::pi;
-        out["delay_uncertainty"] = t.delay_uncertainty;
-        out["met"] = t.met;
-        out["reasons"] = t.reasons;
-        return out;
-      },
-      py::kw_only(), py::arg("noise_sd"), py::arg("curvature"), py::arg("method"), py::arg("delay_cycles"),
-      py::arg("lag_cycles"), py::arg("compensated"), py::arg("delay_uncertainty"), py::arg("rms"), py::arg("cycles"),
-      py::arg("distance"), py::arg("arrival"), py::arg("amplitude_max"), "Behind mgdd.optimize.tune.");
-}
-
 }  // namespace
 
 void bind_seekers(py::module_& m) {
@@ -230,7 +185,6 @@ void bind_seekers(py::module_& m) {
   bind_golden_section(m);
   bind_surface(m);
   bind_gaussian_process(m);
-  bind_tuner(m);
 }
 
 }  // namespace mgdd::bindings

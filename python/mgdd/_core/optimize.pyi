@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'Parameter', 'Spsa', 'Surface', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
+__all__: list[str] = ['ComponentLag', 'ExtremumSeeking', 'FitReport', 'GaussianProcessSeeking', 'GoldenSection', 'GradientDescent', 'Input', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'Parameter', 'Spsa', 'Surface', 'autocorrelation_time', 'latin_hypercube', 'least_squares']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -1478,8 +1478,4 @@ def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.S
 def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
     """
     Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.
-    """
-def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, delay_uncertainty: typing.SupportsFloat | typing.SupportsIndex | None, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
-    """
-    Behind mgdd.optimize.tune.
     """

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ShapeError
 from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
-from mgdd.optimize.measured_surface import Surface, fewest, fit_surface, narrowed, parabola, span_of, twice_as_wide
+from mgdd.optimize.measured_surface import Surface, fewest, fit_surface, narrowed, span_of, twice_as_wide
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
@@ -91,14 +91,18 @@ def _columns(theta: Any) -> tuple[NDArray[np.float64], tuple[str, ...]]:
 
 
 def _unknown(
-    x: NDArray[np.float64], curvature: Any, stderr: Any, optimum: Any, names: tuple[str, ...]
+    x: NDArray[np.float64],
+    curvature: NDArray[np.float64],
+    stderr: NDArray[np.float64],
+    optimum: NDArray[np.float64],
+    names: tuple[str, ...],
 ) -> tuple[Finding, ...]:
     """Say of which inputs J does not show a bend, or no optimum between those that were measured."""
     out = []
-    bends, errors = (np.diag(np.atleast_2d(one)) for one in (curvature, stderr))
+    bends, errors = np.diag(curvature), np.diag(stderr)
     for index, (low, high) in enumerate(zip(x.min(axis=0), x.max(axis=0), strict=True)):
         name = names[index] if names else "theta" if x.shape[1] == 1 else f"theta[{index}]"
-        at = float(np.ravel(optimum)[index])
+        at = float(optimum[index])
         if abs(bends[index]) < _SURE * errors[index]:
             text = f"J does not bend over {name} by more than its noise: {bends[index]:.3g} ± {errors[index]:.2g}"
             remedy = f"measure farther out, or more often; tune with amplitude_max of at most {(high - low) / 2:.3g}"
@@ -173,8 +177,6 @@ def measure_map(
         raise DataError(f"{y.size} points at {distinct} distinct {kind}: must be at least {points + 2} at {points}")
 
     def fit(x: NDArray[np.float64], y: NDArray[np.float64], where: str = "") -> Surface:
-        if inputs == 1:
-            return parabola(x[:, 0], y, maximize=maximize, where=where)
         return fit_surface(x, y, maximize=maximize, names=names, where=where)
 
     wide = fit(x, y)
@@ -195,34 +197,25 @@ def measure_map(
                 "measure more inputs nearer to the optimum",
             ),
         )
-    doubts: dict[str, Any]
+    moved = narrow.optimum - wider.optimum
+    covariance = noise[0] * narrow.optimum_variance + np.outer(moved, moved)
+    bend_sd = np.sqrt(noise[0] * narrow.curvature_variance)
+    found: dict[str, Any] = {
+        "curvature": narrow.curvature,
+        "curvature_stderr": np.hypot(bend_sd, narrow.curvature - wider.curvature),
+        "optimum": narrow.optimum,
+        "optimum_stderr": np.sqrt(np.diag(covariance)),
+    }
     if inputs == 1:
-        doubts = {
-            "curvature_stderr": math.hypot(
-                math.sqrt(noise[0] * narrow.curvature_variance), narrow.curvature - wider.curvature
-            ),
-            "optimum_stderr": math.hypot(math.sqrt(noise[0] * narrow.optimum_variance), narrow.optimum - wider.optimum),
-        }
+        found = {name: value.item() for name, value in found.items()}
     else:
-        moved = narrow.optimum - wider.optimum
-        covariance = noise[0] * narrow.optimum_variance + np.outer(moved, moved)
-        doubts = {
-            "curvature_stderr": np.hypot(
-                np.sqrt(noise[0] * narrow.curvature_variance), narrow.curvature - wider.curvature
-            ),
-            "optimum_stderr": np.sqrt(np.diag(covariance)),
-            "optimum_covariance": covariance,
-            "bends": narrow.bends,
-            "directions": narrow.directions,
-        }
-    findings += _unknown(x, narrow.curvature, np.sqrt(noise[0] * narrow.curvature_variance), narrow.optimum, names)
+        found |= {"optimum_covariance": covariance, "bends": narrow.bends, "directions": narrow.directions}
+    findings += _unknown(x, narrow.curvature, bend_sd, narrow.optimum, names)
     return MeasuredMap(
         noise_sd=math.sqrt(noise[0]),
         noise_sd_stderr=math.sqrt(noise[0] / (2.0 * noise[1])),
-        curvature=narrow.curvature,
-        optimum=narrow.optimum,
         points=int(np.count_nonzero(kept)),
         findings=findings,
         inputs=names,
-        **doubts,
+        **found,
     )

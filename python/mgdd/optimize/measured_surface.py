@@ -1,10 +1,10 @@
-"""Least-squares parabola or quadratic surface, whether it fits, and the readings nearest to the best that it fits."""
+"""Least-squares quadratic of one input or several, whether it fits, and the readings near the best that it fits."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Surface", "fewest", "fit_surface", "narrowed", "parabola", "span_of", "twice_as_wide"]
+__all__ = ["Surface", "fewest", "fit_surface", "narrowed", "span_of", "twice_as_wide"]
 
 _SIGNIFICANCE = 0.01  # of the test of lack of fit
 _FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test believes
@@ -26,16 +26,16 @@ _ILL = 1e8  # condition of a design that shows nothing
 
 @dataclass(frozen=True, kw_only=True)
 class Surface:
-    """A quadratic J(theta): floats for one input; for several, arrays in the order of the inputs."""
+    """A quadratic J(theta), with arrays in the order of the inputs."""
 
     variance: float  # of one measurement about it
     freedom: int
-    curvature: Any
-    curvature_variance: Any  # per unit of `variance`
-    optimum: Any
-    optimum_variance: Any  # covariance for several
-    bends: Any = None
-    directions: Any = None
+    curvature: Array
+    curvature_variance: Array  # per unit of `variance`
+    optimum: Array
+    optimum_variance: Array  # covariance
+    bends: Array
+    directions: Array
 
 
 def fewest(inputs: int) -> int:
@@ -49,35 +49,8 @@ def _scaled(x: Array) -> tuple[Array, Array, Array]:
     return (x - middle) / half, middle, half
 
 
-def parabola(x: Array, y: Array, *, maximize: bool, where: str = "") -> Surface:
-    """Fit J of one input, x of shape (n,)."""
-    middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min())
-    design = np.vander((x - middle) / half, 3, increasing=True)
-    if np.linalg.cond(design) > _ILL:
-        raise DataError("theta: its distinct inputs are too close to each other to show a curvature; spread them")
-    level = y.mean()
-    c, *_ = np.linalg.lstsq(design, y - level, rcond=None)
-    if not (c[2] < 0.0 if maximize else c[2] > 0.0):
-        raise DataError(
-            f"J bends {'up' if maximize else 'down'} over theta{where} (curvature {2.0 * c[2] / half**2:.4g}): "
-            f"there is no {'maximum' if maximize else 'minimum'}; widen the range of theta or repeat more often"
-        )
-    freedom = x.size - 3
-    residual = y - level - design @ c
-    spread = np.linalg.inv(design.T @ design)
-    lever = np.array([0.0, -0.5 / c[2], 0.5 * c[1] / c[2] ** 2])
-    return Surface(
-        variance=float(residual @ residual) / max(freedom, 1),
-        freedom=freedom,
-        curvature=float(2.0 * c[2] / half**2),
-        curvature_variance=float(4.0 * spread[2, 2] / half**4),
-        optimum=float(middle - 0.5 * c[1] / c[2] * half),
-        optimum_variance=float(lever @ spread @ lever) * half**2,
-    )
-
-
 def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], where: str = "") -> Surface:
-    """Fit J of several inputs, x of shape (n, inputs), with all products."""
+    """Fit J of inputs, x of shape (n, inputs), with all products."""
     count = x.shape[1]
     named = names or _numbered(x)
     if (unseen := _unseen(x, named)) is not None:
@@ -126,11 +99,13 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
 
 
 def _numbered(x: Array) -> tuple[str, ...]:
-    return tuple(f"input {place}" for place in range(x.shape[1]))
+    return ("theta",) if x.shape[1] == 1 else tuple(f"input {place}" for place in range(x.shape[1]))
 
 
 def _along(direction: Array, half: Array, names: tuple[str, ...]) -> str:
-    """Write a direction, in shares of half a range, in the units of the inputs."""
+    """Write a direction, in shares of half a range, in the units of the inputs; of one input its name."""
+    if len(names) == 1:
+        return names[0]
     steps = np.where(np.abs(direction) < 1e-6, 0.0, direction * half)  # not what rounding leaves
     return ", ".join(f"{name} {step:+.3g}" for name, step in zip(names, steps, strict=True))
 
@@ -159,7 +134,7 @@ def _unseen(x: Array, names: tuple[str, ...]) -> str | None:
         return None
     i, j = pairs[int(np.abs(along[-1][1 + len(names) :]).argmax())]
     what = f"the curvature of {names[i]}" if i == j else f"how {names[i]} and {names[j]} act together"
-    return f"its points do not show {what}; add some, as the corners of a grid of three values each"
+    return f"its points do not show {what}; spread them, or add some, as the corners of a grid of three values each"
 
 
 def _check_bends(
@@ -169,11 +144,12 @@ def _check_bends(
     if not wrong.any():
         return
     worst = int(np.where(wrong, np.abs(bends), -1.0).argmax())
-    bent = "is flat" if abs(bends[worst]) <= 2.0 * doubt[worst] else f"bends {'up' if maximize else 'down'}"
+    side, end = ("up", "maximum") if maximize else ("down", "minimum")
+    bent = "is flat" if abs(bends[worst]) <= 2.0 * doubt[worst] else f"bends {side}"
+    way = f"{'over' if len(names) == 1 else 'along'} {_along(along[worst], half, names)}"
     raise DataError(
-        f"J {bent} along {_along(along[worst], half, names)}{where} (curvature {bends[worst]:.3g}, standard error "
-        f"{doubt[worst]:.2g}): there is no {'maximum' if maximize else 'minimum'}; widen the range of theta or repeat "
-        "more often"
+        f"J {bent} {way}{where} (curvature {bends[worst]:.3g}, standard error {doubt[worst]:.2g}): there is no {end}; "
+        "widen the range of theta or repeat more often"
     )
 
 
@@ -231,7 +207,7 @@ def narrowed(
     if richer is None:
         return narrow, kept, noise
     free = (float((y - richer[0]) @ (y - richer[0])) / richer[1], richer[1])
-    scale = 1.0 if x.shape[1] == 1 else _scaled(x)[2]
+    scale = _scaled(x)[2]
     best = x[np.argmax(richer[0] if maximize else -richer[0])]
     while not _fits(x[kept], y[kept], narrow, free):
         noise = free
@@ -242,7 +218,7 @@ def narrowed(
         points = fewest(x.shape[1])
         if len(at) <= points or np.count_nonzero(fewer) < points + 2:
             break
-        if x.shape[1] > 1 and _unseen(x[fewer], _numbered(x)) is not None:
+        if _unseen(x[fewer], _numbered(x)) is not None:
             break
         kept = fewer
         narrow = fit(x[kept], y[kept], f" in {span_of(x[kept])}, over the whole of it J is not a parabola")

@@ -16,8 +16,8 @@ from mgdd.optimize.dither_seekers import ExtremumSeeking
 from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
 from mgdd.optimize.inputs import inputs_of, named_values
 from mgdd.optimize.optimum import limits_of
-from mgdd.optimize.tuning_inputs import check_several, hessian_of, numbered, per_input, single
-from mgdd.optimize.tuning_several import coupling_of, tune_several
+from mgdd.optimize.tuning_forms import coupling_of, tuned
+from mgdd.optimize.tuning_inputs import check_wish, hessian_of, of_each, per_input
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -364,16 +364,13 @@ def tune(
         "delay_uncertainty": delay_uncertainty,
         "cycles": cycles,
     }
-    found: Mapping[str, Any]
-    if np.ndim(hessian):
-        check_several(noise_sd, method, delay_uncertainty, cycles)
-        each = {name: per_input(name, value, len(hessian), names) for name, value in lengths.items()}
-        found = tune_several(noise_sd, hessian, names or numbered(len(hessian)), lengths=each, **how)
-    else:
-        one: dict[str, Any] = {name: single(name, value) for name, value in lengths.items()}
-        found = _core.optimize.tune(noise_sd=noise_sd, curvature=hessian, **one, **how)
-    values: dict[str, Any] = dict(found)
-    values["reasons"] = tuple(values["reasons"])
+    check_wish(noise_sd, method, delay_uncertainty, cycles)
+    several, of = np.ndim(hessian) > 0, of_each(np.atleast_2d(hessian), names)
+    each = {name: per_input(name, value, of) for name, value in lengths.items()}
+    values = tuned(noise_sd, np.atleast_2d(hessian), of, lengths=each, **how)
+    if not several:
+        del values["harmonics"]
+        values = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in values.items()}
     return Tuning(
         **values,
         noise_sd=noise_sd,

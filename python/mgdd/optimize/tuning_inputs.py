@@ -10,12 +10,12 @@ import numpy as np
 
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.optimize.inputs import named_values
-from mgdd.optimize.tuning_several import coupling_of
+from mgdd.optimize.tuning_forms import coupling_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["check_several", "hessian_of", "numbered", "per_input", "single"]
+__all__ = ["check_wish", "hessian_of", "of_each", "per_input"]
 
 _METHODS = ("batch", "moving_average", "spsa")
 _MOST_INPUTS = 8
@@ -39,11 +39,11 @@ def hessian_of(curvature: Any, inputs: Sequence[str]) -> tuple[Any, tuple[str, .
         )
     if names and len(names) != count:
         raise ShapeError(f"inputs has {len(names)} entries: must have {count}, one per input of curvature")
-    if not found.ndim:
-        return float(found), names
-    for value in np.ravel(found if found.ndim == 1 else np.diag(found)):
+    for value in np.ravel(found if found.ndim < 2 else np.diag(found)):
         if not (math.isfinite(value) and value != 0.0):
             raise ParameterError.of("|curvature|", abs(value), "> 0; measure J at three points per input or more")
+    if not found.ndim:
+        return float(found), names
     if found.ndim == 1:
         return np.diag(-np.abs(found)), names
     if not np.isfinite(found).all() or not np.allclose(found, found.T, rtol=1e-6, atol=0.0):
@@ -57,35 +57,30 @@ def hessian_of(curvature: Any, inputs: Sequence[str]) -> tuple[Any, tuple[str, .
     return found, names
 
 
-def numbered(count: int) -> tuple[str, ...]:
-    """Name inputs that have no names."""
-    return tuple(f"input {place}" for place in range(count))
+def of_each(hessian: NDArray[np.float64], names: Sequence[str]) -> tuple[str, ...]:
+    """Write of which input a number is; nothing where there is one without a name."""
+    if len(hessian) == 1 and not names:
+        return ("",)
+    return tuple(f" of {name}" for name in names or (f"input {place}" for place in range(len(hessian))))
 
 
-def single(name: str, value: Any) -> float | None:
-    """Read a number of the specification for one input."""
+def per_input(name: str, value: Any, of: Sequence[str]) -> NDArray[np.float64] | None:
+    """Read numbers of the specification, one per input."""
     if value is None:
         return None
-    if np.size(value) != 1:
-        raise ShapeError(f"{name} has {np.size(value)} entries: must be one number, as curvature")
-    return float(np.ravel(value)[0])
-
-
-def per_input(name: str, value: Any, count: int, names: Sequence[str]) -> NDArray[np.float64] | None:
-    """Read numbers of the specification for several inputs."""
-    if value is None:
-        return None
-    numbers = np.asarray(value, dtype=np.float64)
-    if numbers.shape != (count,):
+    numbers, count = np.asarray(value, dtype=np.float64), len(of)
+    if count == 1 and numbers.size != 1:
+        raise ShapeError(f"{name} has {numbers.size} entries: must be one number, as curvature")
+    if count > 1 and numbers.shape != (count,):
         raise ShapeError(f"{name} has shape {numbers.shape}: must be ({count},), one number per input in its unit")
-    for own, number in zip(names or numbered(count), numbers, strict=True):
+    for which, number in zip(of, numbers.ravel(), strict=True):
         if not (number > 0.0 and math.isfinite(number)):
-            raise ParameterError.of(f"{name} of {own}", number, "> 0")
-    return numbers
+            raise ParameterError.of(f"{name}{which}", number, "> 0")
+    return numbers.ravel()
 
 
-def check_several(noise_sd: float, method: str, delay_uncertainty: float | None, cycles: float | None) -> None:
-    """Refuse what the core refuses for one input."""
+def check_wish(noise_sd: float, method: str, delay_uncertainty: float | None, cycles: float | None) -> None:
+    """Refuse what is not per input."""
     if method not in _METHODS:
         raise ParameterError.of("method", method, f"one of {', '.join(_METHODS)}")
     if not (noise_sd > 0.0 and math.isfinite(noise_sd)):

@@ -8,7 +8,6 @@
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
-#include "mgdd/optimize/seekers/tuner.hpp"
 #include "support/names.hpp"
 
 namespace mgdd::optimize {
@@ -103,7 +102,7 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
   EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max[0], 1.2);
 }
 
-TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
+TEST(OptimizeNumbers, DefaultsOfLearning) {
   const LearningSettings l;
   EXPECT_EQ(l.law, LearningLaw::p);
   EXPECT_EQ(l.lower, -unlimited);
@@ -122,14 +121,6 @@ TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
   EXPECT_EQ(law.relative_degree(), 2u);
   EXPECT_EQ(law.samples(), 18u);
   EXPECT_EQ(law.taps(), std::vector<double>{0.5 / 0.4});
-  const TuningSpec w;
-  EXPECT_EQ(w.method, TunedMethod::batch);
-  EXPECT_TRUE(w.compensated);
-  for (const double needed : {w.noise_sd, w.curvature})
-    EXPECT_TRUE(std::isnan(needed));
-  for (const std::optional<double> open :
-       {w.delay_uncertainty, w.rms, w.cycles, w.distance, w.arrival, w.amplitude_max})
-    EXPECT_FALSE(open.has_value());
 }
 
 TEST(OptimizeNumbers, NamesOfTheOptions) {
@@ -140,8 +131,6 @@ TEST(OptimizeNumbers, NamesOfTheOptions) {
   test::expect_names<GainSchedule>({{GainSchedule::decreasing, "decreasing"}, {GainSchedule::constant, "constant"}});
   test::expect_names<LimitMethod>(
       {{LimitMethod::switching, "switching"}, {LimitMethod::penalty, "penalty"}, {LimitMethod::barrier, "barrier"}});
-  test::expect_names<TunedMethod>(
-      {{TunedMethod::batch, "batch"}, {TunedMethod::moving_average, "moving_average"}, {TunedMethod::spsa, "spsa"}});
   test::expect_names<LearningLaw>({{LearningLaw::p, "p"},
                                    {LearningLaw::d, "d"},
                                    {LearningLaw::pd, "pd"},

@@ -1,7 +1,7 @@
-"""The tuner's closed forms for several inputs: harmonics that do not mix, and the scatter of coupled estimates.
+"""The tuner's closed forms: harmonics that do not mix, and the scatter of coupled estimates.
 
-For one input they are those of `_core.optimize.tune`. Below, z is the error of the estimate, each input in units of
-1/sqrt(abs(J'')), so that the Hessian has ones on its diagonal.
+Below, z is the error of the estimate, each input in units of 1/sqrt(abs(J'')), so that the Hessian has ones on its
+diagonal.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["coupling_of", "harmonics_of", "spsa_moments", "tune_several"]
+__all__ = ["coupling_of", "harmonics_of", "spsa_moments", "tuned"]
 
 _RMS, _DISTANCE, _ARRIVAL, _AMPLITUDE_MAX = 0.2, 5.0, 0.45, 1.8  # of sqrt(noise_sd/abs(J''))
 _CYCLES = 50.0
@@ -72,10 +72,10 @@ def _apart(harmonics: tuple[int, ...], period: int) -> bool:
     return not own & ({f % period for f in mixed} | {-f % period for f in mixed})
 
 
-def tune_several(
+def tuned(
     noise_sd: float,
     hessian: Array,
-    names: tuple[str, ...],
+    of: tuple[str, ...],
     *,
     method: str,
     delay_cycles: float,
@@ -85,16 +85,19 @@ def tune_several(
     cycles: float | None,
     lengths: Mapping[str, Array | None],
 ) -> dict[str, Any]:
-    """Choose settings; `lengths` holds rms, distance, arrival and amplitude_max, each per input or None."""
+    """Choose settings; `lengths` holds rms, distance, arrival and amplitude_max, each per input or None.
+
+    `of` is what a message writes behind the name of a number, per input.
+    """
     own = 1.0 / np.sqrt(np.abs(np.diag(hessian)))  # units of z
     length = math.sqrt(noise_sd) * own
     shares = {"rms": _RMS, "distance": _DISTANCE, "arrival": _ARRIVAL, "amplitude_max": _AMPLITUDE_MAX}
     spec = {
         name: (share * length if (given := lengths[name]) is None else given) / own for name, share in shares.items()
     }
-    for name, arrival, distance in zip(names, spec["arrival"] * own, spec["distance"] * own, strict=True):
+    for which, arrival, distance in zip(of, spec["arrival"] * own, spec["distance"] * own, strict=True):
         if not arrival < distance:
-            raise ParameterError.of(f"arrival of {name}", arrival, f"below distance = {distance:g}")
+            raise ParameterError.of(f"arrival{which}", arrival, f"below distance = {distance:g}")
     lag = _core.optimize.ComponentLag(delay_cycles=delay_cycles, lag_cycles=lag_cycles)
     whole = delay_cycles + lag_cycles
     if delay_uncertainty is None:
@@ -119,7 +122,7 @@ def tune_several(
         )
     for i in np.flatnonzero(out["rms"] > spec["rms"] * (1.0 + 1e-6)):
         reasons.append(
-            f"rms of {names[i]} = {spec['rms'][i] * own[i]:.4g} is out of reach with amplitude_max = "
+            f"rms{of[i]} = {spec['rms'][i] * own[i]:.4g} is out of reach with amplitude_max = "
             f"{spec['amplitude_max'][i] * own[i]:.4g}: expect {out['rms'][i] * own[i]:.4g}; an amplitude of "
             f"{out['amplitude'][i] * out['rms'][i] / spec['rms'][i] * own[i]:.4g} would do"
         )
@@ -253,6 +256,7 @@ def _spsa(
     out = {
         "amplitude": c,
         "period": 2,
+        "harmonics": None,
         "gain": np.full(count, q),
         "rate": np.maximum(2.0 * c, 1.2 * q * float(c @ spec["distance"]) / c),
         "time_constant_cycles": time_constant,
