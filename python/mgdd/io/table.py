@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import re
 from abc import ABC, abstractmethod
@@ -14,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument, did_you_mean
-from mgdd.io.column_names import bare_unit, spelled_unit
+from mgdd.io.column_names import bare_unit
 from mgdd.io.files import existing_file, read_plain_text
 from mgdd.io.row_text import Rows, cells_of, parse_number
+from mgdd.io.table_head import first_row_of, names_and_units, separator_of, units_filled
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
@@ -32,17 +32,12 @@ __all__ = [
     "parse_number",
     "read_table",
     "require_width",
-    "spells_units",
     "text_table",
 ]
 
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _NARROW = 4  # columns
 _SHOWN = 12  # names of columns in a message
-_ROWS = 4  # of one width, one below the other, are data
-_HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
-_RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh
-_COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
 
 
 @dataclass(frozen=True)
@@ -275,9 +270,9 @@ def text_table(
     content = Rows.of(text)
     if not len(content):
         raise DataError(f"{source}: the file is empty: rows of numbers are needed")
-    start = _first_row(content, delimiter, decimal) if units_row else 1  # tables of ours have one line of names
+    start = first_row_of(content, delimiter, decimal) if units_row else 1  # tables of ours have one line of names
     shown = content[min(start, len(content) - 1) if units_row else 0][1]
-    mark = delimiter if delimiter is not None else _detect(shown, decimal)
+    mark = delimiter if delimiter is not None else separator_of(shown, decimal)
     if mark == "\t" and delimiter is None:
         content = content.without_outer_tabs(start)
     above, body = list(content.part(0, start)), content.part(start)
@@ -287,8 +282,8 @@ def text_table(
     width = int(body.part(0, 1).cell_counts(mark)[0]) if len(body) else len(heads[0])
     require_width(source, body, mark, width, body[0][0] if len(body) else 0)
     _check_commas(source, above, heads, body, mark)
-    heads = _units_filled(source, content, heads, mark, width)
-    header, units = _names_and_units(heads, width)
+    heads = units_filled(source, content, heads, mark, width)
+    header, units = names_and_units(heads, width)
     return TextTable(source, header, units, decimal, mark, body)
 
 
@@ -329,121 +324,3 @@ def _check_commas(
             f"{source}, line {lines[-1][0]}: {names} columns, and the rows have {len(cells)} cells: commas are "
             "separators and decimal marks as well: write the file with another separator"
         )
-
-
-def _first_row(content: Rows, delimiter: str | None, decimal: str) -> int:
-    """Return where the rows of numbers begin: names, units, remarks and the lines of a preamble stand above them."""
-
-    def mark_of(text: str) -> str | None:
-        return delimiter if delimiter is not None else _detect(text, decimal)
-
-    def said(text: str, mark: str | None) -> tuple[str, ...]:
-        cells = cells_of(text, mark)  # without the empty ones that a spreadsheet adds
-        return cells[: max((k + 1 for k, cell in enumerate(cells) if cell), default=1)]
-
-    last_head: int | None = None
-    for at, (_, text) in enumerate(content):
-        mark = mark_of(text)
-        cells = said(text, mark)
-        if _is_head(cells):
-            continue
-        if _like_number(cells[0]) or (not cells[0] and all(_like_number(cell) for cell in cells if cell)):
-            return at  # one of another width is refused by its line
-        if last_head is None:
-            later = ((k, content[k][1]) for k in range(len(content) - 1, at, -1))
-            last_head = next((k for k, row in later if _is_head(said(row, mark_of(row)))), at)
-        if at >= last_head:
-            return at
-        above = said(content[at - 1][1], mark) if at else ()
-        named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
-        below = [said(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
-        if named and all(len(one) == len(cells) and one[0] != _HEADER_ENDS for one in below):
-            return at
-    return len(content)
-
-
-def _names_and_units(
-    heads: Sequence[tuple[str, ...]], width: int
-) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None]:
-    """Choose the lines above the rows that name the columns and their units; the others are remarks."""
-    whole = [cells[:-1] if cells[-1] == "Comment" and len(cells) > width else cells for cells in heads]  # of LabVIEW
-    wide = [cells for cells in whole if len(cells) == width or (len(cells) > width and cells[0] == "X_Value")]
-    aligned = [cells[len(cells) - width :] for cells in wide]
-    # A remark that a spreadsheet made as wide has empty cells instead of names.
-    named = [row for row in aligned if 2 * sum(map(bool, row)) > width or spells_units(row)] or aligned[-1:]
-    rows = [at for at, cells in enumerate(named) if at and spells_units(cells)]
-    if rows:
-        return named[rows[-1] - 1], named[rows[-1]]
-    if len(heads) == len(named) == 2:
-        return named[0], named[1]
-    return (named[-1] if named else None), None
-
-
-def _units_filled(
-    source: str, content: Rows, heads: Sequence[tuple[str, ...]], mark: str | None, width: int
-) -> list[tuple[str, ...]]:
-    """Give a row of units below the names an empty cell for each column without one, also where blanks separate."""
-    made = list(heads)
-    for at in range(1, len(heads)):
-        cells = heads[at]
-        if not (len(heads[at - 1]) == width > len(cells) and spells_units(cells)):
-            continue
-        found = (
-            (*cells, *("",) * (width - len(cells)))
-            if mark is not None
-            else _below(content.whole_line(at - 1), content.whole_line(at), width)
-        )
-        if found is None:
-            raise DataError(
-                f"{source}, line {content.line[at]}: {len(cells)} units below {width} names, and blanks do not tell "
-                "which column has none: write - for its unit"
-            )
-        made[at] = found
-    return made
-
-
-def _below(names: str, units: str, width: int) -> tuple[str, ...] | None:
-    """Give the unit below each name where one blank separates cells, or where columns are aligned at one side."""
-    cells = units.split(" ")
-    if len(cells) == len(names.split(" ")) == width:
-        return tuple(cells)
-    places = [(word.start(), word.end()) for word in re.finditer(r"\S+", names)]
-    out = [""] * width
-    for word in re.finditer(r"\S+", units):
-        own = [at for at, (start, end) in enumerate(places) if word.start() == start or word.end() == end]
-        if len(own) != 1:
-            return None
-        out[own[0]] = word[0]
-    return tuple(out)
-
-
-def spells_units(cells: Sequence[str]) -> bool:
-    """Return whether a row holds units, and nothing else that is not empty."""
-    texts = [bare_unit(cell) for cell in cells]
-    known = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
-    bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
-    return (bool(known) and all(known)) or (bool(bracketed) and all(bracketed))
-
-
-def _is_head(cells: tuple[str, ...]) -> bool:
-    """Return whether a row holds names: no numbers, or behind a first name nothing but a count of columns."""
-    if not any(_like_number(cell) for cell in cells):
-        return True
-    counted = [int(cell) for cell in cells[1:] if _COUNT.fullmatch(cell)]
-    others = [cell for cell in cells[1:] if cell and not _COUNT.fullmatch(cell)]
-    counts_up = all(b - a == 1 for a, b in itertools.pairwise(counted)) and (not counted or not others)
-    return not _like_number(cells[0]) and counts_up and all(parse_number(cell) is None for cell in others)
-
-
-def _like_number(cell: str) -> bool:
-    """Return whether a cell holds data, even misspelt, and not a name or unit: a header must not swallow a row."""
-    if re.fullmatch(r"1/[^\W\d]+", cell):  # 1/min
-        return False
-    return parse_number(cell) is not None or re.match(r"[+-]?[.,]?\d", cell) is not None
-
-
-def _detect(line: str, decimal: str) -> str | None:
-    for mark in (";", "\t", ","):
-        if mark in line and mark != decimal:
-            return mark
-    return None
