@@ -67,16 +67,16 @@ def test_a_replay_of_frames_says_where_a_command_differs() -> None:
 
 def test_a_run_in_real_time_is_replayed_from_its_file(tmp_path: Path) -> None:
     """Frames through the checks, and measurements as they were: both from one record."""
-    patient = tmp_path / "patient.toml"  # a node that does not let go when this machine stops for a moment
+    file = tmp_path / "patient.toml"  # neither node nor host lets go when this machine stops for a moment
     (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
     text = ETB.file.read_text(encoding="utf-8").replace("timeout_ms = 20", "timeout_ms = 20000")
-    patient.write_text(text, encoding="utf-8")
-    file = tmp_path / "run.rec"
-    with Recorder(file) as recorder, node("record", step=False, signal_map=SignalMap.load(patient)):
-        live = rig_on("record", on_frame=recorder.frame)
+    file.write_text(text, encoding="utf-8")
+    patient, file = SignalMap.load(file), tmp_path / "run.rec"
+    with Recorder(file) as recorder, node("record", step=False, signal_map=patient):
+        live = rig_on("record", signal_map=patient, on_frame=recorder.frame)
         with RecordingRig(live, lambda row: recorder.sample("rig", row)) as rig:
             measured = [dict(live.values) for live in answers(rig, DUTIES)]
-    with CanRig(ETB, ReplayBus.read(file, ETB), mode="replay") as again:
+    with CanRig(patient, ReplayBus.read(file, patient), mode="replay") as again:
         np.testing.assert_equal([dict(m.values) for m in answers(again, DUTIES)], measured)
     with ReplayRig(RigRecord.read(file)) as again:
         np.testing.assert_equal([dict(m.values) for m in answers(again, DUTIES)], measured)

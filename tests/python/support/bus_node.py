@@ -38,8 +38,8 @@ def node(channel: str, *, step: bool = True, signal_map: SignalMap = ETB, seed: 
             serving.join()
 
 
-def rig_on(channel: str, mode: str = "hil", **settings: object) -> CanRig:
-    return CanRig(ETB, f"virtual:{channel}", mode=mode, timeout_s=LONG_S, **settings)  # type: ignore[arg-type]
+def rig_on(channel: str, mode: str = "hil", signal_map: SignalMap = ETB, **settings: object) -> CanRig:
+    return CanRig(signal_map, f"virtual:{channel}", mode=mode, timeout_s=LONG_S, **settings)  # type: ignore[arg-type]
 
 
 def commands(spy: CanTransport) -> list[bytes]:
