@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "mgdd/optimize/seekers/seekers.hpp"
+#include "mgdd/optimize/ask_tell/seekers.hpp"
 
 namespace {
 

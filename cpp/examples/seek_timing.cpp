@@ -5,7 +5,7 @@
 #include <exception>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/laws/extremum_seeking.hpp"
 
 int main() {
   using namespace mgdd::optimize;

@@ -6,8 +6,8 @@
 #include "guarded.hpp"
 #include "mgdd/guide/feed_forward.hpp"
 #include "mgdd/guide/guided_engine.hpp"
-#include "mgdd/optimize/seekers/seeker_history.hpp"
-#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
+#include "mgdd/optimize/ask_tell/variant_seeker.hpp"
 
 namespace mgdd::bindings {
 

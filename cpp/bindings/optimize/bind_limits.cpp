@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
-#include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/laws/dither.hpp"
+#include "mgdd/optimize/limits/constraint_filter.hpp"
 #include "record_binding.hpp"
 
 namespace mgdd::bindings {

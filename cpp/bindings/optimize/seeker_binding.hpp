@@ -12,8 +12,8 @@
 #include "guarded.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/seekers/seeker_history.hpp"
-#include "mgdd/optimize/seekers/seekers.hpp"
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
+#include "mgdd/optimize/ask_tell/seekers.hpp"
 #include "optimize/seeker_inputs.hpp"
 
 namespace mgdd::bindings {

@@ -9,8 +9,8 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/ask_tell/seeker.hpp"
+#include "mgdd/optimize/limits/constraint_filter.hpp"
 #include "record_binding.hpp"
 
 namespace mgdd::bindings {

@@ -6,7 +6,7 @@
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/optimize/reading.hpp"
+#include "mgdd/optimize/ask_tell/reading.hpp"
 
 namespace mgdd::guide {
 namespace {

@@ -240,7 +240,7 @@ void CurveFilter::weigh() noexcept {
     return std::log(slow * likely(d * common) + (1.0 - slow) * likely(d * common + 1));
   };
   double sum = 0.0;
-  std::array<double, assumptions.size()> own;
+  std::array<double, assumptions.size()> own{};
   for (std::size_t a = 0; a < own.size(); ++a) {
     const std::size_t bank = a < common ? leader() * common + a : shared() + a - common;
     own[a] = assumption_weights_[a] + assumption_change * (assumptions[a].prior - assumption_weights_[a]);

@@ -6,8 +6,8 @@
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/reading.hpp"
-#include "mgdd/optimize/seekers/inputs.hpp"
+#include "mgdd/optimize/ask_tell/inputs.hpp"
+#include "mgdd/optimize/ask_tell/reading.hpp"
 
 namespace mgdd::loop {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "mgdd/optimize/ask_tell/variant_seeker.hpp"
 #include "support/guided_case.hpp"
 
 namespace mgdd::guide {

@@ -7,7 +7,7 @@
 #include "mgdd/guide/feed_forward.hpp"
 #include "mgdd/guide/model_optimum.hpp"
 #include "mgdd/loop/engine_loop.hpp"
-#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "mgdd/optimize/ask_tell/variant_seeker.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::guide {

@@ -11,7 +11,7 @@
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/online_calibration.hpp"
-#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/laws/extremum_seeking.hpp"
 #include "support/calibration_case.hpp"
 #include "support/no_alloc.hpp"
 

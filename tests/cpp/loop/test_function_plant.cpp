@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mgdd/loop/run_loop.hpp"
-#include "mgdd/optimize/seekers/seeker_history.hpp"
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::loop {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "mgdd/optimize/seekers/failure_watch.hpp"
+#include "mgdd/optimize/watch/failure_watch.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {

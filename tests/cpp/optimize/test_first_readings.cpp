@@ -1,5 +1,5 @@
 // Gains that a seeker makes of its first readings: the same path in every unit of J, and sense on any curvature.
-#include "mgdd/optimize/seekers/first_readings.hpp"
+#include "mgdd/optimize/watch/first_readings.hpp"
 
 #include <optional>
 

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "support/coupled_map.hpp"
 
 namespace mgdd::optimize {

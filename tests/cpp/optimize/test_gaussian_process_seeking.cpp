@@ -7,7 +7,7 @@
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "support/coupled_map.hpp"
 #include "support/no_alloc.hpp"
 

@@ -1,5 +1,5 @@
 // A lag taken out of readings: exact without noise, and with it better than the lag inverted cycle by cycle.
-#include "mgdd/optimize/seekers/lag_window.hpp"
+#include "mgdd/optimize/watch/lag_window.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // limits that contradict each other, and what a seeker says of them.
 #include <deque>
 
-#include "mgdd/optimize/seekers/seeker_history.hpp"
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {

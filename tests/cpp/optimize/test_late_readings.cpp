@@ -2,7 +2,7 @@
 #include <cmath>
 #include <vector>
 
-#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 #include "support/coupled_map.hpp"
 #include "support/seeker_case.hpp"
 

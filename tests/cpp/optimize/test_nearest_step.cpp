@@ -1,6 +1,6 @@
 // The nearest step: the variational inequality that defines a projection, limits that contradict each other, and no
 // allocation.
-#include "mgdd/optimize/seekers/nearest_step.hpp"
+#include "mgdd/optimize/limits/nearest_step.hpp"
 
 #include <Eigen/Cholesky>
 

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
+#include "mgdd/optimize/ask_tell/seekers.hpp"
 #include "mgdd/optimize/learning/iterative_learning.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
-#include "mgdd/optimize/seekers/seekers.hpp"
 #include "support/names.hpp"
 
 namespace mgdd::optimize {

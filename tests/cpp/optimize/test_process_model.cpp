@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/seekers/process_model.hpp"
+#include "mgdd/optimize/belief/process_model.hpp"
 
 namespace mgdd::optimize {
 namespace {

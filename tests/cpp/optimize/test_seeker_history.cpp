@@ -1,5 +1,5 @@
 // The history of a seeker: rows as they were told, back from its columns bit for bit, refused as a whole.
-#include "mgdd/optimize/seekers/seeker_history.hpp"
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
 
 #include <gtest/gtest.h>
 

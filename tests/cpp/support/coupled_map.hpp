@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/seekers/gaussian_process_seeking.hpp"
+#include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
 
 namespace mgdd::optimize {
 

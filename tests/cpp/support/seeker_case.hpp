@@ -17,7 +17,7 @@
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/seekers/seekers.hpp"
+#include "mgdd/optimize/ask_tell/seekers.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::optimize {

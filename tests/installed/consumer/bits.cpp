@@ -6,9 +6,9 @@
 #include <cstring>
 
 #include "mgdd/common/platform.hpp"
+#include "mgdd/optimize/laws/extremum_seeking.hpp"
+#include "mgdd/optimize/laws/spsa.hpp"
 #include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
-#include "mgdd/optimize/seekers/extremum_seeking.hpp"
-#include "mgdd/optimize/seekers/spsa.hpp"
 #include "mgdd/throttle/models/pw_r.hpp"
 #include "mgdd/throttle/plant.hpp"
 

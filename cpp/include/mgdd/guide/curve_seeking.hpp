@@ -20,9 +20,9 @@
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/curve_filter.hpp"
 #include "mgdd/guide/limit_curves.hpp"
-#include "mgdd/optimize/seekers/dither.hpp"
-#include "mgdd/optimize/seekers/extremum_seeking.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/ask_tell/seeker.hpp"
+#include "mgdd/optimize/laws/dither.hpp"
+#include "mgdd/optimize/laws/extremum_seeking.hpp"
 
 namespace mgdd::guide {
 

@@ -15,7 +15,7 @@
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/guide_path.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/ask_tell/seeker.hpp"
 
 namespace mgdd::guide {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "mgdd/guide/trust.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
-#include "mgdd/optimize/seekers/seeker.hpp"
+#include "mgdd/optimize/ask_tell/seeker.hpp"
+#include "mgdd/optimize/limits/constraint_filter.hpp"
 
 namespace mgdd::guide {
 

@@ -19,7 +19,7 @@
 #include "mgdd/guide/feed_forward.hpp"
 #include "mgdd/guide/model_optimum.hpp"
 #include "mgdd/guide/online_calibration.hpp"
-#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "mgdd/optimize/ask_tell/variant_seeker.hpp"
 
 namespace mgdd::guide {
 

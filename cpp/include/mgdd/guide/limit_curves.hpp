@@ -14,8 +14,8 @@
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
-#include "mgdd/optimize/seekers/causing_inputs.hpp"
-#include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/limits/constraint_filter.hpp"
+#include "mgdd/optimize/watch/causing_inputs.hpp"
 
 namespace mgdd::guide {
 

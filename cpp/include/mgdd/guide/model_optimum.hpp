@@ -17,7 +17,7 @@
 #include "mgdd/engine/performance.hpp"
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/guide_path.hpp"
-#include "mgdd/optimize/seekers/gradient_descent.hpp"
+#include "mgdd/optimize/laws/gradient_descent.hpp"
 
 namespace mgdd::guide {
 

@@ -18,7 +18,7 @@
 #include "mgdd/guide/correlated_step.hpp"
 #include "mgdd/guide/cycle_window.hpp"
 #include "mgdd/guide/online_calibration_settings.hpp"
-#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/laws/extremum_seeking.hpp"
 
 namespace mgdd::guide {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mgdd/guide/feed_forward.hpp"
-#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "mgdd/optimize/ask_tell/variant_seeker.hpp"
 
 namespace mgdd::guide {
 

@@ -11,7 +11,7 @@
 #include <optional>
 #include <string_view>
 
-#include "mgdd/optimize/seekers/local_model.hpp"
+#include "mgdd/optimize/belief/local_model.hpp"
 
 namespace mgdd::guide {
 

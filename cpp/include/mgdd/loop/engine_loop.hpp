@@ -17,7 +17,7 @@
 #include "mgdd/guide/curve_seeking.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 #include "mgdd/loop/function_plant.hpp"
-#include "mgdd/optimize/seekers/seekers.hpp"
+#include "mgdd/optimize/ask_tell/seekers.hpp"
 
 namespace mgdd::loop {
 

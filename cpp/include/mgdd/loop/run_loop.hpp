@@ -8,7 +8,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/loop/engine_loop.hpp"
-#include "mgdd/optimize/seekers/seeker_history.hpp"
+#include "mgdd/optimize/ask_tell/seeker_history.hpp"
 
 namespace mgdd::loop {
 

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "mgdd/common/state.hpp"
+#include "mgdd/optimize/ask_tell/reading.hpp"
 #include "mgdd/optimize/learning/learning_convergence.hpp"
 #include "mgdd/optimize/learning/learning_law.hpp"
-#include "mgdd/optimize/reading.hpp"
 
 namespace mgdd::optimize {
 
