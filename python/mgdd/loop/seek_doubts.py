@@ -27,8 +27,8 @@ _PER_INPUT = 10  # cycles; the estimate is near after 7 to 10 in the median, doc
 _MOVES, _EDGE = 0.1, 0.01  # shares of the bounds
 _SURE = 2.0  # standard deviations
 _BLOCKS, _FEWEST = 6, 60  # of the last half, where a move that goes on shows; cycles
-# Standard deviations of the steps between blocks, and of the slope that turns with time; share of the bounds.
-_GOES_ON, _TURNS, _FAR = 2.2, 3.0, 0.05  # one jump in the second block or later has 1.0 to 1.7 of the first
+# Standard deviations of the steps between blocks; share of the bounds.
+_GOES_ON, _FAR = 2.2, 0.05  # one jump in the second block or later has 1.0 to 1.7 of the first
 _TRUSTED = 0.5
 _PER_DOUBT = 200  # cycles; maps that stand still make a seeker doubt once in them in 15 of 100 runs, never twice
 
@@ -88,14 +88,15 @@ class Readings:
         k = (known - known.mean()) / cycles
         for i in range(names):
             mean, sd = float(steps[:, i].mean()), float(np.std(steps[:, i], ddof=1)) / math.sqrt(len(steps))
-            if abs(mean) <= _GOES_ON * sd or abs(mean) * cycles / 2 <= _FAR * self.width[i]:
+            slower = 2.0 * abs(steps[-2:, i].mean()) < abs(steps[:2, i].mean())  # as towards a best that stands still
+            if slower or abs(mean) <= _GOES_ON * sd or abs(mean) * cycles / 2 <= _FAR * self.width[i]:
                 continue
             terms = np.column_stack([np.ones_like(k), k, k**2, u, u**2, k * u[:, i]])
             fit, left, rank, _ = np.linalg.lstsq(terms, self.j[known], rcond=None)
             if rank < terms.shape[1] or len(known) <= rank:
                 continue
             turn = math.sqrt(float(left[0]) / (len(known) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
-            if math.copysign(1.0 if maximize else -1.0, mean) * float(fit[-1]) > _TURNS * turn:
+            if math.copysign(1.0 if maximize else -1.0, mean) * float(fit[-1]) > _SURE * turn:
                 out[i] = Mean(mean, sd)
         return out
 
