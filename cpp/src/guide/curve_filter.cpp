@@ -26,7 +26,7 @@ constexpr double slow_level = 0.2;  // of a lag: behind a slow sensor a level mo
 struct Assumption {
   double memory_share, drift, slope, prior, velocity;
 };
-constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.8, 0.0},
+constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.75, 0.0},
                                                  {1.0, 0.5, 0.0, 0.06, 0.0},
                                                  {0.25, 0.01, 0.1, 0.1, 0.0},
                                                  {0.1, 0.05, 0.0, 0.04, 0.0},
