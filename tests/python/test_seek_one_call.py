@@ -214,6 +214,30 @@ def test_a_doubtful_result_is_doubted_aloud(code: str, settings: dict[str, Any],
     assert doubted.text in found.dataset.attrs["findings"]
 
 
+def moving(seeker: str, seed: int, velocity: float = 0.0, jump: float = 0.0, top: float = 5.0) -> list[str]:
+    """Give what is said of a moving best by a search of -0.03 (u - best)^2 on bounds of 40, noise 0.3."""
+    noise, cycle = np.random.default_rng(seed), iter(range(240))
+
+    def plant(x: dict[str, float]) -> float:
+        k = next(cycle)
+        best = top - 120.0 * velocity + velocity * k + (jump if k >= 130 else 0.0)
+        return float(-0.03 * (x["u"] - best) ** 2 + 0.3 * noise.normal())
+
+    found = seek(plant, {"u": (-20.0, 20.0)}, seeker=seeker, cycles=240, start={"u": -10.0})
+    return [each.text for each in found.findings if each.code == "moving"]
+
+
+@pytest.mark.parametrize("seeker", ["curve_seeking", "spsa", "gradient_descent"])
+def test_a_best_that_moves_all_the_time_is_said_with_its_velocity(seeker: str) -> None:
+    for velocity in (0.06, -0.06):
+        said = [text for seed in range(4) for text in moving(seeker, seed, velocity)]
+        assert len(said) >= 2
+        speeds = [float(text.split("by ")[1].split(" ±")[0]) for text in said]
+        assert np.median(speeds) == pytest.approx(100.0 * velocity, rel=0.5)
+    still = [moving(seeker, 0), moving(seeker, 1, top=14.0), moving(seeker, 2, jump=6.0), moving(seeker, 3, jump=-6.0)]
+    assert still == [[]] * 4
+
+
 def test_a_good_result_is_not_doubted() -> None:
     doubted = [seek(engine(seed=s), TWO, start={"soc_cad": 8.0, "egr": 0.3}, seed=s).findings for s in range(8)]
     assert sum(not each for each in doubted) >= 7

@@ -44,6 +44,7 @@ void CurveBank::restart(const Prior& prior) noexcept {
   count_ = count_squared_ = weight_ = rest_ = level_variance_ = level_j_ = slope_j_ = 0.0;
   covariance_ = slope_variance_ = remembered_flat_ = 0.0;
   judged_ = 0;
+  phase_ = 0.0;
   remembered_.fill(0.0);
   for (Column* column : {&level_, &slope_, &bend_, &cross_})
     column->setZero();
@@ -60,7 +61,40 @@ double CurveBank::own_weight(const Prior& prior, const Column& drops) const noex
   return noise_variance_ / (noise_variance_ + error * error);
 }
 
-void CurveBank::add(const Prior& prior, const Column& drops, double j, double heard) noexcept {
+// Beyond half a step every place is taken for its neighbour: hypotheses keep their sums, none is interpolated.
+void CurveBank::move(const Prior& prior) noexcept {
+  phase_ += assumed_.velocity;
+  mean_ += assumed_.velocity * prior.step;
+  if (!(std::abs(phase_) > 0.5)) return;
+  const std::int64_t by = phase_ > 0.0 ? 1 : -1;
+  const Eigen::Index to = phase_ > 0.0 ? 1 : 0;
+  phase_ -= static_cast<double>(by);
+  from_ = std::clamp<std::int64_t>(from_ + by, 0, places - 1);
+  to_ = std::clamp<std::int64_t>(to_ + by, from_ + 1, places);
+  for (Column* column : {&level_, &slope_, &bend_, &cross_, &share_, &own_scale_, &scale_variance_}) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      auto own = column->segment(static_cast<Eigen::Index>(s) * places, places);
+      own.segment(to, places - 1) = own.segment(1 - to, places - 1).eval();
+    }
+  }
+}
+
+// These drops of the places where they are now; `room` serves where they have moved.
+const CurveBank::Column& CurveBank::moved(const Column& drops, Column& room) const noexcept {
+  if (phase_ == 0.0) return drops;
+  const Eigen::Index to = phase_ > 0.0 ? 0 : 1;
+  room = drops;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const auto at = static_cast<Eigen::Index>(s) * places;
+    room.segment(at + to, places - 1) +=
+        std::abs(phase_) * (drops.segment(at + 1 - to, places - 1) - drops.segment(at + to, places - 1));
+  }
+  return room;
+}
+
+void CurveBank::add(const Prior& prior, const Column& unmoved, double j, double heard) noexcept {
+  Column room;
+  const Column& drops = moved(unmoved, room);
   const double own = heard * own_weight(prior, drops);
   if (count_ > 0.0) {
     advance();
@@ -113,7 +147,9 @@ double CurveBank::level_variance() const noexcept {
   return (level_variance_ + 2.0 * covariance_ + slope_variance_) / fading_ + assumed_.drift;
 }
 
-CurveBank::Foretold CurveBank::foretell(const Prior& prior, const Column& drops, double j) const noexcept {
+CurveBank::Foretold CurveBank::foretell(const Prior& prior, const Column& unmoved, double j) const noexcept {
+  Column room;
+  const Column& drops = moved(unmoved, room);
   const double base = noise_variance_ * (level_variance() + 1.0);
   const double known = level_j_ + slope_j_, off = j - known;
   double seen = 0.0, likely = 0.0, mean = 0.0, square = 0.0;
@@ -289,7 +325,7 @@ void CurveBank::judge(const Prior& prior) noexcept {
     mean += here * place;
     spread += here * place * place;
   }
-  mean_ = prior.first + mean;
+  mean_ = prior.first + mean + phase_ * prior.step;
   spread_ = std::sqrt(std::max(0.0, spread - mean * mean));
   double usual = 0.0;
   for (std::size_t k = 0; k < classes; ++k) {
@@ -299,7 +335,9 @@ void CurveBank::judge(const Prior& prior) noexcept {
   usual_spread_ = std::exp(0.5 * usual);
 }
 
-CurveBank::Prediction CurveBank::predict(const Prior& prior, const Column& drops) const noexcept {
+CurveBank::Prediction CurveBank::predict(const Prior& prior, const Column& unmoved) const noexcept {
+  Column room;
+  const Column& drops = moved(unmoved, room);
   const double level = level_variance();
   const Column away = drops - level_ - slope_;
   const Column means = own_scale_ * away;

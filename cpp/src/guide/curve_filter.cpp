@@ -21,14 +21,21 @@ constexpr double curvature_reach = 0.3;  // of the prior's sd: second difference
 constexpr double slow_level = 0.2;  // of a lag: behind a slow sensor a level moves no faster than what it shows
 
 // The first two are those of every delay: under one alone the delay whose level errs the least would be believed. The
-// others are of short memory, and stand for a place that moves.
+// next are of short memory, and stand for a place that moves somehow; the last for one that moves steadily. By its
+// velocity, in `prior_sd` per cycle, and their memory they follow a place that moves half to twice as fast.
 struct Assumption {
-  double memory_share, drift, slope, prior;
+  double memory_share, drift, slope, prior, velocity;
 };
-constexpr std::array<Assumption, 4> assumptions{
-    {{1.0, 2e-4, 0.03, 0.8}, {1.0, 0.5, 0.0, 0.06}, {0.25, 0.01, 0.1, 0.1}, {0.1, 0.05, 0.0, 0.04}}};
-constexpr double shortest_memory = 8.0;  // below it a parabola has hardly more readings than unknowns
-constexpr double refuted = 0.9;          // weight of short memory at which a long one is given up
+constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.75, 0.0},
+                                                 {1.0, 0.5, 0.0, 0.06, 0.0},
+                                                 {0.25, 0.01, 0.1, 0.1, 0.0},
+                                                 {0.1, 0.05, 0.0, 0.04, 0.0},
+                                                 {0.3, 0.003, 0.1, 0.025, 0.007},
+                                                 {0.3, 0.003, 0.1, 0.025, -0.007}}};
+constexpr std::size_t steady = 4;                // the first of these
+constexpr double steady_in_doubt = 0.1;          // of its weight: what is sudden is no steady move
+constexpr double shortest_memory = 8.0;          // below it a parabola has hardly more readings than unknowns
+constexpr double refuted = 0.9, steadier = 0.2;  // weight of short memory at which a long one is given up
 // Banks and delays of less weight than these follow the readings in turn: together they move the estimate by little.
 constexpr double little = 0.02, hardly = 0.005;
 constexpr std::int64_t in_turn = 10;
@@ -64,6 +71,8 @@ CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve
       assumption_weights_(assumptions.size()),
       leader_(settings.earlier) {
   lagged_.setZero();
+  prior_.first = settings.lower;
+  prior_.step = (settings.upper - settings.lower) / (places - 1);
   for (std::size_t d = 0; d < delays_; ++d)
     delay_weights_[d] = delay_prior(d);
   const double slowly = 1.0 / (1.0 + slow_level * settings.lag_cycles);
@@ -71,11 +80,10 @@ CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve
     const Assumption& a = assumptions[assumption_of(i)];
     const double memory =
         std::max(a.memory_share * settings.memory_cycles, std::min(shortest_memory, settings.memory_cycles));
-    banks_.emplace_back(CurveBank::Assumed{memory, slowly * slowly * a.drift, slowly * a.slope});
+    banks_.emplace_back(CurveBank::Assumed{memory, slowly * slowly * a.drift, slowly * a.slope,
+                                           std::clamp(a.velocity * settings.prior_sd / prior_.step, -0.5, 0.5)});
   }
   foretold_.resize(banks_.size());
-  prior_.first = settings.lower;
-  prior_.step = (settings.upper - settings.lower) / (places - 1);
   for (int i = 0; i < places; ++i)
     prior_.place[i] = prior_.step * i;
   prior_.scale_sd = settings.scale_sd;
@@ -147,6 +155,8 @@ void CurveFilter::pass(double input) noexcept {
   fill_drops(input, drops);
   lagged_ += (started_ ? per_lag_ : 1.0) * (drops - lagged_);  // settled before the first cycle
   if (!started_) std::fill(ring_.begin(), ring_.end(), lagged_);
+  for (std::size_t b = shared() + steady - common; b < banks_.size(); ++b)
+    banks_[b].move(prior_);
   started_ = true;
   ring_[static_cast<std::size_t>(cycles_) % ring_.size()] = lagged_;
   ++cycles_;
@@ -182,13 +192,14 @@ double CurveFilter::learn(double input, double j) noexcept {
 
 // Where short memory foretells the readings better by far, all go on from what the best of its banks knows.
 void CurveFilter::give_up_the_refuted() noexcept {
+  const double standing = assumption_weights_[0] + assumption_weights_[1];
   double anew = 0.0;
-  std::size_t best = assumptions.size() - 1;
-  for (std::size_t a = common; a < assumptions.size(); ++a) {
+  std::size_t best = common;
+  for (std::size_t a = common; a < steady; ++a) {
     anew += assumption_weights_[a];
-    if (assumption_weights_[a] > assumption_weights_[best]) best = a;
+    if (assumption_weights_[a] >= assumption_weights_[best]) best = a;
   }
-  if (anew < refuted) return;
+  if (anew < refuted * (standing + anew) || anew < steadier * (1.0 - standing - anew)) return;
   const CurveBank& known = banks_[shared() + best - common];
   for (CurveBank& bank : banks_)
     if (&bank != &known) bank.take_over(known);
@@ -289,11 +300,18 @@ void CurveFilter::mix() noexcept {
 // What is known stays: the banks of short memory begin anew with half of all weight, and the readings to come decide.
 void CurveFilter::doubt(double kept) noexcept {
   double anew = 0.0;
-  for (std::size_t a = common; a < assumptions.size(); ++a)
+  for (std::size_t a = common; a < steady; ++a)
     anew += assumptions[a].prior;
-  for (std::size_t a = 0; a < assumptions.size(); ++a)
-    assumption_weights_[a] = 0.5 * (assumption_weights_[a] + (a < common ? 0.0 : assumptions[a].prior / anew));
-  for (std::size_t b = shared(); b < banks_.size(); ++b) {
+  double sum = 0.0;
+  for (std::size_t a = 0; a < assumptions.size(); ++a) {
+    double& weight = assumption_weights_[a];
+    weight *= a < steady ? 1.0 : steady_in_doubt;
+    if (a >= common && a < steady) weight += assumptions[a].prior / anew;
+    sum += weight;
+  }
+  for (double& weight : assumption_weights_)
+    weight /= sum;
+  for (std::size_t b = shared(); b < shared() + steady - common; ++b) {
     banks_[b].fade(kept);
     banks_[b].judge(prior_);
   }

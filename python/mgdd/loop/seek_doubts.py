@@ -26,6 +26,9 @@ _NEAREST = 10  # readings that say what J and limits are at the estimate
 _PER_INPUT = 10  # cycles; the estimate is near after 7 to 10 in the median, docs/benchmarks.md
 _MOVES, _EDGE = 0.1, 0.01  # shares of the bounds
 _SURE = 2.0  # standard deviations
+_BLOCKS, _FEWEST = 6, 60  # of the last half, where a move that goes on shows; cycles
+# Standard deviations of the steps between blocks; share of the bounds.
+_GOES_ON, _FAR = 2.2, 0.05  # one jump in the second block or later has 1.0 to 1.7 of the first
 _TRUSTED = 0.5
 _PER_DOUBT = 200  # cycles; maps that stand still make a seeker doubt once in them in 15 of 100 runs, never twice
 
@@ -68,6 +71,35 @@ class Readings:
         away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[known]
         return _mean(read[known][np.argsort(away, kind="stable")[:_NEAREST]])
 
+    def velocities(self, late_cycles: float, *, maximize: bool) -> list[Mean]:
+        """Give the steady velocity of the best of every input per cycle in the last half, NaN where there is none.
+
+        One jump, or an estimate that wanders, has steps from block to block that scatter as far as their mean. One
+        that still approaches has steady ones, but then the slope of J over the input changes by the input alone.
+        """
+        late, cycles, names = round(late_cycles), self.j.size, self.width.size
+        out = [Mean(math.nan, math.nan)] * names
+        if cycles < _FEWEST:
+            return out
+        half = np.array_split(np.arange(cycles // 2, cycles), _BLOCKS)
+        steps = np.diff([self.estimates[block].mean(axis=0) for block in half], axis=0) / (len(half[0]))
+        known = np.flatnonzero(np.isfinite(self.j[max(cycles // 2, late) :])) + max(cycles // 2, late)
+        u = (self.applied[known - late] - self.applied[known - late].mean(axis=0)) / self.width
+        k = (known - known.mean()) / cycles
+        for i in range(names):
+            mean, sd = float(steps[:, i].mean()), float(np.std(steps[:, i], ddof=1)) / math.sqrt(len(steps))
+            slower = 2.0 * abs(steps[-2:, i].mean()) < abs(steps[:2, i].mean())  # as towards a best that stands still
+            if slower or abs(mean) <= _GOES_ON * sd or abs(mean) * cycles / 2 <= _FAR * self.width[i]:
+                continue
+            terms = np.column_stack([np.ones_like(k), k, k**2, u, u**2, k * u[:, i]])
+            fit, left, rank, _ = np.linalg.lstsq(terms, self.j[known], rcond=None)
+            if rank < terms.shape[1] or len(known) <= rank:
+                continue
+            turn = math.sqrt(float(left[0]) / (len(known) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
+            if math.copysign(1.0 if maximize else -1.0, mean) * float(fit[-1]) > _SURE * turn:
+                out[i] = Mean(mean, sd)
+        return out
+
     def gain(self, late_cycles: float) -> Mean:
         """Compare the mean of the last quarter with the first reading."""
         first = self.j[math.ceil(late_cycles) :]
@@ -93,14 +125,14 @@ def doubts_about(
 ) -> list[Finding]:
     """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
     return [
-        *_about_run(run, readings, asked.inputs, gain),
+        *_about_run(run, readings, asked, gain),
         *_about_limits(readings, asked, kept),
         *_about_seeker(seeker, asked, readings.j.size, seen=gain.value > _SURE * gain.sd),
     ]
 
 
-def _about_run(run: LoopRun, readings: Readings, inputs: Sequence[Input], gain: Mean) -> Iterator[Finding]:
-    cycles = readings.j.size
+def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) -> Iterator[Finding]:
+    inputs, cycles = asked.inputs, readings.j.size
     if run.interrupted:
         yield Finding(
             "interrupted", (), f"interrupted after {cycles} cycles", "seek(plant, seeker=found.seeker) goes on"
@@ -113,8 +145,13 @@ def _about_run(run: LoopRun, readings: Readings, inputs: Sequence[Input], gain: 
         yield Finding("few_cycles", (), f"{cycles} cycles of {len(inputs)} inputs are few", remedy)
     late = readings.estimates[cycles - max(cycles // 4, 1) :]
     moves = np.ptp(late, axis=0) / readings.width
-    for one, move in zip(inputs, moves, strict=True):
-        if move > _MOVES:
+    velocities = readings.velocities(asked.late_cycles, maximize=asked.maximize)
+    for one, move, velocity in zip(inputs, moves, velocities, strict=True):
+        if math.isfinite(velocity.value):
+            per = f"{100.0 * velocity.value:.3g} ± {100.0 * velocity.sd:.1g}"
+            text = f"the best {one.name} moves all the time, by {per} in 100 cycles; the estimate lags behind"
+            yield Finding("moving", (one.name,), text, "go on seeking while the plant runs, or find what moves it")
+        elif move > _MOVES:
             text = f"the estimate of {one.name} moved by {move:.0%} of its bounds over the last {len(late)} cycles"
             yield Finding("not_settled", (one.name,), text, "take more cycles; J may be flat along it")
     for one, value, width in zip(inputs, late[-1], readings.width, strict=True):

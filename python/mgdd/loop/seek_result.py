@@ -49,7 +49,7 @@ class SeekResult(Result):
     reason : str
         Why that one.
     findings : tuple of Finding
-        What speaks against the result: codes ``few_cycles``, ``not_settled``, ``at_bound``, ``no_gain``,
+        What speaks against the result: codes ``few_cycles``, ``moving``, ``not_settled``, ``at_bound``, ``no_gain``,
         ``start_unknown``, ``start_above_limit``, ``limit_broken``, ``no_reading``, ``unexplained``, ``handed_over``,
         ``untrusted_guide``, ``delay``, ``interrupted``, and those of the seeker.
     run : LoopRun

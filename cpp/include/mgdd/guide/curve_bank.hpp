@@ -30,6 +30,7 @@ class CurveBank {
     double memory_cycles = 143.0;  ///< readings fade by exp(-1/memory)
     double drift = 0.0;            ///< variance of the level's step over that of a reading, per cycle
     double slope = 0.0;            ///< standard deviation of the level's slope over that of a reading, per cycle
+    double velocity = 0.0;         ///< of the place, in steps between places per cycle, at most half of one
   };
   /// What all banks share.
   struct Prior {
@@ -57,6 +58,8 @@ class CurveBank {
 
   /// Nothing is known of J's level and of T but the prior; what was learnt of the noise stays.
   void restart(const Prior& prior) noexcept;
+  /// One cycle on, with a reading or without.
+  void move(const Prior& prior) noexcept;
   /// How likely this reading is, whose drops under every hypothesis are these. None was taken yet: not defined.
   Foretold foretell(const Prior& prior, const Column& drops, double j) const noexcept;
   /// Adds a reading to the sums alone; `heard` is its weight beside a usual one, in (0, 1].
@@ -116,6 +119,7 @@ class CurveBank {
     v("noise", self.noise_variance_);
     v("scale", self.scale_);
     v("unexplained", self.unexplained_);
+    v("phase", self.phase_);
     v("judged", self.judged_, counts_end);
   }
 
@@ -126,6 +130,7 @@ class CurveBank {
   void find_places(double total) noexcept;
   void remember() noexcept;
   double own_weight(const Prior& prior, const Column& drops) const noexcept;
+  const Column& moved(const Column& drops, Column& room) const noexcept;
 
   Assumed assumed_;
   double fading_;
@@ -138,6 +143,7 @@ class CurveBank {
   std::array<double, classes> class_variance_{}, class_share_{}, remembered_{};
   double flat_share_ = 0.0, remembered_flat_ = 0.0;
   double mean_ = 0.0, spread_ = 0.0, usual_spread_ = 0.0, noise_variance_ = 0.0, scale_ = 1.0, unexplained_ = 0.0;
+  double phase_ = 0.0;  // steps from the places as the prior has them to where they are now
   std::int64_t judged_ = 0;
   std::int64_t from_ = 0, to_ = places;  // places that the posterior looks at
 };
