@@ -36,7 +36,7 @@ struct GaussianProcessSeekingSettings {
   double memory_cycles = 143.0;            ///< in which level and place are expected to wander by what counts
   int kept = 100;                          ///< readings at most, 10 to 200
   double first_step = 0.1;                 ///< of the first readings to the side, as a share of the bounds
-  double limit_probability = 0.95;         ///< with which a limit holds at every input asked for
+  double limit_probability = 0.95;         ///< with which a limit holds at the estimate, and in forty cycles
   ComponentLag sensor{};                   ///< between the plant and J, where it has one component
   std::vector<ComponentLag> components{};  ///< the same of every component of J; empty: J is one
   int delay_uncertainty = 4;               ///< cycles by which a delay may be shorter or longer: it is learnt
@@ -55,7 +55,8 @@ inline auto fields_of(const GaussianProcessSeekingSettings&) {
       field<&S::memory_cycles>("memory_cycles", "in which level and place are expected to wander by what counts"),
       field<&S::kept>("kept", "readings at most"),
       field<&S::first_step>("first_step", "of the first readings, share of the bounds"),
-      field<&S::limit_probability>("limit_probability", "with which a limit holds at every input asked for"),
+      field<&S::limit_probability>("limit_probability",
+                                   "with which a limit holds at the estimate, and in forty cycles"),
       field<&S::sensor, &ComponentLag::delay_cycles>("delay_cycles", "between the plant and J"),
       field<&S::sensor, &ComponentLag::lag_cycles>("lag_cycles", "the same"),
       field<&S::components>("components", "delay and lag of each component of J", DefaultForm::none),
