@@ -84,6 +84,7 @@ margin_sd : float
     Added to `margin`: this many standard deviations of the reading about the local model that the seeker learns of it.
     Without any, an estimate at the limit is above it in 5 to 25 % of the cycles; with one in less than 1 %.
     Where more readings lie above than this margin lets expect, it grows by as much as five deviations more.
+    `GaussianProcessSeeking` keeps a limit by its ``limit_probability`` instead.
 delay_uncertainty : int
     `delay_cycles` may be off by as many cycles to either side: the delay that foretells the readings clearly better is
     taken instead, and the ``findings`` of the seeker say so. 0: the stated one is exact.

@@ -48,7 +48,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     first_step : float
         Of the readings to the side, as a share of the bounds; half of it where there are limits [-].
     limit_probability : float
-        With which every limit holds at every input asked for, in [0.5, 1), as far as the processes know [-].
+        With which every limit holds at the estimate, and in all of forty inputs asked for, in [0.5, 1), as far as the
+        processes know [-]. The ``margin`` of a limit is kept free beside it, its ``margin_sd`` is not.
     delay_cycles, lag_cycles : float
         Transport delay and time constant between the plant and J [cycles]; behind a lag an input is held for 0.7 time
         constants. Readings that are on their way are counted on.

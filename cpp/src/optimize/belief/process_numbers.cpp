@@ -46,9 +46,10 @@ ProcessModel::Scales ProcessModel::scales_of(const Numbers& numbers) const noexc
   out.noise_variance = noise * noise;
   out.rest = rest * rest;
   const double place = std::exp(numbers[3 + settings_.inputs]), level = std::exp(numbers[4 + settings_.inputs]);
-  const double wide = wander_place * place * kernel_.whole_bend(out);
+  const double walk = settings_.wander * level * wander_level,
+               wide = settings_.wander * wander_place * place * kernel_.whole_bend(out);
   out.wander_slope = wide * wide / settings_.memory;
-  out.wander_level = wander_level * wander_level * level * level * out.noise_variance / settings_.memory;
+  out.wander_level = walk * walk * out.noise_variance / settings_.memory;
   out.inverse_length = (-numbers.segment(3, settings_.inputs)).array().exp().matrix();
   return out;
 }
@@ -135,7 +136,7 @@ double ProcessModel::log_priors(const Numbers& numbers, const Scales& s) const n
   for (Eigen::Index i = 0; i < settings_.inputs; ++i)
     out += log_prior(numbers[3 + i], length_prior, length_prior_sd);
   for (Eigen::Index i = 3 + settings_.inputs; i < 5 + settings_.inputs; ++i)
-    out += log_prior(numbers[i], 0.0, wander_sd);
+    out += log_prior(numbers[i], 0.0, settings_.wander_sd);
   if (kernel_.guided()) {
     const double factor = numbers[numbers.size() - 1] / factor_width;
     out += log_prior(numbers[0] - whole, guided_bend_prior, guided_bend_prior_sd) - std::log1p(factor * factor);

@@ -24,13 +24,17 @@ constexpr std::int64_t resting = 40;                    // inputs at the estimat
 constexpr double turned = -0.7;                         // what a first step is multiplied by after a failure
 constexpr std::int64_t most_turns = 6;                  // for them; then inputs that cannot move are left alone
 constexpr double worth_noise = 1e-12;                   // of J, at least
+constexpr double limited_step = 0.5;                    // of the first step where there are limits
+constexpr double along_edges = 4.0;                     // sd of J that reading it along limits is worth
+constexpr double along_readings = 10.0;  // of the fewest, until it is worth that: early sd promise too much
+constexpr double along_cycles = 100.0;   // without a doubt, then it is worth less and less
 
 }  // namespace
 
 // Within the bounds, and what may be explored by now.
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
   const double wide = growth * (highest_ - lowest_).maxCoeff();
-  const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach : 0.5 * settings_.first_step;
+  const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach : side_step();
   const double far = std::max({wide, least, protocol_.steps.any() ? grid().maxCoeff() : 0.0});
   for (Eigen::Index i = 0; i < z.size(); ++i)
     z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));
@@ -40,6 +44,10 @@ Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
 
 Inputs GaussianProcessSeeking::grid() const noexcept {
   return protocol_.steps.size.cwiseQuotient(settings_.space.upper - settings_.space.lower);
+}
+
+double GaussianProcessSeeking::side_step() const noexcept {
+  return settings_.first_step * (limited_.empty() ? 1.0 : limited_step);
 }
 
 // Standard normal, another one for each stream and index of this cycle.
@@ -55,7 +63,9 @@ void GaussianProcessSeeking::choose() noexcept {
   if (!read || !(guided() || (star_ >= n && to_every_side))) return choose_first();
   const Inputs about = since_failure_ > 0 ? scaled(estimate_) : good_;
   fit(about);
+  know_edge(about);
   const Inputs best = best_of_mean(about);
+  know_edge(best);
   estimate_ = unscaled(best);
   const double aside = dither();
   candidates_.row(0) = best.transpose();
@@ -70,7 +80,7 @@ void GaussianProcessSeeking::choose() noexcept {
   const bool over = rested_ * hold_ >= resting * hold_ + awaited;
   const int points = over ? 2 : candidates;
   if (!over) draw_candidates();
-  judge_safety(points);
+  keep_safe(points, cautious_quantile_);
   means_.setZero();
   covariance_.setZero();
   double variance = 0.0;
@@ -175,8 +185,7 @@ void GaussianProcessSeeking::choose_first() noexcept {
   const Eigen::Index n = estimate_.size();
   const std::int64_t turn = ++star_ / (n + 1), side = star_ % (n + 1) - 1;
   Inputs z = middle_;
-  const double step = settings_.first_step * (limited_.empty() ? 1.0 : 0.5) *
-                      (failing_.count_above(0.0) > 0 ? std::pow(turned, static_cast<double>(turn)) : 1.0);
+  const double step = side_step() * (failing_.count_above(0.0) > 0 ? std::pow(turned, static_cast<double>(turn)) : 1.0);
   if (side >= 0) {
     const double whole = protocol_.steps.any() ? std::max(std::abs(step), grid()[side]) : std::abs(step);
     z[side] += std::copysign(whole, z[side] < 0.5 ? step : -step);
@@ -210,7 +219,7 @@ Inputs GaussianProcessSeeking::best_of_mean(const Inputs& from) noexcept {
         z[i] += width * draw(200 + static_cast<std::uint64_t>(round), p * max_inputs + static_cast<int>(i));
       candidates_.row(p) = reachable(z).transpose();
     }
-    judge_safety(search_points + 1);
+    keep_safe(search_points + 1, quantile_);
     for (ProcessModel& model : j_)
       model.predict_means(candidates_, search_points + 1);
     for (int p = first ? 0 : 1; p <= search_points; ++p) {
@@ -251,6 +260,19 @@ void GaussianProcessSeeking::draw_candidates() noexcept {
   }
 }
 
+// Where limits hold the best input back, of the first `safe` ones in the order: the knowledge gradient among safe
+// inputs is blind to what a limit hides. Off what was read it grows less sure, which would cost more J than a reading
+// promises: the credit gives that back, so that the search slides along the edges.
+int GaussianProcessSeeking::most_along(int safe) const noexcept {
+  const double read = static_cast<double>(j_[0].count()) / (along_readings * j_[0].fewest());
+  const double settled = static_cast<double>(since_doubt_) / along_cycles;
+  const double beta = along_edges * std::min(1.0, read) / std::max(1.0, settled);
+  const auto worth = [&](int p) {
+    return means_[p] + beta * std::sqrt(std::max(covariance_(p, p), 0.0)) + credit_[static_cast<std::size_t>(p)];
+  };
+  return *std::max_element(order_.begin(), order_.begin() + safe, [&](int a, int b) { return worth(a) < worth(b); });
+}
+
 // Of the safe candidates the one whose J, and what it teaches, is worth most; the least unsafe where none is safe.
 int GaussianProcessSeeking::most_worth(int points) noexcept {
   const auto at = [](int p) { return static_cast<std::size_t>(p); };
@@ -262,6 +284,7 @@ int GaussianProcessSeeking::most_worth(int points) noexcept {
   if (safe == 0) {
     return static_cast<int>(std::min_element(mean_over_.begin(), mean_over_.begin() + points) - mean_over_.begin());
   }
+  if (std::ranges::any_of(multipliers_, [](double own) { return own > 0.0; })) return most_along(safe);
   const std::vector<int>& kept = order_;
   for (int a = 0; a < safe; ++a)
     worth_mean_[at(a)] = means_[kept[at(a)]];

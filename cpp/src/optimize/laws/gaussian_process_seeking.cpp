@@ -25,7 +25,9 @@ constexpr double expected_bend = 3.0;     // of a limited quantity, in its scale
 constexpr double label_noise = 0.3;       // of whether a cycle works: 1 or -1
 constexpr std::int64_t most_wary = 64;    // cycles that work, after a failure
 constexpr double held_share = 0.7;        // of the longest lag, for which an input is asked
-constexpr double active_room = 0.05;      // scales of a limit
+constexpr double cautious_cycles = 40.0;  // in all of which a limit is to hold with the stated probability
+constexpr double calm_limits = 0.3;       // over what is expected of J: limits wander less, or are seen to
+constexpr double calm_limits_sd = 2.0;    // logarithm
 constexpr double plane_memory = 20.0;     // cycles of the planes that tell the delays from one another
 
 // Of the limits. Lags are taken out of the readings instead (`LagWindow`).
@@ -95,6 +97,8 @@ std::vector<ProcessModel> limit_processes(const GaussianProcessSeekingSettings& 
     ProcessModel::Settings own = process_settings(s, most_points);
     own.bends_down = false;
     own.bend = expected_bend * s.limits[i].scale;
+    own.wander = calm_limits;
+    own.wander_sd = calm_limits_sd;
     if (!s.limit_guides.empty() && !s.limit_guides[i].empty()) {
       std::vector<double> values = s.limit_guides[i].values();
       for (double& value : values)
@@ -121,6 +125,7 @@ ProcessModel::Settings failing_settings(const GaussianProcessSeekingSettings& s,
 GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings settings)
     : settings_(resolved(std::move(settings))),
       quantile_(random::normal_quantile(settings_.limit_probability)),
+      cautious_quantile_(random::normal_quantile(1.0 - (1.0 - settings_.limit_probability) / cautious_cycles)),
       hold_(1),
       protocol_(settings_.space, settings_.components.size() + settings_.limits.size(),
                 false),  // its own process knows what fails
@@ -140,6 +145,7 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       logarithm_(room_),
       unsafe_(settings_.limits.empty() ? 0 : 1, 0.0),
       candidates_(InputTable::Zero(candidates + most_on_their_way, settings_.space.size())),
+      edges_(InputTable::Zero(static_cast<Eigen::Index>(settings_.limits.size()), settings_.space.size())),
       covariance_(candidates, candidates),
       own_(candidates + most_on_their_way, candidates + most_on_their_way),
       means_(Eigen::VectorXd::Zero(candidates)),
@@ -148,6 +154,9 @@ GaussianProcessSeeking::GaussianProcessSeeking(GaussianProcessSeekingSettings se
       breaks_(candidates, 0.0),
       over_(candidates, 0.0),
       mean_over_(candidates, 0.0),
+      excess_(settings_.limits.size() * candidates, 0.0),
+      multipliers_(room_),
+      credit_(candidates, 0.0),
       order_(candidates, 0) {
   for (std::size_t i = 0; i < logarithm_.size(); ++i)
     logarithm_[i] = guide_above_zero(settings_, i) ? 1.0 : 0.0;

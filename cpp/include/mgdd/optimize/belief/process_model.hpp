@@ -22,13 +22,14 @@ class ProcessModel {
  public:
   struct Settings {
     Eigen::Index inputs = 1;
-    int kept = 100;                    ///< readings, 10 at least
-    int most_points = 100;             ///< that `predict` is asked for at once
-    double memory = 143.0;             ///< [readings] in which level and slopes wander by what counts
-    bool bends_down = true;            ///< whether a maximum is expected, as of J
-    std::optional<double> noise_sd{};  ///< of a reading, > 0; none: learnt
-    std::optional<double> bend{};      ///< that is expected, to a factor of e; none: any
-    bool labels = false;               ///< readings are below or above 0: of the rarer ones those far away are kept
+    int kept = 100;                        ///< readings, 10 at least
+    int most_points = 100;                 ///< that `predict` is asked for at once
+    double memory = 143.0;                 ///< [readings] in which level and slopes wander by what counts
+    double wander = 1.0, wander_sd = 1.0;  ///< over what is expected of J, and how surely: of its logarithm
+    bool bends_down = true;                ///< whether a maximum is expected, as of J
+    std::optional<double> noise_sd{};      ///< of a reading, > 0; none: learnt
+    std::optional<double> bend{};          ///< that is expected, to a factor of e; none: any
+    bool labels = false;                   ///< readings are below or above 0: of the rarer ones those far away are kept
     std::uint64_t seed = 0;
     ProcessGuide guide{};
   };

@@ -3,12 +3,13 @@
 // few readings there would teach about the best input (knowledge gradient, Frazier, Powell and Dayanik 2009), used for
 // `horizon` cycles. With a guide the readings to the side are left out: what a rough model says of J is the mean of the
 // process, whose factor, place and error are learnt. Nothing is asked farther beyond what was read than a part of its
-// width, with a guide a fifth of the bounds where nothing is limited, nor where a limit holds with less than the stated
-// probability: the safe set grows from the start (Sui et al. 2015), nor where cycles are likely to fail, as one more
-// process knows. Level and place wander; readings that the process cannot explain, two in a row, age all that was
-// known. Where several inputs in a row stay at the estimate, the search is over: a small dither, as large as noise and
-// wandering make it pay, goes on until a doubt. ask and tell are noexcept and allocation-free; all randomness is a
-// function of (seed, cycle).
+// width, with a guide a fifth of the bounds where nothing is limited, nor where a limit may break in forty cycles by
+// more than the stated probability lets it: the safe set grows from the start (Sui et al. 2015), nor where cycles are
+// likely to fail, as one more process knows. Along limits that hold the best input back it reads what it knows least
+// of. Level and place wander; readings that the process cannot explain, two in a row, age all that was known. Where
+// several inputs in a row stay at the estimate, the search is over: a small dither, as large as noise and wandering
+// make it pay, goes on until a doubt. ask and tell are noexcept and allocation-free; all randomness is a function of
+// (seed, cycle).
 #pragma once
 
 #include <cstdint>
@@ -35,7 +36,7 @@ struct GaussianProcessSeekingSettings {
   double memory_cycles = 143.0;            ///< in which level and place are expected to wander by what counts
   int kept = 100;                          ///< readings at most, 10 to 200
   double first_step = 0.1;                 ///< of the first readings to the side, as a share of the bounds
-  double limit_probability = 0.95;         ///< with which a limit holds at every input asked for
+  double limit_probability = 0.95;         ///< with which a limit holds at the estimate, and in forty cycles
   ComponentLag sensor{};                   ///< between the plant and J, where it has one component
   std::vector<ComponentLag> components{};  ///< the same of every component of J; empty: J is one
   int delay_uncertainty = 4;               ///< cycles by which a delay may be shorter or longer: it is learnt
@@ -54,7 +55,8 @@ inline auto fields_of(const GaussianProcessSeekingSettings&) {
       field<&S::memory_cycles>("memory_cycles", "in which level and place are expected to wander by what counts"),
       field<&S::kept>("kept", "readings at most"),
       field<&S::first_step>("first_step", "of the first readings, share of the bounds"),
-      field<&S::limit_probability>("limit_probability", "with which a limit holds at every input asked for"),
+      field<&S::limit_probability>("limit_probability",
+                                   "with which a limit holds at the estimate, and in forty cycles"),
       field<&S::sensor, &ComponentLag::delay_cycles>("delay_cycles", "between the plant and J"),
       field<&S::sensor, &ComponentLag::lag_cycles>("lag_cycles", "the same"),
       field<&S::components>("components", "delay and lag of each component of J", DefaultForm::none),
@@ -147,6 +149,7 @@ class GaussianProcessSeeking {
 
  private:
   static constexpr int far_candidates = 8, near_candidates = 47, candidates = 2 + far_candidates + near_candidates;
+  static constexpr double active_room = 0.05;    // scales of a limit
   static constexpr std::int64_t least_wary = 2;  // cycles that work, after a failure
   static constexpr int most_on_their_way = 8;    // inputs whose readings have not come, that are counted on
   Inputs scaled(const Inputs& input) const noexcept;
@@ -171,18 +174,24 @@ class GaussianProcessSeeking {
   }
   void judge_failures(int points) noexcept;
   void judge(double likely, double mean, int point) noexcept;
-  void judge_safety(int points) noexcept;
+  void judge_safety(int points, double quantile) noexcept;
+  void keep_safe(int points, double quantile) noexcept;
+  bool pull_back(int points) noexcept;
+  void know_edge(const Inputs& at) noexcept;
+  double multiply(const Inputs& rise, const Inputs& at) noexcept;
+  double side_step() const noexcept;
   double student(const ProcessModel& model) const noexcept;
   double excess(std::size_t i, int point, double quantile) const noexcept;
   Inputs best_of_mean(const Inputs& from) noexcept;
   int most_worth(int points) noexcept;
+  int most_along(int safe) const noexcept;
   void learn_limit(std::size_t i, const Inputs& z, double value, const Inputs& about) noexcept;
   void explore(const Inputs& z) noexcept;
   void send(const Inputs& z) noexcept;
 
   GaussianProcessSeekingSettings settings_;
-  double quantile_;
-  std::int64_t hold_;  // cycles for which an input is asked behind a lag
+  double quantile_, cautious_quantile_;  // of the estimate, and of what is asked for
+  std::int64_t hold_;                    // cycles for which an input is asked behind a lag
   Protocol protocol_;
   CausingInputs causes_;              // of the limits
   std::vector<DelayFinder> finders_;  // of the components
@@ -205,10 +214,11 @@ class GaussianProcessSeeking {
   std::vector<double> logarithm_;  // 1 where a limit is learnt by it
   std::vector<double> unsafe_;     // cycles in a row in which no input was safe
   // Scratch.
-  InputTable candidates_;
+  InputTable candidates_, edges_;  // slopes of every limit in its scale at the estimate
   Eigen::MatrixXd covariance_, own_;
   Eigen::VectorXd means_;
   std::vector<double> worth_mean_, effect_, breaks_, over_, mean_over_;
+  std::vector<double> excess_, multipliers_, credit_;  // of every limit at the candidates; J per scale of a limit
   std::vector<int> order_;
 };
 
