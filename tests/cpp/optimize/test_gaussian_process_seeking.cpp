@@ -61,7 +61,7 @@ TEST(GaussianProcessSeeking, FindsTheBestAfterFirstReadingsThatAreAlike) {
 
 // One reading of twenty noises in fifty, on either side; and one wrong by far before anything is known.
 TEST(GaussianProcessSeeking, BearsReadingsThatAreFarOut) {
-  constexpr int seeds = 8, cycles = 150;
+  constexpr int seeds = 8, cycles = 150, half = 75;
   double late = 0.0;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     GaussianProcessSeeking seeker(two_inputs(seed));
@@ -70,7 +70,7 @@ TEST(GaussianProcessSeeking, BearsReadingsThatAreFarOut) {
       const double spike = at < 0.01 ? -6.0 : at < 0.02 ? 6.0 : 0.0;
       const double j[] = {50.0 - lost(seeker.ask()) + noise(seed, k) + spike};
       seeker.tell({j, {}});
-      if (k >= cycles / 2) late += lost(seeker.applied()) / (seeds * (cycles - cycles / 2));
+      if (k >= half) late += lost(seeker.applied()) / (seeds * (cycles - half));
     }
   }
   EXPECT_LT(late, 0.12);
