@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,9 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.cli.output import show
-from mgdd.cli.study import rows_table
-from mgdd.studies import sensor_delay
-from mgdd.studies.registry import available_studies
+from mgdd_studies import sensor_delay
+from mgdd_studies.command import rows_table
+from mgdd_studies.registry import available_studies
 
 
 def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[str, str]:
@@ -45,7 +46,7 @@ def test_an_unknown_name_says_where_the_known_ones_are(capsys: pytest.CaptureFix
 def test_a_page_that_zooms_is_refused_before_the_study_runs(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("mgdd.cli.study.run_study", lambda *_, **__: pytest.fail("it ran"))
+    monkeypatch.setattr("mgdd_studies.command.run_study", lambda *_, **__: pytest.fail("it ran"))
     _, err = run(capsys, "sensor-delay", "--interactive", code=2)
     assert "--interactive does not act here; it is of the page that --report writes" in err
     monkeypatch.setitem(sys.modules, "plotly", None)
@@ -109,3 +110,22 @@ def test_ctrl_c_prints_what_is_finished(capsys: pytest.CaptureFixture[str], monk
     assert summary["interrupted"] is True
     assert len(summary["rows"]) == 2
     assert "interrupted: 2 finished rows are printed" in err
+
+
+def test_without_the_package_of_the_studies_it_says_what_to_do(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mgdd_studies.command", None)
+    with pytest.raises(SystemExit, match="2"):
+        main(["study", "--list", "--json"])
+    shown = capsys.readouterr()
+    said = "mgdd_studies is not installed, the package of the studies: it comes with mgdd, install that again"
+    assert shown.err.splitlines()[-1] == f"mgdd study: error: {said}"
+    assert json.loads(shown.out)["error"]["message"] == said
+    assert main(["completion", "bash"]) == 0  # every other command is whole
+
+
+def test_no_command_loads_the_studies_before_it_uses_them() -> None:
+    code = "import sys; from mgdd.cli import main; main(['preset', 'list']); print('mgdd_studies' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"

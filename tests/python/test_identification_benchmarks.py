@@ -17,10 +17,10 @@ from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import FitOptions
 from mgdd.results import Fit
 from mgdd.results.labels import labelled_dataset
-from mgdd.studies import run_study
-from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
-from mgdd.studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
-from mgdd.studies.benchmarks.wiener_hammerstein import WienerHammersteinFit, fit_linear, fit_wiener_hammerstein
+from mgdd_studies import run_study
+from mgdd_studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
+from mgdd_studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
+from mgdd_studies.benchmarks.wiener_hammerstein import WienerHammersteinFit, fit_linear, fit_wiener_hammerstein
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {

@@ -11,12 +11,12 @@ import pytest
 from mgdd import datasets
 from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
-from mgdd.studies import measured_engine_cases, measured_engine_seek, run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.measured_engine_seek import run_measured_engine_seek
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd_studies import measured_engine_cases, measured_engine_seek, run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.measured_engine_seek import run_measured_engine_seek
 
 needs_records = pytest.mark.skipif("h2df_502" not in datasets.names(), reason="MGDD_DATA_DIR holds no folder h2df_502")
 

@@ -15,8 +15,8 @@ from mgdd.identify import OnlineUpdate
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results.model import Model
-from mgdd.studies.base import StudyResult
 from mgdd.throttle import PseudoWiener, Throttle
+from mgdd_studies.base import StudyResult
 
 TIME = np.arange(4000) * 1e-3
 DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * (0.5 * TIME + 0.6 * TIME**2))

@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 from mgdd import datasets
 from mgdd.cli import main
 from mgdd.report import write_report
+from mgdd.report.sections import Section, Table
 from mgdd.results.labels import labelled_dataset
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.registry import available_studies
-from mgdd.studies.sections import Section, Table
-from mgdd.studies.verdicts import verdict_of
+from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.registry import available_studies
+from mgdd_studies.verdicts import verdict_of
 
 NEEDS = {"measured-engine-seek": "h2df_502", "identification-benchmarks": "cascaded_tanks"}
 

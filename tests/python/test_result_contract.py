@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import pickle
-import pkgutil
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -34,10 +33,11 @@ from mgdd.results.result import Result
 from mgdd.rig import Experiment, Recorder, read_record, run_experiment
 from mgdd.rig.experiment.self_test import WAYS_OF, SelfTest
 from mgdd.signals import chirp
-from mgdd.studies import run_study
 from mgdd.surrogate import fit_response, fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.throttle import Throttle, simulate_throttle
+from mgdd_studies import run_study
+from public_objects import MODULES
 
 EXPERIMENT = 'kind = "experiment"\nformat = 1\ntask = "track"\nmode = "simulate"\n'
 
@@ -140,10 +140,9 @@ def subclasses(cls: type) -> set[type]:
 
 
 def test_every_class_of_results_is_here() -> None:
-    for module in pkgutil.walk_packages(mgdd.__path__, "mgdd."):
-        if not module.name.endswith(("__main__", "._core")):
-            importlib.import_module(module.name)
-    kinds = {kind.__name__ for kind in subclasses(Result) if kind.__module__.startswith("mgdd.")}
+    for module in MODULES:
+        importlib.import_module(module)
+    kinds = {kind.__name__ for kind in subclasses(Result) if kind.__module__.split(".")[0] in ("mgdd", "mgdd_studies")}
     kinds -= {"Result", "NumbersResult", "InputNumbers", "MapForms"} | ELSEWHERE
     assert kinds == {name.split()[-1] for name in MADE}
 

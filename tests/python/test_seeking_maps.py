@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mgdd.studies.several_maps import (
+from mgdd_studies.several_maps import (
     CURVATURE,
     Setting,
     bent_by_half,

@@ -6,20 +6,21 @@ import html
 import json
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mgdd import datasets, io, presets
-from mgdd.cli import main, study
+from mgdd.cli import main
 from mgdd.errors import Interrupted
 from mgdd.identify import best_timing
 from mgdd.identify.engine import family
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
+from mgdd_studies import command, run_study
+from mgdd_studies.base import StudyResult
 from study_cache import quick_study, sources
 
 HD = presets.load("hd_diesel_128x144").cylinder
@@ -101,7 +102,7 @@ def test_the_wall_heat_law_moves_the_best_timing_as_much_as_its_scale(result: St
 
 def test_a_kept_study_depends_on_every_module() -> None:
     files = {"/".join(file.parts[-3:]) for file in sources()}
-    assert {"mgdd/studies/base.py", "mgdd/engine/cycle.py", "mgdd/presets/P1.toml"} <= files
+    assert {"mgdd_studies/base.py", "mgdd/engine/cycle.py", "mgdd/presets/P1.toml"} <= files
 
 
 def test_dataset_is_labelled(result: StudyResult) -> None:
@@ -252,7 +253,7 @@ def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.Mo
 def test_ctrl_c_in_the_demo(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "run_study", lambda name, **_: run_study(name, progress=press_at(1)))
+    monkeypatch.setattr(command, "run_study", lambda name, **_: run_study(name, progress=press_at(1)))
     assert main(["demo", "--folder", str(tmp_path)]) == 130
     shown = capsys.readouterr()
     assert "Interrupted: these are the models that were finished" in shown.out
@@ -267,9 +268,10 @@ def test_ctrl_c_in_the_report_of_a_calibration(
     trace = datasets.read("hd_diesel_128x144")[2]
     io.write_csv(trace, tmp_path / "one.csv")
     told = ["--speed-rpm", str(trace.attrs["speed_rpm"]), "--trapped-mass-g", str(trace.attrs["trapped_mass_g"])]
-    monkeypatch.setattr(study, "run_study", lambda name, **given: run_study(name, **{**given, "progress": press_at(1)}))
-    command = ["engine", "calibrate", str(tmp_path / "one.csv"), "--preset", "hd_diesel_128x144", *told]
-    assert main([*command, "--report-folder", str(tmp_path / "page")]) == 130
+    stopped = partial(run_study, progress=press_at(1))
+    monkeypatch.setattr(command, "run_study", lambda name, **given: stopped(name, **(given | stopped.keywords)))
+    argv = ["engine", "calibrate", str(tmp_path / "one.csv"), "--preset", "hd_diesel_128x144", *told]
+    assert main([*argv, "--report-folder", str(tmp_path / "page")]) == 130
     shown = capsys.readouterr()
     assert "RMSE" in shown.out
     assert f"what was finished of the report is in {tmp_path / 'page'}" in shown.err

@@ -12,9 +12,9 @@ import pytest
 
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.registry import available_studies
+from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.registry import available_studies
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.guide import ModelOptimum
 from mgdd.results.labels import check_labels
-from mgdd.studies.base import StudyResult
-from mgdd.studies.calibrated_guide_cases import (
+from mgdd_studies.base import StudyResult
+from mgdd_studies.calibrated_guide_cases import (
     BURN,
     HEAT,
     NONE,
@@ -37,8 +37,8 @@ from mgdd.studies.calibrated_guide_cases import (
     step_row,
     step_run,
 )
-from mgdd.studies.guide_cases import SteadyMap
-from mgdd.studies.online_calibration import (
+from mgdd_studies.guide_cases import SteadyMap
+from mgdd_studies.online_calibration import (
     CYCLES,
     ERRORS,
     NOISES,

@@ -11,9 +11,9 @@ import pytest
 
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.results.labels import check_labels
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.sensor_delay import run_sensor_delay
+from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.sensor_delay import run_sensor_delay
 
 KEYS = ["case", "period_cycles", "phase_deg", "step_sign", "cycles_stays", "final_cad"]
 

@@ -13,9 +13,9 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies.base import StudyResult
-from mgdd.studies.guide_accuracy import HARD, HardCase, run_hard
-from mgdd.studies.guide_cases import (
+from mgdd_studies.base import StudyResult
+from mgdd_studies.guide_accuracy import HARD, HardCase, run_hard
+from mgdd_studies.guide_cases import (
     GUIDES,
     HIGH,
     LOW,
@@ -27,7 +27,7 @@ from mgdd.studies.guide_cases import (
     trimmed,
     verdict_on,
 )
-from mgdd.studies.statistics import first_within, median_interval, stays_within, with_median_interval
+from mgdd_studies.statistics import first_within, median_interval, stays_within, with_median_interval
 
 GUIDE = {guide.name: guide for guide in GUIDES}
 

@@ -11,10 +11,10 @@ import pytest
 from mgdd.engine import OperatingPoint, ignition_delay
 from mgdd.loop import EngineBench
 from mgdd.results.labels import check_labels
-from mgdd.studies.base import StudyResult
-from mgdd.studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
-from mgdd.studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, assumed_laws
-from mgdd.studies.ignition_delay import plane_of
+from mgdd_studies.base import StudyResult
+from mgdd_studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
+from mgdd_studies.ignition_cases import MEASURED_AT, MEASURED_SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, assumed_laws
+from mgdd_studies.ignition_delay import plane_of
 
 WATSON, WOLFER, HARDENBERG = TRUTHS
 LATE = OperatingPoint(speed_rpm=1900.0, fuel_mg=13.0)

@@ -14,12 +14,12 @@ import pytest
 
 from mgdd.errors import Interrupted
 from mgdd.results.labels import check_labels
-from mgdd.studies import design_to_map_engine as drives
-from mgdd.studies import from_design_to_map, run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.design_to_map_engine import CELLS, ENGINES, MIDDLES, Truth
-from mgdd.studies.design_to_map_steps import PROCESS, SETTLING, STAGES, Case, Made, make_map
-from mgdd.studies.from_design_to_map import Maps, effort_row, loss_parts, part_rows
+from mgdd_studies import design_to_map_engine as drives
+from mgdd_studies import from_design_to_map, run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.design_to_map_engine import CELLS, ENGINES, MIDDLES, Truth
+from mgdd_studies.design_to_map_steps import PROCESS, SETTLING, STAGES, Case, Made, make_map
+from mgdd_studies.from_design_to_map import Maps, effort_row, loss_parts, part_rows
 
 OWN = ENGINES["as calibrated"]
 

@@ -9,9 +9,9 @@ import pytest
 
 from mgdd.errors import ConvergenceError
 from mgdd.loop import EngineBench
-from mgdd.studies import design_to_map_steps
-from mgdd.studies.design_to_map_engine import AXES, CELLS, ENGINES, LIMITS, OBJECTIVE, ROUGH, Truth, point_of
-from mgdd.studies.design_to_map_steps import (
+from mgdd_studies import design_to_map_steps
+from mgdd_studies.design_to_map_engine import AXES, CELLS, ENGINES, LIMITS, OBJECTIVE, ROUGH, Truth, point_of
+from mgdd_studies.design_to_map_steps import (
     SETTLING,
     SLOPES,
     check_map,

@@ -12,9 +12,9 @@ import pytest
 from mgdd.errors import Interrupted
 from mgdd.optimize import Spsa
 from mgdd.results.labels import check_labels
-from mgdd.studies import three_input_bench as three
-from mgdd.studies.base import StudyResult
-from mgdd.studies.seekers_several_inputs import _Runs, run_seekers_several_inputs
+from mgdd_studies import three_input_bench as three
+from mgdd_studies.base import StudyResult
+from mgdd_studies.seekers_several_inputs import _Runs, run_seekers_several_inputs
 
 GP, BENT, USELESS = "Gaussian process", "Gaussian process, guide bent by half", "Gaussian process, guide of no use"
 DITHERS = ("SPSA by tune", "extremum seeking by tune")

@@ -9,7 +9,7 @@ import pytest
 
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Spsa
-from mgdd.studies.statistics import (
+from mgdd_studies.statistics import (
     band_variables,
     estimates,
     loops,

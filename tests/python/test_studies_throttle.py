@@ -6,7 +6,7 @@ import pytest
 
 from mgdd.identify.throttle.free_run import quality_of
 from mgdd.results.labels import check_labels
-from mgdd.studies import run_study
+from mgdd_studies import run_study
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mgdd.studies.base import StudyResult
-from mgdd.studies.throttle_cases import throttle_of
-from mgdd.studies.throttle_tracking import (
+from mgdd_studies.base import StudyResult
+from mgdd_studies.throttle_cases import throttle_of
+from mgdd_studies.throttle_tracking import (
     CASES,
     controllers_of,
     row_of,

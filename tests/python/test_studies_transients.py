@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from mgdd.results.labels import check_labels
-from mgdd.studies.base import StudyResult
-from mgdd.studies.guide_cases import SpeedLoadPlane
-from mgdd.studies.guided_transients import Plane, plane_row, run_plane
+from mgdd_studies.base import StudyResult
+from mgdd_studies.guide_cases import SpeedLoadPlane
+from mgdd_studies.guided_transients import Plane, plane_row, run_plane
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
 from mgdd.results.labels import ANGLE, check_labels
-from mgdd.studies.base import StudyResult
-from mgdd.studies.validation_fits import LAWS, Burn, Law, best_slopes, burns_of, meet, redraw
+from mgdd_studies.base import StudyResult
+from mgdd_studies.validation_fits import LAWS, Burn, Law, best_slopes, burns_of, meet, redraw
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
 SINGLE = Law("Wiebe, linear gamma", {"burn_shape": "wiebe", "wall_heat_scale": 1.0})
@@ -118,7 +118,7 @@ def test_stated_intervals_do_not_hold_for_what_a_wrong_burn_law_leaves() -> None
 
 
 def test_redrawn_errors_have_the_size_of_the_residual_and_bartletts_memory() -> None:
-    from mgdd.studies.validation_fits import _disturbed
+    from mgdd_studies.validation_fits import _disturbed
 
     load, trace = measured().loads[1], measured().request.traces[1]
     model, error = (load.overlay[name].to_numpy() for name in ("model_bar", "residual_bar"))

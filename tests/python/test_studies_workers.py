@@ -16,9 +16,9 @@ import parallel_work as work
 from mgdd.cli import main
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.parallel.pool import processes
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.registry import available_studies, function_of
+from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.registry import available_studies, function_of
 
 # Their parts are made of the same pieces as those of the others, or take minutes.
 LONG = {

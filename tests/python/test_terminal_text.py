@@ -13,8 +13,8 @@ import pytest
 from mgdd.cli import main
 from mgdd.cli.output import Table, gated_streams, show
 from mgdd.errors import DataError, Error, Interrupted
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
+from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
 
 ACTING = "\x1b]0;x\x07\x1b[2J\x00\x9b31m\u202e"
 

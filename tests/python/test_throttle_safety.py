@@ -13,9 +13,9 @@ from mgdd.control import Pid, SlidingMode, SupervisedController, ThrottleSupervi
 from mgdd.errors import ParameterError
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.results.labels import check_labels
-from mgdd.studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
-from mgdd.studies.throttle_faults import CASES, SENSORS, run_case
 from mgdd.throttle import SensorPair, Throttle, simulate_throttle
+from mgdd_studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
+from mgdd_studies.throttle_faults import CASES, SENSORS, run_case
 
 NORMAL, HOLDING, LIMITED, LIMP_HOME = range(4)
 TOLD = 2900  # sample of the acknowledgement

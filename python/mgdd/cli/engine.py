@@ -25,9 +25,9 @@ from mgdd.cli.options import (
     refuse_idle,
     traces_of,
 )
-from mgdd.cli.output import Stopped, check_output, emit, lines
+from mgdd.cli.output import Stopped, check_output, emit, lines, whole_or_part
 from mgdd.cli.seek import add_seek
-from mgdd.cli.study import run_or_part
+from mgdd.cli.study import studies
 from mgdd.cli.sweep import add_sweep
 from mgdd.engine import ThermalNo, find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
@@ -167,10 +167,8 @@ def _calibrate(args: argparse.Namespace) -> None:
         payload = {"preset": preset.name, **found.to_dict()}
     emit(args, payload, text=payload["report"])
     if args.report_folder:
-        absolute = list(fit.request.traces)
-        result, stopped = run_or_part(
-            "measured-traces", traces=absolute, cylinder=cylinder, point=point, progress=step, **scheme
-        )
+        given = {"traces": list(fit.request.traces), "cylinder": cylinder, "point": point, **scheme}
+        result, stopped = whole_or_part(studies().run_study, "measured-traces", progress=step, **given)
         write_report(result, args.report_folder)
         if stopped:
             raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")

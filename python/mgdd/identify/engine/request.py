@@ -12,6 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.identify import LoadBurn, with_burn
 from mgdd.engine import analyze
 from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
@@ -24,7 +25,16 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["BURN_FIELDS", "GAMMA_PARAMETER", "SHAPE_FIELDS", "Request", "default_free", "pegged"]
+__all__ = [
+    "BURN_FIELDS",
+    "GAMMA_PARAMETER",
+    "SHAPE_FIELDS",
+    "LoadBurn",
+    "Request",
+    "default_free",
+    "pegged",
+    "with_burn",
+]
 
 SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
 BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
@@ -115,7 +125,7 @@ class Request:
             )
         return out
 
-    def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[_core.identify.LoadBurn]:
+    def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[LoadBurn]:
         """Give the start of each burn: from the trace's heat release, then what is given, then what is known."""
         known = _core.identify.load_parameters()
         burns = []
@@ -127,7 +137,7 @@ class Request:
                         f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
                     )
             full = set(known) - {"start_pressure_bar"} <= set(said)  # then nothing is left to estimate
-            burn = _core.identify.LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
+            burn = LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
             for name, value in said.items():
                 setattr(burn, name, float(value))
             heat = self.known_heat_j[index]
