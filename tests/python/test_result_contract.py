@@ -28,6 +28,7 @@ from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.plot.convergence import convergence
 from mgdd.plot.response import response_diagnostics
+from mgdd.report import Report
 from mgdd.results.labels import check_labels
 from mgdd.results.result import Result
 from mgdd.rig import Experiment, Recorder, read_record, run_experiment
@@ -130,6 +131,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "ExperimentResult": lambda _: run_experiment(Experiment.from_toml(EXPERIMENT)),
     "RecordedRun": record,
     "SelfTest": lambda _: SelfTest(ways_to_die=dict.fromkeys(WAYS_OF["python"], 0.1), limit_s=0.5, notes={}),
+    "Report": lambda _: Report(name="one cycle", dataset=simulate("puma_single"), verdict=("It runs.",)),
     "StudyResult": lambda _: run_study("sensor-delay", quick=True),
 }
 ELSEWHERE = {"WienerHammersteinFit"}  # a Fit of a benchmark, with the methods of Fit

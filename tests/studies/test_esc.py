@@ -116,7 +116,7 @@ def test_ctrl_c_in_the_first_part_of_a_later_group_keeps_the_earlier_ones() -> N
 
 
 def test_bad_requests_are_named() -> None:
-    with pytest.raises(ParameterError, match=r"study 'nothing': must be one of .*sensor-delay"):
+    with pytest.raises(ParameterError, match=r"study = 'nothing': must be one of .*sensor-delay"):
         run_study("nothing")
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
         run_study("sensor-delay", seeds=0)

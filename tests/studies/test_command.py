@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.cli.output import show
-from mgdd_studies import sensor_delay
+from mgdd.errors import Interrupted
+from mgdd_studies import run_study, sensor_delay
+from mgdd_studies.base import StudyResult
 from mgdd_studies.command import rows_table
 from mgdd_studies.registry import available_studies
 
@@ -129,3 +132,23 @@ def test_no_command_loads_the_studies_before_it_uses_them() -> None:
     code = "import sys; from mgdd.cli import main; main(['preset', 'list']); print('mgdd_studies' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "False"
+
+
+def test_a_study_says_what_it_holds(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("sensor-delay")
+    text = repr(result)
+    assert text.startswith("StudyResult sensor-delay\n")
+    assert "rows 7" in text
+    assert result._repr_html_().startswith("<div>")
+
+
+def test_ctrl_c_while_a_study_draws_keeps_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    whole = run_study("sensor-delay", seeds=2, quick=True, figures=False)
+    monkeypatch.setattr("matplotlib.figure.Figure.__init__", stop)
+    with pytest.raises(Interrupted, match=r"while it drew: all \d+ rows are in \.partial") as stopped:
+        run_study("sensor-delay", seeds=2, quick=True, figures=True)
+    assert isinstance(stopped.value.partial, StudyResult)
+    assert stopped.value.partial.summary["rows"] == whole.summary["rows"]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from mgdd.identify.throttle.free_run import quality_of
 from mgdd.results.labels import check_labels
 from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.throttle_faults import CASES
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +103,43 @@ def test_the_torque_demand_study_says_what_each_part_is_worth():
     free = rows["throttle flows 10 % more"]
     wanted = result.dataset["wanted_torque_nm"].sel(case="as believed").to_numpy()[2999]
     assert free["hold_error_nm"] == pytest.approx(0.1 * (wanted + 21.0), abs=1.2)
+
+
+def test_the_study_of_faults_says_so_in_a_table(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("throttle-faults")
+    check_labels(result.dataset)
+    assert len(result.figures) == 1
+    rows = result.summary["rows"]
+    assert {(row["fault"], row["controller"]) for row in rows} == {
+        (name, kind) for name in CASES for kind in ("PID", "sliding mode")
+    }
+    for row in rows:
+        case = CASES[row["fault"]]
+        assert (row["mode"], row["reason"]) == (case.mode, case.reason)
+        assert row["safe_ms"] <= 50.0
+        assert row["kept"]
+        assert row["recovered"]
+        assert (row["return_ms"] is None) == (case.mode != "limp_home" or not case.returns)
+
+
+@pytest.mark.slow
+def test_a_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("throttle-pseudo-wiener")
+    rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
+    better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
+    printed = {"P1": {"pw_r": 99.4, "pw_w": 79.3, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}
+    for plant, kinds in printed.items():
+        for kind, train in kinds.items():
+            row = rows[plant, kind]
+            assert row["fit_train_percent"] >= train - 0.05
+            assert row["ahead_20_ms_deg"] < rows[plant, "persistence"]["ahead_20_ms_deg"]
+        assert rows[plant, "pw_r"]["ahead_20_ms_deg"] <= 0.06
+    for case, row in better.items():
+        assert row["fit_train_percent"] >= rows[case]["fit_train_percent"] - 0.3
+    ahead = [rows["P1", kind]["ahead_20_ms_deg"] for kind in ("pw_r", "pw_w", "pw_p", "persistence")]
+    assert ahead == sorted(ahead)
+    assert 0.55 <= rows["P1", "pw_w"]["ahead_20_ms_deg"] <= 0.70
+    assert rows["P1", "pw_r"]["fit_steps_percent"] >= 96.0
+    assert rows["P1", "pw_w"]["fit_steps_percent"] <= 50.0
+    assert rows["P1", "persistence"]["ahead_20_ms_deg"] == pytest.approx(1.548, abs=0.01)
+    assert len(result.figures) == 4
