@@ -1,7 +1,6 @@
 """Studies: whole pieces of work that end in a table, figures and a summary.
 
-`run_study` runs one by name and returns its data, figures and summary; ``mgdd study`` lists them. The study
-``measured-traces`` takes the user's own traces.
+`run_study` runs one by name and returns its data, figures and summary; ``mgdd study`` lists them.
 """
 
 from __future__ import annotations

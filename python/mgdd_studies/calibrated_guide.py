@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies import calibrated_guide_cases as cases
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
 from mgdd_studies.calibrated_guide_cases import Case, Engine, GuidedRun, Recipe, Runs, Steps
-from mgdd_studies.figures import band, legend_outside, names_of, new_figure
+from mgdd_studies.figures import band, legend_outside, names_of
 from mgdd_studies.guide_cases import SteadyMap
 from mgdd_studies.statistics import band_variables, with_quantiles
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.plot.convergence import convergence
+from mgdd.plot.style import new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,14 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-__all__ = ["band", "convergence_panels", "grey_band", "legend_outside", "names_of", "new_figure", "numbered_plane"]
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Make a figure of that size [inch], which pyplot does not know."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
+__all__ = ["band", "convergence_panels", "grey_band", "legend_outside", "names_of", "numbered_plane"]
 
 
 def names_of(dataset: xr.Dataset, name: str) -> list[str]:

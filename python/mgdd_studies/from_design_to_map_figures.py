@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, minus
+from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, minus, new_figure
 from mgdd_studies.design_to_map_steps import PROCESS
-from mgdd_studies.figures import legend_outside, names_of, new_figure
+from mgdd_studies.figures import legend_outside, names_of
 from mgdd_studies.statistics import mean_interval
 
 if TYPE_CHECKING:

@@ -13,13 +13,13 @@ from mgdd.guide import Curve, CurveSeeking, ModelOptimum
 from mgdd.loop import EngineBench, SurrogatePlant, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.optimize.by_curvature import approach_gain
-from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus
+from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd_studies import measured_engine_cases as measured
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import band, legend_outside, names_of, new_figure
+from mgdd_studies.figures import band, legend_outside, names_of
 from mgdd_studies.statistics import (
     OF_SEEDS,
     band_variables,

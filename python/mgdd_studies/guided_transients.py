@@ -10,10 +10,10 @@ import numpy as np
 
 from mgdd.engine import OperatingPoint
 from mgdd.loop import EngineBench
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import band, names_of, new_figure, numbered_plane
+from mgdd_studies.figures import band, names_of, numbered_plane
 from mgdd_studies.guide_cases import GUIDES, Guide, SpeedLoadPlane, SteadyMap, drive, guided_by, verdict_on, verdicts
 from mgdd_studies.statistics import first_within, mean_interval, with_interval
 

@@ -11,10 +11,10 @@ import numpy as np
 from mgdd.engine import OperatingPoint
 from mgdd.guide import CurveSeeking
 from mgdd.loop import EngineBench
-from mgdd.plot.style import GREY, LINE_STYLES, axis_label, legend
+from mgdd.plot.style import GREY, LINE_STYLES, axis_label, legend, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import legend_outside, names_of, new_figure, numbered_plane
+from mgdd_studies.figures import legend_outside, names_of, numbered_plane
 from mgdd_studies.guide_cases import SpeedLoadPlane, SteadyMap, drive, trimmed
 from mgdd_studies.ignition_cases import MEASURED_AT, SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, assumed_laws
 from mgdd_studies.statistics import OF_SEEDS, band_variables, first_within, with_interval, with_median_interval

@@ -12,10 +12,10 @@ import numpy as np
 from mgdd import datasets, presets
 from mgdd.identify import best_timing
 from mgdd.identify.engine.records import CylinderFit
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, axis_label
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, axis_label, new_figure
 from mgdd.results.labels import ANGLE, labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import names_of, new_figure
+from mgdd_studies.figures import names_of
 from mgdd_studies.statistics import sd_of, with_interval
 from mgdd_studies.validation_fits import (
     LAWS,

@@ -12,9 +12,10 @@ import numpy as np
 from mgdd import plot, presets
 from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, ignition_delay
 from mgdd.loop import EngineBench, SensorDynamics
+from mgdd.plot.style import new_figure
 from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import grey_band, new_figure
+from mgdd_studies.figures import grey_band
 from mgdd_studies.statistics import with_interval
 
 if TYPE_CHECKING:

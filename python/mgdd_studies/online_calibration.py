@@ -11,10 +11,10 @@ import numpy as np
 from mgdd.guide import OnlineCalibration
 from mgdd.loop import EngineBench
 from mgdd.optimize import ExtremumSeeking
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, minus
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, minus, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import band, legend_outside, names_of, new_figure
+from mgdd_studies.figures import band, legend_outside, names_of
 from mgdd_studies.guide_cases import BOUNDS_CAD, PLANT, WRONG, verdict_on, verdicts
 from mgdd_studies.statistics import (
     band_variables,

@@ -64,10 +64,7 @@ def run_study(
     progress : callable, optional
         Called with a short text before each part.
     **options
-        What one study takes beside these. ``measured-traces``: measured ``traces``, their ``cylinder``, the ``point``
-        of what a trace does not carry, and ``step_cad`` and ``integrator`` as in `mgdd.identify.fit_cylinder`; the four
-        heavy-duty diesel traces and the preset ``hd_diesel_128x144`` if left out. ``guided``: ``real``, whether on the
-        surrogate of the measured engine.
+        What one study takes beside these. ``guided``: ``real``, whether on the surrogate of the measured engine.
 
     Returns
     -------

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE
-from mgdd_studies.figures import legend_outside, names_of, new_figure
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, new_figure
+from mgdd_studies.figures import legend_outside, names_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,10 +13,10 @@ import numpy as np
 from mgdd import presets
 from mgdd.control import Pid, SupervisedController, ThrottleSupervisor
 from mgdd.loop import ThrottleFault, VirtualThrottle
+from mgdd.plot.style import new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import SensorPair, Throttle, characteristics
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import new_figure
 from mgdd_studies.throttle_cases import Baseline, baselines, controller_of, supervisor_of, throttle_of
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import Throttle
 from mgdd_studies.base import Parts, Progress, StudyResult
-from mgdd_studies.figures import names_of, new_figure
+from mgdd_studies.figures import names_of
 from mgdd_studies.throttle_cases import DURATION_S, NOISE_DEG, RECORDS, SAMPLE_S, judged_run, noisy_records
 
 if TYPE_CHECKING:

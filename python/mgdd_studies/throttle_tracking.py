@@ -14,11 +14,11 @@ from mgdd.control import GuidedPredictive
 from mgdd.loop import Reference, track, track_many, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.tune import draw_throttles
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import Throttle
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
-from mgdd_studies.figures import legend_outside, new_figure
+from mgdd_studies.figures import legend_outside
 from mgdd_studies.statistics import mean_interval
 from mgdd_studies.throttle_cases import throttle_of
 

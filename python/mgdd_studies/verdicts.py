@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from mgdd.identify.engine.timing_records import undetermined
-
 __all__ = ["verdict_of"]
 
 _CYCLES = "cycles to within 1 °CA of the optimum"
@@ -126,8 +124,7 @@ _SAID: Mapping[str, tuple[_Range | _Share, ...]] = {
 
 def verdict_of(study: str, summary: Mapping[str, Any]) -> tuple[str, ...]:
     """Give the verdict of a study as sentences; none for a study of somebody else without bars."""
-    out = [_moves(row) for row in summary.get("best_timing", ())]
-    out += [text for said in _SAID.get(study, ()) if (text := _sentence(said, summary))]
+    out = [text for said in _SAID.get(study, ()) if (text := _sentence(said, summary))]
     bars = summary.get("bars", ())
     if bars:
         missed = [f"{bar['bar']} (wanted {bar['limit']})" for bar in bars if not bar["met"]]
@@ -164,37 +161,6 @@ def _end(row: Mapping[str, Any], said: _Range, rows: Sequence[Mapping[str, Any]]
     number = f"{size:.0f}" if size >= 1000.0 else f"{size:.3g}"
     who = f" ({', '.join(dict.fromkeys(named))})" if named else ""
     return f"{number} {said.unit}".strip() + who
-
-
-def _moves(row: Mapping[str, Any]) -> str:
-    """Say of a trace how far to move the timing, what that gains, and how sure that is."""
-    best = row["best"]
-    if best is None:
-        return f"{row['file']}: no plausible model, so no best timing."
-    kept, free = (_part(row, prefix) for prefix in ("", "free_"))
-    same = abs(best["shift_cad"] - best["free_shift_cad"]) < 0.05
-    if same and undetermined(row["shift_cad"]) == undetermined(row["free_shift_cad"]):
-        return f"{row['file']}: {free}; its own p_max kept, range {_span(row['shift_cad'])} °CA."
-    return f"{row['file']}: {kept}, its own p_max kept; without that limit {free}."
-
-
-def _part(row: Mapping[str, Any], prefix: str) -> str:
-    """Say the move of one question; a range that spans zero says none."""
-    best, ends = row["best"], row[f"{prefix}shift_cad"]
-    if undetermined(ends):
-        return f"no direction is determined, range {_span(ends)} °CA"
-    to = f" to a p_max of {best['free_p_max_bar']:.0f} bar" if prefix else ""
-    return (
-        f"{_move(best[f'{prefix}shift_cad'])}{to}, gain {best[f'{prefix}gain_percent']:.2f} %, range {_span(ends)} °CA"
-    )
-
-
-def _move(cad: float) -> str:
-    return f"{'retard' if cad > 0 else 'advance'} by {abs(cad):.1f} °CA" if abs(cad) >= 0.05 else "leave the timing"
-
-
-def _span(pair: Sequence[float]) -> str:
-    return " to ".join(dict.fromkeys(f"{value:+z.1f}".replace("-", "−") for value in pair))
 
 
 def _known(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""The main job on the measured traces, and the page it writes."""
+"""The main job on the measured traces, the page that it writes, and the table of the tour."""
 
 from __future__ import annotations
 
@@ -6,20 +6,18 @@ import html
 import json
 import re
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mgdd import datasets, io, presets
-from mgdd.cli import main
+from mgdd import datasets, presets
 from mgdd.errors import Interrupted
 from mgdd.identify import best_timing
 from mgdd.identify.engine import family
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
-from mgdd_studies import command, run_study
+from mgdd_studies import run_study
 from mgdd_studies.base import StudyResult
 from study_cache import quick_study, sources
 
@@ -250,29 +248,33 @@ def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.Mo
     assert stop.value.partial is None
 
 
-def test_ctrl_c_in_the_demo(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(command, "run_study", lambda name, **_: run_study(name, progress=press_at(1)))
-    assert main(["demo", "--folder", str(tmp_path)]) == 130
-    shown = capsys.readouterr()
-    assert "Interrupted: these are the models that were finished" in shown.out
-    assert shown.out.splitlines()[-1].endswith(f"{tmp_path / 'index.html'}")
-    assert (tmp_path / "index.html").is_file()
-    assert f"interrupted: what was finished is printed, and in {tmp_path}" in shown.err
+def ends(pair: list[float], form: str) -> str:
+    return f"{pair[0]:{form}} to {pair[1]:{form}}"
 
 
-def test_ctrl_c_in_the_report_of_a_calibration(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    trace = datasets.read("hd_diesel_128x144")[2]
-    io.write_csv(trace, tmp_path / "one.csv")
-    told = ["--speed-rpm", str(trace.attrs["speed_rpm"]), "--trapped-mass-g", str(trace.attrs["trapped_mass_g"])]
-    stopped = partial(run_study, progress=press_at(1))
-    monkeypatch.setattr(command, "run_study", lambda name, **given: stopped(name, **(given | stopped.keywords)))
-    argv = ["engine", "calibrate", str(tmp_path / "one.csv"), "--preset", "hd_diesel_128x144", *told]
-    assert main([*argv, "--report-folder", str(tmp_path / "page")]) == 130
-    shown = capsys.readouterr()
-    assert "RMSE" in shown.out
-    assert f"what was finished of the report is in {tmp_path / 'page'}" in shown.err
-    assert "interrupted: ranges over 1" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+def test_table_of_the_demo(root: Path) -> None:
+    table = (
+        (root / "docs" / "tour.md")
+        .read_text(encoding="utf-8")
+        .split("<!-- numbers: demo -->")[1]
+        .split("<!-- end numbers -->")[0]
+    )
+    written = [line for line in table.splitlines() if re.match(r"\| \d+ %", line)]
+    summary = quick_study("measured-traces").summary
+    computed = []
+    for load, row in zip((25, 50, 75, 100), summary["traces"], strict=True):
+        best, fit = row["best_timing"], row["calibrated"]
+        cells = (
+            f"{best['best'][name]:{form}} ({ends(best[name], form)})"
+            for name, form in (
+                ("free_ca50_cad", ".1f"),
+                ("free_shift_cad", "+z.1f"),
+                ("free_gain_percent", ".2f"),
+                ("shift_cad", "+z.1f"),
+                ("gain_percent", ".2f"),
+            )
+        )
+        computed.append(
+            f"| {load} % | {fit['rmse_percent']:.2f} | {fit['imep_closed_error_percent']:+.1f} | {' | '.join(cells)} |"
+        )
+    assert written == computed

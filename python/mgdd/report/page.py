@@ -30,18 +30,20 @@ __all__ = ["write_page", "write_report"]
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
 _INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine", "records": "Records"}  # in a summary
+_NUMBERS = " The numbers stand in summary.json beside this page."
 _SHORT = 8  # rows of a table that is not folded
 
 
 def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report", *, interactive: bool = False) -> Path:
-    """Write ``index.html`` and ``summary.json`` of a report.
+    """Write a report as one page, or as a folder with the page and its numbers.
 
     Parameters
     ----------
     result : Report
-        Of any study, for example.
+        `calibration_report` makes one, and every study.
     folder : path-like
-        Made if missing; the two files in it are replaced.
+        Made if missing; ``index.html`` and ``summary.json`` in it are replaced. Or a file that ends in ``.html``: the
+        page alone, whole or not at all.
     interactive : bool
         Zoom and hover in the figures, by Plotly (``pip install "mgdd[interactive]"``): some 5 MB more. Paper, and a
         browser without scripts, shows the pictures.
@@ -66,12 +68,18 @@ def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report",
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_report(result, folder).name
     'index.html'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_report(result, f"{folder}/cycle.html").name
+    'cycle.html'
     """
     folder = Path(folder)
+    if folder.suffix == ".html":
+        write_whole_text(folder, _page(result, interactive=interactive))
+        return folder
     text = json.dumps(to_jsonable(result.summary), indent=2, ensure_ascii=False, allow_nan=False)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    (folder / "index.html").write_text(_page(result, interactive=interactive), encoding="utf-8")
+    (folder / "index.html").write_text(_page(result, interactive=interactive, numbers=_NUMBERS), encoding="utf-8")
     return folder / "index.html"
 
 
@@ -95,7 +103,7 @@ def write_page(
     write_whole_text(file, page)
 
 
-def _page(result: Report, *, interactive: bool) -> str:
+def _page(result: Report, *, interactive: bool, numbers: str = "") -> str:
     script = ""
     if interactive:
         from mgdd.results.interactive import plotly_script
@@ -113,7 +121,7 @@ def _page(result: Report, *, interactive: bool) -> str:
             key=lambda section: not section["figures"],
         ),
         script=script,
-        numbers=" The numbers stand in summary.json beside this page.",
+        numbers=numbers,
     )
 
 

@@ -13,7 +13,7 @@ from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
 from mgdd.plot.measured import measured_and_model
-from mgdd.plot.style import residual_below
+from mgdd.plot.style import new_figure, residual_below
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals import nrmse_fit_percent
 from mgdd.signals.metrics import rmse
@@ -21,7 +21,6 @@ from mgdd_studies.base import Parts, Progress, StudyResult
 from mgdd_studies.benchmarks.drive_axis import drive_free_run, fit_drive
 from mgdd_studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd_studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
-from mgdd_studies.figures import new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable

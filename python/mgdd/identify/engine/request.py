@@ -32,6 +32,7 @@ __all__ = [
     "LoadBurn",
     "Request",
     "default_free",
+    "listed",
     "pegged",
     "with_burn",
 ]
@@ -82,13 +83,9 @@ class Request:
         **pegging: Any,
     ) -> Self:
         """Check the arguments of `fit_cylinder` against each other."""
-        if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
-            raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
         cylinder, fuel_mg = cylinder_of(cylinder), stated("fuel_mg", None, point) or None
         point = point_of(point)
-        given = [one_cycle(trace) for trace in traces]
-        if not given:
-            raise DataError("no traces: a calibration needs at least one")
+        given = listed(traces)
         chosen = None if free is None else (free,) if isinstance(free, str) else tuple(free)
         heats = _known_heats(given, cylinder, fuel_heat_j, fuel_mg, chosen)
         noisy = any(_scatter_of_start(trace, cylinder) > _NOISY_START for trace in given)
@@ -189,6 +186,16 @@ class Request:
             # The same encoder counts the injection.
             new.attrs.update({name: float(old.attrs[name]) + angle_cad for name in _EARLIEST if _has(old, name)})
         return replace(self, traces=moved)
+
+
+def listed(traces: Sequence[Any]) -> list[xr.Dataset]:
+    """Give the traces of a calibration, one cycle each."""
+    if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
+        raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
+    given = [one_cycle(trace) for trace in traces]
+    if not given:
+        raise DataError("no traces: a calibration needs at least one")
+    return given
 
 
 def pegged(

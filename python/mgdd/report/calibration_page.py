@@ -1,4 +1,4 @@
-"""Report of the measured-traces study: what its page says, from the summary alone, and its figures."""
+"""The page of a calibration: what it says, from the summary alone, and its figures."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.timing_records import undetermined
 from mgdd.plot.calibration import wall_heat_profile
 from mgdd.plot.family import family_strips
-from mgdd.plot.style import drawn
+from mgdd.plot.style import drawn, new_figure
 from mgdd.report.sections import Section, Table, as_number
-from mgdd_studies.figures import new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from mgdd.identify.engine.family import Member
     from mgdd.identify.engine.timing_records import BestTiming
 
-__all__ = ["draw", "measured_sections"]
+__all__ = ["draw", "move_of", "sections_of"]
 
 _ANALYSIS = {
     "p_max_bar": ("p_max [bar]", ".1f"),
@@ -94,8 +93,8 @@ _LAWS_TEXT = (
 )
 
 
-def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tuple[Section, ...]:
-    """Make the sections of a report from the summary of the study."""
+def sections_of(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tuple[Section, ...]:
+    """Make the sections from the summary."""
     profiles = s["common"]["wall_heat_scale"]
     return (
         Section(title="Best timing", text=_headline(s), table=_timing(s["best_timing"])),
@@ -154,6 +153,37 @@ def _headline(s: Mapping[str, Any]) -> tuple[str, ...]:
             ),
         )
     return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=kept, n=n, misfit=ModelFamily().misfit_cad)
+
+
+def move_of(row: Mapping[str, Any]) -> str:
+    """Say of a trace how far to move the timing, what that gains, and how sure that is."""
+    best = row["best"]
+    if best is None:
+        return f"{row['file']}: no plausible model, so no best timing."
+    kept, free = (_part(row, prefix) for prefix in ("", "free_"))
+    same = abs(best["shift_cad"] - best["free_shift_cad"]) < 0.05
+    if same and undetermined(row["shift_cad"]) == undetermined(row["free_shift_cad"]):
+        return f"{row['file']}: {free}; its own p_max kept, range {_ends(row['shift_cad'])} °CA."
+    return f"{row['file']}: {kept}, its own p_max kept; without that limit {free}."
+
+
+def _part(row: Mapping[str, Any], prefix: str) -> str:
+    """Say the move of one question; a range that spans zero says none."""
+    best, ends = row["best"], row[f"{prefix}shift_cad"]
+    if undetermined(ends):
+        return f"no direction is determined, range {_ends(ends)} °CA"
+    to = f" to a p_max of {best['free_p_max_bar']:.0f} bar" if prefix else ""
+    return (
+        f"{_move(best[f'{prefix}shift_cad'])}{to}, gain {best[f'{prefix}gain_percent']:.2f} %, range {_ends(ends)} °CA"
+    )
+
+
+def _move(cad: float) -> str:
+    return f"{'retard' if cad > 0 else 'advance'} by {abs(cad):.1f} °CA" if abs(cad) >= 0.05 else "leave the timing"
+
+
+def _ends(pair: Sequence[float]) -> str:
+    return " to ".join(dict.fromkeys(f"{value:+z.1f}".replace("-", "−") for value in pair))
 
 
 def _table(first: Sequence[str], columns: Mapping[str, tuple[str, Any]], rest: Sequence[str], body: Any) -> Table:
@@ -235,7 +265,7 @@ def draw(
     profiles: Mapping[str, WallHeatProfile],
     timing: Sequence[BestTiming],
 ) -> dict[str, Figure]:
-    """Draw the figures of the study by caption; nothing is registered with pyplot."""
+    """Draw the figures by caption; nothing is registered with pyplot."""
     out = {
         "Best timing by every member of the family, without a pressure limit": family_strips(timing),
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
