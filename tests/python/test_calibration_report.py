@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import pytest
 
 from mgdd import datasets, io
 from mgdd.cli import demo, engine, main
-from mgdd.errors import ShapeError
+from mgdd.errors import Interrupted, ShapeError
 from mgdd.report import calibration_report
 from mgdd.report.calibration import shipped_report
 from mgdd.report.calibration_page import move_of
@@ -40,6 +41,19 @@ def test_ctrl_c_in_the_demo(
     assert (tmp_path / "index.html").is_file()
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["interrupted"] is True
     assert f"interrupted: what was finished is printed, and in {tmp_path}" in shown.err
+
+
+def test_without_the_studies_the_demo_is_its_first_part(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(Interrupted) as stop:
+        pressed(shipped_report)(figures=False)
+    monkeypatch.setattr(demo, "shipped_report", lambda **_: stop.value.partial)
+    monkeypatch.setitem(sys.modules, "mgdd_studies.command", None)
+    assert main(["demo", "--folder", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("4 measured traces")
+    assert "mgdd_studies is not installed" in shown
 
 
 def test_a_file_of_the_user_gets_the_page_of_the_demo(
