@@ -261,7 +261,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "maps.CalibrationMap.to_dataset": lambda _: timing_table().to_dataset(),
     "maps.apply_map": lambda _: apply_map(optimize_map(map_sweep(), "efficiency_gross"), map_sweep()),
     "maps.compare_maps": lambda _: compare_maps(timing_table(), timing_table(), tolerance=0.5),
-    "mgdd_studies.StudyResult.dataset": lambda _: quick_study("sensor-delay").dataset,
+    "report.Report.dataset": lambda _: quick_study("sensor-delay").dataset,
     "sweep.sweep": lambda _: [
         sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, traces="pressure_bar"),
         sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, points=True),
