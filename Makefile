@@ -77,12 +77,12 @@ demo: $(VENV)/.stamp-build ## set up, then run the main job on the measured trac
 ready: $(VENV)/.stamp-build | system-test
 	@$(MAKE) --no-print-directory -j2 dev $(VENV)/.stamp-test
 
-test: MARKED := not slow
-test: ready ## set up, then run the tests of both languages, except those marked slow
-	@$(RUN_TESTS); echo "left out: tests marked slow, which \`make test-all\` runs too"
+test: MARKED := not slow and not study
+test: ready ## set up, then run the tests of both languages, but studies and those marked slow
+	@$(RUN_TESTS); echo "left out: studies and tests marked slow, which \`make test-all\` runs too"
 
 test-all: MARKED :=
-test-all: ready ## lint, then the same with those marked slow
+test-all: ready ## lint, then all tests
 	@tools/system_packages.sh browser
 	@$(MAKE) --no-print-directory lint
 	@$(RUN_TESTS)
@@ -142,7 +142,7 @@ stubs: ready ## write python/mgdd/_core/*.pyi from the built module
 	cp -r build/stubs/mgdd/_core* python/mgdd/
 
 # Both libraries must come first: libasan alone dies at the first C++ exception.
-asan: MARKED ?= not slow and not docs
+asan: MARKED ?= not slow and not docs and not study
 asan: $(VENV)/.stamp-test | system-test ## ctest and pytest under AddressSanitizer and UBSan; all: MARKED="not docs"
 	$(CONFIGURE) asan
 	$(BUILD) asan

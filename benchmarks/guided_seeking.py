@@ -28,7 +28,7 @@ from support.seeking_report import arguments, print_tables
 from support.seeking_rows import Row, driven, tuned, untouched
 
 from mgdd import guide, optimize
-from mgdd.studies.several_maps import SeekingMap
+from mgdd_studies.several_maps import SeekingMap
 
 
 def golden(field: SeekingMap, start: float, seed: int) -> optimize.Seeker:  # noqa: ARG001 - no chance in it

@@ -18,8 +18,8 @@ import numpy as np
 
 from mgdd.loop import EngineBench
 from mgdd.optimize import GaussianProcessSeeking
-from mgdd.studies.several_maps import EARLY
-from mgdd.studies.three_input_bench import BOUNDS, LIMITS, START, bench_optimum, bench_run, noisy_bench, told
+from mgdd_studies.several_maps import EARLY
+from mgdd_studies.three_input_bench import BOUNDS, LIMITS, START, bench_optimum, bench_run, noisy_bench, told
 
 
 def run_of(seed: int, cycles: int, best: float) -> dict[str, float]:

@@ -26,9 +26,9 @@ import numpy as np
 from mgdd import datasets
 from mgdd.loop import Measurement, SurrogatePlant, run_seeker
 from mgdd.optimize import ComponentLag, GaussianProcessSeeking, Limit
-from mgdd.studies.measured_engine_cases import lag_of
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.surrogate import EngineSurrogate
+from mgdd_studies.measured_engine_cases import lag_of
 
 NOX = "nox_ppm"
 DRAWN, NEARER = 400_000, (0.05, 0.02, 0.01, 0.004)

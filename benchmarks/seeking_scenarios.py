@@ -39,7 +39,7 @@ from support.seeking_rows import OnMap, Row, driven, untouched
 from mgdd.optimize import GaussianProcessSeeking, Seeker
 
 if TYPE_CHECKING:
-    from mgdd.studies.several_maps import SeekingMap
+    from mgdd_studies.several_maps import SeekingMap
 
 PACKAGES = {name: name for name in ("noisyopt", "scipy", "scikit-optimize")}
 

@@ -29,7 +29,7 @@ from support.seeking_report import arguments, print_tables
 from support.seeking_rows import OnMap, Row, driven, tuned, untouched
 
 from mgdd import optimize
-from mgdd.studies.several_maps import WIDTH, Guide, SeekingMap, of_no_use, off_by_a_fifth, several_maps
+from mgdd_studies.several_maps import WIDTH, Guide, SeekingMap, of_no_use, off_by_a_fifth, several_maps
 
 PACKAGES = {"noisyopt": "noisyopt", "scipy": "scipy", **peer_bayes.PACKAGES}
 KAPPA = 1.0  # of the confidence bound

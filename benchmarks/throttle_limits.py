@@ -15,9 +15,9 @@ import numpy as np
 
 from mgdd.loop import Reference, track, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
-from mgdd.studies.throttle_cases import throttle_of
-from mgdd.studies.throttle_tracking import driving
 from mgdd.throttle import Throttle
+from mgdd_studies.throttle_cases import throttle_of
+from mgdd_studies.throttle_tracking import driving
 
 SEEDS = 11
 CASES = ((40.0, 42.0), (20.0, 60.0), (4.0, 20.0))

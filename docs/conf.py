@@ -65,7 +65,7 @@ autodoc_typehints = "none"  # the docstrings name type, shape and unit
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 nitpick_ignore_regex = [
-    (r"py:.*", r"(?!mgdd\.).*"),  # other projects: no inventories without a network
+    (r"py:.*", r"(?!mgdd(_studies)?\.).*"),  # other projects: no inventories without a network
     (r"py:.*", r"mgdd\._core.*"),  # documented where it is offered, in mgdd.<room>
 ]
 

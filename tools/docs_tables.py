@@ -36,9 +36,9 @@ from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.engine.cycle import convergence as step_error
 from mgdd.guide import OnlineCalibration
 from mgdd.loop import EngineBench
-from mgdd.studies import guided_transients as plane_study
-from mgdd.studies import run_study
-from mgdd.studies.guide_cases import SpeedLoadPlane
+from mgdd_studies import guided_transients as plane_study
+from mgdd_studies import run_study
+from mgdd_studies.guide_cases import SpeedLoadPlane
 
 __all__ = [
     "burn_laws",

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from mgdd.studies import run_study
+from mgdd_studies import run_study
 
 OUT = Path(__file__).parents[1] / "docs" / "_static"
 # Study, number of the figure, resolution: a file stays below 150 kB.

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mgdd.studies import run_study
+from mgdd_studies import run_study
 
 __all__ = ["TABLES", "put_into", "tables"]
 

@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 
 from mgdd.loop import VirtualThrottle
-from mgdd.studies import run_study
-from mgdd.studies.throttle_cases import Baseline, Controller, baselines, controller_of, settings_of, throttle_of
 from mgdd.throttle import SensorPair, Throttle
+from mgdd_studies import run_study
+from mgdd_studies.throttle_cases import Baseline, Controller, baselines, controller_of, settings_of, throttle_of
 
 __all__ = ["Baseline", "baselines", "settings_of", "sine_mse_deg2", "stepped", "throttle_baselines", "throttle_faults"]
 

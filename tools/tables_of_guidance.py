@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tables_of_measured_traces import measured
 
-from mgdd.studies.guide_cases import SpeedLoadPlane
-from mgdd.studies.ignition_cases import TRUTHS, assumed_laws
-from mgdd.studies.ignition_delay import Plane, plane_of, plane_row, slope_row
-from mgdd.studies.model_validation import stage_rows, validate_law
-from mgdd.studies.validation_fits import LAWS, STAGES
+from mgdd_studies.guide_cases import SpeedLoadPlane
+from mgdd_studies.ignition_cases import TRUTHS, assumed_laws
+from mgdd_studies.ignition_delay import Plane, plane_of, plane_row, slope_row
+from mgdd_studies.model_validation import stage_rows, validate_law
+from mgdd_studies.validation_fits import LAWS, STAGES
 
 if TYPE_CHECKING:
     from tables_of_model import Rows

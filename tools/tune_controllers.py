@@ -14,7 +14,7 @@ from pathlib import Path
 from mgdd.loop import tune_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.tuned_sets import TUNED_SETS
-from mgdd.studies.throttle_cases import throttle_of
+from mgdd_studies.throttle_cases import throttle_of
 
 N_THROTTLES, SPREAD, BUDGET, SEED, ROUNDS = 20, 0.2, 400, 7, 2
 TARGET = Path(__file__).resolve().parents[1] / "python/mgdd/loop/tuned_sets.py"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mgdd.studies.several_maps import (
+from mgdd_studies.several_maps import (
     AWAY,
     CURVATURE,
     CYCLES,

@@ -11,7 +11,7 @@ from peers.peer_seekers import FinishedError, Point
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, ModelOptimum
 from mgdd.loop import EngineBench
-from mgdd.studies.several_maps import AWAY, CURVATURE, CYCLES, EARLY, NOISE, WIDTH, SeekingMap, Setting
+from mgdd_studies.several_maps import AWAY, CURVATURE, CYCLES, EARLY, NOISE, WIDTH, SeekingMap, Setting
 
 NEAR = 1.0
 STATED_FROM, STATED_SDS = 20, 1.44  # cycle; half width of an interval of 85 %

@@ -15,8 +15,8 @@ from peers.peer_seekers import installed
 from support import machine
 from support.seeking_rows import Row, check_agreement, run_once
 
-from mgdd.studies.several_maps import CYCLES, EARLY, SeekingMap
-from mgdd.studies.statistics import mean_interval
+from mgdd_studies.several_maps import CYCLES, EARLY, SeekingMap
+from mgdd_studies.statistics import mean_interval
 
 HEADS = (
     ("", "J lost", "95 %", "in the", "cycles", "never", "away", "J lost", "85 %", ""),

@@ -11,7 +11,7 @@ from peers.peer_seekers import Contender, Plant, Point, like, run_to_end
 from support.seeking_maps import CountedPlant
 
 from mgdd import optimize
-from mgdd.studies.several_maps import SeekingMap, tuned_seeker
+from mgdd_studies.several_maps import SeekingMap, tuned_seeker
 
 OnMap = Callable[[SeekingMap], Contender]
 Make = Callable[[SeekingMap, Point, int], optimize.Seeker]  # map, start, seed

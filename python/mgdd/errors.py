@@ -17,10 +17,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Self, TypeVar
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+from typing import Any, Self
 
 __all__ = [
     "ConvergenceError",
@@ -163,7 +160,7 @@ class Error(Exception):
         self.field, self.value, self.bound = field, value, bound
 
     @classmethod
-    def of(cls, field: str, value: Any, bound: str) -> Self:
+    def of(cls, field: str, value: Any, bound: str, *, known: Iterable[str] = ()) -> Self:
         """Make the error of one refused field: ``field = value: must be bound``.
 
         Parameters
@@ -174,6 +171,8 @@ class Error(Exception):
             What was given.
         bound : str
             What it must be, with a remedy where there is one.
+        known : iterable of str
+            Names that it may be, of which the nearest is named.
 
         Returns
         -------
@@ -187,7 +186,8 @@ class Error(Exception):
         ParameterError('cycles = 0: must be >= 1')
         """
         shown = f"{value:.12g}" if isinstance(value, float) else repr(value) if isinstance(value, str) else f"{value}"
-        return cls(f"{field} = {shortened(shown)}: must be {bound}", field=field, value=value, bound=bound)
+        message = hinted(f"{field} = {shortened(shown)}: must be {bound}", str(value), known)
+        return cls(message, field=field, value=value, bound=bound)
 
     def reworded(self, message: str) -> Self:
         """Give the same error with another message, for callers that know more of where it happened.
@@ -282,45 +282,6 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, message: str = "interrupted", partial: Any = None) -> None:
         super().__init__(message)
         self.partial = partial
-
-
-def or_partial(call: Callable[[], Result]) -> tuple[Result, Interrupted | None]:
-    """Call the core: what it returns, or the part that Ctrl-C left with the Interrupted that brought it."""
-    try:
-        return call(), None
-    except Interrupted as stop:
-        if stop.partial is None:
-            raise
-        return stop.partial, stop
-
-
-def keep_finished(call: Callable[[Item], Result], items: Iterable[Item], done: list[Result]) -> Interrupted | None:
-    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included.
-
-    Returns
-    -------
-    Interrupted or None
-        What ended it, for `hand_over`; raised at once where `done` is empty. `items` may look at `done` as it grows.
-    """
-    try:
-        for item in items:
-            done += [call(item)]
-    except KeyboardInterrupt as stop:
-        part = getattr(stop, "partial", None)
-        if part is not None:
-            done.append(part)
-        if not done:
-            raise
-        return Interrupted("interrupted: what was finished is in .partial", done[-1])
-    return None
-
-
-def hand_over(result: Result, stop: Interrupted | WorkerLostError | None) -> Result:
-    """Return a whole result; raise one made of a part in the error that ended it."""
-    if stop is not None:
-        stop.partial = result
-        raise stop
-    return result
 
 
 _OWN = "the page 'A seeker of your own' has it in Python"

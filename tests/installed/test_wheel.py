@@ -16,7 +16,7 @@ TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
 PACKAGE_FILES = re.compile(
     r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|report/templates/[^/]+\.(html|css)"
     r"|data/([^/]+/)*[^/]+\.(csv|txt)|rig/(can/buses|envelopes)/[^/]+\.(dbc|toml)|.*\.pyc)"
-    r"|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
+    r"|mgdd_studies/(.*\.pyc?|py\.typed)|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
 )
 HEAVY = {"scipy", "xarray", "pandas", "matplotlib", "rich", "jinja2", "pooch", "packaging"}
 # Commands of the tour that ask for no file of the reader's own; those of the rig are run as one block below.
@@ -62,7 +62,7 @@ def test_nothing_else_is_installed(environment: Path, tmp_path: Path) -> None:
     code = "import importlib.metadata as m; print(*m.files('mgdd'), sep='\\n')"
     files = call(environment / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
     assert any(file.startswith("mgdd/_core.") for file in files)
-    assert "mgdd/py.typed" in files
+    assert {"mgdd/py.typed", "mgdd_studies/py.typed", "mgdd_studies/command.py"} <= set(files)
     assert [file for file in files if not PACKAGE_FILES.fullmatch(file)] == []
 
 
@@ -81,6 +81,12 @@ def test_python_of_readme_and_tour_runs(environment: Path, tmp_path: Path) -> No
     blocks = re.findall(r"^```python\n(.*?)^```", README + TOUR, re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 4
     call(environment / "bin" / "python", "-c", "\n".join(blocks), cwd=tmp_path)
+
+
+def test_the_studies_are_found_by_their_entry_point(environment: Path, tmp_path: Path) -> None:
+    code = "import importlib.metadata as m; print(*m.entry_points(group='mgdd.studies'), sep='\\n')"
+    assert "mgdd_studies.command" in call(environment / "bin" / "python", "-c", code, cwd=tmp_path)
+    assert "sensor-delay" in call(environment / "bin" / "mgdd", "study", "--list", cwd=tmp_path)
 
 
 @pytest.mark.parametrize("line", COMMANDS)

@@ -289,11 +289,11 @@ def test_a_short_trace_is_told_and_still_reported(
         *HD,
         "--trapped-mass-g",
         "4.13863",
-        "--report-folder",
-        str(tmp_path / "r"),
+        "--report",
+        str(tmp_path / "r.html"),
     )
     assert any("spans -90 to 50" in text for text in out["warnings"])
-    assert "–" in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
+    assert "–" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
 def test_late_injection_and_failed_fits_have_their_exit_codes(

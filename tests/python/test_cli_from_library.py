@@ -96,7 +96,7 @@ def test_help_is_that_of_the_numpydoc(parser: argparse.ArgumentParser) -> None:
 
 def option_sets() -> list[Options]:
     """Every set of options of the package."""
-    modules = [module for name, module in sys.modules.items() if name.startswith("mgdd.cli.")]
+    modules = [module for name, module in sys.modules.items() if name.startswith(("mgdd.cli.", "mgdd_studies.command"))]
     values = [value for module in modules for value in vars(module).values()]
     each = [own for value in values for own in (value.values() if isinstance(value, dict) else (value,))]
     return list({id(own): own for own in each if isinstance(own, Options)}.values())

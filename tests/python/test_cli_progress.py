@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from mgdd import cli
 from mgdd.cli import main, output
 from mgdd.cli.progress import _INTERVAL_S, Progress
 from mgdd.errors import ParameterError
-from mgdd.studies.sections import Table
+from mgdd.report import Table
+from mgdd_studies import command
 
 
 class Terminal(io.StringIO):
@@ -126,16 +126,15 @@ def test_fields_of_an_error_are_passed_on() -> None:
 def test_a_result_that_was_printed_stands_alone(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from mgdd.cli import study
     from mgdd.errors import ConvergenceError
 
-    real = study.emit
+    real = command.emit
 
     def then_fail(*args: Any, **how: Any) -> None:
         real(*args, **how)
         raise ConvergenceError("did not converge")
 
-    monkeypatch.setattr(study, "emit", then_fail)
+    monkeypatch.setattr(command, "emit", then_fail)
     assert main(["study", "--list", "--json"]) == 3
     captured = capsys.readouterr()
     assert list(json.loads(captured.out)) == ["studies"]
@@ -148,7 +147,7 @@ def test_ctrl_c_before_a_result_is_an_error(
     def press(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli.study, "run_study", press)
+    monkeypatch.setattr(command, "run_study", press)
     assert main(["study", "sensor-delay", "--json"]) == 130
     assert json.loads(capsys.readouterr().out)["error"]["type"] == "KeyboardInterrupt"
 

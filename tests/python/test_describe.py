@@ -27,12 +27,11 @@ from mgdd.presets.preset import Preset
 from mgdd.results.describe import Row, as_html, as_text, picture_of, rows_of
 from mgdd.results.units import unit_of
 from mgdd.signals import chirp
-from mgdd.studies.base import StudyResult
-from mgdd.studies.benchmarks.drive_axis import DriveModel
-from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate_throttle
+from mgdd_studies.benchmarks.drive_axis import DriveModel
+from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
 
 
 def objects() -> dict[str, Callable[[], Any]]:
@@ -150,14 +149,6 @@ def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
     chain = DemandChain(bore_mm=52.0, pedal_map=PedalMap.of_full_load([900.0, 5000.0], [150.0, 130.0]))
     for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), chain, chain.pedal_map):
         assert eval(repr(record), names) == record
-
-
-def test_a_study_says_what_it_holds(quick_study: Callable[..., StudyResult]) -> None:
-    result = quick_study("sensor-delay")
-    text = repr(result)
-    assert text.startswith("StudyResult sensor-delay\n")
-    assert "rows 7" in text
-    Tags(result._repr_html_())
 
 
 def test_many_and_long_rows_are_counted_and_cut() -> None:

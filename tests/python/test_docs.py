@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import itertools
-import pkgutil
 import re
 import shlex
 import sys
@@ -20,6 +19,7 @@ import pytest
 
 import mgdd
 from mgdd.results.labels import VARIABLES
+from public_objects import ROOMS
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tools"))
@@ -139,18 +139,17 @@ def test_a_question_is_answered_two_clicks_from_the_landing_page(question: str) 
 
 
 # --- names --------------------------------------------------------------------------------------------------
-ROOMS = sorted(m.name for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_"))
 
 
 def public() -> list[tuple[str, str, object]]:
-    modules = [(room, importlib.import_module(f"mgdd.{room}")) for room in ROOMS]
+    modules = [(room, importlib.import_module(room)) for room in ROOMS]
     return [(room, name, getattr(module, name)) for room, module in modules for name in module.__all__]
 
 
 def test_rooms_say_what_is_public() -> None:
-    assert set(mgdd.__all__) - {"__version__"} <= set(ROOMS)
+    assert {f"mgdd.{name}" for name in mgdd.__all__} - {"mgdd.__version__"} <= set(ROOMS)
     for room in ROOMS:
-        assert importlib.import_module(f"mgdd.{room}").__all__, f"mgdd.{room} has no __all__"
+        assert importlib.import_module(room).__all__, f"{room} has no __all__"
 
 
 def test_reference_lists_every_public_name() -> None:
@@ -159,7 +158,7 @@ def test_reference_lists_every_public_name() -> None:
         room = re.search(r"currentmodule:: (\S+)", block)
         listed |= {f"{room[1]}.{name}" for name in re.findall(r"^   (\w+)$", block, re.MULTILINE) if room}
         listed |= set(re.findall(r"autodata:: (\S+)", block))
-    expected = {f"mgdd.{room}.{name}" for room, name, _ in public()}
+    expected = {f"{room}.{name}" for room, name, _ in public()}
     assert listed == expected, f"docs/api.md lacks {expected - listed}, has too much {listed - expected}"
 
 
@@ -169,17 +168,17 @@ def test_public_docstring_is_complete(room: str, name: str, item: object) -> Non
         pytest.skip("a constant; the reference documents it")
     text = inspect.getdoc(item) or ""
     summary = text.split("\n\n")[0].replace("\n", " ")
-    assert summary.endswith("."), f"mgdd.{room}.{name}: no summary"
+    assert summary.endswith("."), f"{room}.{name}: no summary"
     if isinstance(item, type) and issubclass(item, Exception):
         return
-    assert re.search(r"^Examples\n-{8}$", text, re.MULTILINE), f"mgdd.{room}.{name}: no example"
+    assert re.search(r"^Examples\n-{8}$", text, re.MULTILINE), f"{room}.{name}: no example"
     try:
         called = not getattr(item, "_is_protocol", False)  # a protocol is implemented, not called
         takes_arguments = called and bool(inspect.signature(item).parameters)
     except ValueError:  # a class of the core; its fields document themselves
         takes_arguments = not hasattr(item, "fields")
     section = re.search(r"^(Parameters|Attributes)\n-{10}$", text, re.MULTILINE)
-    assert section or not takes_arguments or hasattr(item, "fields"), f"mgdd.{room}.{name}: no Parameters"
+    assert section or not takes_arguments or hasattr(item, "fields"), f"{room}.{name}: no Parameters"
 
 
 # --- sources ------------------------------------------------------------------------------------------------

@@ -24,8 +24,8 @@ from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality
 from mgdd.results.model import Model
-from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.throttle import PseudoWiener
+from mgdd_studies.benchmarks.two_tanks import TwoTanksModel
 
 TIME = np.arange(4000) * 1e-3
 DUTY = 0.12 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + TIME))

@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 import mgdd
+import mgdd_studies
 from map_cases import sweep as map_sweep
 from map_cases import timing_table
 from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
@@ -260,7 +261,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "maps.CalibrationMap.to_dataset": lambda _: timing_table().to_dataset(),
     "maps.apply_map": lambda _: apply_map(optimize_map(map_sweep(), "efficiency_gross"), map_sweep()),
     "maps.compare_maps": lambda _: compare_maps(timing_table(), timing_table(), tolerance=0.5),
-    "studies.StudyResult.dataset": lambda _: quick_study("measured-traces").dataset,
+    "report.Report.dataset": lambda _: quick_study("sensor-delay").dataset,
     "sweep.sweep": lambda _: [
         sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, traces="pressure_bar"),
         sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, points=True),
@@ -332,8 +333,8 @@ def test_written_and_read_back(source: str, tmp_path: Path) -> None:
 
 def test_every_file_is_classic_whatever_engine_is_installed() -> None:
     """The reader of this package knows no other; without an engine's name xarray takes the first that it finds."""
-    package = Path(mgdd.__file__).resolve().parent
-    files = [file for folder in package.iterdir() for file in folder.rglob("*.py")]
+    packages = [Path(each.__file__).resolve().parent for each in (mgdd, mgdd_studies)]
+    files = [file for package in packages for folder in package.iterdir() for file in folder.rglob("*.py")]
     calls = [line for file in files for line in file.read_text(encoding="utf-8").splitlines() if ".to_netcdf(" in line]
     assert calls
     assert [line.strip() for line in calls if 'engine="scipy"' not in line] == []

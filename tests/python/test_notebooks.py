@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import doctest
 import importlib
-import pkgutil
 import re
 import subprocess
 import sys
@@ -14,14 +13,13 @@ from urllib.parse import unquote
 import nbformat
 import pytest
 
-import mgdd
 from mgdd import datasets
+from public_objects import MODULES
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tools"))
 run_notebooks = importlib.import_module("run_notebooks")
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
-MODULES = sorted({"mgdd", *(module.name for module in pkgutil.walk_packages(mgdd.__path__, "mgdd."))})
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 DEAR_PAGES = {"tour.md", "getting_started.md", "calibration.md"}  # they calibrate
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
@@ -57,11 +55,7 @@ def test_notebook_runs_and_prints_what_it_shows(path: Path, tmp_path: Path) -> N
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow if name.startswith("mgdd.studies.") else [])
-        for name in MODULES
-        if not name.endswith(("__main__", "._core"))
-    ],
+    [pytest.param(name, marks=pytest.mark.slow if name.startswith("mgdd_studies.") else []) for name in MODULES],
 )
 def test_docstring_examples(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -35,7 +35,8 @@ def test_one_version(root: Path) -> None:
 
 
 def test_package_is_typed() -> None:
-    assert importlib.resources.files("mgdd").joinpath("py.typed").is_file()
+    for package in ("mgdd", "mgdd_studies"):
+        assert importlib.resources.files(package).joinpath("py.typed").is_file()
 
 
 @pytest.mark.slow

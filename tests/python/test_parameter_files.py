@@ -24,13 +24,13 @@ from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.loop import SurrogatePlant
 from mgdd.presets.preset import Preset
-from mgdd.studies.benchmarks.drive_axis import DriveModel
-from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
-from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
 from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate_throttle
+from mgdd_studies.benchmarks.drive_axis import DriveModel
+from mgdd_studies.benchmarks.two_tanks import TwoTanksModel
+from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
 
 TIME = 1e-3 * np.arange(300)
 DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))

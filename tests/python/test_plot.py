@@ -330,7 +330,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
         (plot.seeking, sought, "asked", "mgdd.loop.run_seeker"),
-        (convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
+        (convergence, tracks, "estimate_median_cad", "a study of seekers"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
         (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
         (plot.throttle_run, followed, "angle_deg", "mgdd.throttle.simulate_throttle"),

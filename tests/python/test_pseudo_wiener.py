@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from mgdd.identify import OnlineUpdate
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results.model import Model
-from mgdd.studies.base import StudyResult
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3
@@ -184,26 +182,3 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[0], method="newton")
     with pytest.raises(ParameterError, match="'mass' is not a parameter"):
         OnlineUpdate(MODELS[0], free=["mass"])
-
-
-@pytest.mark.slow
-def test_the_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
-    result = quick_study("throttle-pseudo-wiener")
-    rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
-    better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
-    printed = {"P1": {"pw_r": 99.4, "pw_w": 79.3, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}
-    for plant, kinds in printed.items():
-        for kind, train in kinds.items():
-            row = rows[plant, kind]
-            assert row["fit_train_percent"] >= train - 0.05
-            assert row["ahead_20_ms_deg"] < rows[plant, "persistence"]["ahead_20_ms_deg"]
-        assert rows[plant, "pw_r"]["ahead_20_ms_deg"] <= 0.06
-    for case, row in better.items():
-        assert row["fit_train_percent"] >= rows[case]["fit_train_percent"] - 0.3
-    ahead = [rows["P1", kind]["ahead_20_ms_deg"] for kind in ("pw_r", "pw_w", "pw_p", "persistence")]
-    assert ahead == sorted(ahead)
-    assert 0.55 <= rows["P1", "pw_w"]["ahead_20_ms_deg"] <= 0.70
-    assert rows["P1", "pw_r"]["fit_steps_percent"] >= 96.0
-    assert rows["P1", "pw_w"]["fit_steps_percent"] <= 50.0
-    assert rows["P1", "persistence"]["ahead_20_ms_deg"] == pytest.approx(1.548, abs=0.01)
-    assert len(result.figures) == 4

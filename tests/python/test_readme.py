@@ -8,38 +8,10 @@ from pathlib import Path
 import pytest
 
 from mgdd.cli import main
-from study_cache import quick_study
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
-
-
-def span(pair: list[float], form: str) -> str:
-    return f"{pair[0]:{form}} to {pair[1]:{form}}"
-
-
-def test_table_of_the_demo() -> None:
-    table = TOUR.split("<!-- numbers: demo -->")[1].split("<!-- end numbers -->")[0]
-    written = [line for line in table.splitlines() if re.match(r"\| \d+ %", line)]
-    summary = quick_study("measured-traces").summary
-    computed = []
-    for load, row in zip((25, 50, 75, 100), summary["traces"], strict=True):
-        best, fit = row["best_timing"], row["calibrated"]
-        cells = (
-            f"{best['best'][name]:{form}} ({span(best[name], form)})"
-            for name, form in (
-                ("free_ca50_cad", ".1f"),
-                ("free_shift_cad", "+z.1f"),
-                ("free_gain_percent", ".2f"),
-                ("shift_cad", "+z.1f"),
-                ("gain_percent", ".2f"),
-            )
-        )
-        computed.append(
-            f"| {load} % | {fit['rmse_percent']:.2f} | {fit['imep_closed_error_percent']:+.1f} | {' | '.join(cells)} |"
-        )
-    assert written == computed
 
 
 def test_pictures_and_links_exist() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import inspect
 import pickle
-import pkgutil
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -29,15 +28,17 @@ from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.plot.convergence import convergence
 from mgdd.plot.response import response_diagnostics
+from mgdd.report import Report
 from mgdd.results.labels import check_labels
 from mgdd.results.result import Result
 from mgdd.rig import Experiment, Recorder, read_record, run_experiment
 from mgdd.rig.experiment.self_test import WAYS_OF, SelfTest
 from mgdd.signals import chirp
-from mgdd.studies import run_study
 from mgdd.surrogate import fit_response, fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.throttle import Throttle, simulate_throttle
+from mgdd_studies import run_study
+from public_objects import MODULES
 
 EXPERIMENT = 'kind = "experiment"\nformat = 1\ntask = "track"\nmode = "simulate"\n'
 
@@ -130,6 +131,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "ExperimentResult": lambda _: run_experiment(Experiment.from_toml(EXPERIMENT)),
     "RecordedRun": record,
     "SelfTest": lambda _: SelfTest(ways_to_die=dict.fromkeys(WAYS_OF["python"], 0.1), limit_s=0.5, notes={}),
+    "Report": lambda _: Report(name="one cycle", dataset=simulate("puma_single"), verdict=("It runs.",)),
     "StudyResult": lambda _: run_study("sensor-delay", quick=True),
 }
 ELSEWHERE = {"WienerHammersteinFit"}  # a Fit of a benchmark, with the methods of Fit
@@ -140,10 +142,9 @@ def subclasses(cls: type) -> set[type]:
 
 
 def test_every_class_of_results_is_here() -> None:
-    for module in pkgutil.walk_packages(mgdd.__path__, "mgdd."):
-        if not module.name.endswith(("__main__", "._core")):
-            importlib.import_module(module.name)
-    kinds = {kind.__name__ for kind in subclasses(Result) if kind.__module__.startswith("mgdd.")}
+    for module in MODULES:
+        importlib.import_module(module)
+    kinds = {kind.__name__ for kind in subclasses(Result) if kind.__module__.split(".")[0] in ("mgdd", "mgdd_studies")}
     kinds -= {"Result", "NumbersResult", "InputNumbers", "MapForms"} | ELSEWHERE
     assert kinds == {name.split()[-1] for name in MADE}
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import savgol_filter
 
 from mgdd.signals.excitation import _TAPS, maximum_length_sequence
-from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
+from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation
 
 
 def shift_register(register: int) -> list[int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -12,9 +13,9 @@ import pytest
 CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop > rig"
 # parallel knows errors alone: whatever is long enough to leave the machine may use it.
 PYTHON = (
-    "errors > _arguments _settings > _core > parallel results > signals > io plot > presets > optimize > control"
-    " > engine throttle > identify > surrogate > guide"
-    " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
+    "errors > _arguments _settings > _core > parallel results > signals > io plot > presets > optimize"
+    " > control > engine throttle > identify > surrogate > guide"
+    " > loop sweep design datasets > maps > rig > report > cli > __main__ > mgdd_studies"
 )
 
 STRANGERS = [("identify/engine", "identify/throttle")]  # parts of one room that do not know each other
@@ -38,22 +39,40 @@ def cpp_arrows(root: Path) -> list[tuple[str, str, str]]:
 
 def python_arrows(root: Path) -> list[tuple[str, str, str]]:
     """(file, own room, imported room), imports inside functions and type-checking blocks included."""
-    package, arrows = root / "python" / "mgdd", []
-    for path in sorted(package.rglob("*.py")):
-        relative = path.relative_to(package)
-        room = relative.parts[0].removesuffix(".py")
-        if room == "__init__":  # the front door may open every room
-            continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            names = []
-            if isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):
-                assert node.level == 0, f"{relative}: relative import"
-                names = [f"{node.module}.{alias.name}" for alias in node.names]
-            ours = [name.split(".") for name in names if name.split(".")[0] == "mgdd"]
-            arrows += [(str(path.relative_to(root)), room, parts[1] if parts[1:] else "mgdd") for parts in ours]
+    arrows = []
+    for module, path in modules(root).items():
+        if module != "mgdd":  # the front door may open every room
+            names = [f"{source}.{name}" if name else source for source, name in imported(path)]
+            ours = [name for name in names if name.partition(".")[0] in ("mgdd", "mgdd_studies")]
+            arrows += [(str(path.relative_to(root)), room_of(module), room_of(name)) for name in ours]
     return arrows
+
+
+def modules(root: Path) -> dict[str, Path]:
+    """Every module of both packages and its file, by its full name."""
+    return {
+        ".".join(path.relative_to(root / "python").with_suffix("").parts).removesuffix(".__init__"): path
+        for package in ("mgdd", "mgdd_studies")
+        for path in sorted((root / "python" / package).rglob("*.py"))
+    }
+
+
+def imported(path: Path) -> list[tuple[str, str]]:
+    """(module, name) of every import of a file; without a name where the module itself is imported."""
+    found: list[tuple[str, str]] = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, "") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            found += [(str(node.module), alias.name) for alias in node.names]
+    return found
+
+
+def room_of(module: str) -> str:
+    """Name the room of a module: a folder or file of mgdd, and the studies are one."""
+    package, _, rest = module.partition(".")
+    return package if package != "mgdd" else rest.partition(".")[0] or "mgdd"
 
 
 def faults(arrows: list[tuple[str, str, str]], stairs: str) -> list[str]:
@@ -98,23 +117,13 @@ def include_graph(root: Path) -> dict[str, set[str]]:
 
 def import_graph(root: Path) -> dict[str, set[str]]:
     """Which module imports which, inside functions and for type checkers too."""
-    package = root / "python" / "mgdd"
-    paths = {
-        ".".join(["mgdd", *path.relative_to(package).with_suffix("").parts]).removesuffix(".__init__"): path
-        for path in sorted(package.rglob("*.py"))
+    ours = modules(root)
+    graph = {
+        module: {f"{source}.{name}" if f"{source}.{name}" in ours else source for source, name in imported(path)}
+        for module, path in ours.items()
+        if module != "mgdd"
     }
-    return {module: imports_of(path, set(paths)) - {"mgdd"} for module, path in paths.items() if module != "mgdd"}
-
-
-def imports_of(path: Path, modules: set[str]) -> set[str]:
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names} & modules
-        elif isinstance(node, ast.ImportFrom):
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-            found |= {name if name in modules else str(node.module) for name in names} & modules
-    return found
+    return {module: (found & ours.keys()) - {"mgdd"} for module, found in graph.items()}
 
 
 def circle(graph: dict[str, set[str]]) -> list[str]:
@@ -182,7 +191,9 @@ def write(root: Path, file: str, text: str) -> None:
         ("cpp/src/engine/a.cpp", '#include "../loop/b.hpp"\n', "engine must not use loop"),
         ("cpp/include/mgdd/cellar/a.hpp", '#include "mgdd/common/b.hpp"\n', "unknown room 'cellar'"),
         ("python/mgdd/engine.py", "from mgdd import _core, results\nimport numpy\n", None),
-        ("python/mgdd/studies/a.py", "from mgdd.studies.b import run\n", None),
+        ("python/mgdd_studies/a.py", "from mgdd_studies.b import run\nfrom mgdd.cli import main\n", None),
+        ("python/mgdd/cli/a.py", "from mgdd_studies import run_study\n", "cli must not use mgdd_studies"),
+        ("python/mgdd/cli/a.py", "import mgdd_studies.base\n", "cli must not use mgdd_studies"),
         ("python/mgdd/plot/a.py", "def f():\n    from mgdd import engine\n", "plot must not use engine"),
         ("python/mgdd/io/a.py", "import mgdd.plot.cycle\n", "io must not use plot"),
         ("python/mgdd/engine.py", "import mgdd\n", "unknown room 'mgdd'"),
@@ -197,3 +208,85 @@ def test_the_test_sees_what_it_should(tmp_path: Path, file: str, text: str, faul
     else:
         assert len(found) == 1
         assert fault in found[0]
+
+
+# --- the studies and mgdd -----------------------------------------------------------------------------------
+# The compiled halves of their own benchmarks: one extension module serves both packages.
+THEIR_OWN = "mgdd._core.systems"
+
+
+def private_uses(root: Path) -> list[str]:
+    """What the studies take of mgdd that is not public.
+
+    Public is a module, and a name in the list of a module, where no part of the path begins with an underscore.
+    """
+    ours = {module: path for module, path in modules(root).items() if module.partition(".")[0] == "mgdd"}
+    lists = {module: {"__version__", *listed_names(path)} for module, path in ours.items()}
+    found = []
+    for path in sorted((root / "python" / "mgdd_studies").rglob("*.py")):
+        uses = {(module, name) for module, name in imported(path) if module in ours or module.startswith("mgdd._")}
+        uses |= {(module, "") for module, name in imported(path) if not name and module in ours}
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        bound = dict[str, str]()  # what stands for a module of mgdd
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                bound |= {alias.asname or "mgdd": alias.name if alias.asname else "mgdd" for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                bound |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute):
+                head, dot, rest = ast.unparse(node.value).partition(".")
+                if (module := f"{bound.get(head, '')}{dot}{rest}") in ours:
+                    uses.add((module, node.attr))
+                elif head not in ("self", "cls") and re.match(r"_[a-z]", node.attr):
+                    found.append(f"{path.name}: {ast.unparse(node)}")
+        for module, name in uses:
+            whole = f"{module}.{name}" if name else module
+            hidden = any(re.match(r"_[a-z]", part) for part in whole.split("."))
+            if whole != THEIR_OWN and (hidden or not (whole in ours or name in lists[module])):
+                found.append(f"{path.name}: {whole}")
+    return sorted(found)
+
+
+def listed_names(path: Path) -> set[str]:
+    """Read the list of public names of a module."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["__all__"]:
+            return set(ast.literal_eval(node.value))
+    return set()
+
+
+def test_the_studies_take_nothing_private(root: Path) -> None:
+    assert private_uses(root) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("from mgdd.io import load\nfrom mgdd import io, __version__\nio.load()", []),
+        ("from mgdd.io.deep import load\nimport mgdd.io\nmgdd.io.load()", []),
+        ("from mgdd._core import systems\nsystems.Tank()", []),
+        ("from mgdd import _core", ["a.py: mgdd._core"]),
+        ("from mgdd._core.engine import Cylinder", ["a.py: mgdd._core.engine.Cylinder"]),
+        ("from mgdd.io import helper", ["a.py: mgdd.io.helper"]),
+        ("def f():\n    from mgdd.io import _load", ["a.py: mgdd.io._load"]),
+        ("from mgdd import io as files\nfiles.helper()", ["a.py: mgdd.io.helper"]),
+        ("import mgdd.io\nmgdd.io.helper()", ["a.py: mgdd.io.helper"]),
+        ("from mgdd.io import load\nload()._state = 1", ["a.py: load()._state"]),
+        ("class A:\n    def f(self):\n        return self._x", []),
+    ],
+)
+def test_what_is_private_is_seen(tmp_path: Path, text: str, found: list[str]) -> None:
+    write(tmp_path, "python/mgdd/__init__.py", "")
+    write(tmp_path, "python/mgdd/io/__init__.py", '__all__ = ["load"]\n')
+    write(tmp_path, "python/mgdd/io/deep.py", '__all__ = ["load"]\n')
+    write(tmp_path, "python/mgdd_studies/a.py", text)
+    assert private_uses(tmp_path) == found
+
+
+def test_mgdd_names_the_studies_at_their_entry_alone(root: Path) -> None:
+    package = root / "python" / "mgdd"
+    named = [path for path in package.rglob("*.*") if path.suffix != ".pyc" and b"mgdd_studies" in path.read_bytes()]
+    assert [str(path.relative_to(package)) for path in named] == ["cli/study.py"]
+    entered = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
+    assert entered == {"mgdd.studies": {"command": "mgdd_studies.command"}}

@@ -12,9 +12,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.cli.output import Table, gated_streams, show
-from mgdd.errors import DataError, Error, Interrupted
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
+from mgdd.errors import DataError, Error
 
 ACTING = "\x1b]0;x\x07\x1b[2J\x00\x9b31m\u202e"
 
@@ -75,16 +73,6 @@ def test_a_message_is_short_and_plain_whatever_it_quotes() -> None:
 
 
 # --- Ctrl-C where a result is drawn ---------------------------------------------------------------------------
-def test_ctrl_c_while_a_study_draws_keeps_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stop(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    whole = run_study("sensor-delay", seeds=2, quick=True, figures=False)
-    monkeypatch.setattr("matplotlib.figure.Figure.__init__", stop)
-    with pytest.raises(Interrupted, match=r"while it drew: all \d+ rows are in \.partial") as stopped:
-        run_study("sensor-delay", seeds=2, quick=True, figures=True)
-    assert isinstance(stopped.value.partial, StudyResult)
-    assert stopped.value.partial.summary["rows"] == whole.summary["rows"]
 
 
 @pytest.mark.parametrize(

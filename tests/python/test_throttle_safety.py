@@ -12,10 +12,9 @@ import pytest
 from mgdd.control import Pid, SlidingMode, SupervisedController, ThrottleSupervisor
 from mgdd.errors import ParameterError
 from mgdd.loop import ThrottleFault, VirtualThrottle
-from mgdd.results.labels import check_labels
-from mgdd.studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
-from mgdd.studies.throttle_faults import CASES, SENSORS, run_case
 from mgdd.throttle import SensorPair, Throttle, simulate_throttle
+from mgdd_studies.throttle_cases import baselines, controller_of, supervisor_of, throttle_of
+from mgdd_studies.throttle_faults import CASES, SENSORS, run_case
 
 NORMAL, HOLDING, LIMITED, LIMP_HOME = range(4)
 TOLD = 2900  # sample of the acknowledgement
@@ -307,20 +306,3 @@ def test_a_sensor_fault_that_ends_is_forgotten_by_a_run():
     short = SensorPair().sense(run, faults=[ThrottleFault(kind="open_wire", sensor=1, from_s=0.1, until_s=0.25)])
     assert float(lasting["detected_s"]) == pytest.approx(0.2, abs=0.005)
     assert math.isnan(float(short["detected_s"]))
-
-
-def test_the_study_says_so_in_a_table(quick_study):
-    result = quick_study("throttle-faults")
-    check_labels(result.dataset)
-    assert len(result.figures) == 1
-    rows = result.summary["rows"]
-    assert {(row["fault"], row["controller"]) for row in rows} == {
-        (name, kind) for name in CASES for kind in ("PID", "sliding mode")
-    }
-    for row in rows:
-        case = CASES[row["fault"]]
-        assert (row["mode"], row["reason"]) == (case.mode, case.reason)
-        assert row["safe_ms"] <= 50.0
-        assert row["kept"]
-        assert row["recovered"]
-        assert (row["return_ms"] is None) == (case.mode != "limp_home" or not case.returns)

@@ -27,11 +27,11 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.identify import estimate_tdc
 from mgdd.io.pressure import mean_cycle
 from mgdd.presets.preset import Preset
+from mgdd.report import Section, Table
 from mgdd.report.page import write_page
 from mgdd.report.records import DRAWN_CYCLES, record_section
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
-from mgdd.studies.sections import Section, Table
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from mgdd.cli.options import add_command
+from mgdd.cli.options import Parser, UsageError, add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.io.extras import import_extra
 
@@ -35,6 +36,9 @@ def add(commands: Any, root: argparse.ArgumentParser) -> None:
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:
     """Walk over everything that can be given; argparse has no public way, shtab takes the same one."""
+    if isinstance(parser, Parser):
+        with contextlib.suppress(UsageError):  # a command whose package is not there has no options
+            parser.filled()
     for action in parser._actions:
         yield action
         if isinstance(action.choices, dict):

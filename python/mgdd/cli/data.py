@@ -25,8 +25,8 @@ from mgdd.io.column_names import stated_unit, stem
 from mgdd.io.plain_csv import long_columns, write_long
 from mgdd.io.reading import Reading
 from mgdd.io.table import Table as FileTable
+from mgdd.report import Table
 from mgdd.results.labels import ANGLE
-from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -25,9 +25,8 @@ from mgdd.cli.options import (
     refuse_idle,
     traces_of,
 )
-from mgdd.cli.output import Stopped, check_output, emit, lines
+from mgdd.cli.output import Stopped, check_file, check_output, emit, lines, whole_or_part, wrote
 from mgdd.cli.seek import add_seek
-from mgdd.cli.study import run_or_part
 from mgdd.cli.sweep import add_sweep
 from mgdd.engine import ThermalNo, find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
@@ -37,7 +36,7 @@ from mgdd.identify.engine.best_timing import doubts_of, headline_of
 from mgdd.identify.engine.calibration import TDC_SPAN_CAD, judge_fit
 from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
 from mgdd.io.pressure import mean_cycle
-from mgdd.report import write_report
+from mgdd.report import calibration_report, write_report
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,7 +121,10 @@ def _add_calibrate(verbs: Any) -> None:
         help="parameters to fit (default: soc_cad,burn_duration_cad,fuel_heat_j per trace and wall_heat_scale; "
         "the double Wiebe also its shape); gamma is that of the gamma law in use; with --fuel-mg the heat is held",
     )
-    parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
+    parser.add_argument(
+        "--report", metavar="PAGE.html",
+        help="also write a page that needs no network: best timing by every model, its limits, figures (a minute)",
+    )  # fmt: skip
     _add_pressure(parser)
     add_engine(parser)
     Options(fit_cylinder, "step_cad").add(parser, "scheme")
@@ -155,25 +157,27 @@ def _known(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
 def _calibrate(args: argparse.Namespace) -> None:
     """Fit, judge, compare, print."""
     check_output(args)
+    check_file("--report", args.report, (".html",))
     cylinder, point, preset = engine_of(args)
     traces = _traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     known, scheme = _known(args, cylinder), SCHEME.given(args)
-    step = args.progress.expect(45 + (90 if args.report_folder else 0))
+    step = args.progress.expect(45 + (90 if args.report else 0))
     step("calibrate")
     fit = fit_cylinder(traces, cylinder, free=free, point=point, **known, **scheme)
     found = judge_fit(fit, fuel_heat_j=known["fuel_heat_j"], progress=step)
     with named_options(**{field: option for option, field in CYLINDER_CHOICES.items()}):
         payload = {"preset": preset.name, **found.to_dict()}
     emit(args, payload, text=payload["report"])
-    if args.report_folder:
-        absolute = list(fit.request.traces)
-        result, stopped = run_or_part(
-            "measured-traces", traces=absolute, cylinder=cylinder, point=point, progress=step, **scheme
-        )
-        write_report(result, args.report_folder)
+    if args.report:
+        result, stopped = whole_or_part(
+            calibration_report, traces, cylinder, point=point, name="mgdd engine calibrate", progress=step, **known,
+            **scheme,
+        )  # fmt: skip
+        write_report(result, args.report)
+        wrote(args.report)
         if stopped:
-            raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
+            raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report}")
     if not fit.report.success:
         raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 

@@ -16,7 +16,7 @@ from mgdd.cli.ranges import factors_of
 from mgdd.design import FeasibleRegion, design_points
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.point_table import read_points
-from mgdd.studies.sections import Table
+from mgdd.report import Table
 from mgdd.sweep import sweep
 
 if TYPE_CHECKING:

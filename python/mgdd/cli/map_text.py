@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.cli.output import is_terminal
 from mgdd.maps.cells import NUMBERS, TEXTS
-from mgdd.studies.sections import Table
+from mgdd.report import Table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

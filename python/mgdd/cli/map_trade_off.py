@@ -15,8 +15,8 @@ from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.maps import apply_map
 from mgdd.plot import trade_off
 from mgdd.plot.style import drawn
+from mgdd.report import Table
 from mgdd.results.labels import label_of
-from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

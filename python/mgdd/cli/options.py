@@ -88,6 +88,23 @@ class UsageError(Exception):
 class Parser(argparse.ArgumentParser):
     """An argument parser that raises usage errors, so that ``--json`` commands can print them as JSON."""
 
+    later: Callable[[Parser], None] | None = None  # adds the options of a command when they are wanted, not before
+
+    def filled(self) -> Parser:
+        """Give the parser with all its options."""
+        later, self.later = self.later, None
+        if later is not None:
+            try:
+                later(self)
+            except ImportError as error:
+                self.error(str(error))
+        return self
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse with all options."""
+        self.filled()
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
         """Raise the message, with the nearest choice behind one that is none."""
         if found := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)$", message):

@@ -6,16 +6,16 @@ import argparse
 import contextlib
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from mgdd.errors import ParameterError, printable
+from mgdd.errors import Interrupted, ParameterError, printable
 from mgdd.io.files import write_whole, write_whole_text
 from mgdd.io.plain_csv import write_traces
+from mgdd.report import Report, Table
 from mgdd.results.labels import VARIABLES, to_jsonable
-from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,12 +34,23 @@ __all__ = [
     "save_figure",
     "show",
     "trusted",
+    "whole_or_part",
     "wrote",
 ]
 
 
 class Stopped(KeyboardInterrupt):
     """Ctrl-C after which something was kept; the message says what."""
+
+
+def whole_or_part(work: Callable[..., Report], *given: Any, **options: Any) -> tuple[Report, bool]:
+    """Do work that ends in a report, or as much of it as Ctrl-C leaves, and say whether it did."""
+    try:
+        return work(*given, **options), False
+    except Interrupted as stop:
+        if not isinstance(stop.partial, Report):
+            raise
+        return stop.partial, True
 
 
 class _Gate:

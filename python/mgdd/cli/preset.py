@@ -13,7 +13,7 @@ from mgdd.cli.output import check_file, check_output, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
 from mgdd.presets.preset import Preset
-from mgdd.studies.sections import Table
+from mgdd.report import Table
 
 __all__ = ["add"]
 

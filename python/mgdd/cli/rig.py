@@ -14,6 +14,7 @@ from mgdd.cli import rig_records, rig_run, rig_watch
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
+from mgdd.report import Table
 from mgdd.rig import Experiment, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
@@ -23,7 +24,6 @@ from mgdd.rig.can.signals import noted_signals
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import simulated_plant
 from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test
-from mgdd.studies.sections import Table
 
 __all__ = ["add"]
 

@@ -1,141 +1,44 @@
-"""`mgdd study`: run one of the studies, print its table, write its figures."""
+"""`mgdd study`, which the package of the studies brings: looked up and loaded when it is used, not before."""
 
 from __future__ import annotations
 
-import argparse
-import re
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from importlib import metadata
+from typing import Any
 
-from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, refuse_idle
-from mgdd.cli.output import Stopped, check_output, emit
-from mgdd.errors import Interrupted, ParameterError, hinted
-from mgdd.io.extras import import_extra
-from mgdd.parallel.pool import processes
-from mgdd.report import write_report
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.registry import available_studies
-from mgdd.studies.sections import Table, cells, column_names
+from mgdd.cli.options import add_command
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+__all__ = ["add", "studies"]
 
-__all__ = ["add", "run_or_part"]
-
-_STUDY = Options(run_study, "seeds", "quick")
-_PAGE = Options(write_report, "interactive")
-_LOW = "_low"
-_OPTIONS = {"real": ("guided",)}  # of single studies
+_GROUP = "mgdd.studies"
+# What pyproject.toml enters, for the tree of developers: links on PYTHONPATH have no metadata in which to look.
+_OURS = metadata.EntryPoint("command", "mgdd_studies.command", _GROUP)
 
 
 def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        "study",
-        run,
-        help_text="run a study of the package: a table over seeds, with figures",
+    """Add the command; its options are those of the studies."""
+    parser: Any = add_command(
+        commands, "study", lambda args: studies().run(args),
+        help_text="run a study: a table over seeds, with figures",
         example="mgdd study sensor-delay --figures figures",
-    )
-    parser.add_argument("name", nargs="?", metavar="NAME", help=f"one of {', '.join(available_studies())}")
-    parser.add_argument("--list", action="store_true", help="list the studies and their titles")
-    _STUDY.add(parser)
-    parser.add_argument(
-        "--real", action="store_true", default=None,
-        help="of guided: on the surrogate of the measured hydrogen-diesel engine instead of the virtual bench",
     )  # fmt: skip
-    parser.add_argument(
-        "--workers", type=int, metavar="N", help="processes that share its parts (default: one part after the other)"
-    )
-    parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
-    parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
-    _PAGE.add(parser)
-    parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: %(default)s)")
+    parser.later = lambda own: studies().fill(own)
 
 
-def run(args: argparse.Namespace) -> None:
-    """List the studies, or run one."""
-    check_output(args)
-    titles = available_studies()
-    if args.list:
-        refuse_idle(args, *_OPTIONS, "workers", why="--list runs no study")
-        width = max(map(len, titles))
-        text = "\n".join(f"{name:{width}} {title}" for name, title in titles.items())
-        emit(args, {"studies": [{"name": name, "title": title} for name, title in titles.items()]}, text=text)
-        return
-    if args.name not in titles:
-        given = "no study named" if args.name is None else f"no study {args.name!r}"
-        raise ParameterError(hinted(f"{given}: must be one of those that --list prints", args.name or "", titles))
-    options: dict[str, Any] = {}
-    for option, studies in _OPTIONS.items():
-        if args.name not in studies:
-            refuse_idle(args, option, why=f"it is an option of the study {', '.join(studies)}, not of {args.name}")
-        elif getattr(args, option) is not None:
-            options[option] = getattr(args, option)
-    if args.report is None:
-        refuse_idle(args, "interactive", why="it is of the page that --report writes")
-    elif args.interactive:
-        import_extra("plotly", "interactive", "an interactive figure")  # before the study runs, not after it
-    folder = None if args.figures is None else Path(args.figures)
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-    drawn = folder is not None or args.report is not None
-    step = args.progress.expect(10)
-    result, stopped = run_or_part(
-        args.name, figures=drawn, progress=step, **_STUDY.given(args),
-        executor=None if args.workers is None else processes(args.workers), **options,
-    )  # fmt: skip
-    files = {} if folder is None else _files(result.figures, folder, f"{args.name}.{args.format}")
-    summary: dict[str, Any] = dict(result.summary)
-    if folder is not None:
-        summary["figures"] = [path.as_posix() for path in files]
-    if args.report is not None:
-        summary["report"] = (Path(args.report) / "index.html").as_posix()
-    emit(args, summary, text=_text(titles[args.name], summary))
-    for path, (caption, figure) in files.items():
-        figure.savefig(path, dpi=120, metadata={"Title": caption})
-    if args.report is not None:
-        write_report(result, args.report, **_PAGE.given(args))
-    if stopped:
-        raise Stopped(f"{len(summary['rows'])} finished rows are printed")
+def studies() -> Any:
+    """Load what the package of the studies offers: ``fill`` and ``run`` of the command, and ``run_study``.
 
-
-def run_or_part(name: str, **options: Any) -> tuple[StudyResult, bool]:
-    """Run a study, or as much of it as Ctrl-C leaves, and say whether it did."""
+    Raises
+    ------
+    ImportError
+        It is not installed.
+    """
+    entry = next(iter(metadata.entry_points(group=_GROUP)), _OURS)
     try:
-        return run_study(name, **options), False
-    except Interrupted as stop:
-        if not isinstance(stop.partial, StudyResult):
+        return entry.load()
+    except ModuleNotFoundError as error:
+        package = entry.module.partition(".")[0]
+        if error.name not in (package, entry.module):
             raise
-        return stop.partial, True
-
-
-def _files(figures: Mapping[str, Figure], folder: Path, ending: str) -> dict[Path, tuple[str, Figure]]:
-    files = {}
-    stem, _, suffix = ending.rpartition(".")
-    for number, (caption, figure) in enumerate(figures.items(), start=1):
-        slug = "-".join(re.findall(r"[a-z0-9]+", caption.lower())[:6])
-        files[folder / f"{stem}-{number}-{slug}.{suffix}"] = caption, figure
-    return files
-
-
-def _text(title: str, summary: Mapping[str, Any]) -> list[str | Table]:
-    seeds = summary["seeds"]
-    chance = f" ({seeds} seed{'s' if seeds != 1 else ''})" if seeds else ""
-    out: list[str | Table] = [f"{summary['study']}: {title}{chance}\n", rows_table(summary["rows"])]
-    if any(name.endswith(_LOW) for row in summary["rows"] for name in row):
-        out.append("\nBrackets: 95 % interval over seeds, of the mean or, for cycles, of the median.")
-    if summary.get("figures"):
-        out += ["", *summary["figures"]]
-    if summary.get("report"):
-        out += ["", f"Report: {summary['report']}"]
-    return out
-
-
-def rows_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Lay out flat rows: one line each, intervals behind their mean, the names of the keys as the head."""
-    names = column_names(rows)
-    return Table(columns=tuple(names), rows=tuple(tuple(cells(row, names)) for row in rows))
+        raise ImportError(
+            f"{package} is not installed, the package of the studies: it comes with mgdd, install that again"
+        ) from None

@@ -18,7 +18,7 @@ from mgdd.loop.tune import with_stiction
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
-from mgdd.studies.sections import Table
+from mgdd.report import Table
 from mgdd.throttle import Throttle
 
 __all__ = ["add"]

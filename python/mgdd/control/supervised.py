@@ -9,7 +9,7 @@ from typing import Protocol
 from mgdd._core.control import ThrottleSupervisor
 from mgdd.errors import ParameterError
 
-__all__ = ["SupervisedController"]
+__all__ = ["Controller", "SupervisedController"]
 
 
 class Controller(Protocol):

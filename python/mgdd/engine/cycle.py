@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core.engine import NoxProxy, OperatingPoint
+from mgdd._core.engine import NoxProxy, OperatingPoint, volume_l
 from mgdd.presets.meant import engine_of
 from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 from mgdd.results.units import unit_attributes
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from mgdd.presets.meant import CylinderLike, PointLike
 
-__all__ = ["convergence", "sensitivities", "simulate", "timing_sweep"]
+__all__ = ["convergence", "sensitivities", "simulate", "timing_sweep", "volume_l"]
 
 _LOG = logging.getLogger(__name__)
 TRACES = (

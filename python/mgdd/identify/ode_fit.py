@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, keep_finished
+from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
 from mgdd.identify.starts import search_starts, spread_starts
 from mgdd.optimize import least_squares
 from mgdd.optimize.fit_options import FitOptions, Resolved, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run, quality_of
+from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit
 from mgdd.results.fit_report import FitReport

@@ -79,7 +79,8 @@ def search_starts(
     Returns
     -------
     tuple
-        What was found, in the order of the starts, and what ended the work before its end, for `mgdd.errors.hand_over`.
+        What was found, in the order of the starts, and what ended the work before its end, for
+        `mgdd.parallel.finished.hand_over`.
 
     Raises
     ------

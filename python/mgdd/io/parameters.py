@@ -21,7 +21,10 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     import os
 
-__all__ = ["FORMS", "Entry", "ModelParameters", "ParameterFile", "Parameters", "Wanted", "entries", "wanted", "written"]
+__all__ = [
+    "FIT_NOTES", "FORMS", "Entry", "ModelParameters", "ParameterFile", "Parameters", "Wanted", "entries", "wanted",
+    "written",
+]  # fmt: skip
 
 FORMAT = 1
 FIT_NOTES = ("source", "unidentifiable")  # what a fit says beside its model, in a table [fit] too

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import hand_over, or_partial
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.bench_record import cycles_to_dataset
@@ -18,6 +17,7 @@ from mgdd.loop.plant_record import VOID, steered
 from mgdd.loop.summary import of_first_input
 from mgdd.optimize import Seeker
 from mgdd.optimize.seeker_findings import findings_of
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.result import Figures
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from mgdd.presets.meant import throttle_model_of
 if TYPE_CHECKING:
     from mgdd.throttle.pseudo_wiener import PseudoWiener
 
-__all__ = ["FAMILIES", "Family", "Groups", "groups_of"]
+__all__ = ["FAMILIES", "Family", "Groups", "Setup", "groups_of"]
 
 Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
 _SIDES = ("above", "below")

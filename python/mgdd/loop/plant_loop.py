@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, hand_over, hinted, or_partial
+from mgdd.errors import Interrupted, ParameterError, hinted
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.function_plant import core_of
@@ -20,6 +20,7 @@ from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.plant_record import Cycles, Row, cycles_told, dataset_of
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import Seeker
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.finding import Finding
 from mgdd.results.labels import label_of
 from mgdd.results.result import Figures, Result

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over
+from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.loop.controller_families import Setup, groups_of
 from mgdd.loop.many_tracks import track_many
 from mgdd.loop.reference import Reference
 from mgdd.loop.tuned import family_of, shipped_numbers
+from mgdd.parallel.finished import hand_over
 from mgdd.parallel.pool import MakesExecutor, Pool
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.result import NumbersResult

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
+from mgdd._core.optimize import FitReport as CoreReport
+from mgdd._core.optimize import LeastSquaresOptions
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.results.fit_report import FitReport
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["least_squares"]
+__all__ = ["CoreReport", "LeastSquaresOptions", "least_squares"]
 
 
 def least_squares(
@@ -109,7 +111,7 @@ def least_squares(
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=bool(log))
         for name, low, high, log in zip(names, lowers.tolist(), uppers.tolist(), logs.tolist(), strict=True)
     ]
-    options = _core.optimize.LeastSquaresOptions(
+    options = LeastSquaresOptions(
         max_iterations=max_iterations,
         cost_tolerance=cost_tolerance,
         step_tolerance=step_tolerance,

@@ -68,8 +68,8 @@ def run_chunks(
     Returns
     -------
     Interrupted, WorkerLostError or None
-        What ended the work before its end, for `mgdd.errors.hand_over`: Ctrl-C, or a lost worker. What runs then is
-        waited for and kept.
+        What ended the work before its end, for `mgdd.parallel.finished.hand_over`: Ctrl-C, or a lost worker. What runs
+        then is waited for and kept.
 
     Raises
     ------

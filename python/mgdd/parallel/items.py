@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from mgdd.errors import hand_over
 from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.finished import hand_over
 from mgdd.parallel.pool import MakesExecutor
 
 __all__ = ["map_items"]

@@ -63,7 +63,7 @@ def convergence(tracks: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     'estimate [°CA aTDC]'
     """
     optional = (*_BAND, "optimum_cad")
-    tracks = require("tracks", tracks, ("cycle", "estimate_median_cad"), "a study of mgdd.studies", optional)
+    tracks = require("tracks", tracks, ("cycle", "estimate_median_cad"), "a study of seekers", optional)
     median = tracks["estimate_median_cad"]
     others = [str(dim) for dim in median.dims if dim != "cycle"]
     if "cycle" not in median.dims or len(others) != 1:

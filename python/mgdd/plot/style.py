@@ -35,6 +35,7 @@ __all__ = [
     "legend",
     "minus",
     "new_axes",
+    "new_figure",
     "require",
     "residual_below",
 ]
@@ -60,11 +61,16 @@ def new_axes(ax: Axes | None, *, height: float = 3.8) -> Axes:
     return plt.subplots(figsize=(6.6, height), layout="constrained")[1]
 
 
-def drawn(draw: Callable[..., Axes], data: xr.Dataset | Result, *, size: tuple[float, float], **how: Any) -> Figure:
-    """Draw data on the only axes of a new figure of `size` inches, which pyplot does not know."""
+def new_figure(width: float, height: float) -> Figure:
+    """Make a figure of that size [inch], which pyplot does not know."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, layout="constrained")
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def drawn(draw: Callable[..., Axes], data: xr.Dataset | Result, *, size: tuple[float, float], **how: Any) -> Figure:
+    """Draw data on the only axes of a new figure of `size` inches, which pyplot does not know."""
+    figure = new_figure(*size)
     draw(data, ax=figure.add_subplot(), **how)
     return figure
 

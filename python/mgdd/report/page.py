@@ -1,4 +1,4 @@
-"""One self-contained HTML page: of a study, with its summary as JSON beside it, or of any sections."""
+"""One self-contained HTML page: of a report, with its summary as JSON beside it, or of any sections."""
 
 from __future__ import annotations
 
@@ -16,35 +16,34 @@ from typing import TYPE_CHECKING, Any
 from mgdd._core import __version__
 from mgdd.errors import DataError
 from mgdd.io.files import write_whole_text
+from mgdd.report.sections import as_number
 from mgdd.results.labels import to_jsonable
-from mgdd.studies.registry import available_studies
-from mgdd.studies.sections import as_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mgdd.studies.base import StudyResult
-    from mgdd.studies.sections import Section
+    from mgdd.report.report import Report
+    from mgdd.report.sections import Section
 
 __all__ = ["write_page", "write_report"]
 
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
 _INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine", "records": "Records"}  # in a summary
+_NUMBERS = " The numbers stand in summary.json beside this page."
 _SHORT = 8  # rows of a table that is not folded
 
 
-def write_report(
-    result: StudyResult, folder: str | os.PathLike[str] = "mgdd-report", *, interactive: bool = False
-) -> Path:
-    """Write ``index.html`` and ``summary.json`` of a study.
+def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report", *, interactive: bool = False) -> Path:
+    """Write a report as one page, or as a folder with the page and its numbers.
 
     Parameters
     ----------
-    result : StudyResult
-        Of any study.
+    result : Report
+        `calibration_report` makes one, and every study.
     folder : path-like
-        Made if missing; the two files in it are replaced.
+        Made if missing; ``index.html`` and ``summary.json`` in it are replaced. Or a file that ends in ``.html``: the
+        page alone, whole or not at all.
     interactive : bool
         Zoom and hover in the figures, by Plotly (``pip install "mgdd[interactive]"``): some 5 MB more. Paper, and a
         browser without scripts, shows the pictures.
@@ -62,18 +61,25 @@ def write_report(
     Examples
     --------
     >>> import tempfile
-    >>> from mgdd.report import write_report
-    >>> from mgdd.studies import run_study
-    >>> result = run_study("sensor-delay", seeds=2, quick=True, figures=False)
+    >>> from mgdd.engine import simulate
+    >>> from mgdd.report import Report, Section, write_report
+    >>> note = Section(title="Note", text=("A cycle without misfire.",))
+    >>> result = Report(name="one cycle", dataset=simulate("puma_single"), sections=(note,))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_report(result, folder).name
     'index.html'
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_report(result, f"{folder}/cycle.html").name
+    'cycle.html'
     """
     folder = Path(folder)
+    if folder.suffix == ".html":
+        write_whole_text(folder, _page(result, interactive=interactive))
+        return folder
     text = json.dumps(to_jsonable(result.summary), indent=2, ensure_ascii=False, allow_nan=False)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    (folder / "index.html").write_text(_page(result, interactive=interactive), encoding="utf-8")
+    (folder / "index.html").write_text(_page(result, interactive=interactive, numbers=_NUMBERS), encoding="utf-8")
     return folder / "index.html"
 
 
@@ -97,16 +103,15 @@ def write_page(
     write_whole_text(file, page)
 
 
-def _page(result: StudyResult, *, interactive: bool) -> str:
+def _page(result: Report, *, interactive: bool, numbers: str = "") -> str:
     script = ""
     if interactive:
         from mgdd.results.interactive import plotly_script
 
         script = plotly_script()
-    title = result.title or available_studies().get(result.name, result.name)
-    first, last = _first_and_last_fact(f"study {result.name}")
+    first, last = _first_and_last_fact(result.made_by)
     return _rendered(
-        title=title[:1].upper() + title[1:],
+        title=result.heading,
         verdict=result.verdict,
         interrupted=bool(result.summary.get("interrupted")),
         facts=[first, *_inputs(result.summary), last],
@@ -116,7 +121,7 @@ def _page(result: StudyResult, *, interactive: bool) -> str:
             key=lambda section: not section["figures"],
         ),
         script=script,
-        numbers=" The numbers stand in summary.json beside this page.",
+        numbers=numbers,
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from mgdd import plot
 from mgdd.plot.style import drawn
+from mgdd.report.sections import Section, Table, as_number
 from mgdd.results.labels import ANGLE, label_of
-from mgdd.studies.sections import Section, Table, as_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -14,8 +14,9 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import NoxProxy
 from mgdd.engine.cycle import TRACES
-from mgdd.errors import ParameterError, argument, did_you_mean, hand_over
+from mgdd.errors import ParameterError, argument, did_you_mean
 from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.finished import hand_over
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.finding import Finding

@@ -1,4 +1,4 @@
-"""Every public class of the package, found by walking its modules, and an object of each that can be made simply."""
+"""Modules and public classes of both packages, found by walking them, and an object of each class made simply."""
 
 from __future__ import annotations
 
@@ -14,9 +14,16 @@ from types import ModuleType
 from typing import Any
 
 import mgdd
+import mgdd_studies
 from mgdd import _core
 
 SEEKING = {"start": 2.0, "lower": -30.0, "upper": 10.0}
+# Every package whose names are public, and every module.
+ROOMS = sorted(f"mgdd.{m.name}" for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_"))
+ROOMS.append("mgdd_studies")
+MODULES = ["mgdd", "mgdd_studies"]
+MODULES += [m.name for each in (mgdd, mgdd_studies) for m in pkgutil.walk_packages(each.__path__, f"{each.__name__}.")]
+MODULES = sorted(name for name in MODULES if "._core" not in name and not name.endswith("__main__"))
 ARGUMENTS: tuple[dict[str, Any], ...] = (
     {},
     SEEKING,
@@ -42,14 +49,12 @@ def bound_classes(room: ModuleType = _core) -> dict[str, type]:
 def public_classes() -> dict[str, type]:
     """Give every class in the list of names of a module, by its full name."""
     found: dict[type, str] = {}
-    for module in pkgutil.walk_packages(mgdd.__path__, "mgdd."):
-        if "._core" in module.name or module.name.endswith("__main__"):
-            continue
-        room = importlib.import_module(module.name)
+    for module in MODULES:
+        room = importlib.import_module(module)
         for name in getattr(room, "__all__", ()):
             member = getattr(room, name)
             if inspect.isclass(member) and not issubclass(member, BaseException):
-                found.setdefault(member, f"{module.name}.{name}")
+                found.setdefault(member, f"{module}.{name}")
     return {name: member for member, name in found.items()}
 
 

@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import mgdd
+import mgdd_studies
 from mgdd import _core
-from mgdd.studies import run_study
-from mgdd.studies.base import StudyResult
-from mgdd.studies.registry import function_of
+from mgdd_studies import run_study
+from mgdd_studies.base import StudyResult
+from mgdd_studies.registry import function_of
 
 ALL = Path(__file__).resolve().parents[3] / "build" / "studies"
 KEPT_VERSIONS = 3
@@ -41,9 +42,9 @@ QUICK: dict[str, dict[str, int]] = {
 
 
 def sources() -> list[Path]:
-    """List the files that a result depends on; in a build of developers the folders of the package are links."""
-    package = Path(mgdd.__file__).resolve().parent
-    return sorted(file for ending in ("py", "toml", "csv") for file in package.rglob(f"*.{ending}"))
+    """List the files that a result depends on; in a build of developers what stands in a package is a link."""
+    packages = [Path(each.__file__).resolve().parent for each in (mgdd, mgdd_studies)]
+    return sorted(file for each in packages for ending in ("py", "toml", "csv") for file in each.rglob(f"*.{ending}"))
 
 
 @functools.cache
@@ -67,7 +68,7 @@ def quick_study(name: str) -> StudyResult:
 
 
 def study(name: str, **options: Any) -> StudyResult:
-    """Give what `mgdd.studies.run_study` gives, with figures; run it only if nobody has."""
+    """Give what `mgdd_studies.run_study` gives, with figures; run it only if nobody has."""
     call = inspect.signature(function_of(name)).bind(**(options | {"figures": True}))
     call.apply_defaults()
     # The result does not depend on who is told of progress; his address is another one in every process.

@@ -10,12 +10,13 @@ from mgdd import _core
 from mgdd._core.optimize import Limit
 from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import DEFAULT_CAD, check_request
-from mgdd.errors import ConvergenceError, Interrupted, hand_over
+from mgdd.errors import ConvergenceError, Interrupted
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
 from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming, undetermined
 from mgdd.optimize.optimum import Optimum, limits_of
+from mgdd.parallel.finished import hand_over
 from mgdd.presets.meant import CylinderLike, PointLike
 
 if TYPE_CHECKING:

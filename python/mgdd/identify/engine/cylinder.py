@@ -12,12 +12,12 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace import conditions
-from mgdd.errors import hand_over, or_partial
 from mgdd.identify.engine.findings import findings_of
 from mgdd.identify.engine.model_error import with_model_error
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
-from mgdd.identify.engine.request import Bounds, Request, closed
+from mgdd.identify.engine.request import Bounds, Request, closed, with_burn
 from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.presets.meant import CylinderLike, PointLike
 from mgdd.results.fit import FitQuality
 from mgdd.results.fit_report import FitReport
@@ -212,7 +212,7 @@ def _load(
     return Load(
         file=label,
         point=own,
-        cylinder=_core.identify.with_burn(cylinder, burn),
+        cylinder=with_burn(cylinder, burn),
         soc_cad=burn.soc_cad,
         burn_duration_cad=burn.burn_duration_cad,
         fuel_heat_j=burn.fuel_heat_j,

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from mgdd._core.engine import Cylinder
-from mgdd.errors import Interrupted, ParameterError, hand_over
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.plausible import Plausibility
 from mgdd.identify.engine.records import CylinderFit, Load
 from mgdd.identify.engine.request import BURN_FIELDS, GAMMA_PARAMETER, SHAPE_FIELDS, Request
+from mgdd.parallel.finished import hand_over
 from mgdd.results.describe import described
 
 __all__ = ["Member", "ModelFamily", "fit_family"]

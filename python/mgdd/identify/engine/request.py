@@ -12,6 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.identify import LoadBurn, with_burn
 from mgdd.engine import analyze
 from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
@@ -24,7 +25,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["BURN_FIELDS", "GAMMA_PARAMETER", "SHAPE_FIELDS", "Request", "default_free", "pegged"]
+__all__ = [
+    "BURN_FIELDS",
+    "GAMMA_PARAMETER",
+    "SHAPE_FIELDS",
+    "LoadBurn",
+    "Request",
+    "default_free",
+    "listed",
+    "pegged",
+    "with_burn",
+]
 
 SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
 BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
@@ -72,13 +83,9 @@ class Request:
         **pegging: Any,
     ) -> Self:
         """Check the arguments of `fit_cylinder` against each other."""
-        if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
-            raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
         cylinder, fuel_mg = cylinder_of(cylinder), stated("fuel_mg", None, point) or None
         point = point_of(point)
-        given = [one_cycle(trace) for trace in traces]
-        if not given:
-            raise DataError("no traces: a calibration needs at least one")
+        given = listed(traces)
         chosen = None if free is None else (free,) if isinstance(free, str) else tuple(free)
         heats = _known_heats(given, cylinder, fuel_heat_j, fuel_mg, chosen)
         noisy = any(_scatter_of_start(trace, cylinder) > _NOISY_START for trace in given)
@@ -115,7 +122,7 @@ class Request:
             )
         return out
 
-    def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[_core.identify.LoadBurn]:
+    def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[LoadBurn]:
         """Give the start of each burn: from the trace's heat release, then what is given, then what is known."""
         known = _core.identify.load_parameters()
         burns = []
@@ -127,7 +134,7 @@ class Request:
                         f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
                     )
             full = set(known) - {"start_pressure_bar"} <= set(said)  # then nothing is left to estimate
-            burn = _core.identify.LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
+            burn = LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
             for name, value in said.items():
                 setattr(burn, name, float(value))
             heat = self.known_heat_j[index]
@@ -179,6 +186,16 @@ class Request:
             # The same encoder counts the injection.
             new.attrs.update({name: float(old.attrs[name]) + angle_cad for name in _EARLIEST if _has(old, name)})
         return replace(self, traces=moved)
+
+
+def listed(traces: Sequence[Any]) -> list[xr.Dataset]:
+    """Give the traces of a calibration, one cycle each."""
+    if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
+        raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
+    given = [one_cycle(trace) for trace in traces]
+    if not given:
+        raise DataError("no traces: a calibration needs at least one")
+    return given
 
 
 def pegged(

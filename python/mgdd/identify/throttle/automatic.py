@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mgdd import _core
-from mgdd.errors import Interrupted, hand_over
+from mgdd.errors import Interrupted
 from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.delay_report import delay_at_end, with_delay
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
@@ -35,6 +35,7 @@ from mgdd.identify.throttle.nuisances import (
 )
 from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.parallel.finished import hand_over
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport

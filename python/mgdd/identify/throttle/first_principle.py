@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over, or_partial
+from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.identify.starts import rank, search_starts
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
 from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
@@ -17,6 +17,7 @@ from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, qua
 from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.results import Fit
 from mgdd.results.finding import Finding

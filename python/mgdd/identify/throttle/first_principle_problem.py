@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.identify.throttle.first_principle_model import (
     GROUP_NAMES,
     LONGEST_DELAY,
@@ -20,6 +20,7 @@ from mgdd.identify.throttle.first_principle_model import (
 )
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle
 from mgdd.identify.throttle.free_run import LOG_COLUMNS
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.finding import Finding
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, hand_over, or_partial
+from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.delay_report import delay_at_end
 from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.noise_ceiling import below_ceiling
 from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport

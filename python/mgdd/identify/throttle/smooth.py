@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, or_partial
+from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.identify.starts import rank, search_starts
 from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
+from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit
 from mgdd.results.describe import described
