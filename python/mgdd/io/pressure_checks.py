@@ -200,10 +200,10 @@ def check_trace(
     place = Place(source, rows)
     if degrees.size < MIN_SAMPLES:
         raise DataError(f"{source}: {degrees.size} samples; at least {MIN_SAMPLES} are needed")
-    for name, column in (("crank angle", degrees), *(("pressure", row) for row in np.atleast_2d(values))):
-        bad = np.flatnonzero(~np.isfinite(column))
+    for name, rows_of in (("crank angle", degrees[None]), ("pressure", np.atleast_2d(values))):
+        bad = np.argwhere(~np.isfinite(rows_of))
         if bad.size:
-            where, value = place.row(int(bad[0])), column[bad[0]]
+            where, value = place.row(int(bad[0, 1])), rows_of[tuple(bad[0])]
             raise DataError(f"{where}: {name} = {value}: must be finite; remove or repair it")
     if angle_unit == "rad":
         degrees = np.rad2deg(degrees)
@@ -214,8 +214,10 @@ def check_trace(
     bar = to_bar(values, unit)
     check_magnitude(degrees, values, unit, source, unit_of_file)
     if bar.ndim == 2:
-        for cycle, row in enumerate(values, start=1):
-            check_magnitude(degrees, row, unit, f"{source}, cycle {cycle}", unit_of_file)
+        low = _low(degrees)
+        odd = [cycle for cycle, peak in enumerate(values.max(axis=1)) if not _peak_fits(float(peak), unit, low)]
+        for cycle in odd[:1]:
+            check_magnitude(degrees, values[cycle], unit, f"{source}, cycle {cycle + 1}", unit_of_file)
     mean = bar if bar.ndim == 1 else bar.mean(axis=0)
     _check_peak(degrees, mean, source)
     _check_tdc(degrees, mean, source)

@@ -57,13 +57,15 @@ def no_pressure(values: NDArray[np.float64], cycles: float) -> str | None:
     if (held := _held(values)) is not None:
         return held
     low, high = float(values.min()), float(values.max())
-    step = np.diff(values)
-    some = np.sort(step[:: -(-step.size // _SOME)])  # where nearly all are even, the middle of some is
-    usual = float(some[some.size // 2])
-    if usual and np.count_nonzero(np.abs(step - usual) <= 1e-3 * abs(usual)) >= _EVEN * step.size:
-        return f"even steps from {low:g} to {high:g}, as an angle, a time or a count"
+    at = np.arange(0, values.size - 1, -(-values.size // _SOME))
+    some = values[at + 1] - values[at]  # where nearly all steps are even, so are most of some
+    usual = float(np.sort(some)[at.size // 2])
+    if usual and 2 * np.count_nonzero(np.abs(some - usual) <= 1e-3 * abs(usual)) > at.size:
+        step = np.diff(values)
+        if np.count_nonzero(np.abs(step - usual) <= 1e-3 * abs(usual)) >= _EVEN * step.size:
+            return f"even steps from {low:g} to {high:g}, as an angle, a time or a count"
     above = np.count_nonzero(values > 0.5 * (low + high)) / values.size
-    if not _ABOVE[0] < above < _ABOVE[1] or np.abs(step).max() >= _SMOOTH * (high - low):
+    if not _ABOVE[0] < above < _ABOVE[1] or np.abs(np.diff(values)).max() >= _SMOOTH * (high - low):
         return None
     first, last = low + _LEVELS[0] * (high - low), low + _LEVELS[1] * (high - low)
     marks = np.where(values >= last, 1, np.where(values <= first, -1, 0))
