@@ -96,14 +96,20 @@ class Heading(NamedTuple):
 
 def heading(name: str, units_row: str | None = None, *, where: str = "column") -> Heading:
     """Read one column's name and its cell in the units row; two units that differ are refused."""
+    try:
+        return _heading(name, units_row)
+    except DataError as error:
+        raise error.reworded(f"{where}: {error}") from error
+
+
+@lru_cache(maxsize=1024)  # the files of a folder have the same names
+def _heading(name: str, units_row: str | None) -> Heading:
     said, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
     name, name_gauge = _without_reference(name)
     units_row, row_gauge = _without_reference(units_row or "")
     in_name, in_row = _known(_unit_word(name, lone=not units_row) or ""), _known(units_row)
     if in_name and in_row and in_name != in_row:
-        raise DataError(
-            f"{where}: the header says {in_name} and the units row {units_row!r}: correct the one that is wrong"
-        )
+        raise DataError(f"the header says {in_name} and the units row {units_row!r}: correct the one that is wrong")
     unit = in_row or in_name
     words = _words(_BRACKETS.sub(" ", name))
     quantity = _QUANTITIES.get(unit or "")

@@ -6,6 +6,7 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from mgdd.errors import DataError
 
@@ -214,8 +215,10 @@ def _placed(
         return None
     usual = median[around]
     lift = max(0.0, 0.3 - float(usual.min()))  # a relative pressure may be below zero
-    shape = np.polynomial.Chebyshev.fit(cad[around], np.log(usual + lift), _DEGREE)
-    slope = shape.deriv()
+    low, width = float(cad[around][0]), float(np.ptp(cad[around]))
+    design = chebyshev.chebvander(2.0 * (cad[around] - low) / width - 1.0, _DEGREE)
+    shape = np.linalg.lstsq(design, np.log(usual + lift), rcond=None)[0]
+    slope = chebyshev.chebder(shape) * 2.0 / width
     head = max(3, int(5.0 / max(float(np.median(np.diff(angle))), 1e-3)))
     rise = part[:, -head:].mean(axis=1) - part[:, :head].mean(axis=1)
     usual_rise = float(np.median(rise))
@@ -229,9 +232,9 @@ def _placed(
     change = np.zeros((n, 3)) if start is None else start
     for turn in range(_TURNS):
         level, factor, late = change.T[:, :, None]
-        at = angle - late
-        model = np.exp(shape(at))
-        rate = -(1.0 + factor) * model * slope(at)
+        at = 2.0 * (angle - late - low) / width - 1.0
+        model = np.exp(chebyshev.chebval(at, shape))
+        rate = -(1.0 + factor) * model * chebyshev.chebval(at, slope)
         model -= lift
         left = part - (1.0 + factor) * model - level
         noise, known = 1.0, turn > 0 or start is not None

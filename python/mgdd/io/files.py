@@ -224,6 +224,8 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) 
             raise DataError(f"{origin}: damaged UTF-16 at byte {error.start}: write it again, as UTF-8") from error
     if b"\0" in raw:
         raise _binary(origin)
+    if raw.isascii():
+        return raw.decode("ascii")  # a plain copy, which the next one is not
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -115,7 +115,8 @@ def check_magnitude(
 
 def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str) -> list[str]:
     """Doubt a unit that the peak allows and the intake level does not; one line, or none."""
-    level = _level_bar(degrees, to_bar(values, unit))
+    level = _level_bar(degrees, values)
+    level = None if level is None else (level[0], float(to_bar(np.array(level[1]), unit)))
     if level is None or _level_fits(level):
         return []
     angle, bar = level

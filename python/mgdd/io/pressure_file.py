@@ -294,7 +294,7 @@ def odd_shape(degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> int | 
     """Return the first row that is not of the shape of row 0: another cylinder, or another quantity."""
     step = float(np.median(np.abs(np.diff(degrees))))
     spread = rows - rows.mean(axis=1, keepdims=True)
-    norms = np.sqrt((spread**2).sum(axis=1))
+    norms = np.sqrt(np.einsum("ij,ij->i", spread, spread))
     with np.errstate(invalid="ignore", divide="ignore"):
         alike = spread @ spread[0] / (norms * norms[0])
     away = np.abs(rows.argmax(axis=1) - rows[0].argmax()) * step
