@@ -138,9 +138,9 @@ def lost_turn(cad: NDArray[np.float64], pressure: NDArray[np.float64]) -> int | 
     near, far = np.abs(cad) < 40.0, np.abs(cad) > 320.0
     if len(pressure) < 2 or near.sum() < 8 or far.sum() < 8:
         return None
-    low = pressure.min()
-    level = pressure - low + max(low, 0.3)  # a relative pressure may be below zero
-    share = np.log(level[:, near].mean(axis=1) / level[:, far].mean(axis=1))
+    low = float(pressure.min())
+    lift = max(low, 0.3) - low  # a relative pressure may be below zero
+    share = np.log((pressure[:, near].mean(axis=1) + lift) / (pressure[:, far].mean(axis=1) + lift))
     right, wrong = share > _TURN, share < -_TURN
     if not (right.any() and wrong.any()):
         return None
@@ -188,7 +188,7 @@ def _agree(one: Phases, better: Phases) -> bool:
     """Whether no cycle moves by more than noise from one fit to the other (after Hausman; a prior makes it rough)."""
     usual = np.sqrt(max(one.stderr_cad**2 - better.stderr_cad**2, (0.6 * one.stderr_cad) ** 2))
     off = better.late_cad - one.late_cad
-    off = np.abs(off - np.median(off))
+    off = np.abs(off - _middle(off))
     return bool(off.max() <= odd_bound(off.size) * usual)
 
 
@@ -219,14 +219,14 @@ def _placed(
     design = chebyshev.chebvander(2.0 * (cad[around] - low) / width - 1.0, _DEGREE)
     shape = np.linalg.lstsq(design, np.log(usual + lift), rcond=None)[0]
     slope = chebyshev.chebder(shape) * 2.0 / width
-    head = max(3, int(5.0 / max(float(np.median(np.diff(angle))), 1e-3)))
+    head = max(3, int(5.0 / max(float(angle[-1] - angle[0]) / (angle.size - 1), 1e-3)))
     rise = part[:, -head:].mean(axis=1) - part[:, :head].mean(axis=1)
-    usual_rise = float(np.median(rise))
+    usual_rise = _middle(rise)
     if not usual_rise > 0.0:
         return None
     charge = _UNKNOWN_CHARGE
     if len(part) > 3:
-        charge = _CHARGE_SCATTERS * 1.4826 * float(np.median(np.abs(rise / usual_rise - 1.0)))
+        charge = _CHARGE_SCATTERS * 1.4826 * _middle(np.abs(rise / usual_rise - 1.0))
         charge = float(np.clip(charge, *_CHARGE))
     n = len(part)
     change = np.zeros((n, 3)) if start is None else start
@@ -239,7 +239,7 @@ def _placed(
         left = part - (1.0 + factor) * model - level
         noise, known = 1.0, turn > 0 or start is not None
         if known:
-            rest = left - np.median(left, axis=0) if n > 2 else left - left.mean(axis=0)
+            rest = left - (np.partition(left, n // 2, axis=0)[n // 2] if n > 2 else left.mean(axis=0))
             rest -= rest.mean(axis=1, keepdims=True)
             each = np.sqrt((rest**2).mean(axis=1) / (1.0 - 1.0 / n))
             spread = np.maximum(np.sort(each)[[n // 2, int(0.9 * n)]], _QUIETEST_BAR)
@@ -256,7 +256,12 @@ def _placed(
         if known and np.abs(step[:, 2]).max() < _SETTLED_CAD:
             break
     error = noise * np.sqrt(np.linalg.inv(normal)[:, 2, 2])
-    return _Fit(Phases(change[:, 2], float(np.median(error))), spread, change)
+    return _Fit(Phases(change[:, 2], _middle(error)), spread, change)
+
+
+def _middle(values: NDArray[np.float64]) -> float:
+    """Give the upper median, in a tenth of the time of NumPy's."""
+    return float(np.partition(values, values.size // 2)[values.size // 2])
 
 
 def phase_warnings(

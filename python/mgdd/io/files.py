@@ -36,6 +36,7 @@ _UTF8 = re.compile(rb"[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf
 _SPECIAL = {stat.S_ISFIFO: "a pipe", stat.S_ISCHR: "a device", stat.S_ISBLK: "a device", stat.S_ISSOCK: "a socket"}
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BLOCK = 1 << 20  # bytes that are looked at before a whole file is in memory
+_WHOLE = 1 << 24  # bytes; less is read at once, whatever it holds
 _DEEPEST = 64  # levels
 _WIDEST = 64  # bits of a whole number, with or without a sign
 
@@ -154,12 +155,13 @@ class Stamp:
 def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) -> str:
     """Read a text file that `existing_file` finds and `decoded` takes."""
     file = existing_file(path)
-    with file.open("rb") as stream:
-        # A file with holes, as any binary one, is none of text: seen before it is in memory.
-        if not stream.read(2).startswith(_UTF16):
-            while block := stream.read(_BLOCK):
-                if b"\0" in block:
-                    raise _binary(str(file))
+    if file.stat().st_size > _WHOLE:
+        with file.open("rb") as stream:
+            # A file with holes, as any binary one, is none of text: seen before it is in memory.
+            if not stream.read(2).startswith(_UTF16):
+                while block := stream.read(_BLOCK):
+                    if b"\0" in block:
+                        raise _binary(str(file))
     return decoded(bytes_of(file), str(file), only_utf8=only_utf8)
 
 

@@ -202,8 +202,9 @@ def check_trace(
     if degrees.size < MIN_SAMPLES:
         raise DataError(f"{source}: {degrees.size} samples; at least {MIN_SAMPLES} are needed")
     for name, rows_of in (("crank angle", degrees[None]), ("pressure", np.atleast_2d(values))):
-        bad = np.argwhere(~np.isfinite(rows_of))
-        if bad.size:
+        finite = np.isfinite(rows_of)
+        if not finite.all():
+            bad = np.argwhere(~finite)
             where, value = place.row(int(bad[0, 1])), rows_of[tuple(bad[0])]
             raise DataError(f"{where}: {name} = {value}: must be finite; remove or repair it")
     if angle_unit == "rad":

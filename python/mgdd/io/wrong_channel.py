@@ -29,7 +29,7 @@ def no_angle(values: NDArray[np.float64], unit: str) -> str | None:
         return None
     low, high = float(values.min()), float(values.max())
     step, span = np.diff(values), high - low
-    if (held := _held(values)) is not None:
+    if (held := _held(values, low, high)) is not None:
         return held
     inner = step[np.abs(step) <= 0.5 * span]
     if not inner.size or np.all(inner > 0.0) or np.all(inner < 0.0):
@@ -52,11 +52,13 @@ def no_angle(values: NDArray[np.float64], unit: str) -> str | None:
 
 def no_pressure(values: NDArray[np.float64], cycles: float) -> str | None:
     """Say what a column looks like that cannot be the pressure of so many cycles; None where it may be one."""
-    if values.size < MIN_SAMPLES or not np.isfinite(values).all():
+    if values.size < MIN_SAMPLES:
         return None
-    if (held := _held(values)) is not None:
-        return held
     low, high = float(values.min()), float(values.max())
+    if not np.isfinite(low + high):  # a NaN is both
+        return None
+    if (held := _held(values, low, high)) is not None:
+        return held
     at = np.arange(0, values.size - 1, -(-values.size // _SOME))
     some = values[at + 1] - values[at]  # where nearly all steps are even, so are most of some
     usual = float(np.sort(some)[at.size // 2])
@@ -78,8 +80,7 @@ def no_pressure(values: NDArray[np.float64], cycles: float) -> str | None:
     return None
 
 
-def _held(values: NDArray[np.float64]) -> str | None:
-    low, high = float(values.min()), float(values.max())
+def _held(values: NDArray[np.float64], low: float, high: float) -> str | None:
     if low == high:
         return f"the constant {low:g}"
     near = _NEAR * (high - low)
