@@ -81,7 +81,7 @@ void CurveBank::move(const Prior& prior) noexcept {
 
 // These drops of the places where they are now; `room` serves where they have moved.
 const CurveBank::Column& CurveBank::moved(const Column& drops, Column& room) const noexcept {
-  if (phase_ == 0.0) return drops;
+  if (phase_ == 0.0) return drops;  // NOLINT(bugprone-return-const-ref-from-parameter): of the caller
   const Eigen::Index to = phase_ > 0.0 ? 0 : 1;
   room = drops;
   for (std::size_t s = 0; s < shapes; ++s) {

@@ -119,9 +119,10 @@ void GaussianProcessSeeking::know_edge(const Inputs& at) noexcept {
     apart[k] = candidates_(1 + 2 * k, k) - candidates_(2 + 2 * k, k);
   }
   const auto slopes = [&](const ProcessModel& model, auto&& out, double scale) {
-    for (Eigen::Index k = 0; k < n; ++k)
-      out[k] +=
-          (model.mean(1 + 2 * static_cast<int>(k)) - model.mean(2 + 2 * static_cast<int>(k))) / (apart[k] * scale);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const int up = 1 + 2 * static_cast<int>(k);
+      out[k] += (model.mean(up) - model.mean(up + 1)) / (apart[k] * scale);
+    }
   };
   Inputs rest = Inputs::Zero(n);
   for (ProcessModel& model : j_) {
