@@ -141,7 +141,7 @@ def test_a_seeker_of_any_kind_begins_there(
     [
         ("--guide-preset puma_single", "--guide-preset does not act here; --guide none has no model"),
         ("--guide-set wall_heat_scale=1", "--guide-set does not act here; --guide none has no model"),
-        ("--guide calibrated --guide-shape parabola", "--guide-shape parabola: a parabola cannot be calibrated"),
+        ("--guide calibrated --guide-shape parabola", "--guide-shape 'parabola': a parabola cannot be calibrated"),
         ("--guide-shape parabola", "--guide-shape does not act here; --guide none has no model"),
         ("--guide-map x.toml", "--guide-map does not act here; --guide none has no model"),
         ("--guide map", "--guide map needs --guide-map FILE"),
@@ -161,7 +161,7 @@ def test_a_seeker_of_any_kind_begins_there(
         ("--guide map --guide-map none.toml", "none.toml"),
         ("--guide map --guide-map x.toml --guide-set wall_heat_scale=1", "--guide-set does not act here; --guide map"),
         ("--guide curve --guide-map x.toml", "--guide-map does not act here; --guide curve has a model"),
-        ("--guide feed_forward --guide-shape parabola", "--guide-shape parabola: a parabola is no timing"),
+        ("--guide feed_forward --guide-shape parabola", "--guide-shape 'parabola': a parabola is not one timing"),
         ("--guide curve --seeker spsa", "--seeker acts with --guide none, feed_forward or map"),
         ("--guide calibrated --sensor analyser", "use --sensor soft, or --guide curve with the model's shape"),
         ("--guide curve --guide-shape parabola --sensor analyser", "use --sensor soft, or --guide curve with"),

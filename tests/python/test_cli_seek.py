@@ -195,7 +195,7 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         (
             ["--seeker-set", "limits=3"],
             [],
-            "--seeker-set: 'limits' is no setting: the search gives it",
+            "--seeker-set: 'limits' is not one of them: the search gives it",
             2,
         ),
         (["--fuel-mg", "-3"], ["--fuel-mg", "30"], "--fuel-mg -3 mg: must be", 2),

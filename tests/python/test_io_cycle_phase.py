@@ -111,6 +111,18 @@ def test_an_encoder_that_loses_pulses_is_doubted():
     assert pressure_trace(FULL, cycles).attrs["warnings"] == ""
 
 
+@pytest.mark.parametrize("step", [0.2, 0.5, 1.0])
+def test_forty_degrees_of_compression_are_enough(step):
+    whole = foreign(np.random.default_rng(2), draw(np.random.default_rng(1), "diesel"), 20, step=step, noise_bar=0.02)
+    cycles = whole.bar.copy()
+    cycles[7] = np.roll(cycles[7], round(2.0 / step))
+    late = whole.angle > -100.0 - 0.5 * step
+    assert "compression of cycle 8 lies +" in " ".join(
+        phase_warnings(whole.angle[late], cycles[:, late], over_time=False, source="x")
+    )
+    assert phase_warnings(whole.angle[late], whole.bar[:, late], over_time=False, source="x") == []
+
+
 def test_lost_samples_are_placed_and_the_step_of_the_encoder_stays():
     for kind in ("spark", "diesel"):
         random = np.random.default_rng(4)

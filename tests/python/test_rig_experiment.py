@@ -88,7 +88,7 @@ def test_a_wrong_key_is_named_with_its_value_and_remedy(text: str, said: str) ->
         ("start = { soc_cad = 50 }", "seek.start: soc_cad = 50: must be in"),
         ("tolerance = { egr = 1 }", "seek.tolerance has egr: must have one number for each of soc_cad"),
         ('settings = { memory_cycles = "x" }', "seek.settings: memory_cycles = 'x'"),
-        ("settings = { start = 1 }", "seek.settings: 'start' is no setting"),
+        ("settings = { start = 1 }", "seek.settings: 'start' is not one of them"),
         ("cycles = 1", "seek.cycles = 1: must be >= 2"),
         ("noise_sd = 0", "seek.noise_sd = 0: must be > 0"),
         ('model = "nope"', "seek.model = 'nope': no preset"),

@@ -1,4 +1,4 @@
-// Binds include/mgdd/optimize: extremum seeking, SPSA, gradient descent, golden section, and the tuner.
+// Binds include/mgdd/optimize: extremum seeking, SPSA, gradient descent, golden section, surfaces, Gaussian processes.
 #include <optional>
 #include <string>
 #include <utility>

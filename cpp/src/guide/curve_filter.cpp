@@ -33,7 +33,7 @@ constexpr std::array<Assumption, 6> assumptions{{{1.0, 2e-4, 0.03, 0.75, 0.0},
                                                  {0.3, 0.003, 0.1, 0.025, 0.007},
                                                  {0.3, 0.003, 0.1, 0.025, -0.007}}};
 constexpr std::size_t steady = 4;                // the first of these
-constexpr double steady_in_doubt = 0.1;          // of its weight: what is sudden is no steady move
+constexpr double steady_in_doubt = 0.1;          // of its weight: a sudden change is not a steady one
 constexpr double shortest_memory = 8.0;          // below it a parabola has hardly more readings than unknowns
 constexpr double refuted = 0.9, steadier = 0.2;  // weight of short memory at which a long one is given up
 // Banks and delays of less weight than these follow the readings in turn: together they move the estimate by little.

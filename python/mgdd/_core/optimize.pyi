@@ -283,8 +283,8 @@ class Input:
         Largest change of the estimate per step of the seeker, in the unit of the input, > 0.
     step : float
         Resolution in which it is set, in the unit of the input: the lower bound and whole steps above it, or multiples
-        where there is no lower bound; 0 where any value can be set. What a seeker asks for lies on a step, its estimate
-        between them.
+        where there is no lower bound; 0 where any value can be set. Every input that a seeker asks for is on a step; its
+        estimate may be between two, `settable` of the seeker is not.
     
     Raises
     ------

@@ -13,7 +13,7 @@ import numpy as np
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.cli.from_library import Options, default_of
+from mgdd.cli.from_library import Options, default_of, named_options
 from mgdd.cli.options import assignments, refuse_idle
 from mgdd.cli.output import check_file, wrote
 from mgdd.errors import DataError, ParameterError, did_you_mean
@@ -83,10 +83,12 @@ def guide_of(args: argparse.Namespace, bench: EngineBench) -> TimingMap | Engine
     if args.guide == "map":
         return _read_map(args.guide_map)
     own = bench.settings
-    return EngineGuide(
-        cylinder=_cylinder_of(args, own["cylinder"]), kind=args.guide, performance=own["performance"],
-        nox=own["true_nox"], **GUIDE.given(args),
-    )  # fmt: skip
+    cylinder = _cylinder_of(args, own["cylinder"])
+    with named_options(kind="guide", shape="guide_shape"):
+        return EngineGuide(
+            cylinder=cylinder, kind=args.guide, performance=own["performance"], nox=own["true_nox"],
+            **GUIDE.given(args),
+        )  # fmt: skip
 
 
 def _cylinder_of(args: argparse.Namespace, base: Cylinder) -> Cylinder:

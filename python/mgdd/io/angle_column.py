@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import TIME_UNITS, Heading, heading
-from mgdd.io.cycle_phase import CYCLE_DEG, repetition
+from mgdd.io.cycle_period import CYCLE_DEG, repetition
 from mgdd.io.encoder import Turning, turning_of
 from mgdd.io.pressure_checks import MIN_SAMPLES
 from mgdd.io.reading import ANGLE_UNITS, Reading

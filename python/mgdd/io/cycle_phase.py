@@ -1,4 +1,4 @@
-"""Whether the cycles of one record lie at the same crank angles: their period, and the place of each compression."""
+"""Whether the cycles of one record lie at the same crank angles: the place of each compression."""
 
 from __future__ import annotations
 
@@ -13,19 +13,29 @@ from mgdd.errors import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Jump", "Period", "Phases", "lost_turn", "odd_bound", "phase_warnings", "phases", "repetition"]
+__all__ = [
+    "COMPRESSION_CAD",
+    "DRIFT_CAD",
+    "SIGNIFICANT",
+    "Jump",
+    "Phases",
+    "lost_turn",
+    "odd_bound",
+    "phase_warnings",
+    "phases",
+]
 
-CYCLE_DEG = 720.0
 # Compression before any burn, a spark-ignited one too [°CA aTDC]: cycles differ there by level and factor alone. It is
 # drawn out towards TDC, where the shift tells itself from the factor, while what is left stays noise.
 _FROM_CAD, _TO_CAD, _LEAST_CAD = -110.0, -60.0, 40.0
 _LATER_CAD, _AS_QUIET = (-50.0, -40.0, -30.0, -20.0, -10.0), 1.05
 # The median cycle is known so far beyond: within it a cycle may be shifted without leaving it.
 _MARGIN_CAD = 4.0
+COMPRESSION_CAD = _FROM_CAD - _MARGIN_CAD, _LATER_CAD[-1] + _MARGIN_CAD  # all that `phases` looks at
 # 0.2 °CA from first to last is 0.1 °CA in the mean and 1 % of the work; less is not told from the exponent.
 DRIFT_CAD = 0.2
 _JUMP_CAD, _REFUSED_CAD = 0.75, 2.0
-_SIGNIFICANT = 4.0
+SIGNIFICANT = 4.0  # standard errors
 # A step of the place: its t, its height over the scatter, and the least that matters [samples, °CA].
 _STEP_T, _STEP_SCATTERS, _STEP_SAMPLES, _STEP_CAD = 6.0, 5.0, 0.7, 0.15
 # Share of the standard error of a place that is noise of its own; the rest is the doubt about the charge.
@@ -39,9 +49,6 @@ _QUIETEST_BAR = 1e-3  # no sensor is quieter; without noise the shift and the fa
 _UNKNOWN_CHARGE = 3e-2  # of two or three, which do not show how they scatter
 # Logarithm of the pressure at firing TDC over that at gas exchange: sound cycles 2.3, misfires 1.8, another turn -2.3.
 _TURN = 0.5
-# Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed told as half.
-_SHORTEST_DEG = 200.0
-_ALIKE, _WHOLE_ALIKE = 0.9, 0.6
 
 
 class Jump(NamedTuple):
@@ -91,7 +98,7 @@ class Phases(NamedTuple):
     def drifts(self) -> bool:
         """Whether the drift is more than noise and matters."""
         drift, stderr = self.drift_cad
-        return abs(drift) > max(DRIFT_CAD, _SIGNIFICANT * stderr)
+        return abs(drift) > max(DRIFT_CAD, SIGNIFICANT * stderr)
 
     def jump(self, step_cad: float) -> Jump | None:
         """Find from which cycle on all lie elsewhere, beside a drift, as where samples are lost."""
@@ -125,14 +132,6 @@ class Phases(NamedTuple):
         return np.where(off > odd_bound(off.size) * usual, local, self.late_cad)
 
 
-class Period(NamedTuple):
-    """After how many degrees a record repeats, over how many cycles, and whether that is not 720."""
-
-    degrees: float
-    cycles: int
-    differs: bool
-
-
 def lost_turn(cad: NDArray[np.float64], pressure: NDArray[np.float64]) -> int | None:
     """Give the first cycle (rows) whose firing TDC stands at gas exchange, where others have it at 0; or None."""
     near, far = np.abs(cad) < 40.0, np.abs(cad) > 320.0
@@ -153,7 +152,8 @@ def phases(cad: NDArray[np.float64], pressure: NDArray[np.float64]) -> Phases | 
     A cycle is level + (1 + factor) times the median one, shifted; the level is free, and the factor has the scatter of
     the charge, without which it is nearly the shift. By Gauss-Newton.
     """
-    if len(pressure) < 2:
+    early = cad[(cad >= _FROM_CAD) & (cad <= _TO_CAD)]
+    if len(pressure) < 2 or early.size < 20 or np.ptp(early) < _LEAST_CAD:
         return None
     cad, pressure = _thinned(cad, pressure)
     usual = np.median(pressure, axis=0)
@@ -176,7 +176,7 @@ def _thinned(
     size = int(_MEAN_CAD / step + 1e-6) if step > 0.0 else 1
     if size < 2:
         return cad, pressure
-    inner = (cad >= _FROM_CAD - _MARGIN_CAD) & (cad <= _LATER_CAD[-1] + _MARGIN_CAD)
+    inner = (cad >= COMPRESSION_CAD[0]) & (cad <= COMPRESSION_CAD[1])
     whole = np.flatnonzero(inner)[: inner.sum() // size * size]
     return (
         cad[whole].reshape(-1, size).mean(axis=1),
@@ -211,8 +211,6 @@ def _placed(
     around = (cad >= _FROM_CAD - _MARGIN_CAD) & (cad <= end + _MARGIN_CAD)
     inside = (cad >= _FROM_CAD) & (cad <= end)
     angle, part = cad[inside], pressure[:, inside]
-    if inside.sum() < 20 or np.ptp(angle) < _LEAST_CAD:
-        return None
     usual = median[around]
     lift = max(0.0, 0.3 - float(usual.min()))  # a relative pressure may be below zero
     low, width = float(cad[around][0]), float(np.ptp(cad[around]))
@@ -306,64 +304,3 @@ def phase_warnings(
     if over_time and stands_apart and abs(off[odd]) > _REFUSED_CAD:
         raise DataError(f"{source}: {text}")
     return [text]
-
-
-def repetition(degrees: NDArray[np.float64], pressure: NDArray[np.float64], firing_tdc_deg: float) -> Period | None:
-    """Find after how many degrees a record that runs on repeats; None where it has less than two cycles.
-
-    Autocorrelation finds it roughly, the compressions of the cycles so cut make it exact.
-    """
-    first, span = float(degrees[0]), float(degrees[-1] - degrees[0])
-    step = max(float(np.median(np.diff(degrees))), 0.1)
-    if span < 1.9 * CYCLE_DEG:
-        return None
-    even = np.interp(np.arange(0.0, span, step), degrees - first, pressure)
-    rough = _rough_period(even, step)
-    if rough is None:
-        return None
-    period, differs = rough, abs(rough / CYCLE_DEG - 1.0) > 0.005
-    grid = np.arange(_FROM_CAD - _MARGIN_CAD, _LATER_CAD[-1] + _MARGIN_CAD + 1e-9, max(step, 0.25))
-    count = 0
-    for _ in range(8):
-        scale = period / CYCLE_DEG
-        centre = first + ((firing_tdc_deg - first) % CYCLE_DEG) * scale
-        at = centre + period * np.arange(-1, int(span / period) + 2)[:, None] + grid * scale
-        at = at[(at[:, 0] >= first) & (at[:, -1] <= degrees[-1])]
-        count = len(at)
-        placed = phases(grid, np.interp(at, degrees, pressure))
-        if placed is None:
-            break
-        drift, stderr = placed.drift_cad
-        period += scale * drift / (count - 1)
-        off = (period - CYCLE_DEG) * (count - 1)
-        blurred = 0.5 * step if count < 3 else 0.0  # two cycles hardly show their scatter
-        differs = abs(off) > max(DRIFT_CAD, _SIGNIFICANT * stderr * scale, blurred)
-        if abs(drift) < 0.01:
-            break
-    return Period(period, max(count, int(span / period)), differs)
-
-
-def _rough_period(even: NDArray[np.float64], step: float) -> float | None:
-    """First lag at which the record is as much like itself as it ever is."""
-    n = even.size
-    wave = even - even.mean()
-    size = 1 << (2 * n - 1).bit_length()
-    raw = np.fft.irfft(np.abs(np.fft.rfft(wave, size)) ** 2, size)[:n]
-    power = np.concatenate([[0.0], np.cumsum(wave**2)])
-    lags = np.arange(n)
-    both = np.sqrt(power[n - lags] * (power[n] - power[lags]))
-    alike = raw / np.where(both > 0.0, both, np.inf)
-    low, high = int(_SHORTEST_DEG / step), int(0.6 * n)
-    inner = np.arange(max(low, 1), high)
-    tops = inner[(alike[inner] >= alike[inner - 1]) & (alike[inner] > alike[inner + 1])]
-    if not tops.size or alike[tops].max() < 0.5:
-        return None
-    top = tops[alike[tops] >= _ALIKE * alike[tops].max()][0]
-    # Burns that scatter make a cycle unlike the next: a part of that lag which repeats clearly is the cycle.
-    for parts in range(int(top * step / _SHORTEST_DEG), 1, -1):
-        near = tops[np.abs(tops - top / parts) <= 0.02 * top / parts]
-        if near.size and alike[near].max() >= _WHOLE_ALIKE * alike[top]:
-            top = near[alike[near].argmax()]
-            break
-    a, b, c = alike[top - 1 : top + 2]
-    return float((top + 0.5 * (a - c) / (a - 2.0 * b + c)) * step)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.cycle_phase import CYCLE_DEG, phases, repetition
+from mgdd.io.cycle_period import CYCLE_DEG, repetition
+from mgdd.io.cycle_phase import phases
 from mgdd.io.table import Place
 from mgdd.signals.even_grid import wide_steps
 

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd._core import engine as _core
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import TIME_UNITS, Heading
-from mgdd.io.cycle_phase import CYCLE_DEG
+from mgdd.io.cycle_period import CYCLE_DEG
 from mgdd.io.table import Table
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step

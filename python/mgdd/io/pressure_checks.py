@@ -217,8 +217,8 @@ def check_trace(
     check_magnitude(degrees, values, unit, source, unit_of_file)
     if bar.ndim == 2:
         low = _low(degrees)
-        odd = [cycle for cycle, peak in enumerate(values.max(axis=1)) if not _peak_fits(float(peak), unit, low)]
-        for cycle in odd[:1]:
+        odd = (cycle for cycle, peak in enumerate(values.max(axis=1)) if not _peak_fits(float(peak), unit, low))
+        if (cycle := next(odd, None)) is not None:
             check_magnitude(degrees, values[cycle], unit, f"{source}, cycle {cycle + 1}", unit_of_file)
     mean = bar if bar.ndim == 1 else bar.mean(axis=0)
     _check_peak(degrees, mean, source)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import TIME_UNITS, check_choice
-from mgdd.io.cycle_phase import CYCLE_DEG
+from mgdd.io.cycle_period import CYCLE_DEG
 from mgdd.io.encoder import Encoder
 from mgdd.io.pressure_checks import PRESSURE_UNITS
 

@@ -69,10 +69,10 @@ class EngineGuide:
             if getattr(self, name) not in among:
                 raise ParameterError.of(name, getattr(self, name), f"one of {', '.join(among)}")
         if self.shape == "parabola" and self.kind != "curve":
-            why = "cannot be calibrated" if self.kind == "calibrated" else "is no timing"
+            why = "cannot be calibrated" if self.kind == "calibrated" else "is not one timing"
             raise ParameterError(
-                f"{argument('guide_shape', 'parabola')}: a parabola {why}; use {argument('guide', 'curve')}, or leave "
-                f"{argument('guide_shape')} out"
+                f"{argument('shape', repr('parabola'))}: a parabola {why}; use {argument('kind', repr('curve'))}, or "
+                f"leave {argument('shape')} out"
             )
 
     def model(self, bounds_cad: tuple[float, float]) -> ModelOptimum:

@@ -143,7 +143,7 @@ class Question:
         for name in self.settings:
             if name in _OWN_WORDS:
                 raise ParameterError(
-                    f"{argument('settings')}: {name!r} is no setting: the search gives it, leave it out"
+                    f"{argument('settings')}: {name!r} is not one of them: the search gives it, leave it out"
                 )
             if name not in takes:
                 have = [each for each in takes if each not in _OWN_WORDS]

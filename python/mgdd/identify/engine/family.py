@@ -59,7 +59,7 @@ class ModelFamily(Plausibility):
     Raises
     ------
     mgdd.errors.ParameterError
-        An empty list, a name that is no law, or a range that does not rise.
+        An empty list, an unknown law, or a range that does not rise.
 
     Notes
     -----
