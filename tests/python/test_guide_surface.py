@@ -50,6 +50,7 @@ def fitted() -> Any:
 
 FORMS = {
     "function": lambda: guide,
+    "function of plain numbers": lambda: lambda soc, egr: guide({"soc_cad": soc, "egr": egr}),
     "map": lambda: grid(np.linspace(-25, 15, 17), np.linspace(0.0, 0.4, 17)),
     "map, turned": lambda: grid(np.linspace(15, -25, 17), np.linspace(0.0, 0.4, 17)),
     "fit": fitted,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 
 #include "mgdd/common/bounds.hpp"
@@ -107,6 +108,22 @@ void Curve::find_best() noexcept {
   }
   best_ = first_ + (static_cast<double>(highest) + shift) / per_step_;
   top_ = (*this)(best_);
+}
+
+double Curve::rises_again() const noexcept {
+  const auto highest = std::max_element(values_.begin(), values_.end());
+  double lowest = *highest, again = 0.0;
+  const auto look = [&](auto from, auto to) {
+    double low = *highest;
+    for (auto value = from; value != to; ++value) {
+      low = std::min(low, *value);
+      again = std::max(again, *value - low);
+    }
+    lowest = std::min(lowest, low);
+  };
+  look(highest, values_.end());
+  look(std::make_reverse_iterator(highest), values_.rend());
+  return again > 0.0 ? again / (*highest - lowest) : 0.0;
 }
 
 }  // namespace mgdd::guide

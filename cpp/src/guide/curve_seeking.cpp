@@ -51,6 +51,7 @@ constexpr double plain_amplitude_share = 0.1;  // of prior_sd
 constexpr double plain_range_share = 0.05;     // of the range: the largest amplitude
 constexpr double plain_periods_per_lag = 2.4;  // a shorter dither would be damped away
 constexpr double curvature_share = 0.3;        // of prior_sd
+constexpr double most_rise = 0.1;  // of a curve's height, as a coarse model ripples: several maxima above it
 
 CurveSeekingSettings checked(CurveSeekingSettings s) {
   if (s.space.size() != 1) {
@@ -85,6 +86,12 @@ CurveSeekingSettings checked(CurveSeekingSettings s) {
   if (!(s.curve.curvature(curvature_share * s.prior_sd) < 0.0)) {
     throw about("curve", ParameterError("curve does not bend down at its best input, " + text(s.curve.best()) +
                                         ": give a guide whose J has a maximum, or a parabola"));
+  }
+  if (const double again = s.curve.rises_again(); again > most_rise) {
+    throw about(
+        "curve",
+        ParameterError("curve has several maxima, it rises again by " + text(100.0 * again) +
+                       " % of its height: give a guide with one, or a function as guide of GaussianProcessSeeking"));
   }
   if (!(s.curve.best() >= s.space.lower[0] && s.curve.best() <= s.space.upper[0])) {
     throw about("curve", ParameterError("curve has its best input at " + text(s.curve.best()) + ": must be in [" +
@@ -324,8 +331,8 @@ void CurveSeeking::begin_at(const Curve& curve, double mean, double sd) noexcept
 }
 
 bool CurveSeeking::usable(const Curve& curve) const noexcept {
-  return curve.curvature(curvature_share * settings_.prior_sd) < 0.0 && curve.best() >= settings_.space.lower[0] &&
-         curve.best() <= settings_.space.upper[0];
+  return curve.curvature(curvature_share * settings_.prior_sd) < 0.0 && curve.rises_again() <= most_rise &&
+         curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0];
 }
 
 bool CurveSeeking::believe(const Curve& curve, double sd) noexcept {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
@@ -25,8 +26,8 @@ def surface_of(
     Parameters
     ----------
     guide : callable, fitted response, DataArray or Surface
-        A callable takes what `ask` gives and returns a number; a fitted response has ``predict``; a DataArray has one
-        dimension with coordinates per input. None for none.
+        A callable takes what `ask` gives, or plain numbers in their order, and returns one; a fitted response has
+        ``predict``; a DataArray has one dimension with coordinates per input. None for none.
     names : sequence of str
         Of the inputs; empty where they have none.
     lower, upper : sequence of float
@@ -74,12 +75,23 @@ def _asked(guide: Callable[[Any], Any], names: Sequence[str], point: Sequence[fl
     at: Any = dict(zip(names, map(float, point), strict=True)) if names else np.asarray(point, np.float64)
     where = ", ".join(f"{name} = {value:.6g}" for name, value in at.items()) if names else f"{at}"
     try:
-        value = float(guide(at))
+        value = float(_called(guide, at))
     except (Error, ArithmeticError, LookupError, TypeError, ValueError) as error:
         raise ParameterError(f"{argument} fails at {where}: {error}") from error
     if not math.isfinite(value):
         raise ParameterError(f"{argument} gives {value} at {where}: it must be finite between the bounds; narrow them")
     return value
+
+
+def _called(guide: Callable[..., Any], at: Any) -> Any:
+    """Call a guide with its inputs by name or, like a plant, as plain numbers in their order."""
+    try:
+        return guide(at)
+    except TypeError:
+        if isinstance(at, dict):
+            with contextlib.suppress(TypeError):
+                return guide(*at.values())
+        raise
 
 
 def _of_map(guide: Any, names: Sequence[str], argument: str) -> Any:

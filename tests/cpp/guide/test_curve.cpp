@@ -65,6 +65,13 @@ TEST(Curve, AMaximumAtAnEndIsNone) {
   EXPECT_DOUBLE_EQ(Curve(inputs, std::vector{4.0, 1.0, 0.0, -1.0}).best(), 0.0);
 }
 
+TEST(Curve, RisesAgainByAsMuchAsItsOtherMaximumStandsOut) {
+  const std::vector<double> x{0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
+  EXPECT_LT(Curve(x, std::vector{1.0, 4.0, 6.0, 5.0, 3.0, 2.0, 0.0}).rises_again(), 0.01);
+  EXPECT_NEAR(Curve(x, std::vector{1.0, 4.0, 10.0, 5.0, 0.0, 6.0, 2.0}).rises_again(), 0.6, 0.05);
+  EXPECT_NEAR(Curve(x, std::vector{2.0, 6.0, 0.0, 5.0, 10.0, 4.0, 1.0}).rises_again(), 0.6, 0.05);
+}
+
 TEST(Curve, RefusesWhatIsNoCurveAndStaysWhatItWas) {
   const std::vector<double> x{0.0, 1.0, 3.0};
   EXPECT_THROW(Curve(x, std::vector{1.0, 2.0}), ShapeError);

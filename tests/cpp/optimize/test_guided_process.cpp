@@ -126,6 +126,34 @@ TEST(GuidedProcess, AGuideThatSaysNothingIsLeftBehind) {
   EXPECT_LT(seeker.guide_factor(), 0.2);
 }
 
+// So flat that the noise would explain all that it says: no more readings are taken for outliers than can be.
+TEST(GuidedProcess, AGuideThatIsAHundredTimesTooFlatCostsLittle) {
+  const auto loss_in_40 = [](double height) {
+    std::vector<double> axis, values;
+    for (int i = 0; i < 41; ++i)
+      axis.push_back(-20.0 + 0.75 * i);
+    for (const double x : axis)
+      values.push_back(-height * (x - 5.0) * (x - 5.0));
+    double sum = 0.0;
+    for (std::uint64_t seed = 0; seed < 16; ++seed) {
+      GaussianProcessSeekingSettings s;
+      s.space.inputs = {{.name = "soc_cad", .lower = -20.0, .upper = 10.0}};
+      s.space.start = scalar_input(-18.0 + 26.0 * random::uniform(seed, 5, 0));
+      s.seed = seed;
+      if (height > 0.0) s.guide = {Surface({axis}, values)};
+      GaussianProcessSeeking seeker(s);
+      for (int k = 0; k < 40; ++k) {
+        const double off = seeker.ask()[0] + 6.0;
+        sum += 0.08 * off * off;
+        const double j[] = {-0.08 * off * off + 0.25 * random::normal(seed, 9, static_cast<std::uint64_t>(k))};
+        seeker.tell({j, {}});
+      }
+    }
+    return sum / 16.0;
+  };
+  EXPECT_LT(loss_in_40(0.0008), 2.0 * loss_in_40(0.0));
+}
+
 // A guide says J itself, also where less is better.
 TEST(GuidedProcess, MinimisingIsMaximisingTheNegative) {
   auto down = settings_of(3, [](double soc, double egr) { return -off_by_a_fifth(soc, egr); });

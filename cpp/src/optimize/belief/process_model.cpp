@@ -19,7 +19,8 @@ constexpr double crowd = 0.75;  // share of the readings, those nearest to the e
 constexpr int first_trials = 60, more_trials = 20, late_trials = 3;
 constexpr int first_readings = 15;
 constexpr int fewest_weighed = 4;
-constexpr double most_trusted = 81.0;  // of what a variance is multiplied by: nine standard deviations
+constexpr double most_trusted = 81.0;   // of what a variance is multiplied by: nine standard deviations
+constexpr double most_outliers = 0.25;  // of the readings: where there are more, the numbers are wrong and not they
 constexpr int waking_readings = 3;
 constexpr double waking_rise = 1e3;    // of what all earlier readings span
 constexpr double least_noise = 1e-12;  // of a reading
@@ -252,9 +253,15 @@ void ProcessModel::refresh() noexcept {
 
 void ProcessModel::fit(const Inputs& about) noexcept {
   scatter_ = weighed_;
-  level_ = middle();
   const auto enough = kernel_.guided() ? 2 : settings_.inputs + 1;
-  if (!begun_ || told_ <= enough) begin_numbers();
+  if (static_cast<double>((scatter_.head(count_).array() > most_trusted).count()) >
+      most_outliers * static_cast<double>(count_)) {
+    scatter_.setOnes();
+    begin_numbers(false);
+  } else if (!begun_ || told_ <= enough) {
+    begin_numbers(kernel_.guided());
+  }
+  level_ = middle();
   know_tables();
   choose_readings(about);
   if (told_ >= enough) {

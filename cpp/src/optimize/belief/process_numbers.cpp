@@ -197,8 +197,8 @@ double ProcessModel::guide_in_readings() const noexcept {
   return both > 0.0 && squares > 0.0 ? std::log(both / squares) : 0.0;
 }
 
-// The bend that the spread of the readings suggests.
-void ProcessModel::begin_numbers() noexcept {
+// Logarithm of the bend that the spread of the readings suggests.
+double ProcessModel::bend_in_readings() const noexcept {
   double low = largest_reading, high = -low, farthest = 1e-6;
   for (std::int64_t i = 0; i < count_; ++i) {
     if (!trusted(i)) continue;
@@ -211,13 +211,18 @@ void ProcessModel::begin_numbers() noexcept {
   }
   const double spread = high - low, highest = std::max(std::abs(low), std::abs(high));
   const double rise = std::max({spread, 1e-9 * highest, settings_.noise_sd.value_or(0.0), least_rise});
-  numbers_[0] = std::log(rise / (0.3 * farthest));
+  return std::log(rise / (0.3 * farthest));
+}
+
+// Of the height of the guide, or of what the readings span.
+void ProcessModel::begin_numbers(bool by_guide) noexcept {
+  numbers_[0] = bend_in_readings();
   numbers_[1] = noise_prior;
   numbers_[2] = rest_prior;
   numbers_.segment(3, settings_.inputs).setConstant(length_prior);
   numbers_.segment(3 + settings_.inputs, 2).setZero();
-  if (kernel_.guided()) {
-    numbers_[numbers_.size() - 1] = 0.0;
+  if (kernel_.guided()) numbers_[numbers_.size() - 1] = 0.0;
+  if (by_guide) {
     numbers_[0] = std::log(kernel_.guide_bend()) + guided_bend_prior;
     numbers_[1] = noise_prior - guided_bend_prior;
   }
@@ -254,7 +259,7 @@ void ProcessModel::suspect() noexcept {
   for (const bool left_out : {false, true}) {
     if (left_out) scatter_[wrong] = largest_reading;
     level_ = middle();
-    begin_numbers();
+    begin_numbers(kernel_.guided());
     numbers_.segment(2, 3 + settings_.inputs) = known.segment(2, 3 + settings_.inputs);
     if (settings_.bend) {
       const double shift = std::log(*settings_.bend) - numbers_[0];
@@ -287,6 +292,8 @@ ProcessModel::Numbers ProcessModel::anew(std::uint64_t trial) const noexcept {
   if (kernel_.guided()) {
     const double fitted[] = {guide_in_readings(), 0.0, useless_factor};
     out[out.size() - 1] = fitted[trial / 4 % 3] + factor_width * normal(104);
+    // A guide that is too flat by far would have the noise explain what the readings say.
+    if (trial / 4 % 3 == 2) out[0] = bend_in_readings() + bend_search_sd * normal(101);
   }
   return out;
 }

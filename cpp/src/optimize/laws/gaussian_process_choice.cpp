@@ -34,7 +34,10 @@ constexpr double along_cycles = 100.0;   // without a doubt, then it is worth le
 // Within the bounds, and what may be explored by now.
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
   const double wide = growth * (highest_ - lowest_).maxCoeff();
-  const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach : side_step();
+  double explained = 1.0;  // in full where the guide holds half of the bend
+  for (const ProcessModel& model : j_)
+    explained = std::min(explained, 2.0 * model.guide_share());
+  const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach * explained : side_step();
   const double far = std::max({wide, least, protocol_.steps.any() ? grid().maxCoeff() : 0.0});
   for (Eigen::Index i = 0; i < z.size(); ++i)
     z[i] = std::clamp(z[i], std::max(0.0, lowest_[i] - far), std::min(1.0, highest_[i] + far));

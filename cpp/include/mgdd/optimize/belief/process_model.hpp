@@ -123,7 +123,7 @@ class ProcessModel {
   double likelihood_by(const Numbers& numbers, const InputTable& at, const Eigen::VectorXd& values,
                        const Eigen::VectorXd& ages, int count) noexcept;
   double log_priors(const Numbers& numbers, const Scales& s) const noexcept;
-  void begin_numbers() noexcept;
+  void begin_numbers(bool by_guide) noexcept;
   void suspect() noexcept;
   void weigh() noexcept;
   double oddness(const Inputs& z, double value) noexcept;
@@ -132,6 +132,7 @@ class ProcessModel {
   void try_numbers(int trials) noexcept;
   Numbers anew(std::uint64_t trial) const noexcept;
   double guide_in_readings() const noexcept;
+  double bend_in_readings() const noexcept;
   void tabulate(std::int64_t reading) noexcept;
   void tabulate_lengths() noexcept;
   void know_tables() noexcept;
