@@ -51,7 +51,7 @@ $(VENV)/.stamp-run: pyproject.toml | $(VENV)/.stamp-build
 	$(ALOUD) $(FETCH) -r $@ || { rm -f $@; $(NOT_FETCHED); }
 
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/.stamp-run
-	$(ALOUD) $(FETCH) --group test --group lint --group docs || $(NOT_FETCHED)
+	$(ALOUD) $(FETCH) --group dev || $(NOT_FETCHED)
 	touch $@
 
 # --- build --------------------------------------------------------------------------------------------------
@@ -123,12 +123,13 @@ CPP_FILES = $(shell find cpp tests -name '*.hpp' -o -name '*.cpp')
 STUBGEN   = $(DEV) $(PY) tools/stubs.py mgdd._core
 
 .PHONY: lint format stubs asan tsan clang mingw-check tidy bench docs
-lint: $(VENV)/.stamp-test ## ruff, mypy --strict, clang-format, codespell: look, change nothing
+lint: $(VENV)/.stamp-test ## ruff, mypy --strict, clang-format, codespell, changelog.d: look, change nothing
 	ruff check .
 	ruff format --check .
 	$(ALOUD) mypy
 	@echo "clang-format of every C++ file"; clang-format --dry-run -Werror $(CPP_FILES)
 	codespell
+	@echo "names of the fragments in changelog.d"; towncrier build --draft --version next >/dev/null
 
 format: $(VENV)/.stamp-test ## put every file into the house style
 	ruff check --fix-only -q .
@@ -203,6 +204,10 @@ mutants: ready ## changed lines that the tests notice: make mutants MODULE=throt
 docs: SITE ?= docs/_build/html
 docs: ready ## documentation, docs/_build/html; one version of a site: SITE=FOLDER/0.1.0
 	$(DEV) $(ALOUD) $(PY) -m sphinx -W -n --keep-going -q -b html docs $(SITE)
+
+.PHONY: changelog
+changelog: $(VENV)/.stamp-test ## gather changelog.d into CHANGELOG.md, under the version of CMakeLists.txt
+	towncrier build --yes --version "$$(sed -n 's/^ *VERSION \([0-9.]*\)$$/\1/p' CMakeLists.txt)"
 
 .PHONY: clean help
 clean: ## remove what these commands made

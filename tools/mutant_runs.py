@@ -30,7 +30,7 @@ __all__ = ["Cpp", "Outcome", "Python", "Runner", "fingerprint"]
 _PARTS = (
     "cmake", "cpp", "docs", "notebooks", "python", "tests", "tools",
     "CHANGELOG.md", "CITATION.cff", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE", "README.md",
-    "pyproject.toml", "references.bib",
+    "THIRD_PARTY.md", "pyproject.toml", "references.bib",
 )  # fmt: skip
 # Processor time, so that a busy machine kills no mutant: what the tests need without one, times this, and this more.
 _FACTOR = 8.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import importlib.resources
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -32,6 +34,20 @@ def test_one_version(root: Path) -> None:
     assert mgdd.__version__ == match[1]
     citation = (root / "CITATION.cff").read_text(encoding="utf-8")
     assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [match[1]]
+
+
+def test_licences_of_dependencies_are_named(root: Path) -> None:
+    """Every package that an installation may fetch, and beside LGPL what says so of itself."""
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = [wanted for name, group in project["optional-dependencies"].items() if name != "all" for wanted in group]
+    wanted = {re.split(r"[^\w-]", line)[0] for line in [*project["dependencies"], *extras]}
+    rows = [line for line in (root / "THIRD_PARTY.md").read_text(encoding="utf-8").splitlines() if line[0:1] == "|"]
+    assert wanted <= set(re.findall(r"`([\w-]+)`", "".join(rows)))
+    for name in wanted & {str(found.name) for found in importlib.metadata.distributions()}:
+        about = importlib.metadata.metadata(name)
+        licence = " ".join([*about.get_all("License-Expression", []), *about.get_all("Classifier", [])])
+        copyleft = "LGPL" in licence or "General Public" in licence
+        assert [("LGPL" in row) for row in rows if f"`{name}`" in row] == [copyleft], name
 
 
 def test_package_is_typed() -> None:
