@@ -1,4 +1,4 @@
-"""Measure what the analysis of pressure sees and how smoothing acts: the two tables of docs/theory_engine.md.
+"""Measure what the analysis of pressure sees and how smoothing acts (docs/theory_engine.md).
 
 Simulated cycles of both engine presets, wall-heat scale 0.3 to 1.5, gamma 1.34 to 1.40 or linear, intake 1 to 3 bar,
 noise of 0.05 bar, steps of 0.2 to 1 °CA. Run: python tools/measure_trace_analysis.py [--cycles N]
