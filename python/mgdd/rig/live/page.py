@@ -259,10 +259,13 @@ def serve(source: Source, port: int, ready: Callable[[str], None], *, alive: Cal
         def match(self, request: Any) -> dict[str, Any] | None:
             return None if request.host_name in _OURS else {}
 
+    def show(document: Any) -> None:
+        _View(source, document)
+
     try:
         socket.create_server(("127.0.0.1", port)).close()  # the server leaves a socket behind where it fails
         server = server_of(
-            {path: lambda document: _View(source, document) and None}, port=port, address="127.0.0.1",
+            {path: show}, port=port, address="127.0.0.1",
             allow_websocket_origin=sorted(_OURS), use_index=False, redirect_root=False,
             check_unused_sessions_milliseconds=2000, unused_session_lifetime_milliseconds=5000,
         )  # fmt: skip
