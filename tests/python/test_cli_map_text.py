@@ -9,7 +9,7 @@ import pytest
 
 from map_cases import timing_table
 from mgdd.cli import main, output
-from mgdd.cli.map_text import COLUMNS, map_blocks
+from mgdd.cli.map_files import COLUMNS, map_blocks
 from mgdd.cli.output import show
 from mgdd.maps import CalibrationMap, write_map
 
@@ -95,7 +95,7 @@ def test_a_wide_map_is_cut_for_the_terminal(monkeypatch: pytest.MonkeyPatch) -> 
     whole = show(map_blocks(table))
     assert len(whole.splitlines()) == 7
     monkeypatch.setattr(output, "is_terminal", lambda: True)
-    monkeypatch.setattr("mgdd.cli.map_text.is_terminal", lambda: True)
+    monkeypatch.setattr("mgdd.cli.map_files.is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "80")
     cut = show(map_blocks(table))
     assert max(map(len, cut.splitlines())) <= 80

@@ -19,7 +19,7 @@ import pytest
 from rich.console import Console
 
 from mgdd.cli import main
-from mgdd.cli.rig_live import LiveView
+from mgdd.cli.rig_run import LiveView
 from mgdd.loop import Measurement
 from mgdd.rig import read_record
 from mgdd.rig.experiment.stand import Cycle

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from mgdd.cli.options import option
 from mgdd.errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-__all__ = ["add_over", "bounds_of", "factors_of", "grid_of", "limits_given"]
 
 _Number = TypeVar("_Number", int, float)
 
@@ -25,11 +24,9 @@ _INPUT_FORM = "write NAME=LOW:HIGH, for example soc_cad=-20:5, or NAME=LOW:HIGH:
 
 def add_over(parser: Any, *, what: str) -> None:
     """Add the option of a grid."""
-    parser.add_argument(
-        "--over", action="append", default=[], metavar="NAME=LOW:HIGH:N",
-        help=f"N even values of {what} from LOW to HIGH, both included, or NAME=VALUE,VALUE for values of your own, in "
-        "the unit that the name ends in; repeatable, one dimension each",
-    )  # fmt: skip
+    option(parser, "--over NAME=LOW:HIGH:N ...",
+           f"N even values of {what} from LOW to HIGH, both included, or NAME=VALUE,VALUE for values of your own, in "
+           "the unit that the name ends in; repeatable, one dimension each")  # fmt: skip
 
 
 def grid_of(given: Sequence[str]) -> dict[str, NDArray[np.float64]]:

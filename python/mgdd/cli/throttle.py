@@ -1,52 +1,34 @@
-"""`mgdd throttle simulate | demand | excite | identify | validate | track | tune`, each in a module of its own."""
+"""`mgdd throttle simulate | demand`: the plant under a duty, and what a pedal wants."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from mgdd.cli import throttle_excite, throttle_identify, throttle_simulate, throttle_track
-from mgdd.cli.options import add_command, add_group
-from mgdd.cli.output import check_output, emit
-from mgdd.cli.throttle_parameters import changes_of
+import numpy as np
+
+from mgdd.cli.from_library import Options, as_option
+from mgdd.cli.options import option
+from mgdd.cli.output import emit, save_figure
+from mgdd.cli.throttle_parameters import add_throttle, changes_of, throttle_of
+from mgdd.errors import ParameterError
 from mgdd.io.parameters import ParameterFile
-from mgdd.throttle import DemandChain
-
-__all__ = ["add"]
-
-
-def add(commands: Any) -> None:
-    """Add the group and its commands."""
-    verbs = add_group(
-        commands, "throttle",
-        help_text="an electronic throttle: simulate, demand, excite, identify, validate, track, tune",
-        example="mgdd throttle identify chirp.csv --model pw_r --test steps.csv --json",
-    )  # fmt: skip
-    throttle_simulate.add(verbs)
-    _add_demand(verbs)
-    throttle_excite.add(verbs)
-    throttle_identify.add(verbs)
-    throttle_track.add(verbs)
+from mgdd.plot import throttle_run
+from mgdd.plot.style import drawn
+from mgdd.throttle import DemandChain, simulate_throttle
+from mgdd.throttle.duty_file import read_duty
+from mgdd.throttle.simulation import step_summary
 
 
-def _add_demand(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "demand", _demand,
-        help_text="steady torque, air flow, manifold pressure and opening that a pedal wants at a speed",
-        example="mgdd throttle demand --pedal-percent 30 --speed-rpm 2000 --json",
-    )  # fmt: skip
-    parser.add_argument("--pedal-percent", type=float, required=True, metavar="X", help="pedal, 0 to 100")
-    parser.add_argument("--speed-rpm", type=float, required=True, metavar="X", help="engine speed")
+def _add_demand(parser: Any) -> None:
+    option(parser, "--pedal-percent X", "pedal, 0 to 100", required=True)
+    option(parser, "--speed-rpm X", "engine speed", required=True)
     group = parser.add_argument_group("chain")
-    group.add_argument("--chain", metavar="FILE.toml", help="parameters of the chain (default: an engine of 2 L)")
-    group.add_argument(
-        "--set", action="append", default=[], metavar="FIELD=VALUE",
-        help="any field of the chain, repeatable, for example bore_mm=52",
-    )  # fmt: skip
+    option(group, "--chain FILE.toml", "parameters of the chain (default: an engine of 2 L)")
+    option(group, "--set FIELD=VALUE ...", "any field of the chain, repeatable, for example bore_mm=52")
 
 
 def _demand(args: argparse.Namespace) -> None:
-    check_output(args)
     chain = _chain(args)
     steady = chain.steady(args.pedal_percent, args.speed_rpm).isel(pedal_percent=0, speed_rpm=0)
     numbers = {str(name): float(steady[name]) for name in steady.data_vars}
@@ -66,3 +48,49 @@ def _chain(args: argparse.Namespace) -> DemandChain:
     chain = DemandChain() if args.chain is None else DemandChain.of_file(ParameterFile.read(args.chain))
     fields = {name: field for name, field in DemandChain.fields().items() if name != "pedal_map"}
     return chain.replace(**changes_of(args, fields))
+
+
+_TIME = Options(simulate_throttle, "duration_s", "sample_s")
+_SIGNALS = Options(simulate_throttle, "supply_v", "airflow_torque_nm")  # columns of the input beside time and duty, too
+_RUN = Options(simulate_throttle, "start_deg", "bridge", "step_s")
+
+
+def _add_simulate(parser: Any) -> None:
+    signal = parser.add_mutually_exclusive_group(required=True)
+    option(signal, "--duty X", "constant duty, -1 to 1; positive opens")
+    option(signal, "--input FILE.csv", "columns time_s and duty, evenly sampled; supply_v, airflow_torque_nm if there")
+    group = parser.add_argument_group("run")
+    _TIME.add(group)
+    _SIGNALS.add(group)
+    _RUN.add(group)
+    option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
+    add_throttle(parser)
+
+
+def _simulate(args: argparse.Namespace) -> None:
+    throttle, preset = throttle_of(args)
+    timed, signals = _TIME.given(args), _SIGNALS.given(args)
+    if args.input is None:
+        given = {"duty": args.duty, **timed, **signals}
+    elif timed:
+        raise ParameterError(f"{as_option(next(iter(timed)))} goes with --duty: the times of --input are its own")
+    else:
+        given = read_duty(args.input, signals)
+    run = simulate_throttle(throttle, **given, **_RUN.given(args))
+    payload = {
+        "preset": preset,
+        "duty": args.duty,
+        "bridge": _RUN.of(args)["bridge"],
+        **step_summary(run),
+        "max_current_a": float(np.abs(run["current_a"]).max()),
+        "duration_s": float(run["time_s"][-1] - run["time_s"][0]),
+        "samples": run.sizes["time_s"],
+        "step_s": _RUN.of(args)["step_s"],
+        "parameters": throttle.to_dict(),
+    }
+    emit(args, payload, traces=run)
+    if args.figure is not None:
+        save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
+
+
+COMMANDS = {"simulate": (_add_simulate, _simulate), "demand": (_add_demand, _demand)}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import presets
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import assignments
+from mgdd.cli.options import assignments, option
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.presets.preset import Preset
@@ -17,8 +17,6 @@ from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["LOG", "add_preset", "add_throttle", "changes_of", "known_only", "log_in", "preset_of", "throttle_of"]
 
 LOG = Options(
     read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
@@ -48,10 +46,7 @@ def add_throttle(parser: argparse.ArgumentParser) -> None:
     """Add preset and fields; the names are those of the parameters."""
     group = parser.add_argument_group("throttle")
     add_preset(group, "--preset")
-    group.add_argument(
-        "--set", action="append", default=[], metavar="FIELD=VALUE",
-        help="any field of the throttle, repeatable, for example coulomb_nm=0.3",
-    )  # fmt: skip
+    option(group, "--set FIELD=VALUE ...", "any field of the throttle, repeatable, for example coulomb_nm=0.3")
 
 
 def preset_of(args: argparse.Namespace) -> Preset:
