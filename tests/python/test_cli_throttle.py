@@ -120,16 +120,16 @@ def test_identify_then_validate(
         capsys, "throttle", "identify", train, "--model", model, "--test", test, "--output", str(fit_file),
         "--figure", str(figure),
     )  # fmt: skip
-    assert out["model"] == model
-    assert out["fit_percent_train"] > 98.0
-    assert out["fit_percent_test"] > 92.0
-    assert 0.0 < out["rmse_test"] < 0.6
+    assert out["kind"] == model
+    assert out["train"]["nrmse_fit_percent"] > 98.0
+    assert out["test"]["nrmse_fit_percent"] > 92.0
+    assert 0.0 < out["test"]["rmse"] < 0.6
     assert out["parameters"]["limp_home_deg"] == pytest.approx(8.0, abs=0.2)
     assert isinstance(out["unidentifiable"], list)
     assert figure.stat().st_size > 10_000
     again = run_json(capsys, "throttle", "validate", str(fit_file), test)
     assert again["kind"] == model
-    assert again["fit_percent"] == pytest.approx(out["fit_percent_test"], rel=1e-9)
+    assert again["fit_percent"] == pytest.approx(out["test"]["nrmse_fit_percent"], rel=1e-9)
     assert again["n_step_rms"]["20"] < 0.3 * again["n_step_rms_persistence"]["20"]
     assert again["fit_percent"] == out["validation"]["fit_percent"]
 
@@ -157,10 +157,9 @@ def test_columns_are_mapped(capsys: pytest.CaptureFixture[str], tmp_path: Path, 
         "rad",
     )
     out = run_json(capsys, "throttle", "identify", str(file), *columns)
-    assert out["fit_percent_test"] is None
-    assert out["rmse_test"] is None
+    assert out["test"] is None
     plain = run_json(capsys, "throttle", "identify", files[0])
-    assert out["fit_percent_train"] == pytest.approx(plain["fit_percent_train"], abs=1e-6)
+    assert out["train"] == pytest.approx(plain["train"], abs=1e-6)
     said = refused(capsys, "throttle", "identify", str(file), *columns[:6])
     assert "time_unit" not in said
     assert "--time-unit 'ms'" in said, "remedies are those of the command line"

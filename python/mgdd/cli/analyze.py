@@ -22,7 +22,7 @@ from mgdd.cli.options import (
     readers_of,
     refuse_idle,
 )
-from mgdd.cli.output import check_file, emit, error_of, lines, wrote
+from mgdd.cli.output import check_file, emit, error_of, lines, warn, wrote
 from mgdd.engine import Cylinder, OperatingPoint, Trust, analyze, trust
 from mgdd.engine.trust import Check
 from mgdd.errors import DataError, ParameterError
@@ -173,8 +173,7 @@ def _one(
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
         payload["tdc"] = found.figures
         payload["warnings"] += found.doubts()
-        for doubt in found.doubts():
-            _LOG.warning("%s: %s", payload["file"], doubt)
+        warn(*found.doubts(), of=payload["file"])
         place = f"{found.tdc_offset_cad:+.2f} °CA, {found.low_cad:+.2f} to {found.high_cad:+.2f} possible"
         text.append(f"TDC offset {place}; {found.cost}")
     return result, payload, text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import numpy as np
 from mgdd import datasets
 from mgdd.cli.from_library import Options, default_of
 from mgdd.cli.options import READING, add_encoder, encoder_of, option
-from mgdd.cli.output import emit, wrote
+from mgdd.cli.output import emit, warn, wrote
 from mgdd.datasets.files import FILES, LICENCES, place
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read, read_pressure
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _SERIES = 12  # columns of one name that are shown one by one
-_LOG = logging.getLogger(__name__)
 _OWN = Options(read, "channels", "pressure_column", "angle_column")
 _SPEED, _FETCH = Options(read_pressure, "speed_rpm"), Options(datasets.read, "fetch")
 _WRITERS: Mapping[str, Callable[[xr.Dataset, str], None]] = {
@@ -135,8 +133,7 @@ def _cell(value: Any) -> str:
 def _convert(args: argparse.Namespace) -> None:
     _check_written(args)
     bench = read(args.file, **_given(args))
-    for warning in bench.attrs["warnings"].splitlines():
-        _LOG.warning("%s: %s", bench.attrs["file"], warning)
+    warn(*bench.attrs["warnings"].splitlines(), of=bench.attrs["file"])
     files = _write(args, [bench])
     payload = {
         "file": files[0],

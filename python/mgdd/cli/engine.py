@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
@@ -16,14 +15,14 @@ from mgdd.cli.options import (
     add_files,
     check_pegging,
     engine_of,
-    number_pairs,
     option,
     point_given,
     refuse_idle,
     traces_of,
 )
-from mgdd.cli.output import check_file, emit, lines, whole_or_part, wrote
+from mgdd.cli.output import check_file, emit, lines, warn, whole_or_part, wrote
 from mgdd.cli.progress import Stopped
+from mgdd.cli.ranges import number_pairs
 from mgdd.engine import ThermalNo, find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
 from mgdd.errors import ConvergenceError
@@ -37,7 +36,6 @@ from mgdd.report import calibration_report, write_report
 if TYPE_CHECKING:
     import xarray as xr
 
-_LOG = logging.getLogger(__name__)
 _TIMING = Options(simulate, "soc_cad")
 _SEARCH = Options(find_optimum, "objective", "bounds_cad")
 _NO = Options(
@@ -162,23 +160,12 @@ def _optimum(args: argparse.Namespace) -> None:
         return
     scheme = SCHEME.given(args)
     best = find_optimum(cylinder, point, limits=limits, **_SEARCH.given(args), **scheme)
-    now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
-    payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}
-    payload |= {
-        "curvature_per_cad2": best.curvature,
-        "objective": best.objective,
-        "value": best.value,
-        "limits": limits,
-    }
-    payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
-    payload["findings"] = [str(finding) for finding in best.findings]
-    for finding in best.findings:
-        _LOG.warning("%s", finding)
-    payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
-    payload["soi_cad"] = reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])
+    warn(*best.findings)
+    known = {"preset": preset.name, "soi_cad": reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])}
     sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
     held = ", ".join(best.active_limits) or "no limit"
-    emit(args, payload, text=lines({**payload, "held_by": held}), traces=sweep)
+    text = lines({**best.inputs, **best.values, **known, "curvature": best.curvature, "held_by": held})
+    emit(args, {**known, **best.to_dict()}, text=text, traces=sweep)
 
 
 def _optimum_of_files(

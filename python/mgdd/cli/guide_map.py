@@ -14,8 +14,9 @@ import numpy as np
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, default_of, named_options
-from mgdd.cli.options import assignments, option, refuse_idle
+from mgdd.cli.options import option, refuse_idle
 from mgdd.cli.output import check_file, wrote
+from mgdd.cli.ranges import assignments
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import OperatingPoint
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import CSV, doubts_said, write_table
-from mgdd.cli.options import SCHEME, add_engine, engine_of, number_pairs, option, refuse_idle
+from mgdd.cli.map_files import CSV, doubts_said, table_writers
+from mgdd.cli.options import SCHEME, add_engine, engine_of, option, refuse_idle
 from mgdd.cli.output import emit, lines
-from mgdd.cli.ranges import factors_of
+from mgdd.cli.ranges import factors_of, number_pairs
 from mgdd.design import FeasibleRegion, design_points
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.point_table import read_points
@@ -63,11 +63,7 @@ def _design(args: argparse.Namespace) -> None:
     payload = _payload(plan, limits, region, said)
     payload["within"] = args.within
     payload["existing"] = 0 if before is None else before.sizes["point"]
-    file = args.output
-    if file is not None and Path(file).suffix != ".json":
-        write_table(plan, file)
-        args.output = None
-    emit(args, {**payload, "file": file}, text=_text(payload, plan if file is None else None))
+    emit(args, payload, text=_text(payload, plan if args.output is None else None), write=table_writers(plan))
 
 
 def _region(args: argparse.Namespace, limits: Mapping[str, float]) -> FeasibleRegion | None:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import logging
 import shutil
 import string
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.output import emit, save_figure, wrote
+from mgdd.cli.output import emit, warn
 from mgdd.cli.progress import is_terminal
 from mgdd.errors import DataError
 from mgdd.io.binary_files import read_netcdf, write_netcdf
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from mgdd.results.labels import Label
 
 
-_LOG = logging.getLogger(__name__)
-
 CSV = Options(read_points, "delimiter", "decimal")
 MAP_ENDINGS = (".csv", ".json", ".nc", ".dcm", ".cdfx")
 READING = Options(read_map, "name", "decimal", "rows", "columns", "sheet")
@@ -53,8 +51,7 @@ def doubts_said() -> Iterator[list[str]]:
         warnings.simplefilter("always", UserWarning)
         yield said
     said += [str(doubt.message) for doubt in doubts]
-    for text in said:
-        _LOG.warning("%s", text)
+    warn(*said)
 
 
 def map_in(args: argparse.Namespace, file: str) -> CalibrationMap:
@@ -74,7 +71,12 @@ def grid_table(file: str) -> xr.Dataset:
     return data
 
 
-def write_table(data: xr.Dataset, file: str) -> None:
+def table_writers(data: xr.Dataset) -> dict[str, Callable[[str], None]]:
+    """Give what writes a table, by the ending of its file."""
+    return dict.fromkeys((".csv", ".nc"), partial(_write_table, data))
+
+
+def _write_table(data: xr.Dataset, file: str) -> None:
     """Write netCDF, or plain CSV, a point per row with its inputs first."""
     if Path(file).suffix == ".csv":
         if POINT not in data.dims:  # a grid: a point per row
@@ -86,20 +88,15 @@ def write_table(data: xr.Dataset, file: str) -> None:
         write_columns({POINT: numbers} | {name: data[name].to_numpy() for name in (*inputs, *results)}, file)
     else:
         write_netcdf(data, file)
-    wrote(file)
 
 
 def emit_map(
     args: argparse.Namespace, table: CalibrationMap, text: Any, *, draw: Callable[..., Any] = map_cells, **more: Any
 ) -> None:
     """Write a map to ``-o`` and its picture to ``--figure``, then print it: as text, or its JSON file and more."""
-    file, args.output = args.output, None  # the object below goes to stdout, the map into the file
-    if file is not None:
-        write_map(table, file)
-        wrote(file)
-    emit(args, {**map_content(table), **more, "file": file}, text=text)
-    if args.figure is not None:
-        save_figure(drawn(draw, table.to_dataset(), size=_SIZE), args.figure)
+    write = dict.fromkeys(MAP_ENDINGS, partial(write_map, table))
+    picture = partial(drawn, draw, table.to_dataset(), size=_SIZE)
+    emit(args, {**map_content(table), **more}, text=text, write=write, figure=picture)
 
 
 COLUMNS = ("value", *NUMBERS, *TEXTS)

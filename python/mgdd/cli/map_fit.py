@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.map_files import CSV, write_table
-from mgdd.cli.options import option
-from mgdd.cli.output import emit, save_figure, wrote
-from mgdd.cli.ranges import add_over, grid_of
+from mgdd.cli.map_files import CSV, table_writers
+from mgdd.cli.options import add_over, option
+from mgdd.cli.output import emit, warn
+from mgdd.cli.ranges import grid_of
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.files import write_whole_text
@@ -24,7 +23,6 @@ from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import POINT, input_names, read_points
 from mgdd.plot.response import response_diagnostics
 from mgdd.plot.style import drawn
-from mgdd.results.fit import figures_of
 from mgdd.results.labels import label_of
 from mgdd.surrogate import ResponseModel, fit_response
 from mgdd.surrogate.prediction_table import prediction_table
@@ -36,7 +34,6 @@ if TYPE_CHECKING:
     from mgdd.results import Fit
 
 
-_LOG = logging.getLogger(__name__)
 _COLUMN = Options(fit_response, "response")
 _FIT = Options(fit_response, "kind", "degree", "select", "folds", "n_starts", "seed")
 
@@ -56,16 +53,13 @@ def _fit(args: argparse.Namespace) -> None:
     table, left_out = _table(args)
     factors = [str(name) for name in table.data_vars if name != args.response]
     fit = fit_response(table, args.response, factors=factors, **_FIT.given(args))
-    if args.output is not None and Path(args.output).suffix == ".toml":
-        source = f"{args.response} of {Path(args.file).name}, {table.sizes[POINT]} points"
-        write_whole_text(args.output, replace(fit.model.to_parameters(), notes={"source": source}).to_toml())
-        wrote(args.output)
-        file, args.output = args.output, None
-    else:
-        file = None
-    emit(args, {**_figures(fit, factors), "left_out": left_out, "file": file}, text=fit.summary())
-    if args.figure is not None:
-        save_figure(_picture(fit, len(factors)), args.figure)
+    source = f"{args.response} of {Path(args.file).name}, {table.sizes[POINT]} points"
+    emit(
+        args, {**_figures(fit, factors), "left_out": left_out}, text=fit.summary(),
+        write={".toml": lambda file: write_whole_text(
+            file, replace(fit.model.to_parameters(), notes={"source": source}).to_toml())},
+        figure=lambda: drawn(response_diagnostics, fit.diagnostics, size=(6.6, 5.4 + 2.3 * -(-len(factors) // 3))),
+    )  # fmt: skip
 
 
 def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
@@ -84,7 +78,7 @@ def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
     if gone == known.size:
         raise DataError(f"{args.file}: {args.response} or a factor is NaN at every point: there is nothing to fit")
     if gone:
-        _LOG.warning("%s: %d of %d points have no value (NaN) and are left out", args.file, gone, known.size)
+        warn(f"{gone} of {known.size} points have no value (NaN) and are left out", of=args.file)
     return table.isel({POINT: known}), gone
 
 
@@ -97,31 +91,21 @@ def _inputs(file: str, response: str) -> list[str]:
 
 
 def _figures(fit: Fit, factors: Sequence[str]) -> dict[str, Any]:
-    model, figures = fit.model, fit.to_dict()
+    model = fit.model
     of_kind: dict[str, Any] = {"terms": list(model.terms)}
     if model.kind != "polynomial":
         of_kind = {"length_scales": dict(zip(factors, model.surface.length_scales.tolist(), strict=True))}
     return {
-        "model": fit.kind,
+        **fit.to_dict(),
         "response": model.name,
         "unit": model.label.units,
         "factors": list(factors),
         "points": model.values.size,
-        **figures_of(fit),
         "checked_by": fit.checked_by,
         "noise_sd": float(model.surface.noise_sd),
         **of_kind,
-        "parameters": figures["parameters"],
-        "stderr": figures["stderr"],
-        "unidentifiable": figures["unidentifiable"],
         "outliers": np.flatnonzero(fit.diagnostics["outlier"].to_numpy()).tolist(),  # type: ignore[attr-defined]
-        "findings": [str(finding) for finding in fit.findings],
-        "status": figures["status"],
     }
-
-
-def _picture(fit: Any, factors: int) -> Any:
-    return drawn(response_diagnostics, fit.diagnostics, size=(6.6, 5.4 + 2.3 * -(-factors // 3)))
 
 
 _LEVEL = Options(ResponseModel.predict, "level")
@@ -156,11 +140,7 @@ def _predict(args: argparse.Namespace) -> None:
         for name, count in outside.items()
         if count
     ]
-    for text in said:
-        _LOG.warning("%s", text)
-    file, args.output = args.output, None
-    if file is not None:
-        write_table(table, file)
+    warn(*said)
     payload = {
         "models": {model.name: file for model, file in zip(models, args.files, strict=True)},
         "shape": dict(table.sizes),
@@ -168,9 +148,9 @@ def _predict(args: argparse.Namespace) -> None:
         "extrapolated": outside,
         "ranges": {model.name: _range(table[model.name]) for model in models},
         "warnings": said,
-        "file": file,
     }
-    emit(args, payload, text=_predicted(payload, table, models))
+    text = _predicted(payload, table, models, args.output)
+    emit(args, payload, text=text, write=table_writers(table))
 
 
 def _model(file: str) -> ResponseModel:
@@ -202,14 +182,14 @@ def _range(values: xr.DataArray) -> list[float] | None:
     return [float(known.min()), float(known.max())] if known.size else None
 
 
-def _predicted(payload: Mapping[str, Any], table: xr.Dataset, models: Sequence[ResponseModel]) -> str:
+def _predicted(payload: Mapping[str, Any], table: xr.Dataset, models: Sequence[ResponseModel], file: str | None) -> str:
     size = " x ".join(f"{count} {name}" for name, count in payload["shape"].items())
     out = [f"{payload['points']} points: {size}"]
     for model in models:
         found, label = payload["ranges"][model.name], label_of(table[model.name])
         said = "no value inside of the fitted points" if found is None else f"{found[0]:.4g} to {found[1]:.4g}"
         out.append(f"{model.name}: {said} {'' if label.units == '-' or found is None else label.units}".rstrip())
-    return "\n".join([*out, *([] if payload["file"] else ["-o table.nc keeps the table"])])
+    return "\n".join([*out, *([] if file else ["-o table.nc keeps the table"])])
 
 
 COMMANDS = {"fit": (_add_fit, _fit), "predict": (_add_predict, _predict)}

@@ -11,7 +11,8 @@ import numpy as np
 
 from mgdd.cli.from_library import Options, named_options
 from mgdd.cli.map_files import FORMS, READING, doubts_said, emit_map, grid_table, map_blocks, map_in
-from mgdd.cli.options import assignments, number_pairs, option
+from mgdd.cli.options import option
+from mgdd.cli.ranges import assignments, number_pairs
 from mgdd.maps import CalibrationMap, optimize_map, smooth_map
 from mgdd.maps.compare import steepest
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +18,10 @@ from mgdd.cli.map_files import (
     grid_table,
     map_blocks,
     map_in,
-    write_table,
+    table_writers,
 )
 from mgdd.cli.options import option
-from mgdd.cli.output import emit, save_figure
+from mgdd.cli.output import emit
 from mgdd.errors import ParameterError
 from mgdd.maps import CalibrationMap, apply_map, compare_maps
 from mgdd.maps.cells import TEXTS, cell_at
@@ -92,10 +92,6 @@ def _add_diff(parser: Any) -> None:
 def _diff(args: argparse.Namespace) -> None:
     first, second = (map_in(args, file) for file in (args.first, args.second))
     found = compare_maps(first, second, **_COMPARED.given(args))
-    file = args.output
-    if file is not None and Path(file).suffix == ".nc":
-        write_table(found, file)
-        args.output = None
     axes = {name: found[name].to_numpy() for name in first.axes}
     payload = {
         "name": first.name,
@@ -106,11 +102,10 @@ def _diff(args: argparse.Namespace) -> None:
         "tolerance": args.tolerance,
         "axes": [{"name": name, "entries": entries} for name, entries in axes.items()],
         **{name: found[name].to_numpy() for name in ("difference", "sd", "held_outside", "beyond")},
-        "file": file,
     }
-    emit(args, payload, text=_differences(args, found, first, second))
-    if args.figure is not None:
-        save_figure(drawn(map_cells, found, size=(6.6, 4.6), variable="difference"), args.figure)
+    picture = partial(drawn, map_cells, found, size=(6.6, 4.6), variable="difference")
+    text = _differences(args, found, first, second)
+    emit(args, payload, text=text, write=table_writers(found), figure=picture)
 
 
 def _differences(

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import READING, grid_table, map_in
-from mgdd.cli.options import number_pairs, option, refuse_idle
-from mgdd.cli.output import emit, save_figure
+from mgdd.cli.options import option, refuse_idle
+from mgdd.cli.output import emit
+from mgdd.cli.ranges import number_pairs
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.maps import apply_map
 from mgdd.plot import trade_off
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _ALONG, _EVERY = Options(trade_off, over="along"), Options(trade_off, "every")
-_SIZE = (6.6, 4.6)
 
 
 def _add_trade_off(parser: Any) -> None:
@@ -62,10 +63,9 @@ def _trade_off(args: argparse.Namespace) -> None:
         marked = marked[[args.along, args.right, args.up]].sel(fixed)
     lines = _lines(args, shown, marked, free)
     payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}
-    emit(args, payload, text=_text(args, shown, lines, free))
-    if args.figure is not None:
-        how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
-        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
+    how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
+    picture = partial(drawn, trade_off, shown, size=(6.6, 4.6), marked=marked, **how)
+    emit(args, payload, text=_text(args, shown, lines, free), figure=picture)
 
 
 def _axes(args: argparse.Namespace, table: xr.Dataset) -> tuple[str, ...]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 import functools
-import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
+from mgdd.cli.output import warn
+from mgdd.cli.ranges import assignments
 from mgdd.engine import analyze, simulate
 from mgdd.errors import ParameterError
 from mgdd.io import Encoder, pressure_chunks, read_pressure
@@ -22,7 +23,6 @@ from mgdd.presets.preset import Preset
 if TYPE_CHECKING:
     import xarray as xr
 
-_LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
 GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
@@ -136,7 +136,7 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Prese
     preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
     cylinder = {name: value for name, value in _set(args).items() if name not in _POINT}
     if getattr(args, "files", None) and (assumed := assumed_geometry(args)):
-        _LOG.warning("no engine is given: the traces are read with %s; give --preset or --set", assumed)
+        warn(f"no engine is given: the traces are read with {assumed}; give --preset or --set")
     for name, field in CYLINDER_CHOICES.items():
         if getattr(args, name) is not None:
             if field in cylinder:
@@ -172,8 +172,7 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         return noted(read_pressure(file, **how), file)
 
     def noted(trace: xr.Dataset, file: str) -> xr.Dataset:
-        for warning in trace.attrs["warnings"].splitlines():
-            _LOG.warning("%s: %s", trace.attrs["file"], warning)
+        warn(*trace.attrs["warnings"].splitlines(), of=trace.attrs["file"])
         return trace.assign_attrs(**rows[file])
 
     return {file: functools.partial(read, file) for file in args.files}
@@ -202,47 +201,8 @@ def require_positive(args: argparse.Namespace, *names: str) -> None:
             raise ParameterError.of(as_option(name), value, f"> 0 {name.rpartition('_')[2]} and finite")
 
 
-def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
-    """Read repeated NAME=NUMBER options."""
-    out: dict[str, float] = {}
-    for item in items:
-        name, value = _pair(item, option, "NAME=NUMBER")
-        number = _value(name, value, {})
-        if isinstance(number, str):
-            raise ParameterError(f"{option} {item}: {value!r} is not a number")
-        _once(name, option, out)
-        out[name] = number
-    return out
-
-
-def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]], option: str = "--set") -> dict[str, Any]:
-    """Read repeated FIELD=VALUE of an option; the caller judges a name that is not a field."""
-    out: dict[str, Any] = {}
-    for item in items:
-        name, value = _pair(item, option, "FIELD=VALUE")
-        _once(name, option, out)
-        out[name] = _value(name, value, fields)
-    return out
-
-
-def _once(name: str, option: str, known: Mapping[str, Any]) -> None:
-    if name in known:
-        raise ParameterError(f"{option} {name} is given twice: give it once")
-
-
-def _pair(item: str, option: str, form: str) -> tuple[str, str]:
-    name, sign, value = item.partition("=")
-    if not (sign and name.strip() and value.strip()):
-        raise ParameterError(f"{option} {item}: write {form}")
-    return name.strip().replace("-", "_"), value.strip()
-
-
-def _value(name: str, text: str, fields: Mapping[str, Mapping[str, Any]]) -> float | str:
-    if "choices" in fields.get(name, {}):
-        return text
-    try:
-        return float(text)
-    except ValueError:
-        if name in fields:
-            raise ParameterError.of(name, text, f"a number [{fields[name]['unit']}]") from None
-        return text
+def add_over(parser: Any, *, what: str) -> None:
+    """Add the option of a grid."""
+    option(parser, "--over NAME=LOW:HIGH:N ...",
+           f"N even values of {what} from LOW to HIGH, both included, or NAME=VALUE,VALUE for values of your own, in "
+           "the unit that the name ends in; repeatable, one dimension each")  # fmt: skip

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +22,9 @@ from mgdd.results.labels import VARIABLES, to_jsonable
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+
+_LOG = logging.getLogger(__name__)
 
 
 def whole_or_part(work: Callable[..., Report], *given: Any, **options: Any) -> tuple[Report, bool]:
@@ -60,27 +65,38 @@ def wrote(file: str) -> None:
     print(f"wrote {file}", file=sys.stderr)
 
 
+def warn(*doubts: object, of: str = "") -> None:
+    """Say doubts on stderr, of a file if it is named."""
+    for doubt in doubts:
+        _LOG.warning("%s%s", f"{of}: " if of else "", doubt)
+
+
 def emit(
     args: argparse.Namespace,
     payload: Mapping[str, Any],
     *,
     text: str | Sequence[str | Table] | None = None,
     traces: xr.Dataset | None = None,
+    write: Mapping[str, Callable[[str], None]] | None = None,
+    figure: Callable[[], Figure] | None = None,
 ) -> None:
-    """Print the result, as one JSON object or as text, and write it to the output file."""
-    plain = to_jsonable(payload)
+    """Print the result, as one JSON object or as text, and write it to the output file, then the figure.
+
+    `write` has by its ending what writes a file that is not this JSON; the object names the file then.
+    """
+    file, write = args.output, write if write is not None or traces is None else {".csv": partial(write_traces, traces)}
+    plain = to_jsonable({**payload, "file": file} if write is not None and traces is None else payload)
     args.progress.close()
-    if args.output is not None:
-        if Path(args.output).suffix == ".csv" and traces is not None:
-            write_traces(traces, args.output)
-        else:
-            write_whole_text(args.output, json_text(plain) + "\n")
-        wrote(args.output)
+    if file is not None:
+        (write or {}).get(Path(file).suffix, lambda file: write_whole_text(file, json_text(plain) + "\n"))(file)
+        wrote(file)
     args.emitted = True
     if args.json:
         print(json_text(plain))
     else:
         print(show([text] if isinstance(text, str) else text or [lines(plain)]), file=trusted(sys.stdout))
+    if figure is not None and args.figure is not None:
+        save_figure(figure(), args.figure)
 
 
 def lines(payload: Mapping[str, Any]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import logging
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import option, refuse_idle
-from mgdd.cli.output import emit, lines, wrote
+from mgdd.cli.output import emit, lines, warn, wrote
 from mgdd.cli.progress import Stopped, is_terminal
 from mgdd.rig import CanRig, Experiment, run_experiment
 from mgdd.rig.can.modes import MODES
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from mgdd.rig.experiment.stand import Cycle
 
 
-_LOG = logging.getLogger(__name__)
 _WHERE = Options(Experiment.with_mode, "connection", "pace", "record")
 _ARMED = Options(run_experiment, "arm", "key_file")
 
@@ -56,8 +54,7 @@ def _checked(args: argparse.Namespace) -> CheckedExperiment:
 
 def _run(args: argparse.Namespace) -> None:
     checked = _checked(args)
-    for doubt in checked.to_dict().get("warnings", []):
-        _LOG.warning("%s", doubt)
+    warn(*checked.to_dict().get("warnings", []))
     experiment = checked.experiment
     stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
     folder = args.folder or str(Path("mgdd-runs") / f"{experiment.task}-{experiment.mode}-{stamp}")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,10 +15,10 @@ from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
-from mgdd.cli.options import add_engine, assignments, engine_of, number_pairs, option
-from mgdd.cli.output import emit, lines, save_figure
+from mgdd.cli.options import add_engine, engine_of, option
+from mgdd.cli.output import emit, lines, warn
 from mgdd.cli.progress import Stopped
-from mgdd.cli.ranges import bounds_of, limits_given
+from mgdd.cli.ranges import assignments, bounds_of, limits_given, number_pairs
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
@@ -30,6 +30,7 @@ from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize import ComponentLag
 from mgdd.optimize.optimum import Optimum
+from mgdd.plot import seeking
 from mgdd.plot.style import drawn
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.results.units import unit_attributes
@@ -37,7 +38,6 @@ from mgdd.results.units import unit_attributes
 if TYPE_CHECKING:
     import xarray as xr
 
-_LOG = logging.getLogger(__name__)
 _BENCH = Options(
     EngineBench, "soc_scatter_cad", "seed", efficiency_noise_percent="noise", misfire_probability="misfire"
 )  # fmt: skip
@@ -106,16 +106,12 @@ def _seek(args: argparse.Namespace) -> None:
     run, table = found.run, guide if isinstance(guide, TimingMap) else None
     learnt, unlearnt = learn_map(args, table, found.seeker, bench.point, interrupted=run.interrupted)
     doubts = [*map(str, found.findings), *unlearnt]
-    for doubt in doubts:
-        _LOG.warning("%s", doubt)
+    warn(*doubts)
     payload = found.to_dict() | {"preset": preset, "sensor": args.sensor, "seed": bench.seed}
     payload |= _judged(bench, best, found) | _guided(args, found, guide) | learnt | {"warnings": doubts}
-    emit(args, payload, text=_text(payload, found), traces=_table(run.dataset))
-    if args.figure:
-        from mgdd import plot
-
-        how = {"optimum_cad": best["soc_cad"]} if len(best.inputs) == 1 else {}
-        save_figure(drawn(plot.seeking, run.dataset, size=(8.0, 7.0), **how), args.figure)
+    how = {"optimum_cad": best["soc_cad"]} if len(best.inputs) == 1 else {}
+    picture = partial(drawn, seeking, run.dataset, size=(8.0, 7.0), **how)
+    emit(args, payload, text=_text(payload, found), traces=_table(run.dataset), figure=picture)
     if run.interrupted:
         raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 

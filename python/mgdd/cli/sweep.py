@@ -8,11 +8,11 @@ import time
 from typing import Any
 
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import write_table
-from mgdd.cli.options import SCHEME, add_engine, engine_of, option
+from mgdd.cli.map_files import table_writers
+from mgdd.cli.options import SCHEME, add_engine, add_over, engine_of, option
 from mgdd.cli.output import emit
 from mgdd.cli.progress import Stopped
-from mgdd.cli.ranges import add_over, grid_of
+from mgdd.cli.ranges import grid_of
 from mgdd.errors import Interrupted
 from mgdd.io.point_table import read_points
 from mgdd.results.labels import labelled_dataset
@@ -50,9 +50,6 @@ def _sweep(args: argparse.Namespace) -> None:
         stopped, table = True, stop.partial
         cycles = int(table["finished"].sum())
     seconds = time.perf_counter() - begun
-    file, args.output = args.output, None  # the object below goes to stdout, the table into the file
-    if file is not None:
-        write_table(table, file)
     payload = {
         "preset": preset.name,
         "shape": dict(table.sizes),
@@ -61,12 +58,13 @@ def _sweep(args: argparse.Namespace) -> None:
         "interrupted": stopped,
         "n_void": table.attrs["n_void"],
         "warnings": table.attrs["warnings"].splitlines(),
-        "file": file,
     }
-    emit(args, payload)
+    emit(args, payload, write=table_writers(table))
     if stopped:
         kept = f"{cycles} of {math.prod(table.sizes.values())} cycles are"
-        raise Stopped(f"{kept} kept in {file}" if file else f"{kept} finished, none kept; name a file with -o")
+        raise Stopped(
+            f"{kept} kept in {args.output}" if args.output else f"{kept} finished, none kept; name a file with -o"
+        )
 
 
 COMMANDS = {"sweep": (_add_sweep, _sweep)}

@@ -3,21 +3,81 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd import presets
 from mgdd.cli.from_library import Options, as_option
-from mgdd.cli.options import option
-from mgdd.cli.output import emit, save_figure
-from mgdd.cli.throttle_parameters import add_throttle, changes_of, throttle_of
-from mgdd.errors import ParameterError
+from mgdd.cli.options import assignments, option
+from mgdd.cli.output import emit, warn
+from mgdd.errors import ParameterError, did_you_mean
+from mgdd.io import read_throttle_log
 from mgdd.io.parameters import ParameterFile
 from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
-from mgdd.throttle import DemandChain, simulate_throttle
+from mgdd.presets.preset import Preset
+from mgdd.throttle import DemandChain, Throttle, simulate_throttle
 from mgdd.throttle.duty_file import read_duty
 from mgdd.throttle.simulation import step_summary
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LOG = Options(
+    read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
+    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal", "sheet",
+)  # fmt: skip
+
+_DEFAULT_PRESET = "P1"
+
+
+def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
+    """Read a log as the options of `LOG` say, and say what was left out of it."""
+    log = read_throttle_log(file, **LOG.given(args))
+    warn(*log.attrs["warnings"].splitlines(), of=file)
+    return log
+
+
+def add_preset(group: Any, name: str) -> None:
+    """Add the preset of a throttle."""
+    what = f"{', '.join(presets.available('throttle'))} or a TOML file (default: {_DEFAULT_PRESET})"
+    option(group, f"{name} NAME_OR_FILE.toml", what, dest="preset")
+
+
+def add_throttle(parser: argparse.ArgumentParser) -> None:
+    """Add preset and fields; the names are those of the parameters."""
+    group = parser.add_argument_group("throttle")
+    add_preset(group, "--preset")
+    option(group, "--set FIELD=VALUE ...", "any field of the throttle, repeatable, for example coulomb_nm=0.3")
+
+
+def preset_of(args: argparse.Namespace) -> Preset:
+    """Load the preset of a throttle; it refuses to be an engine when it is asked for its throttle."""
+    return presets.load(args.preset or _DEFAULT_PRESET)
+
+
+def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
+    """Make the throttle of a preset and the fields over it."""
+    preset = preset_of(args)
+    return preset.throttle.replace(**changes_of(args, Throttle.fields())), preset.name
+
+
+def changes_of(args: argparse.Namespace, fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Read ``--set FIELD=VALUE`` over the fields of a record; an unknown name is refused with the closest one."""
+    return known_only(assignments(args.set, fields), fields, "--set")
+
+
+def known_only(values: dict[str, Any], fields: Iterable[str], option: str) -> dict[str, Any]:
+    """Refuse a name that is not among the fields."""
+    for name in values:
+        if name not in fields:
+            guess = did_you_mean(name, fields)
+            have = f"{guess + '; ' if guess else ''}the fields are {', '.join(fields)}"
+            raise ParameterError(f"{option} {name}: no field {name!r}; {have}")
+    return values
 
 
 def _add_demand(parser: Any) -> None:
@@ -88,9 +148,7 @@ def _simulate(args: argparse.Namespace) -> None:
         "step_s": _RUN.of(args)["step_s"],
         "parameters": throttle.to_dict(),
     }
-    emit(args, payload, traces=run)
-    if args.figure is not None:
-        save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
+    emit(args, payload, traces=run, figure=partial(drawn, throttle_run, run, size=(7.0, 5.4)))
 
 
 COMMANDS = {"simulate": (_add_simulate, _simulate), "demand": (_add_demand, _demand)}

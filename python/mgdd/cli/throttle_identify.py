@@ -4,33 +4,30 @@ from __future__ import annotations
 
 import argparse
 import inspect
-import logging
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd import identify, signals
 from mgdd.cli.from_library import Options, as_option, default_of, shown
 from mgdd.cli.options import option
-from mgdd.cli.output import emit, save_figure, wrote
-from mgdd.cli.throttle_parameters import LOG, add_throttle, log_in, throttle_of
+from mgdd.cli.output import emit, warn
+from mgdd.cli.throttle import LOG, add_throttle, log_in, throttle_of
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.io.files import write_whole_text
 from mgdd.optimize import FitOptions
-from mgdd.results.fit import figures_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from mgdd.identify.throttle.excitation_check import ExcitationCheck
     from mgdd.identify.throttle.validation import ThrottleValidation
-    from mgdd.results import Fit
 
 
 _MODEL = Options(identify.identify_throttle, "model")
 _FIT = Options(identify.identify_throttle, "limp_home_deg", "two_sided", "closed_deg", "open_deg")
 _SEARCH = Options(FitOptions, "seed")
 _LOG_TITLE = "columns of the log, by name, or by number from 0"
-_LOG = logging.getLogger(__name__)
 
 # Searches that ended without a tolerance met, but with a model: stiction makes the last of the cost rough.
 _ENDED = ("stalled", "iteration_limit")
@@ -69,43 +66,24 @@ def _identify(args: argparse.Namespace) -> None:
     options = FitOptions(**_SEARCH.given(args))
     given = _MODEL.given(args) | _FIT.given(args)
     fit = identify.identify_throttle(log, test=test, delay_samples=args.delay_samples, options=options, **given)
-    own = args.output if args.output is not None and Path(args.output).suffix == ".toml" else None
-    if own is not None:
-        Path(own).write_text(fit.to_toml(), encoding="utf-8", newline="\n")
-        wrote(own)
-        args.output = None
     validation = identify.validate_throttle(fit, log if test is None else test)
-    payload = _payload(fit) | {"validation": validation.to_dict()}
-    emit(args, payload, text=f"{fit.summary()}\n\n{validation.summary()}")
-    if args.figure:
-        _draw(validation, args.figure, fit.report.to_dataset())
+    emit(args, {**fit.to_dict(), "validation": validation.to_dict()}, text=f"{fit.summary()}\n\n{validation.summary()}",
+         write={".toml": lambda file: write_whole_text(file, fit.to_toml())},
+         figure=lambda: _drawn(validation, fit.report.to_dataset()))  # fmt: skip
     report = fit.report
     if not report.success and report.status not in _ENDED:
         raise ConvergenceError(f"{args.file}: the fit has failed ({report.message}); look at the log, or excite more")
     if report.status == "iteration_limit":
-        _LOG.warning("%s: the search %s; the figures hold for what it has found", args.file, report.message)
-
-
-def _payload(fit: Fit) -> dict[str, Any]:
-    figures = fit.to_dict()
-    same = ("source", "parameters", "stderr", "unidentifiable", "status", "success", "nit", "nfev")
-    return {
-        "model": fit.kind,
-        **figures_of(fit),
-        "findings": [str(finding) for finding in fit.findings],
-        **{name: figures[name] for name in same},
-    }
+        warn(f"the search {report.message}; the figures hold for what it has found", of=args.file)
 
 
 def _validate(args: argparse.Namespace) -> None:
     model = identify.load_throttle_model(args.fit)
     validation = identify.validate_throttle(model, log_in(args, args.file))
-    emit(args, validation.to_dict(), text=validation.summary())
-    if args.figure:
-        _draw(validation, args.figure, None)
+    emit(args, validation.to_dict(), text=validation.summary(), figure=lambda: _drawn(validation, None))
 
 
-def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | None) -> None:
+def _drawn(validation: ThrottleValidation, correlation: xr.Dataset | None) -> Figure:
     from matplotlib.figure import Figure
 
     from mgdd import plot
@@ -117,7 +95,7 @@ def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | N
         validation.plot(what, ax=pane)
     if correlation is not None:
         plot.correlation_matrix(correlation, ax=axes[3])
-    save_figure(figure, file)
+    return figure
 
 
 _DESIGN = Options(identify.design_excitation, "side", "duration_s", "step_s")
@@ -186,15 +164,11 @@ def _excite(args: argparse.Namespace) -> None:
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
     payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": step_s}
     payload |= attrs | check.to_dict()
-    emit(args, payload, text=_text(args.kind, attrs, check), traces=_table(args.output, check))
+    emit(args, payload, text=_text(args.kind, attrs, check), traces=check.prediction)
 
 
 def _text(kind: str, attrs: dict[str, Any], check: ExcitationCheck) -> str:
     return f"{kind}, offset {attrs['offset']:.4g}, amplitude {attrs['amplitude']:.4g}\n{check.summary()}"
-
-
-def _table(output: str | None, check: ExcitationCheck) -> xr.Dataset | None:
-    return check.prediction if output is not None and Path(output).suffix == ".csv" else None
 
 
 COMMANDS = {

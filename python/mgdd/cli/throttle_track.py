@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import logging
+from functools import partial
 from typing import Any
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import number_pairs, option
-from mgdd.cli.output import emit, save_figure
-from mgdd.cli.throttle_parameters import add_preset, add_throttle, known_only, preset_of, throttle_of
+from mgdd.cli.options import option
+from mgdd.cli.output import emit, warn
+from mgdd.cli.ranges import number_pairs
+from mgdd.cli.throttle import add_preset, add_throttle, known_only, preset_of, throttle_of
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
@@ -24,7 +25,6 @@ from mgdd.throttle import Throttle
 _AIR = Options(track, airflow_torque_nm="airflow")
 _RUN = Options(track, "delay_samples", "noise_deg", "seed")
 _TUNE = Options(tune_controller, "spread", "budget", "seed", "delay_samples", "noise_deg", n_throttles="throttles")
-_LOG = logging.getLogger(__name__)
 
 
 def _add_track(parser: Any) -> None:
@@ -73,8 +73,7 @@ def _track(args: argparse.Namespace) -> None:
         delay_samples=None if args.model is not None else how["delay_samples"],
         noise_deg=how["noise_deg"],
     )
-    for doubt in doubts:
-        _LOG.warning("%s", doubt)
+    warn(*doubts)
     run = track(controller, reference, throttle=plant, **_AIR.given(args), **how)
     p50, p999 = step_times_us(controller, run)
     payload = {
@@ -89,9 +88,8 @@ def _track(args: argparse.Namespace) -> None:
         "step_us_p999": p999,
         "warnings": list(doubts),
     }
-    emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
-    if args.figure is not None:
-        save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
+    traces = run.drop_vars([name for name in FIGURES if name in run])
+    emit(args, payload, traces=traces, figure=partial(drawn, throttle_run, run, size=(7.0, 5.4)))
 
 
 def _tune(args: argparse.Namespace) -> None:
