@@ -10,6 +10,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.cli.commands import COMMANDS, UsageError, root_parser, understood
+from typed import Capsys
 
 VERBS = {name.rpartition(" ")[2] for name in COMMANDS}
 # What is typed, and the command that it is, or what the one line names.
@@ -52,6 +53,7 @@ engine optimum --json = engine optimum
 throttle identify log.csv = throttle identify
 throttle tune = throttle tune
 throttle control = throttle track
+engine tune -> mgdd throttle tune
 selftest = rig selftest
 download hd_diesel_128x144 -o d.csv = data get
 engin simulate -> 'engine'
@@ -87,13 +89,13 @@ def test_a_verb_alone_is_its_command_or_names_all_that_have_it(verb: str) -> Non
 
 
 @pytest.mark.parametrize("typed", ["help engine", "engine help", "engine --help"])
-def test_help_is_a_word_too(typed: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_is_a_word_too(typed: str, capsys: Capsys) -> None:
     with pytest.raises(SystemExit, match="0"):
         main(typed.split())
     assert "usage: mgdd engine [-h] COMMAND" in capsys.readouterr().out
 
 
-def test_a_wrong_option_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_option_is_one_line(capsys: Capsys) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(["engine", "simulate", "--soc-cda", "3"])
     assert capsys.readouterr().err.splitlines() == [

@@ -14,6 +14,7 @@ import pytest
 from mgdd.cli import main
 from mgdd.cli.commands import COMMANDS, Parser, root_parser
 from mgdd.cli.from_library import Options
+from typed import Capsys
 
 
 def made(
@@ -152,7 +153,7 @@ def test_choices_that_are_documented_are_those_that_are_checked() -> None:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_ends_with_an_example_that_its_command_takes(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_ends_with_an_example_that_its_command_takes(name: str, capsys: Capsys) -> None:
     with pytest.raises(SystemExit, match="0"):
         main([*name.split(), "--help"])
     example = capsys.readouterr().out.partition("example:\n  mgdd ")[2]
@@ -179,7 +180,7 @@ def test_help_ends_with_an_example_that_its_command_takes(name: str, capsys: pyt
         ("throttle demand --pedal-percent 3 --speed-rpm 900 --set bre_mm=3", "bore_mm"),
     ],
 )
-def test_the_nearest_name_is_asked_for(argv: str, near: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_nearest_name_is_asked_for(argv: str, near: str, capsys: Capsys) -> None:
     try:
         code = main(argv.split())
     except SystemExit as stop:
@@ -188,7 +189,7 @@ def test_the_nearest_name_is_asked_for(argv: str, near: str, capsys: pytest.Capt
     assert f"did you mean '{near}'?" in capsys.readouterr().err
 
 
-def test_nothing_near_is_not_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_near_is_not_asked_for(capsys: Capsys) -> None:
     with pytest.raises(SystemExit):
         main(["engine", "xyz"])
     assert "did you mean" not in capsys.readouterr().err

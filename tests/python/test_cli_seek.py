@@ -17,6 +17,9 @@ import pytest
 from mgdd.cli import main
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench
+from typed import Capsys, commands
+
+seek, refused = commands("engine", "seek")
 
 SEEKERS = ("extremum_seeking", "spsa", "golden_section")
 SEEDS = range(3)
@@ -26,22 +29,8 @@ def by(seeker: str) -> tuple[str, ...]:
     return ("--seeker", seeker, *(("--noise-sd", "0.25") if seeker == "golden_section" else ()))
 
 
-def seek(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
-    code = main(["engine", "seek", *argv, "--json"])
-    captured = capsys.readouterr()
-    assert code == 0, captured.err
-    return json.loads(captured.out)
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
-    assert main(["engine", "seek", *argv]) == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    return captured.err
-
-
 @pytest.mark.parametrize("seeker", SEEKERS)
-def test_every_seeker_finds_the_steady_optimum(seeker: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_seeker_finds_the_steady_optimum(seeker: str, capsys: Capsys) -> None:
     best = EngineBench().find_optimum()
     runs = [seek(capsys, *by(seeker), "--start", "soc_cad=-20", "--seed", str(seed)) for seed in SEEDS]
     for run in runs:
@@ -56,7 +45,7 @@ def test_every_seeker_finds_the_steady_optimum(seeker: str, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize("seeker", SEEKERS)
-def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: Capsys) -> None:
     argv = (*by(seeker), "--start", "soc_cad=4", "--limit", "p_max_bar=95")
     runs = [seek(capsys, *argv, "--seed", str(seed)) for seed in SEEDS]
     assert runs[0]["optimum"]["soc_cad"] == pytest.approx(-3.08, abs=0.01)
@@ -67,7 +56,7 @@ def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: pytest.Captu
     assert -0.2 < np.mean([run["figures"]["final_soc_cad"] - run["optimum"]["soc_cad"] for run in runs]) < 1.6
 
 
-def test_a_dither_behind_the_analyser_arrives(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_dither_behind_the_analyser_arrives(capsys: Capsys) -> None:
     bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser")
     run = seek(capsys, "--sensor", "analyser", *by("extremum_seeking"))
     assert run["optimum"]["soc_cad"] == bench.find_optimum()["soc_cad"]
@@ -75,7 +64,7 @@ def test_a_dither_behind_the_analyser_arrives(capsys: pytest.CaptureFixture[str]
     assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=2.0)
 
 
-def test_any_setting_of_a_seeker_can_be_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_any_setting_of_a_seeker_can_be_said(capsys: Capsys) -> None:
     runs = [
         seek(capsys, *by("extremum_seeking"), "--seeker-set", f"form={form}", "--cycles", "300")
         for form in ("washout", "batch")
@@ -85,7 +74,7 @@ def test_any_setting_of_a_seeker_can_be_said(capsys: pytest.CaptureFixture[str])
     assert "did you mean 'form'" in said
 
 
-def test_a_curve_behind_the_analyser_guides_each_component(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_curve_behind_the_analyser_guides_each_component(capsys: Capsys) -> None:
     rough = ("--guide", "curve", "--guide-set", "wall_heat_scale=0.25")
     run = seek(capsys, "--sensor", "analyser", *rough, "--limit", "p_max_bar=100")
     assert (run["guide"], run["seeker"]) == ("curve", "GaussianProcessSeeking")
@@ -94,28 +83,28 @@ def test_a_curve_behind_the_analyser_guides_each_component(capsys: pytest.Captur
     assert run["j_lost"] < 0.15
 
 
-def test_the_period_follows_the_lag_of_the_speed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_period_follows_the_lag_of_the_speed(capsys: Capsys) -> None:
     argv = ("--sensor", "analyser", "--speed-rpm", "4000", "--fuel-mg", "25", "--seed", "2")
     run = seek(capsys, *argv, *by("extremum_seeking"))
     assert run["cycles"] > 8000  # the lag lasts 67 cycles here, 25 at 1500 rpm
     assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=2.0)
 
 
-def test_the_soft_sensor_needs_no_patience(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_soft_sensor_needs_no_patience(capsys: Capsys) -> None:
     run = seek(capsys, "--sensor", "soft", "--preset", "hd_diesel_128x144", "--misfire", "0.03")
     assert (run["cycles"], run["preset"]) == (200, "hd_diesel_128x144")
     assert run["j_lost"] < 0.15
     assert 1 <= run["figures"]["misfires"] <= 15
 
 
-def test_a_run_that_never_arrives_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_never_arrives_says_so(capsys: Capsys) -> None:
     argv = (*by("extremum_seeking"), "--start", "soc_cad=-25", "--cycles", "20")
     assert seek(capsys, *argv)["cycles_to"] is None
     assert main(["engine", "seek", *argv]) == 0
     assert "cycles_to                                 –" in capsys.readouterr().out
 
 
-def test_cov_of_imep_can_be_a_limit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_cov_of_imep_can_be_a_limit(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     out = seek(capsys, "--limit", "cov-imep-percent=1.0", "-o", str(file))
     assert out["limits"].keys() == {"cov_imep_percent"}
@@ -124,7 +113,7 @@ def test_cov_of_imep_can_be_a_limit(capsys: pytest.CaptureFixture[str], tmp_path
 
 
 def test_a_start_above_a_limit_is_doubted_and_counted(
-    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture, tmp_path: Path
+    capsys: Capsys, caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     file = tmp_path / "run.csv"
     out = seek(capsys, "--start", "soc_cad=-20", "--limit", "p_max_bar=95", "-o", str(file))
@@ -138,7 +127,7 @@ def test_a_start_above_a_limit_is_doubted_and_counted(
     assert "the first reading of p_max_bar" in caplog.text
 
 
-def test_the_text_names_worst_cycle_and_share(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_text_names_worst_cycle_and_share(capsys: Capsys) -> None:
     assert main(["engine", "seek", "--start", "soc_cad=-20", "--limit", "p_max_bar=95", "--cycles", "300"]) == 0
     measured, free = capsys.readouterr().out.splitlines()[-2:]
     assert measured.startswith("p_max_bar as measured: worst 1")
@@ -148,7 +137,7 @@ def test_the_text_names_worst_cycle_and_share(capsys: pytest.CaptureFixture[str]
         assert " %), from cycle 150 on in " in text
 
 
-def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_figure(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "run.png"
     seek(capsys, "--figure", str(file), "--limit", "p_max_bar=95", "--misfire", "0.01", "--cycles", "300")
     assert file.read_bytes().startswith(b"\x89PNG")
@@ -192,12 +181,7 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         (["--start", "soc_cad=50"], ["--start", "soc_cad=5"], "--start: soc_cad = 50: must be in [-30, 10]", 2),
         (["--tolerance", "egr=1"], ["--tolerance", "soc_cad=1"], "--tolerance has egr: must have one number for", 2),
         (["--seeker-set", "memory_cycles=x"], [], "--seeker-set: memory_cycles = 'x': must be", 2),
-        (
-            ["--seeker-set", "limits=3"],
-            [],
-            "--seeker-set: 'limits' is not one of them: the search gives it",
-            2,
-        ),
+        (["--seeker-set", "limits=3"], [], "--seeker-set: 'limits' is not one of them: the search gives it", 2),
         (["--fuel-mg", "-3"], ["--fuel-mg", "30"], "--fuel-mg -3 mg: must be", 2),
         (["--limit", "p_max_bar=nan"], ["--limit", "p_max_bar=95"], "p_max_bar = nan: must be a finite number", 2),
         (["--limit", "p_max_bar=20"], ["--limit", "p_max_bar=85"], "no soc_cad in [-30, 10] keeps", 3),
@@ -215,16 +199,14 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         (["-o", "run.txt"], [], "-o run.txt: the ending", 2),
     ],
 )
-def test_wrong_then_right(
-    wrong: list[str], right: list[str], message: str, code: int, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_then_right(wrong: list[str], right: list[str], message: str, code: int, capsys: Capsys) -> None:
     short = ["--cycles", "40"]
     assert message in refused(capsys, *([] if "--cycles" in wrong else short), *wrong, code=code)
     out = seek(capsys, *([] if "--cycles" in right else short), *right)
     assert math.isfinite(out["inputs"]["soc_cad"])
 
 
-def test_help_names_the_default_length(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_names_the_default_length(capsys: Capsys) -> None:
     with pytest.raises(SystemExit) as stop:
         main(["engine", "seek", "--help"])
     assert stop.value.code == 0

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
-import mgdd
+from mgdd._core import __version__
 from mgdd.errors import hinted
 
 
@@ -239,10 +239,11 @@ class Parser(argparse.ArgumentParser):
 def root_parser() -> Parser:
     """Make the parser of `mgdd`; what stands below it is made when it is asked for."""
     parser = Parser(
-        prog="mgdd", description=(mgdd.__doc__ or "").partition("\n")[0], epilog=_EPILOG,
+        prog="mgdd", epilog=_EPILOG,
+        description="Model-guided data-driven optimization and control for internal combustion engine systems.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("-V", "-v", "--version", action="version", version=f"mgdd {mgdd.__version__}")
+    parser.add_argument("-V", "-v", "--version", action="version", version=f"mgdd {__version__}")
     parser.example = "mgdd engine simulate"
     parser.set_defaults(parser=parser)
     _add_below(parser, "")
@@ -293,15 +294,15 @@ def understood(words: Sequence[str], parser: Parser) -> list[str]:
     if "help" in named:
         named.remove("help")
         rest.append("--help")
-    if not named:
-        return [*rest, *front]
-    group = named[0] if named[0] in COMMANDS else ""
+    group = named[0] if named and named[0] in COMMANDS else ""
     at = 1 if group else 0
-    if group and COMMANDS[group].module:
+    if len(named) == at or (group and COMMANDS[group].module):
         return [*named, *rest, *front]
-    found = _meant(group, named[at]) if len(named) > at else [group]
-    if len(found) > 1:
-        parser.error(f"{' '.join(named[: at + 1])}: write {' or '.join(f'mgdd {name}' for name in found)}")
+    found = _meant(group, named[at])
+    others = [] if found else _meant("", named[at])  # of another group
+    if len(found) > 1 or others:
+        ways = " or ".join(f"mgdd {name}" for name in found or others)
+        parser.error(f"{' '.join(named[: at + 1])}: write {ways}")
     named[: at + 1] = found[0].split() if found else named[: at + 1]
     return [*named, *rest, *front]
 

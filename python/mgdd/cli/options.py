@@ -23,6 +23,8 @@ from mgdd.presets.preset import Preset
 if TYPE_CHECKING:
     import xarray as xr
 
+__all__ = ["refuse_idle"]  # what other packages take
+
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
 GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")

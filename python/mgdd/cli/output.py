@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+__all__ = ["emit", "whole_or_part"]  # what other packages take
+
 _LOG = logging.getLogger(__name__)
 
 

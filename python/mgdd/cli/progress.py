@@ -12,6 +12,8 @@ from typing import Any, Self, TextIO, cast
 
 from mgdd.errors import printable
 
+__all__ = ["Progress", "Stopped"]  # what other packages take
+
 _INTERVAL_S = 12.0
 
 

@@ -82,11 +82,7 @@ def _replay(args: argparse.Namespace) -> None:
     compared = result.counters["replay"]
     same = compared["different"] == 0 and compared["samples"] > 0
     verdict = "every output is the recorded one, bit for bit" if same else "the outputs differ"
-    emit(
-        args,
-        {"same": same, "replay": compared, "result": result.figures},
-        text=f"{lines(compared)}\n\n{verdict}",
-    )
+    emit(args, {"same": same, "replay": compared, "result": result.figures}, text=f"{lines(compared)}\n\n{verdict}")
     if not same:
         args.exit_code = _DIFFERENT
 
