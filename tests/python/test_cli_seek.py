@@ -145,64 +145,52 @@ def test_figure(capsys: Capsys, tmp_path: Path) -> None:
     assert "does not exist; make it" in refused(capsys, "--figure", "nowhere/run.png")
 
 
-@pytest.mark.parametrize(
-    ("wrong", "right", "message", "code"),
-    [
-        (["--start", "soc_cad=-31"], ["--start", "soc_cad=-29"], "soc_cad = -31: must be in [-30, 10]", 2),
-        (["--start", "soc_cad=nan"], ["--start", "soc_cad=-8"], "soc_cad = nan", 2),
-        (["--start", "-8"], ["--start", "soc_cad=-8"], "NAME=", 2),
-        (
-            ["--input", "soc_cad=-61:5"],
-            ["--input", "soc_cad=-60:5"],
-            "--input soc_cad=-61:5: -61 must be in [-60, 20], the window of the bench",
-            2,
-        ),
-        (["--input", "soc_cad=5:-25"], ["--input", "soc-cad=-25:5"], "LOW and HIGH must be finite and LOW < HIGH", 2),
-        (["--input", "soc_cad=-25:5:31"], ["--input", "soc_cad=-25:5:2"], "STEP must be > 0 and at most HIGH - LOW", 2),
-        (["--input", "soc_cad"], ["--input", "soc_cad=-25:5"], "--input soc_cad: write NAME=LOW:HIGH", 2),
-        (["--input", "boost=0:9"], ["--input", "soc_cad=-25:5"], "--input boost: the bench has soc_cad, intake_", 2),
-        (["--input", "soc=-25:5"], ["--input", "soc_cad=-25:5"], "did you mean 'soc_cad'?", 2),
-        (
-            ["--input", "soc_cad=-25:5", "--input", "soc_cad=-20:5"],
-            ["--input", "soc_cad=-25:5"],
-            "--input soc_cad is given twice",
-            2,
-        ),
-        (["--cycles", "0"], ["--cycles", "2"], "--cycles 0: must be >= 2", 2),
-        (["--cycles", "3000000"], ["--cycles", "2"], "--cycles 3000000: must be <= 2000000", 2),
-        (["--seed", "-1"], ["--seed", "1"], "--seed -1: must be in [0, 2**64)", 2),
-        (["--misfire", "1.5"], ["--misfire", "0.5"], "--misfire 1.5: must be in [0, 1]", 2),
-        (["--noise", "-1"], ["--noise", "0"], "--noise -1 %: must be in [0, 20]", 2),
-        (["--soc-scatter-cad", "6"], ["--soc-scatter-cad", "5"], "--soc-scatter-cad 6 °CA: must be in [0, 5]", 2),
-        (["--limit", "p_maxx=95"], ["--limit", "p_max_bar=95"], "--limit 'p_maxx' is not measured: must be one of", 2),
-        (["--limit", "p_max_bar"], ["--limit", "p_max_bar=95"], "write NAME=X", 2),
-        (["--limit", "p_max_bar=99:9"], ["--limit", "p_max_bar=9:99"], "--limit p_max_bar=99:9: write NAME=X, or", 2),
-        (["--limit", "p_max_bar=300:"], ["--limit", "p_max_bar=:110"], "keeps p_max_bar >= 300: move a limit", 3),
-        (["--start", "soc_cad=50"], ["--start", "soc_cad=5"], "--start: soc_cad = 50: must be in [-30, 10]", 2),
-        (["--tolerance", "egr=1"], ["--tolerance", "soc_cad=1"], "--tolerance has egr: must have one number for", 2),
-        (["--seeker-set", "memory_cycles=x"], [], "--seeker-set: memory_cycles = 'x': must be", 2),
-        (["--seeker-set", "limits=3"], [], "--seeker-set: 'limits' is not one of them: the search gives it", 2),
-        (["--fuel-mg", "-3"], ["--fuel-mg", "30"], "--fuel-mg -3 mg: must be", 2),
-        (["--limit", "p_max_bar=nan"], ["--limit", "p_max_bar=95"], "p_max_bar = nan: must be a finite number", 2),
-        (["--limit", "p_max_bar=20"], ["--limit", "p_max_bar=85"], "no soc_cad in [-30, 10] keeps", 3),
-        (
-            ["--seeker", "golden_section"],
-            ["--seeker", "golden_section", "--noise-sd", "0.25"],
-            "--seeker golden_section: needs --noise-sd",
-            2,
-        ),
-        (["--sensor", "analyser", *by("spsa")], by("spsa"), "--seeker spsa: takes J of the same cycle", 2),
-        (["--sensor", "analyser", *by("golden_section")], by("golden_section"), "extremum_seeking", 2),
-        (["--motored"], [], "leave --motored out", 2),
-        (["--preset", "nonesuch"], ["--preset", "puma_single"], "nonesuch", 2),
-        (["--set", "bore_mm=-1"], ["--set", "bore_mm=80"], "bore_mm = -1", 2),
-        (["-o", "run.txt"], [], "-o run.txt: the ending", 2),
-    ],
-)
-def test_wrong_then_right(wrong: list[str], right: list[str], message: str, code: int, capsys: Capsys) -> None:
-    short = ["--cycles", "40"]
-    assert message in refused(capsys, *([] if "--cycles" in wrong else short), *wrong, code=code)
-    out = seek(capsys, *([] if "--cycles" in right else short), *right)
+# What is refused, what is meant, and what the message says; behind => where nothing is feasible.
+WRONG = """
+--start soc_cad=-31 | --start soc_cad=-29 -> soc_cad = -31: must be in [-30, 10]
+--start soc_cad=nan | --start soc_cad=-8 -> soc_cad = nan
+--start -8 | --start soc_cad=-8 -> NAME=
+--input soc_cad=-61:5 | --input soc_cad=-60:5 -> --input soc_cad=-61:5: -61 must be in [-60, 20], the window of the
+--input soc_cad=5:-25 | --input soc-cad=-25:5 -> LOW and HIGH must be finite and LOW < HIGH
+--input soc_cad=-25:5:31 | --input soc_cad=-25:5:2 -> STEP must be > 0 and at most HIGH - LOW
+--input soc_cad | --input soc_cad=-25:5 -> --input soc_cad: write NAME=LOW:HIGH
+--input boost=0:9 | --input soc_cad=-25:5 -> --input boost: the bench has soc_cad, intake_
+--input soc=-25:5 | --input soc_cad=-25:5 -> did you mean 'soc_cad'?
+--input soc_cad=-25:5 --input soc_cad=-20:5 | --input soc_cad=-25:5 -> --input soc_cad is given twice
+--cycles 0 | --cycles 2 -> --cycles 0: must be >= 2
+--cycles 3000000 | --cycles 2 -> --cycles 3000000: must be <= 2000000
+--seed -1 | --seed 1 -> --seed -1: must be in [0, 2**64)
+--misfire 1.5 | --misfire 0.5 -> --misfire 1.5: must be in [0, 1]
+--noise -1 | --noise 0 -> --noise -1 %: must be in [0, 20]
+--soc-scatter-cad 6 | --soc-scatter-cad 5 -> --soc-scatter-cad 6 °CA: must be in [0, 5]
+--limit p_maxx=95 | --limit p_max_bar=95 -> --limit 'p_maxx' is not measured: must be one of
+--limit p_max_bar | --limit p_max_bar=95 -> write NAME=X
+--limit p_max_bar=99:9 | --limit p_max_bar=9:99 -> --limit p_max_bar=99:9: write NAME=X, or
+--limit p_max_bar=300: | --limit p_max_bar=:110 => keeps p_max_bar >= 300: move a limit
+--start soc_cad=50 | --start soc_cad=5 -> --start: soc_cad = 50: must be in [-30, 10]
+--tolerance egr=1 | --tolerance soc_cad=1 -> --tolerance has egr: must have one number for
+--seeker-set memory_cycles=x | -> --seeker-set: memory_cycles = 'x': must be
+--seeker-set limits=3 | -> --seeker-set: 'limits' is not one of them: the search gives it
+--fuel-mg -3 | --fuel-mg 30 -> --fuel-mg -3 mg: must be
+--limit p_max_bar=nan | --limit p_max_bar=95 -> p_max_bar = nan: must be a finite number
+--limit p_max_bar=20 | --limit p_max_bar=85 => no soc_cad in [-30, 10] keeps
+--seeker golden_section | --seeker golden_section --noise-sd 0.25 -> --seeker golden_section: needs --noise-sd
+--sensor analyser --seeker spsa | --seeker spsa -> --seeker spsa: takes J of the same cycle
+--sensor analyser --seeker golden_section --noise-sd 0.25 | --seeker golden_section --noise-sd 0.25 -> extremum_seeking
+--motored | -> leave --motored out
+--preset nonesuch | --preset puma_single -> nonesuch
+--set bore_mm=-1 | --set bore_mm=80 -> bore_mm = -1
+-o run.txt | -> -o run.txt: the ending
+"""
+
+
+@pytest.mark.parametrize("line", WRONG.strip().splitlines())
+def test_wrong_then_right(line: str, capsys: Capsys) -> None:
+    typed, arrow, message = line.partition(" => " if " => " in line else " -> ")
+    wrong, right = (each.split() for each in typed.split("|"))
+    short = ("--cycles", "40")
+    assert message in refused(capsys, *(() if "--cycles" in wrong else short), *wrong, code=3 if arrow == " => " else 2)
+    out = seek(capsys, *(() if "--cycles" in right else short), *right)
     assert math.isfinite(out["inputs"]["soc_cad"])
 
 

@@ -90,7 +90,11 @@ def emit(
     plain = to_jsonable({**payload, "file": file} if write is not None and traces is None else payload)
     args.progress.close()
     if file is not None:
-        (write or {}).get(Path(file).suffix, lambda file: write_whole_text(file, json_text(plain) + "\n"))(file)
+        writer = (write or {}).get(Path(file).suffix)
+        if writer is None:
+            write_whole_text(file, json_text(plain) + "\n")
+        else:
+            writer(file)
         wrote(file)
     args.emitted = True
     if args.json:

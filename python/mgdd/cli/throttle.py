@@ -11,8 +11,9 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.cli.from_library import Options, as_option
-from mgdd.cli.options import assignments, option
+from mgdd.cli.options import option
 from mgdd.cli.output import emit, warn
+from mgdd.cli.ranges import assignments
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.io.parameters import ParameterFile
