@@ -108,7 +108,7 @@ def test_a_wrong_command_line_too(capsys: Capsys) -> None:
         error = json.loads(captured.out)["error"]
         assert error["type"] == "UsageError"
         assert error["message"] in captured.err
-        assert captured.err.startswith("usage: mgdd")
+        assert captured.err.startswith("mgdd engine simulate: error: ")
         with pytest.raises(SystemExit):
             main(argv[:-1])
         assert capsys.readouterr().out == ""
