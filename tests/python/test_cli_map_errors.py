@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +29,10 @@ BENCH = """speed_rpm,fuel_mg,p_max_bar,flat_k,hole_bar
 """
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one good file of each kind."""
-    monkeypatch.chdir(tmp_path)
+    tmp_path = tmp_path_factory.mktemp("good")
     write_netcdf(map_sweep(), tmp_path / "table.nc")
     write_netcdf(map_sweep().isel(speed_rpm=0, fuel_mg=0, drop=True), tmp_path / "line.nc")
     best = optimize_map(map_sweep(), "efficiency_gross", limits={"p_max_bar": 140.0}, max_loss=1e-5)
@@ -52,6 +53,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "cut.nc").write_bytes((tmp_path / "table.nc").read_bytes()[:700])
     (tmp_path / "hdf.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
     (tmp_path / "design.csv").write_text("point,speed_rpm,fuel_mg\n0,900,6\n1,1500,50\n")
+    return tmp_path
+
+
+@pytest.fixture
+def here(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(shutil.copytree(good, tmp_path, dirs_exist_ok=True))
     return tmp_path
 
 
