@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import refuse_idle
-from mgdd.cli.output import Stopped, check_output, emit, whole_or_part
+from mgdd.cli.output import emit, whole_or_part
+from mgdd.cli.progress import Stopped
 from mgdd.errors import ParameterError
 from mgdd.io.extras import import_extra
 from mgdd.parallel.pool import processes
@@ -49,7 +50,6 @@ def fill(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """List the studies, or run one."""
-    check_output(args)
     titles = available_studies()
     if args.list:
         refuse_idle(args, *_OPTIONS, "workers", why="--list runs no study")

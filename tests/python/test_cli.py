@@ -14,6 +14,8 @@ import pytest
 from mgdd import datasets, io, presets
 from mgdd.cli import main
 from mgdd.engine import Cylinder, OperatingPoint, find_optimum, simulate
+from typed import Capsys, refused
+from typed import ran as run_json
 
 HD = ("--preset", "hd_diesel_128x144")
 
@@ -34,21 +36,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], str]:
     return names, str(conditions)
 
 
-def run_json(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
-    code = main([*argv, "--json"])
-    captured = capsys.readouterr()
-    assert code == 0, captured.err
-    return json.loads(captured.out)  # fails unless stdout is exactly one JSON value
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
-    assert main(list(argv)) == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    return captured.err
-
-
-def test_simulate_prints_the_library_result(capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_prints_the_library_result(capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "simulate", "--preset", "puma_single", "--soc-cad", "-6")
     cycle = simulate(Cylinder(), OperatingPoint(), soc_cad=-6.0)
     for name in (
@@ -59,7 +47,7 @@ def test_simulate_prints_the_library_result(capsys: pytest.CaptureFixture[str]) 
     assert out["imep_gross_bar"] == pytest.approx(9.627, rel=5e-4)
 
 
-def test_options_are_parameter_names(capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_are_parameter_names(capsys: Capsys) -> None:
     out = run_json(
         capsys, "engine", "simulate", "--speed-rpm", "2000", "--fuel-mg", "12", "--burn-duration-cad", "25",
         "--burn", "wiebe", "--gamma", "linear", "--integrator", "split", "--step-cad", "0.5", "--soc-cad", "-9",
@@ -71,7 +59,7 @@ def test_options_are_parameter_names(capsys: pytest.CaptureFixture[str]) -> None
     assert out["imep_closed_bar"] == pytest.approx(float(cycle["imep_closed_bar"]), rel=1e-12)
 
 
-def test_injection_timing_adds_the_delay(capsys: pytest.CaptureFixture[str]) -> None:
+def test_injection_timing_adds_the_delay(capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "simulate", "--soi-cad", "-10")
     assert out["soi_cad"] == -10.0
     assert out["soc_cad"] == pytest.approx(-5.4, abs=0.05)
@@ -79,14 +67,14 @@ def test_injection_timing_adds_the_delay(capsys: pytest.CaptureFixture[str]) -> 
     assert "does not ignite" in late
 
 
-def test_motored_has_no_burn_angles(capsys: pytest.CaptureFixture[str]) -> None:
+def test_motored_has_no_burn_angles(capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "simulate", "--motored")
     assert out["ca50_cad"] is None
     assert out["p_max_bar"] == pytest.approx(70.11, rel=5e-4)
     assert "contradict" in refused(capsys, "engine", "simulate", "--motored", "--fuel-mg", "10")
 
 
-def test_output_file_holds_the_traces(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_output_file_holds_the_traces(tmp_path: Path, capsys: Capsys) -> None:
     file = tmp_path / "cycle.csv"
     assert main(["engine", "simulate", "-o", str(file)]) == 0
     capsys.readouterr()
@@ -97,7 +85,7 @@ def test_output_file_holds_the_traces(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "ending" in refused(capsys, "engine", "simulate", "-o", str(tmp_path / "cycle.xls"))
 
 
-def test_analyze_measured_trace(files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_analyze_measured_trace(files: tuple[list[str], str], capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "analyze", files[0][1], *HD)
     assert out["ca50_cad"] == pytest.approx(6.9, abs=0.05)
     assert out["imep_closed_bar"] == pytest.approx(13.71, abs=0.005)
@@ -105,18 +93,10 @@ def test_analyze_measured_trace(files: tuple[list[str], str], capsys: pytest.Cap
     assert out["heat_net_j"] == pytest.approx(4436.0, abs=1.0)
     assert out["method"] == "none"
     assert out["gamma"] == 1.33
-    assert {
-        "pegging_bar",
-        "n_expansion",
-        "ca10_cad",
-        "ca90_cad",
-        "heat_gross_j",
-        "p_max_bar",
-        "p_max_cad",
-    } <= set(out)
+    assert {"pegging_bar", "n_expansion", "ca10_cad", "ca90_cad", "heat_gross_j", "p_max_bar", "p_max_cad"} <= set(out)
 
 
-def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: Capsys) -> None:
     motored = simulate(Cylinder(wall_heat_scale=0.0), OperatingPoint(fuel_mg=0.0))
     shifted = io.pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values - 0.2, name="shifted")
     file = tmp_path / "shifted.csv"
@@ -125,21 +105,13 @@ def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.Captu
     assert out["pegging_bar"] == pytest.approx(0.2, abs=0.005)
 
 
-def test_calibrate_reports_what_it_cannot_tell(
-    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_calibrate_reports_what_it_cannot_tell(files: tuple[list[str], str], capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "calibrate", *files[0], *HD, "--conditions", files[1])
     assert all(row["rmse_percent"] <= 1.5 and abs(row["imep_closed_error_percent"]) <= 3.0 for row in out["traces"])
     assert all(row["onset_against_soi_cad"] >= 0.0 for row in out["traces"])
-    assert {
-        "file",
-        "p_max_bar",
-        "rmse_bar",
-        "soc_cad",
-        "burn_duration_cad",
-        "fuel_heat_j",
-        "ca50_cad",
-    } <= set(out["traces"][0])
+    assert {"file", "p_max_bar", "rmse_bar", "soc_cad", "burn_duration_cad", "fuel_heat_j", "ca50_cad"} <= set(
+        out["traces"][0]
+    )
     scale = out["common"]["wall_heat_scale"]
     assert {"value", "stderr", "identifiable"} <= set(scale)
     assert scale["identifiable"] is False
@@ -152,9 +124,7 @@ def test_calibrate_reports_what_it_cannot_tell(
 
 
 @pytest.mark.slow
-def test_calibrate_with_known_fuel_and_free_gamma_and_pegging(
-    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_calibrate_with_known_fuel_and_free_gamma_and_pegging(files: tuple[list[str], str], capsys: Capsys) -> None:
     common = ["engine", "calibrate", files[0][1], *HD, "--conditions", _one_row(files[1], 2)]
     free = "gamma,wall_heat_scale,soc_cad,burn_duration_cad,wiebe_m"
     out = run_json(capsys, *common, "--fuel-mg", "115", "--free", free)
@@ -167,25 +137,21 @@ def test_calibrate_with_known_fuel_and_free_gamma_and_pegging(
 
 
 @pytest.mark.slow
-def test_calibrate_without_conditions_has_no_onset_column(
-    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_calibrate_without_conditions_has_no_onset_column(files: tuple[list[str], str], capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "calibrate", *files[0], *HD)
     assert all("onset_against_soi_cad" not in row for row in out["traces"])
     measured = [row["rmse_percent"] for row in out["traces"]]
     assert measured == pytest.approx([0.64, 0.50, 0.37, 0.68], abs=0.015)
 
 
-def test_optimum_matches_the_library(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimum_matches_the_library(capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "optimum", "--limit", "p_max_bar=95")
     best = find_optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
-    assert {"soc_cad", "ca50_cad", "efficiency_gross", "curvature_per_cad2"} <= set(out)
-    assert out["soc_cad"] == pytest.approx(best["soc_cad"], abs=1e-9)
-    assert out["p_max_bar"] <= 95.0
-    assert out["active_limits"] == ["p_max_bar"]
+    assert {name: out[name] for name in best.to_dict()} == best.to_dict()
+    assert set(out) - set(best.to_dict()) == {"preset", "soi_cad"}
 
 
-def test_optimum_of_files_is_a_range(files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimum_of_files_is_a_range(files: tuple[list[str], str], capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "optimum", files[0][3], *HD, "--conditions", _one_row(files[1], 4))
     (row,) = out["traces"]
     kept = [member for member in row["members"] if member["plausible"]]
@@ -222,15 +188,13 @@ def _one_row(conditions: str, row: int) -> str:
         (["--preset", "nowhere.toml"], ["nowhere.toml"]),
     ],
 )
-def test_bad_input_names_field_value_and_remedy(
-    argv: list[str], words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input_names_field_value_and_remedy(argv: list[str], words: list[str], capsys: Capsys) -> None:
     error = refused(capsys, "engine", "simulate", *argv)
     for word in words:
         assert word in error
 
 
-def test_bad_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_files(tmp_path: Path, capsys: Capsys) -> None:
     empty = tmp_path / "empty.csv"
     empty.write_text("")
     assert "empty" in refused(capsys, "engine", "analyze", str(empty))
@@ -248,7 +212,7 @@ def test_bad_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "--pressure-unit 'Pa'" in refused(capsys, "engine", "analyze", str(pascal), *HD)
 
 
-def test_angles_before_tdc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_angles_before_tdc(tmp_path: Path, capsys: Capsys) -> None:
     trace, turned = datasets.read("hd_diesel_128x144")[0], tmp_path / "turned.csv"
     columns = trace["crank_angle_cad"].values.tolist(), trace["pressure_bar"].values.tolist()
     turned.write_text("".join(f"{-a!r} {p!r}\n" for a, p in zip(*columns, strict=True)))
@@ -257,9 +221,7 @@ def test_angles_before_tdc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert out["ca50_cad"] == pytest.approx(5.0, abs=0.1)
 
 
-def test_conditions_of_a_campaign(
-    tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_conditions_of_a_campaign(tmp_path: Path, files: tuple[list[str], str], capsys: Capsys) -> None:
     out = run_json(capsys, "engine", "calibrate", files[0][0], *HD, "--conditions", files[1])  # one file of four rows
     assert out["traces"][0]["soi_cad"] == -5.06
     twin = tmp_path / Path(files[0][0]).name
@@ -274,9 +236,7 @@ def test_conditions_of_a_campaign(
 
 
 @pytest.mark.slow
-def test_a_short_trace_is_told_and_still_reported(
-    tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_short_trace_is_told_and_still_reported(tmp_path: Path, files: tuple[list[str], str], capsys: Capsys) -> None:
     trace = io.read_pressure(files[0][1]).sel(crank_angle_cad=slice(-90.0, 50.0))
     short = tmp_path / "short.csv"
     io.write_csv(trace, short)
@@ -296,9 +256,7 @@ def test_a_short_trace_is_told_and_still_reported(
     assert "–" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
-def test_late_injection_and_failed_fits_have_their_exit_codes(
-    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_late_injection_and_failed_fits_have_their_exit_codes(files: tuple[list[str], str], capsys: Capsys) -> None:
     assert "ignites at 26.2" in refused(capsys, "engine", "simulate", "--soi-cad", "14")
     # Wall heat beyond reason on a coarse step: the model leaves the numbers wherever the search wants to go.
     beyond = ("--set", "woschni_cp_m_per_sk=1", "--speed-rpm", "60", "--step-cad", "5")
@@ -308,9 +266,7 @@ def test_late_injection_and_failed_fits_have_their_exit_codes(
     assert "did not converge" in captured.err
 
 
-def test_a_held_scale_beyond_the_search_is_still_compared(
-    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_held_scale_beyond_the_search_is_still_compared(files: tuple[list[str], str], capsys: Capsys) -> None:
     held = ("--set", "wall_heat_scale=3", "--free", "soc_cad,burn_duration_cad,fuel_heat_j")
     out = run_json(capsys, "engine", "calibrate", files[0][1], *HD, *held)
     assert out["common"]["wall_heat_scale"]["value"] == 3.0
@@ -329,18 +285,18 @@ def test_a_held_scale_beyond_the_search_is_still_compared(
     ],
 )
 def test_options_that_would_do_nothing_are_refused(
-    argv: list[str], words: str, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+    argv: list[str], words: str, files: tuple[list[str], str], capsys: Capsys
 ) -> None:
     assert words in refused(capsys, "engine", "analyze", files[0][0], *HD, *argv)
 
 
-def test_infeasible_limit_has_its_own_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+def test_infeasible_limit_has_its_own_exit_code(capsys: Capsys) -> None:
     error = refused(capsys, "engine", "optimum", "--limit", "p_max_bar=50", code=3)
     assert "p_max_bar >=" in error
     assert "is not an indicator" in refused(capsys, "engine", "optimum", "--limit", "p_maxx=50")
 
 
-def test_preset_file_round_trip(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_preset_file_round_trip(tmp_path: Path, capsys: Capsys) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(presets.load("puma_single").to_toml().replace("value = 86.0", "value = 90.0"))
     out = run_json(capsys, "engine", "simulate", "--preset", str(file))
@@ -366,16 +322,7 @@ def test_process_keeps_stdout_clean() -> None:
     assert call("engine", "simulate", "--soc-cad", "-6", "--soi-cad", "-9").returncode == 2
 
 
-@pytest.mark.parametrize("command", ["simulate", "analyze", "calibrate", "optimum"])
-def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match="0"):
-        main(["engine", command, "--help"])
-    text = capsys.readouterr().out
-    assert "example:" in text
-    assert f"mgdd engine {command}" in text
-
-
-def test_without_a_command_it_says_which_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_command_it_says_which_there_are(capsys: Capsys) -> None:
     assert main([]) == 2
     said = capsys.readouterr()
     assert said.out == ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,9 @@ import pytest
 from mgdd import datasets, io
 from mgdd.cli import main
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
+from typed import Capsys, commands
+
+run_json, refused = commands("engine", "analyze")
 
 HD = ("--preset", "hd_diesel_128x144")
 
@@ -22,19 +24,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
-def run_json(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
-    code = main(["engine", "analyze", *argv, "--json"])
-    captured = capsys.readouterr()
-    assert code == 0, captured.err
-    return json.loads(captured.out)
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    assert main(["engine", "analyze", *argv]) == 2
-    return capsys.readouterr().err
-
-
-def test_the_payload_says_how_it_was_computed(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_payload_says_how_it_was_computed(file: str, capsys: Capsys) -> None:
     out = run_json(capsys, file, *HD)
     assert out["heat_window"] == "found"
     assert out["smoothing"] == "none"
@@ -50,13 +40,13 @@ def test_the_payload_says_how_it_was_computed(file: str, capsys: pytest.CaptureF
     assert given["imep_closed_bar"] == out["imep_closed_bar"]
 
 
-def test_a_stated_intake_pressure_is_judged(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stated_intake_pressure_is_judged(file: str, capsys: Capsys) -> None:
     (line,) = run_json(capsys, file, *HD, "--intake-pressure-kpa", "100")["warnings"]
     assert "the stated intake pressure is 1 bar" in line
     assert run_json(capsys, file, *HD, "--intake-pressure-kpa", "230")["warnings"] == []
 
 
-def test_brake_work_beyond_the_gas_is_refused(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_brake_work_beyond_the_gas_is_refused(file: str, capsys: Capsys) -> None:
     assert run_json(capsys, file, *HD, "--bmep-bar", "12.5")["warnings"] == []  # closed IMEP is 13.7 bar
     assert "below bmep_bar = 16" in refused(capsys, file, *HD, "--bmep-bar", "16")
     # Six cylinders of 1.853 L at 16 bar: p V/(4 pi) = 1415.6 N m.
@@ -72,13 +62,11 @@ def test_brake_work_beyond_the_gas_is_refused(file: str, capsys: pytest.CaptureF
         (["--smoothing", "savitzky_golay", "--smoothing-width-cad", "2"], "take 4 or more"),
     ],
 )
-def test_options_that_cannot_act_are_refused(
-    argv: list[str], words: str, file: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_options_that_cannot_act_are_refused(argv: list[str], words: str, file: str, capsys: Capsys) -> None:
     assert words in refused(capsys, file, *HD, *argv)
 
 
-def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: Capsys) -> None:
     cycles = [simulate(Cylinder(), OperatingPoint(), soc_cad=soc) for soc in (-9.0, -6.0, -5.0, 1.0)]
     file, table = tmp_path / "record.csv", tmp_path / "figures.csv"
     columns = [cycles[0].crank_angle_cad.values, *(cycle.pressure_bar.values for cycle in cycles)]
@@ -101,9 +89,7 @@ def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.Capt
     assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-4)
 
 
-def test_ringing_of_a_record_and_the_share_of_its_cycles_that_knock(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ringing_of_a_record_and_the_share_of_its_cycles_that_knock(tmp_path: Path, capsys: Capsys) -> None:
     file = tmp_path / "record.csv"
     runs = [simulate("puma_single", soc_cad=soc, step_cad=0.25) for soc in (-9.0, -6.0, -5.0, -2.0)]
     angle = runs[0]["crank_angle_cad"].to_numpy()
@@ -124,7 +110,7 @@ def test_ringing_of_a_record_and_the_share_of_its_cycles_that_knock(
 
 
 @pytest.mark.slow
-def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, capsys: Capsys) -> None:
     trace = datasets.read("hd_diesel_128x144")[1]
     angle, pressure = trace["crank_angle_cad"].values + 3.0, trace["pressure_bar"].values
     late = tmp_path / "late.csv"

@@ -13,6 +13,7 @@ import pytest
 from mgdd import datasets, io
 from mgdd.cli import main
 from mgdd.engine import analyze, simulate
+from typed import Capsys
 
 ENGINE = ("--preset", "puma_single")
 
@@ -45,7 +46,7 @@ def read(page: Path) -> tuple[str, list[str]]:
 
 
 def test_a_page_has_a_section_per_file_and_the_exit_code_tells_of_a_refused_one(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
     page = tmp_path / "page.html"
     files = [str(folder / name) for name in ("record.csv", "torn.csv", "one.csv")]
@@ -80,9 +81,7 @@ def test_a_page_has_a_section_per_file_and_the_exit_code_tells_of_a_refused_one(
     ]  # fmt: skip
 
 
-def test_files_without_a_page_are_printed_one_after_the_other(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_without_a_page_are_printed_one_after_the_other(folder: Path, tmp_path: Path, capsys: Capsys) -> None:
     both = [str(folder / "one.csv"), str(folder / "record.csv")]
     assert main(["engine", "analyze", *both, *ENGINE]) == 0
     assert capsys.readouterr().out.count("imep_closed_bar") == 2
@@ -95,7 +94,7 @@ def test_files_without_a_page_are_printed_one_after_the_other(
 
 
 def test_nothing_is_written_where_a_path_is_wrong(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    folder: Path, tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def never(*_: object, **__: object) -> None:
         raise AssertionError("an analysis was begun")
@@ -116,7 +115,7 @@ def test_nothing_is_written_where_a_path_is_wrong(
 
 
 def test_one_refused_file_is_an_error_alone_and_a_section_of_a_page(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
     torn, page = str(folder / "torn.csv"), tmp_path / "page.html"
     assert main(["engine", "analyze", torn, *ENGINE, "--json"]) == 2
@@ -128,7 +127,7 @@ def test_one_refused_file_is_an_error_alone_and_a_section_of_a_page(
 
 
 def test_a_long_record_is_drawn_by_some_of_its_cycles(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    folder: Path, tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mgdd.cli.analyze.DRAWN_CYCLES", 5)
     page = tmp_path / "page.html"

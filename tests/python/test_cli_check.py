@@ -9,6 +9,7 @@ import pytest
 
 from mgdd import datasets, io
 from mgdd.cli import main
+from typed import Capsys
 
 HD = ("--preset", "hd_diesel_128x144")
 
@@ -23,7 +24,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return [str(folder / name) for name in ("sound.csv", "clipped.csv", "torn.csv")]
 
 
-def test_every_file_has_a_verdict(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_file_has_a_verdict(files: list[str], capsys: Capsys) -> None:
     assert main(["engine", "check", *files, *HD, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["files"]
     assert [(each["file"], each["verdict"]) for each in found] == [
@@ -36,7 +37,7 @@ def test_every_file_has_a_verdict(files: list[str], capsys: pytest.CaptureFixtur
     assert "line 3" in found[2]["checks"][0]["text"]
 
 
-def test_without_an_engine_the_geometry_is_open(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_an_engine_the_geometry_is_open(files: list[str], capsys: Capsys) -> None:
     def seen(*options: str) -> dict[str, object]:
         assert main(["engine", "check", files[0], "--json", *options]) == 0
         return dict(json.loads(capsys.readouterr().out))
@@ -55,7 +56,7 @@ def test_without_an_engine_the_geometry_is_open(files: list[str], capsys: pytest
     assert whole["files"][0]["warnings"] == []
 
 
-def test_fuel_by_set_is_fuel(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_fuel_by_set_is_fuel(files: list[str], capsys: Capsys) -> None:
     texts = []
     for stated in (["--fuel-mg", "400"], ["--set", "fuel_mg=400"]):
         assert main(["engine", "check", files[0], *HD, *stated]) == 0
@@ -64,7 +65,7 @@ def test_fuel_by_set_is_fuel(files: list[str], capsys: pytest.CaptureFixture[str
     assert "of the heat of the stated fuel" in texts[0]
 
 
-def test_text_says_the_worst_first(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_says_the_worst_first(files: list[str], capsys: Capsys) -> None:
     assert main(["engine", "check", *files[1:], *HD]) == 0
     clipped, torn = capsys.readouterr().out.split("\n\n")
     assert clipped.splitlines()[0] == "clipped.csv: fail"
@@ -72,7 +73,7 @@ def test_text_says_the_worst_first(files: list[str], capsys: pytest.CaptureFixtu
     assert torn.splitlines()[0] == "torn.csv: fail"
 
 
-def test_what_is_stated_is_judged(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_stated_is_judged(files: list[str], tmp_path: Path, capsys: Capsys) -> None:
     def verdict(*options: str) -> str:
         assert main(["engine", "check", files[0], *HD, "--json", *options]) == 0
         (file,) = json.loads(capsys.readouterr().out)["files"]

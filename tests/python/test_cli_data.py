@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,8 @@ from mgdd.io.plain_csv import long_columns, write_long
 from mgdd.io.table import read_table
 from mgdd.results.labels import ANGLE, labelled_dataset
 from table_files import write_hdf5
+from typed import Capsys
+from typed import ran as out
 
 FULL = np.arange(-180.0, 180.0, 0.5)
 HUMP = np.exp(-(((FULL - 8.0) / 30.0) ** 2))
@@ -41,15 +42,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def out(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
-    assert main([*argv, "--json"]) == 0
-    return dict(json.loads(capsys.readouterr().out))
-
-
 # --- laws --------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("ending", ["nc", "csv", "parquet"])
 @pytest.mark.usefixtures("folder")
-def test_what_was_written_reads_back_equal(ending: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_was_written_reads_back_equal(ending: str, capsys: Capsys) -> None:
     if ending == "parquet":
         pytest.importorskip("pyarrow")
     source = "all.h5" if ending == "nc" else "fast.h5"
@@ -103,7 +99,7 @@ def test_long_columns_are_those_of_the_dataset(tmp_path: Path) -> None:
 
 # --- info --------------------------------------------------------------------------------------------------
 @pytest.mark.usefixtures("folder")
-def test_info_says_what_each_column_is_taken_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_says_what_each_column_is_taken_for(capsys: Capsys) -> None:
     shown = out(capsys, "data", "info", "all.h5")
     assert shown["format"].startswith("HDF5")
     assert shown["sizes"] == {ANGLE: 720, "cycle": 3, "time_1_s": 11}
@@ -124,7 +120,7 @@ def test_info_says_what_each_column_is_taken_for(capsys: pytest.CaptureFixture[s
     assert text[-1].startswith("doubtful: the file gives no unit of 'imep'")
 
 
-def test_info_shows_a_file_that_cannot_be_cut(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_shows_a_file_that_cannot_be_cut(folder: Path, capsys: Capsys) -> None:
     rows = "".join(f"{0.5 * k},{100 * float(CYCLES[0, k % 720])!r},{'ok' if k % 2 else ''}\n" for k in range(1440))
     (folder / "run.csv").write_text("CAD,p [kPa],note\n" + rows)
     shown = out(capsys, "data", "info", "run.csv")
@@ -142,7 +138,7 @@ def test_info_shows_a_file_that_cannot_be_cut(folder: Path, capsys: pytest.Captu
 
 
 @pytest.mark.usefixtures("folder")
-def test_info_shows_a_column_per_cycle_as_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_shows_a_column_per_cycle_as_one(capsys: Capsys) -> None:
     out(capsys, "data", "convert", "fast.h5", "-o", "bench.nc")
     columns = out(capsys, "data", "info", "bench.nc")["columns"]
     assert [column["name"] for column in columns] == [
@@ -151,9 +147,7 @@ def test_info_shows_a_column_per_cycle_as_one(capsys: pytest.CaptureFixture[str]
     ]  # fmt: skip
 
 
-def test_a_long_series_is_one_line_in_a_file_that_cannot_be_cut(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_long_series_is_one_line_in_a_file_that_cannot_be_cut(folder: Path, capsys: Capsys) -> None:
     np.savez(folder / "many.npz", angle=FULL + 540.0, p=np.tile(CYCLES[:1], (30, 1)).T)
     columns = out(capsys, "data", "info", "many.npz")["columns"]
     assert [(column["name"], column["highest"]) for column in columns] == [
@@ -175,16 +169,14 @@ def test_a_long_series_is_one_line_in_a_file_that_cannot_be_cut(
         (["get", "emps"], "-o FILE is needed"),
     ],
 )
-def test_errors_name_the_remedy(
-    argv: list[str], message: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_errors_name_the_remedy(argv: list[str], message: str, folder: Path, capsys: Capsys) -> None:
     before = sorted(folder.iterdir())
     assert main(["data", *argv]) == 2
     assert message in capsys.readouterr().err
     assert sorted(folder.iterdir()) == before
 
 
-def test_the_nearest_set_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_nearest_set_is_named(capsys: Capsys) -> None:
     with pytest.raises(SystemExit):
         main(["data", "get", "emp", "-o", "a.nc"])
     assert "did you mean 'emps'?" in capsys.readouterr().err
@@ -198,7 +190,7 @@ def test_warnings_are_said(caplog: pytest.LogCaptureFixture) -> None:
 
 # --- public data -------------------------------------------------------------------------------------------
 def test_sets_are_listed_with_licence_and_place(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    capsys: Capsys, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path))
@@ -212,7 +204,7 @@ def test_sets_are_listed_with_licence_and_place(
 
 @pytest.mark.parametrize("ending", ["csv", "nc", "parquet"])
 @pytest.mark.usefixtures("folder")
-def test_a_set_is_written_and_reads_back(ending: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_set_is_written_and_reads_back(ending: str, capsys: Capsys) -> None:
     if ending == "parquet":
         pytest.importorskip("pyarrow")
     said = out(capsys, "data", "get", "hd_diesel_128x144", "-o", f"hd.{ending}")

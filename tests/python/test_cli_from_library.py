@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import inspect
-import sys
+import shlex
 from collections.abc import Iterator
 from typing import Literal
 
 import pytest
 
 from mgdd.cli import main
+from mgdd.cli.commands import COMMANDS, Parser, root_parser
 from mgdd.cli.from_library import Options
-from mgdd.cli.main import _parser
+from typed import Capsys
 
 
 def made(
@@ -96,14 +98,15 @@ def test_help_is_that_of_the_numpydoc(parser: argparse.ArgumentParser) -> None:
 
 def option_sets() -> list[Options]:
     """Every set of options of the package."""
-    modules = [module for name, module in sys.modules.items() if name.startswith(("mgdd.cli.", "mgdd_studies.command"))]
+    names = {f"mgdd.cli.{command.module}" for command in COMMANDS.values() if command.module}
+    modules = [importlib.import_module(name) for name in (*names, "mgdd.cli.options", "mgdd_studies.command")]
     values = [value for module in modules for value in vars(module).values()]
     each = [own for value in values for own in (value.values() if isinstance(value, dict) else (value,))]
     return list({id(own): own for own in each if isinstance(own, Options)}.values())
 
 
 def actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    for action in parser._actions:
+    for action in (parser.filled() if isinstance(parser, Parser) else parser)._actions:
         yield action
         if isinstance(action.choices, dict):
             for below in dict.fromkeys(action.choices.values()):
@@ -144,19 +147,18 @@ def test_choices_that_are_documented_are_those_that_are_checked() -> None:
     from mgdd.surrogate.polynomial import MODELS
     from mgdd.surrogate.response_fit import KINDS, SELECTIONS
 
-    offered = {tuple(action.choices) for action in actions(_parser()) if action.choices is not None}
+    offered = {tuple(action.choices) for action in actions(root_parser()) if action.choices is not None}
     for known in (METHODS, EXCITATIONS, CHOICES, PRESSURE_UNITS, ANGLE_UNITS, MODELS, KINDS, SELECTIONS):
         assert tuple(known) in offered, known
 
 
-def test_all_help_can_be_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    groups = next(a.choices for a in _parser()._actions if isinstance(a.choices, dict))
-    for group, below in groups.items():
-        verbs = next((a.choices for a in below._actions if isinstance(a.choices, dict)), {"": None})
-        for verb in verbs:
-            with pytest.raises(SystemExit, match="0"):
-                main([*filter(None, (group, verb)), "--help"])
-            assert "example:" in capsys.readouterr().out
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_ends_with_an_example_that_its_command_takes(name: str, capsys: Capsys) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main([*name.split(), "--help"])
+    example = capsys.readouterr().out.partition("example:\n  mgdd ")[2]
+    if COMMANDS[name].module:
+        assert root_parser().parse_args(shlex.split(example)).run
 
 
 @pytest.mark.parametrize(
@@ -178,7 +180,7 @@ def test_all_help_can_be_printed(capsys: pytest.CaptureFixture[str]) -> None:
         ("throttle demand --pedal-percent 3 --speed-rpm 900 --set bre_mm=3", "bore_mm"),
     ],
 )
-def test_the_nearest_name_is_asked_for(argv: str, near: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_nearest_name_is_asked_for(argv: str, near: str, capsys: Capsys) -> None:
     try:
         code = main(argv.split())
     except SystemExit as stop:
@@ -187,7 +189,7 @@ def test_the_nearest_name_is_asked_for(argv: str, near: str, capsys: pytest.Capt
     assert f"did you mean '{near}'?" in capsys.readouterr().err
 
 
-def test_nothing_near_is_not_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_near_is_not_asked_for(capsys: Capsys) -> None:
     with pytest.raises(SystemExit):
         main(["engine", "xyz"])
     assert "did you mean" not in capsys.readouterr().err

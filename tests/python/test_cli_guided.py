@@ -14,6 +14,9 @@ from mgdd.cli.guide_map import learn_map
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.loop import EngineBench, run_seeker
 from mgdd.optimize import ExtremumSeeking
+from typed import Capsys, commands
+
+seek, refused = commands("engine", "seek")
 
 KINDS = ("feed_forward", "curve", "calibrated", "map")
 ROUGH = ("--guide-set", "wall_heat_scale=0.8", "--guide-set", "burn_duration_ref_cad=45")
@@ -29,20 +32,6 @@ def table(tmp_path: Path) -> Path:
     return file
 
 
-def seek(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
-    code = main(["engine", "seek", *argv, "--json"])
-    captured = capsys.readouterr()
-    assert code == 0, captured.err
-    return json.loads(captured.out)
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
-    assert main(["engine", "seek", *argv]) == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    return captured.err
-
-
 def options(kind: str, table: Path) -> tuple[str, ...]:
     return ("--guide", "map", "--guide-map", str(table)) if kind == "map" else ("--guide", kind, *ROUGH)
 
@@ -52,7 +41,7 @@ def first_timing(file: Path) -> float:
         return float(next(csv.DictReader(line for line in stream if not line.startswith("#")))["asked_soc_cad"])
 
 
-def test_without_a_guide_nothing_is_guided(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_guide_nothing_is_guided(capsys: Capsys) -> None:
     out = seek(capsys, "--cycles", "60")
     assert out.keys() >= FIELDS
     assert out["guide"] == "none"
@@ -60,9 +49,7 @@ def test_without_a_guide_nothing_is_guided(capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_begins_at_the_guide_and_improves_on_it(
-    kind: str, capsys: pytest.CaptureFixture[str], table: Path
-) -> None:
+def test_every_kind_begins_at_the_guide_and_improves_on_it(kind: str, capsys: Capsys, table: Path) -> None:
     out = seek(capsys, *options(kind, table), "--cycles", "600", "--seed", "3")
     assert out.keys() >= FIELDS
     assert out["guide"] == kind
@@ -81,12 +68,12 @@ def test_every_kind_begins_at_the_guide_and_improves_on_it(
         assert out["guide_wall_heat_scale"] == pytest.approx(0.5, rel=0.05)  # the bench has 0.5
 
 
-def test_a_plain_parabola_guides_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plain_parabola_guides_as_well(capsys: Capsys) -> None:
     out = seek(capsys, "--guide", "curve", *ROUGH, "--guide-shape", "parabola", "--cycles", "600")
     assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
 
 
-def test_another_engine_can_be_the_guide(capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_engine_can_be_the_guide(capsys: Capsys) -> None:
     out = seek(capsys, "--guide", "curve", "--guide-preset", "hd_diesel_128x144", "--cycles", "600")
     assert out["preset"] == "puma_single"
     assert abs(out["start"]["soc_cad"] - OPTIMUM_CAD) > 0.2
@@ -94,7 +81,7 @@ def test_another_engine_can_be_the_guide(capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.mark.parametrize("kind", ["feed_forward", "curve", "calibrated"])
-def test_a_guided_run_starts_below_the_limit(kind: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_guided_run_starts_below_the_limit(kind: str, capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "run.csv"  # an exact model: over the limit at its best
     out = seek(capsys, "--guide", kind, "--limit", "p_max_bar=95", "-o", str(file))
     assert "start_above_limit" not in [finding["code"] for finding in out["findings"]]
@@ -106,9 +93,7 @@ def test_a_guided_run_starts_below_the_limit(kind: str, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_start_is_that_of_the_user(
-    kind: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
-) -> None:
+def test_the_start_is_that_of_the_user(kind: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     out = seek(capsys, *options(kind, table), "--start", "soc_cad=-18", "--cycles", "50", "-o", str(file))
     assert out["start"] == {"soc_cad": -18.0}
@@ -116,9 +101,7 @@ def test_the_start_is_that_of_the_user(
 
 
 @pytest.mark.parametrize("seeker", ["gradient_descent", "spsa"])
-def test_a_seeker_of_any_kind_begins_there(
-    seeker: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
-) -> None:
+def test_a_seeker_of_any_kind_begins_there(seeker: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
     for kind in ("feed_forward", "map"):
         file = tmp_path / f"{kind}.csv"
         seek(
@@ -147,10 +130,7 @@ def test_a_seeker_of_any_kind_begins_there(
         ("--guide map", "--guide map needs --guide-map FILE"),
         ("--guide map --guide-map x.txt", "--guide-map x.txt: the ending must be one of .csv, .toml"),
         ("--guide map --guide-map x.csv --guide-map-out y.txt", "--guide-map-out y.txt: the ending must be one of"),
-        (
-            "--guide map --guide-map x.csv --guide-map-out no/y.csv",
-            "no/y.csv: the folder no does not exist; make it",
-        ),
+        ("--guide map --guide-map x.csv --guide-map-out no/y.csv", "no/y.csv: the folder no does not exist; make it"),
         ("--guide map --guide-map none.csv", "none.csv"),
         ("--guide-map-out y.csv", "--guide-map-out does not act here; --guide none has no model"),
         ("--guide curve --guide-map-out y.csv", "--guide-map-out does not act here; --guide curve has a model"),
@@ -177,24 +157,22 @@ def test_a_seeker_of_any_kind_begins_there(
         ("--guide curve --input soc_cad=5:10", "--guide curve: the best timing of the model, -5.6"),
     ],
 )
-def test_what_cannot_guide_is_refused_with_the_remedy(argv: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_guide_is_refused_with_the_remedy(argv: str, said: str, capsys: Capsys) -> None:
     assert said in refused(capsys, *argv.split())
 
 
-def test_a_table_that_ends_before_the_point_is_refused(capsys: pytest.CaptureFixture[str], table: Path) -> None:
+def test_a_table_that_ends_before_the_point_is_refused(capsys: Capsys, table: Path) -> None:
     said = refused(capsys, "--guide", "map", "--guide-map", str(table), "--speed-rpm", "3500")
     assert "its axes end before" in said
 
 
-def test_a_feed_forward_beyond_the_bounds_starts_inside(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_feed_forward_beyond_the_bounds_starts_inside(capsys: Capsys) -> None:
     out = seek(capsys, "--guide", "feed_forward", "--input", "soc_cad=-4:10", "--cycles", "50")
     assert -4.0 < out["start"]["soc_cad"] <= -3.0
 
 
 @pytest.mark.parametrize("ending", ["csv", "toml"])
-def test_a_run_that_settles_writes_its_timing_back(
-    ending: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
-) -> None:
+def test_a_run_that_settles_writes_its_timing_back(ending: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
     before, out_file = tmp_path / "timing.csv", tmp_path / f"learnt.{ending}"
     TimingMap.from_toml(table.read_text(encoding="utf-8")).write_csv(before, source="by hand")
     run = ("--guide", "map", "--guide-map", str(before), "--guide-map-out", str(out_file), "--cycles", "1200")
@@ -216,7 +194,7 @@ def test_a_run_that_settles_writes_its_timing_back(
 
 
 def test_a_run_that_has_not_settled_writes_nothing(
-    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture, table: Path, tmp_path: Path
+    capsys: Capsys, caplog: pytest.LogCaptureFixture, table: Path, tmp_path: Path
 ) -> None:
     out_file = tmp_path / "learnt.csv"
     run = ("--guide", "map", "--guide-map", str(table), "--guide-map-out", str(out_file), "--cycles", "60", "--json")
@@ -245,7 +223,7 @@ def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None
         assert any("interrupted" in doubt for doubt in doubts) is interrupted
 
 
-def test_an_axis_that_no_point_has_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_an_axis_that_no_point_has_is_named(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "timing.csv"
     file.write_text("speed,timing_cad\n900,-2\n1500,-5\n", encoding="utf-8")
     said = refused(capsys, "--guide", "map", "--guide-map", str(file))

@@ -9,13 +9,13 @@ import pytest
 
 from map_cases import FUEL, SPEED, bend, centre, timing_table
 from map_cases import sweep as map_sweep
-from map_commands import ran
 from mgdd import datasets
 from mgdd.cli import main
 from mgdd.engine import OperatingPoint
 from mgdd.guide import TimingMap
 from mgdd.io.binary_files import write_netcdf
 from mgdd.maps import CalibrationMap, optimize_map, read_dcm, read_map, write_map
+from typed import Capsys, ran
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_the_axes_of_map_and_table_may_stand_in_another_order(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_axes_of_map_and_table_may_stand_in_another_order(here: Path, capsys: Capsys) -> None:
     best = optimize_map(map_sweep(), "efficiency_gross")
     late = best.values + np.arange(15.0).reshape(3, 5) / 10.0
     write_map(best.replaced(late), here / "late.json")
@@ -36,7 +36,7 @@ def test_the_axes_of_map_and_table_may_stand_in_another_order(here: Path, capsys
     assert told["achieved"]["loss"]["highest"] == pytest.approx(loss.max(), rel=0.05)
 
 
-def test_diff_at_the_breakpoints_of_the_first(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diff_at_the_breakpoints_of_the_first(here: Path, capsys: Capsys) -> None:
     axes = {"fuel_mg": [6.0, 20.0, 40.0]}
     write_map(CalibrationMap(axes, [400.0, 800.0, 1600.0], name="rail_bar"), here / "old.json")
     write_map(CalibrationMap({"fuel_mg": [10.0, 30.0]}, [500.0, 900.0], name="rail_bar"), here / "new.json")
@@ -48,7 +48,7 @@ def test_diff_at_the_breakpoints_of_the_first(here: Path, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize("ending", ["csv", "nc", "json"])
-def test_export_keeps_everything(ending: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_export_keeps_everything(ending: str, here: Path, capsys: Capsys) -> None:
     write_map(timing_table(), here / "map.json")
     told = ran(capsys, "map", "export", "map.json", "-o", f"other.{ending}")
     assert read_map(here / f"other.{ending}") == timing_table()
@@ -56,7 +56,7 @@ def test_export_keeps_everything(ending: str, here: Path, capsys: pytest.Capture
     assert told["left_out"] == []
 
 
-def test_several_maps_into_one_dcm_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_several_maps_into_one_dcm_file(here: Path, capsys: Capsys) -> None:
     soc = CalibrationMap({"fuel_mg": [6.0, 20.0, 40.0]}, [-1.0, -4.0, -6.5], name="soc_cad", cells={"sd": 0.3})
     rail = CalibrationMap({"speed_rpm": [900.0, 3000.0]}, [400.0, 1600.0], name="rail_bar")
     write_map(soc, here / "soc.json")
@@ -73,7 +73,7 @@ def test_several_maps_into_one_dcm_file(here: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize("ending", ["csv", "toml"])
-def test_a_seeker_takes_the_map_as_its_guide(ending: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_seeker_takes_the_map_as_its_guide(ending: str, here: Path, capsys: Capsys) -> None:
     soc = CalibrationMap(
         {"speed_rpm": [900.0, 2000.0, 3000.0], "fuel_mg": [6.0, 40.0]}, [[-2, -4], [-4, -6], [-7, -9]], name="soc_cad",
         cells={"sd": 0.4},
@@ -93,7 +93,7 @@ def test_a_seeker_takes_the_map_as_its_guide(ending: str, here: Path, capsys: py
     assert "a calibration map, another form of file: mgdd map export soc.csv --guide-map" in capsys.readouterr().err
 
 
-def test_a_measured_engine_becomes_a_map(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_measured_engine_becomes_a_map(here: Path, capsys: Capsys) -> None:
     if "advisor_engine_maps" not in datasets.names():
         pytest.skip("advisor_engine_maps is not in MGDD_DATA_DIR")
     told = ran(capsys, "map", "export", "--advisor", "mercedes", "--name", "nox_g_per_kwh", "-o", "nox.json")
@@ -108,9 +108,7 @@ def test_a_measured_engine_becomes_a_map(here: Path, capsys: pytest.CaptureFixtu
     assert (here / "nox.png").stat().st_size > 10_000
 
 
-def test_a_measured_grid_becomes_a_label_file(
-    here: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_measured_grid_becomes_a_label_file(here: Path, capsys: Capsys, caplog: pytest.LogCaptureFixture) -> None:
     """The way of a measured map: its axes chosen, its gaps filled within a tolerance, as CDFX and as DCM."""
     pytest.importorskip("clarabel", reason="clarabel is not installed: pip install 'mgdd[maps]'")
     torque = 50.0 + 1e-2 * SPEED[:, None] - 0.4 * FUEL
@@ -144,7 +142,7 @@ def test_a_measured_grid_becomes_a_label_file(
 
 
 def test_axes_without_names_are_doubted_on_the_command_line(
-    here: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+    here: Path, capsys: Capsys, caplog: pytest.LogCaptureFixture
 ) -> None:
     (here / "bare.csv").write_text(",10,20\n900,1,2\n1500,3,5\n")
     assert main(["map", "show", "bare.csv"]) == 0

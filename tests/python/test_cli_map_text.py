@@ -9,9 +9,10 @@ import pytest
 
 from map_cases import timing_table
 from mgdd.cli import main, output
-from mgdd.cli.map_text import COLUMNS, map_blocks
+from mgdd.cli.map_files import COLUMNS, map_blocks
 from mgdd.cli.output import show
 from mgdd.maps import CalibrationMap, write_map
+from typed import Capsys
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def test_a_curve_is_two_columns() -> None:
 
 
 @pytest.mark.parametrize("column", COLUMNS)
-def test_every_column_can_be_shown(column: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_column_can_be_shown(column: str, here: Path, capsys: Capsys) -> None:
     write_map(timing_table(), here / "map.nc")
     assert main(["map", "show", "map.nc", "--column", column]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -95,7 +96,7 @@ def test_a_wide_map_is_cut_for_the_terminal(monkeypatch: pytest.MonkeyPatch) -> 
     whole = show(map_blocks(table))
     assert len(whole.splitlines()) == 7
     monkeypatch.setattr(output, "is_terminal", lambda: True)
-    monkeypatch.setattr("mgdd.cli.map_text.is_terminal", lambda: True)
+    monkeypatch.setattr("mgdd.cli.map_files.is_terminal", lambda: True)
     monkeypatch.setenv("COLUMNS", "80")
     cut = show(map_blocks(table))
     assert max(map(len, cut.splitlines())) <= 80
@@ -103,7 +104,7 @@ def test_a_wide_map_is_cut_for_the_terminal(monkeypatch: pytest.MonkeyPatch) -> 
     assert all(f"{value:.3f}" in cut for value in table.values.ravel()[1:])
 
 
-def test_a_picture_of_each_kind(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_picture_of_each_kind(here: Path, capsys: Capsys) -> None:
     write_map(timing_table(), here / "map.json")
     for options in (
         ["--figure", "cells.svg"],
@@ -116,7 +117,7 @@ def test_a_picture_of_each_kind(here: Path, capsys: pytest.CaptureFixture[str]) 
     assert (here / "cells.svg").read_text().startswith("<?xml")
 
 
-def test_equal_maps_have_no_difference(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_equal_maps_have_no_difference(here: Path, capsys: Capsys) -> None:
     write_map(small(), here / "a.json")
     write_map(small(), here / "b.csv")
     assert main(["map", "diff", "a.json", "b.csv"]) == 0

@@ -10,10 +10,10 @@ import pytest
 
 from map_cases import FUEL, SOC, SPEED, bend, centre, efficiency, p_max
 from map_cases import sweep as map_sweep
-from map_commands import ran
 from mgdd.cli import main
 from mgdd.io.binary_files import write_netcdf
 from mgdd.maps import CalibrationMap, optimize_map, write_map
+from typed import Capsys, ran
 
 AXES = ["--right", "p_max_bar", "--up", "efficiency_gross"]
 
@@ -27,7 +27,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_line_per_breakpoint_of_the_axis_that_is_left(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_per_breakpoint_of_the_axis_that_is_left(here: Path, capsys: Capsys) -> None:
     found = ran(
         capsys, "map", "trade-off", "table.nc", *AXES, "--at", "speed_rpm=1400", "--map", "best.json",
         "--figure", "trade.png", "--every", "9",
@@ -48,7 +48,7 @@ def test_a_line_per_breakpoint_of_the_axis_that_is_left(here: Path, capsys: pyte
     assert (here / "trade.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_every_axis_can_be_fixed_and_the_lines_can_be_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_axis_can_be_fixed_and_the_lines_can_be_kept(here: Path, capsys: Capsys) -> None:
     both = ["--at", "fuel_mg=25", "--at", "speed_rpm=900"]
     (line,) = ran(capsys, "map", "trade-off", "table.nc", *AXES, *both)["lines"]
     assert set(line) == {"soc_cad", "p_max_bar", "efficiency_gross"}
@@ -60,7 +60,7 @@ def test_every_axis_can_be_fixed_and_the_lines_can_be_kept(here: Path, capsys: p
 
 
 @pytest.mark.usefixtures("here")
-def test_the_text_has_ranges_with_units(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_text_has_ranges_with_units(capsys: Capsys) -> None:
     assert main(["map", "trade-off", "table.nc", *AXES, "--at", "fuel_mg=6", "--map", "best.json"]) == 0
     head, first, *others = capsys.readouterr().out.splitlines()
     assert head.split("  ")[0] == "speed_rpm"
@@ -92,7 +92,7 @@ def test_the_text_has_ranges_with_units(capsys: pytest.CaptureFixture[str]) -> N
         ([*AXES, "--at", "fuel_mg=6", "-o", "a.csv"], "the ending must be one of .json"),
     ],
 )
-def test_what_is_refused(options: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_refused(options: list[str], message: str, here: Path, capsys: Capsys) -> None:
     before = sorted(here.iterdir())
     assert main(["map", "trade-off", "table.nc", *options]) == 2
     assert message in capsys.readouterr().err

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from map_commands import ran
 from mgdd.cli import main
 from mgdd.design import FeasibleRegion, design_points
+from typed import Capsys, ran
 
 RANGES = {"speed_rpm": (900.0, 3100.0), "fuel_mg": (6.0, 30.0)}
 OVER = ["--over", "speed_rpm=900:3100", "--over", "fuel_mg=6:30", "--points", "12", "--seed", "4"]
@@ -29,7 +29,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("margin", [0.0, 0.1])
-def test_the_region_is_that_of_the_library(margin: float, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_region_is_that_of_the_library(margin: float, capsys: Capsys) -> None:
     region = FeasibleRegion.of_points(DRIVEN, margin=margin, infeasible=REFUSED)
     expected = design_points(RANGES, 12, feasible=region, seed=4)
     options = ["--within", "driven.csv", "--refused", "refused.csv", *(["--margin", "0.1"] if margin else [])]
@@ -42,7 +42,7 @@ def test_the_region_is_that_of_the_library(margin: float, capsys: pytest.Capture
 
 
 @pytest.mark.usefixtures("here")
-def test_limits_of_the_model_hold_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+def test_limits_of_the_model_hold_as_well(capsys: Capsys) -> None:
     found = ran(capsys, "map", "design", *OVER, "--within", "driven.csv", "--limit", "p_max_bar=100")
     assert FeasibleRegion.of_points(DRIVEN).contains(found["columns"]).all()
     assert 0.0 < found["highest"]["p_max_bar"] <= 100.0
@@ -65,7 +65,7 @@ def test_limits_of_the_model_hold_as_well(capsys: pytest.CaptureFixture[str]) ->
         (["--over", "soc_cad=-9:0", "--within", "driven.csv"], "driven.csv: no column 'soc_cad'"),
     ],
 )
-def test_what_is_refused(options: list[str], message: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_refused(options: list[str], message: str, here: Path, capsys: Capsys) -> None:
     assert main(["map", "design", *OVER, *options, "-o", "design.csv"]) == 2
     assert message in capsys.readouterr().err
     assert not (here / "design.csv").exists()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -11,14 +10,11 @@ import pytest
 
 from mgdd import presets
 from mgdd.cli import main
+from typed import Capsys
+from typed import ran as out
 
 
-def out(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
-    assert main([*argv, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_presets_are_listed_by_kind(capsys: pytest.CaptureFixture[str]) -> None:
+def test_presets_are_listed_by_kind(capsys: Capsys) -> None:
     listed = out(capsys, "preset", "list")["presets"]
     assert tuple(row["name"] for row in listed) == presets.available()
     assert all(set(row) == {"name", "kind", "title"} for row in listed)
@@ -29,7 +25,7 @@ def test_presets_are_listed_by_kind(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("name", presets.available())
-def test_a_preset_is_shown_with_units_and_sources(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_preset_is_shown_with_units_and_sources(name: str, capsys: Capsys) -> None:
     shown, preset = out(capsys, "preset", "show", name), presets.load(name)
     assert (shown["name"], shown["kind"], shown["title"]) == (preset.name, preset.kind, preset.title)
     for table, record in preset.records.items():
@@ -43,9 +39,7 @@ def test_a_preset_is_shown_with_units_and_sources(name: str, capsys: pytest.Capt
 
 
 @pytest.mark.parametrize("name", presets.available())
-def test_a_copy_is_read_back_and_never_replaces_a_file(
-    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_copy_is_read_back_and_never_replaces_a_file(name: str, capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     assert out(capsys, "preset", "copy", name, str(file)) == {"name": name, "file": str(file)}
     copied, shipped = presets.load(file), presets.load(name)
@@ -69,7 +63,7 @@ def test_a_copy_is_read_back_and_never_replaces_a_file(
     ],
 )
 def test_what_is_no_preset_is_refused(
-    argv: str, said: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    argv: str, said: str, capsys: Capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["preset", *argv.split()]) == 2
@@ -77,7 +71,7 @@ def test_what_is_no_preset_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_copy_of_an_engine_simulates(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_copy_of_an_engine_simulates(capsys: Capsys, tmp_path: Path) -> None:
     file = str(tmp_path / "mine.toml")
     assert main(["preset", "copy", "puma_single", file]) == 0
     capsys.readouterr()
@@ -109,7 +103,7 @@ offer() {{
         ("mgdd engine simulate --preset scr", {"script.sh"}),
     ],
 )
-def test_bash_completes(words: str, offered: set[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bash_completes(words: str, offered: set[str], tmp_path: Path, capsys: Capsys) -> None:
     pytest.importorskip("shtab")
     assert main(["completion", "bash"]) == 0
     (tmp_path / "script.sh").write_text(capsys.readouterr().out, encoding="utf-8")
@@ -121,7 +115,7 @@ def test_bash_completes(words: str, offered: set[str], tmp_path: Path, capsys: p
     assert offered <= set(replies.split())
 
 
-def test_the_script_of_zsh_and_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_script_of_zsh_and_as_json(capsys: Capsys) -> None:
     pytest.importorskip("shtab")
     assert main(["completion", "zsh"]) == 0
     text = capsys.readouterr().out

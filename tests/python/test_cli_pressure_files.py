@@ -11,6 +11,7 @@ import pytest
 from mgdd import datasets
 from mgdd.cli import main
 from mgdd.results.labels import ANGLE
+from typed import Capsys
 
 HD = ("--preset", "hd_diesel_128x144")
 TRACE = datasets.read("hd_diesel_128x144")[1]
@@ -47,7 +48,7 @@ FORMS: dict[str, tuple[list[np.ndarray], str, list[str], str]] = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_form_has_its_option(form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_form_has_its_option(form: str, tmp_path: Path, capsys: Capsys) -> None:
     columns, header, options, message = FORMS[form]
     path = written(tmp_path, columns, header)
     assert main(["engine", "analyze", path, *HD, *options, "--json"]) == 0
@@ -57,7 +58,7 @@ def test_every_form_has_its_option(form: str, tmp_path: Path, capsys: pytest.Cap
         assert message in capsys.readouterr().err
 
 
-def test_the_speed_of_a_file_comes_from_its_conditions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_speed_of_a_file_comes_from_its_conditions(tmp_path: Path, capsys: Capsys) -> None:
     path = written(tmp_path, [(CLOSED + 143.0) / 7.2, BAR], "time_ms,p")
     conditions = tmp_path / "conditions.csv"
     conditions.write_text("file,speed_rpm\nbench.csv,1200\n")
@@ -72,7 +73,7 @@ def test_warnings_of_reading_are_logged(tmp_path: Path, caplog: pytest.LogCaptur
     assert "--pressure-unit 'MPa' would make it 2.32 bar" in caplog.text
 
 
-def test_a_calibration_names_the_columns_to_choose_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_calibration_names_the_columns_to_choose_from(tmp_path: Path, capsys: Capsys) -> None:
     path = written(tmp_path, [CLOSED, BAR, 1.02 * BAR], "angle,p1,p2")
     assert main(["engine", "calibrate", path, *HD]) == 2
     assert "bench.csv: 2 cycles, and one is needed" in capsys.readouterr().err

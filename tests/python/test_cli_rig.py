@@ -19,10 +19,11 @@ import pytest
 from rich.console import Console
 
 from mgdd.cli import main
-from mgdd.cli.rig_live import LiveView
+from mgdd.cli.rig_run import LiveView
 from mgdd.loop import Measurement
 from mgdd.rig import read_record
 from mgdd.rig.experiment.stand import Cycle
+from typed import Capsys
 
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")
@@ -79,12 +80,12 @@ def test_a_hub_says_its_bus_and_at_the_end_its_counts() -> None:
         ),
     ],
 )
-def test_wrong_options_are_named(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_options_are_named(arguments: list[str], text: str, capsys: Capsys) -> None:
     assert main(["rig", *arguments]) == 2
     assert text in capsys.readouterr().err
 
 
-def test_a_port_that_is_taken_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_that_is_taken_is_named(capsys: Capsys) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         assert main(["rig", "hub", "--port", str(port)]) == 2
@@ -93,7 +94,7 @@ def test_a_port_that_is_taken_is_named(capsys: pytest.CaptureFixture[str]) -> No
     assert "--port 0 takes a free one" in said
 
 
-def test_a_node_ends_in_time_and_says_what_it_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_node_ends_in_time_and_says_what_it_did(tmp_path: Path, capsys: Capsys) -> None:
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     truth = tmp_path / "truth.csv"
     options = ["--bus", "virtual:cli-node", "--duration-s", "0.2", "--truth", str(truth), "--json"]
@@ -163,7 +164,7 @@ def test_a_quiet_terminal_gets_the_result_alone(file: Path, tmp_path: Path) -> N
     assert "settling_ms" in quiet
 
 
-def test_a_pipe_gets_text_or_one_object(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_pipe_gets_text_or_one_object(file: Path, tmp_path: Path, capsys: Capsys) -> None:
     assert main(["rig", "run", str(file), "--folder", str(tmp_path / "one")]) == 0
     text = capsys.readouterr().out
     assert "settling_ms" in text
@@ -177,7 +178,7 @@ def test_a_pipe_gets_text_or_one_object(file: Path, tmp_path: Path, capsys: pyte
 
 
 def test_the_default_folder_is_new_for_every_run(
-    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["rig", "run", str(file), "--json", "--quiet"]) == 0
@@ -211,7 +212,7 @@ def test_the_default_folder_is_new_for_every_run(
 )
 def test_bad_input_is_named(
     file: Path, arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Capsys,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     given = [str(file) if word == "FILE" else word for word in arguments]
@@ -222,7 +223,7 @@ def test_bad_input_is_named(
     assert not (tmp_path / "mgdd-runs").exists()
 
 
-def test_check_prints_what_is_compared_before_a_bench(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_prints_what_is_compared_before_a_bench(file: Path, capsys: Capsys) -> None:
     """Inputs, time limits and the whole envelope: the list before a run on a bench asks for them."""
     pytest.importorskip("cantools")
     assert main(["rig", "check", str(file), "--mode", "hil"]) == 0
@@ -263,9 +264,7 @@ def test_a_recording_lasts_as_long_as_was_asked(tmp_path: Path) -> None:
     assert read_record(file).frames.sizes["frame"] > 5
 
 
-def test_an_export_that_cannot_be_written_names_its_target(
-    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_export_that_cannot_be_written_names_its_target(file: Path, tmp_path: Path, capsys: Capsys) -> None:
     assert main(["rig", "run", str(file), "--folder", str(tmp_path / "run"), "--quiet"]) == 0
     target = tmp_path / "away" / "run"
     assert main(["rig", "export", str(tmp_path / "run" / "run.rec"), str(target), "--kind", "csv"]) == 2

@@ -17,6 +17,9 @@ import pytest
 from mgdd.cli import main
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench
+from typed import Capsys, commands
+
+seek, refused = commands("engine", "seek")
 
 SEEKERS = ("extremum_seeking", "spsa", "golden_section")
 SEEDS = range(3)
@@ -26,22 +29,8 @@ def by(seeker: str) -> tuple[str, ...]:
     return ("--seeker", seeker, *(("--noise-sd", "0.25") if seeker == "golden_section" else ()))
 
 
-def seek(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
-    code = main(["engine", "seek", *argv, "--json"])
-    captured = capsys.readouterr()
-    assert code == 0, captured.err
-    return json.loads(captured.out)
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
-    assert main(["engine", "seek", *argv]) == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    return captured.err
-
-
 @pytest.mark.parametrize("seeker", SEEKERS)
-def test_every_seeker_finds_the_steady_optimum(seeker: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_seeker_finds_the_steady_optimum(seeker: str, capsys: Capsys) -> None:
     best = EngineBench().find_optimum()
     runs = [seek(capsys, *by(seeker), "--start", "soc_cad=-20", "--seed", str(seed)) for seed in SEEDS]
     for run in runs:
@@ -56,7 +45,7 @@ def test_every_seeker_finds_the_steady_optimum(seeker: str, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize("seeker", SEEKERS)
-def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: Capsys) -> None:
     argv = (*by(seeker), "--start", "soc_cad=4", "--limit", "p_max_bar=95")
     runs = [seek(capsys, *argv, "--seed", str(seed)) for seed in SEEDS]
     assert runs[0]["optimum"]["soc_cad"] == pytest.approx(-3.08, abs=0.01)
@@ -67,7 +56,7 @@ def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: pytest.Captu
     assert -0.2 < np.mean([run["figures"]["final_soc_cad"] - run["optimum"]["soc_cad"] for run in runs]) < 1.6
 
 
-def test_a_dither_behind_the_analyser_arrives(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_dither_behind_the_analyser_arrives(capsys: Capsys) -> None:
     bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser")
     run = seek(capsys, "--sensor", "analyser", *by("extremum_seeking"))
     assert run["optimum"]["soc_cad"] == bench.find_optimum()["soc_cad"]
@@ -75,7 +64,7 @@ def test_a_dither_behind_the_analyser_arrives(capsys: pytest.CaptureFixture[str]
     assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=2.0)
 
 
-def test_any_setting_of_a_seeker_can_be_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_any_setting_of_a_seeker_can_be_said(capsys: Capsys) -> None:
     runs = [
         seek(capsys, *by("extremum_seeking"), "--seeker-set", f"form={form}", "--cycles", "300")
         for form in ("washout", "batch")
@@ -85,7 +74,7 @@ def test_any_setting_of_a_seeker_can_be_said(capsys: pytest.CaptureFixture[str])
     assert "did you mean 'form'" in said
 
 
-def test_a_curve_behind_the_analyser_guides_each_component(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_curve_behind_the_analyser_guides_each_component(capsys: Capsys) -> None:
     rough = ("--guide", "curve", "--guide-set", "wall_heat_scale=0.25")
     run = seek(capsys, "--sensor", "analyser", *rough, "--limit", "p_max_bar=100")
     assert (run["guide"], run["seeker"]) == ("curve", "GaussianProcessSeeking")
@@ -94,28 +83,28 @@ def test_a_curve_behind_the_analyser_guides_each_component(capsys: pytest.Captur
     assert run["j_lost"] < 0.15
 
 
-def test_the_period_follows_the_lag_of_the_speed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_period_follows_the_lag_of_the_speed(capsys: Capsys) -> None:
     argv = ("--sensor", "analyser", "--speed-rpm", "4000", "--fuel-mg", "25", "--seed", "2")
     run = seek(capsys, *argv, *by("extremum_seeking"))
     assert run["cycles"] > 8000  # the lag lasts 67 cycles here, 25 at 1500 rpm
     assert run["figures"]["final_soc_cad"] == pytest.approx(run["optimum"]["soc_cad"], abs=2.0)
 
 
-def test_the_soft_sensor_needs_no_patience(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_soft_sensor_needs_no_patience(capsys: Capsys) -> None:
     run = seek(capsys, "--sensor", "soft", "--preset", "hd_diesel_128x144", "--misfire", "0.03")
     assert (run["cycles"], run["preset"]) == (200, "hd_diesel_128x144")
     assert run["j_lost"] < 0.15
     assert 1 <= run["figures"]["misfires"] <= 15
 
 
-def test_a_run_that_never_arrives_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_never_arrives_says_so(capsys: Capsys) -> None:
     argv = (*by("extremum_seeking"), "--start", "soc_cad=-25", "--cycles", "20")
     assert seek(capsys, *argv)["cycles_to"] is None
     assert main(["engine", "seek", *argv]) == 0
     assert "cycles_to                                 –" in capsys.readouterr().out
 
 
-def test_cov_of_imep_can_be_a_limit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_cov_of_imep_can_be_a_limit(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     out = seek(capsys, "--limit", "cov-imep-percent=1.0", "-o", str(file))
     assert out["limits"].keys() == {"cov_imep_percent"}
@@ -124,7 +113,7 @@ def test_cov_of_imep_can_be_a_limit(capsys: pytest.CaptureFixture[str], tmp_path
 
 
 def test_a_start_above_a_limit_is_doubted_and_counted(
-    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture, tmp_path: Path
+    capsys: Capsys, caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     file = tmp_path / "run.csv"
     out = seek(capsys, "--start", "soc_cad=-20", "--limit", "p_max_bar=95", "-o", str(file))
@@ -138,7 +127,7 @@ def test_a_start_above_a_limit_is_doubted_and_counted(
     assert "the first reading of p_max_bar" in caplog.text
 
 
-def test_the_text_names_worst_cycle_and_share(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_text_names_worst_cycle_and_share(capsys: Capsys) -> None:
     assert main(["engine", "seek", "--start", "soc_cad=-20", "--limit", "p_max_bar=95", "--cycles", "300"]) == 0
     measured, free = capsys.readouterr().out.splitlines()[-2:]
     assert measured.startswith("p_max_bar as measured: worst 1")
@@ -148,7 +137,7 @@ def test_the_text_names_worst_cycle_and_share(capsys: pytest.CaptureFixture[str]
         assert " %), from cycle 150 on in " in text
 
 
-def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_figure(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "run.png"
     seek(capsys, "--figure", str(file), "--limit", "p_max_bar=95", "--misfire", "0.01", "--cycles", "300")
     assert file.read_bytes().startswith(b"\x89PNG")
@@ -156,75 +145,56 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert "does not exist; make it" in refused(capsys, "--figure", "nowhere/run.png")
 
 
-@pytest.mark.parametrize(
-    ("wrong", "right", "message", "code"),
-    [
-        (["--start", "soc_cad=-31"], ["--start", "soc_cad=-29"], "soc_cad = -31: must be in [-30, 10]", 2),
-        (["--start", "soc_cad=nan"], ["--start", "soc_cad=-8"], "soc_cad = nan", 2),
-        (["--start", "-8"], ["--start", "soc_cad=-8"], "NAME=", 2),
-        (
-            ["--input", "soc_cad=-61:5"],
-            ["--input", "soc_cad=-60:5"],
-            "--input soc_cad=-61:5: -61 must be in [-60, 20], the window of the bench",
-            2,
-        ),
-        (["--input", "soc_cad=5:-25"], ["--input", "soc-cad=-25:5"], "LOW and HIGH must be finite and LOW < HIGH", 2),
-        (["--input", "soc_cad=-25:5:31"], ["--input", "soc_cad=-25:5:2"], "STEP must be > 0 and at most HIGH - LOW", 2),
-        (["--input", "soc_cad"], ["--input", "soc_cad=-25:5"], "--input soc_cad: write NAME=LOW:HIGH", 2),
-        (["--input", "boost=0:9"], ["--input", "soc_cad=-25:5"], "--input boost: the bench has soc_cad, intake_", 2),
-        (["--input", "soc=-25:5"], ["--input", "soc_cad=-25:5"], "did you mean 'soc_cad'?", 2),
-        (
-            ["--input", "soc_cad=-25:5", "--input", "soc_cad=-20:5"],
-            ["--input", "soc_cad=-25:5"],
-            "--input soc_cad is given twice",
-            2,
-        ),
-        (["--cycles", "0"], ["--cycles", "2"], "--cycles 0: must be >= 2", 2),
-        (["--cycles", "3000000"], ["--cycles", "2"], "--cycles 3000000: must be <= 2000000", 2),
-        (["--seed", "-1"], ["--seed", "1"], "--seed -1: must be in [0, 2**64)", 2),
-        (["--misfire", "1.5"], ["--misfire", "0.5"], "--misfire 1.5: must be in [0, 1]", 2),
-        (["--noise", "-1"], ["--noise", "0"], "--noise -1 %: must be in [0, 20]", 2),
-        (["--soc-scatter-cad", "6"], ["--soc-scatter-cad", "5"], "--soc-scatter-cad 6 °CA: must be in [0, 5]", 2),
-        (["--limit", "p_maxx=95"], ["--limit", "p_max_bar=95"], "--limit 'p_maxx' is not measured: must be one of", 2),
-        (["--limit", "p_max_bar"], ["--limit", "p_max_bar=95"], "write NAME=X", 2),
-        (["--limit", "p_max_bar=99:9"], ["--limit", "p_max_bar=9:99"], "--limit p_max_bar=99:9: write NAME=X, or", 2),
-        (["--limit", "p_max_bar=300:"], ["--limit", "p_max_bar=:110"], "keeps p_max_bar >= 300: move a limit", 3),
-        (["--start", "soc_cad=50"], ["--start", "soc_cad=5"], "--start: soc_cad = 50: must be in [-30, 10]", 2),
-        (["--tolerance", "egr=1"], ["--tolerance", "soc_cad=1"], "--tolerance has egr: must have one number for", 2),
-        (["--seeker-set", "memory_cycles=x"], [], "--seeker-set: memory_cycles = 'x': must be", 2),
-        (
-            ["--seeker-set", "limits=3"],
-            [],
-            "--seeker-set: 'limits' is not one of them: the search gives it",
-            2,
-        ),
-        (["--fuel-mg", "-3"], ["--fuel-mg", "30"], "--fuel-mg -3 mg: must be", 2),
-        (["--limit", "p_max_bar=nan"], ["--limit", "p_max_bar=95"], "p_max_bar = nan: must be a finite number", 2),
-        (["--limit", "p_max_bar=20"], ["--limit", "p_max_bar=85"], "no soc_cad in [-30, 10] keeps", 3),
-        (
-            ["--seeker", "golden_section"],
-            ["--seeker", "golden_section", "--noise-sd", "0.25"],
-            "--seeker golden_section: needs --noise-sd",
-            2,
-        ),
-        (["--sensor", "analyser", *by("spsa")], by("spsa"), "--seeker spsa: takes J of the same cycle", 2),
-        (["--sensor", "analyser", *by("golden_section")], by("golden_section"), "extremum_seeking", 2),
-        (["--motored"], [], "leave --motored out", 2),
-        (["--preset", "nonesuch"], ["--preset", "puma_single"], "nonesuch", 2),
-        (["--set", "bore_mm=-1"], ["--set", "bore_mm=80"], "bore_mm = -1", 2),
-        (["-o", "run.txt"], [], "-o run.txt: the ending", 2),
-    ],
-)
-def test_wrong_then_right(
-    wrong: list[str], right: list[str], message: str, code: int, capsys: pytest.CaptureFixture[str]
-) -> None:
-    short = ["--cycles", "40"]
-    assert message in refused(capsys, *([] if "--cycles" in wrong else short), *wrong, code=code)
-    out = seek(capsys, *([] if "--cycles" in right else short), *right)
+# What is refused, what is meant, and what the message says; behind => where nothing is feasible.
+WRONG = """
+--start soc_cad=-31 | --start soc_cad=-29 -> soc_cad = -31: must be in [-30, 10]
+--start soc_cad=nan | --start soc_cad=-8 -> soc_cad = nan
+--start -8 | --start soc_cad=-8 -> NAME=
+--input soc_cad=-61:5 | --input soc_cad=-60:5 -> --input soc_cad=-61:5: -61 must be in [-60, 20], the window of the
+--input soc_cad=5:-25 | --input soc-cad=-25:5 -> LOW and HIGH must be finite and LOW < HIGH
+--input soc_cad=-25:5:31 | --input soc_cad=-25:5:2 -> STEP must be > 0 and at most HIGH - LOW
+--input soc_cad | --input soc_cad=-25:5 -> --input soc_cad: write NAME=LOW:HIGH
+--input boost=0:9 | --input soc_cad=-25:5 -> --input boost: the bench has soc_cad, intake_
+--input soc=-25:5 | --input soc_cad=-25:5 -> did you mean 'soc_cad'?
+--input soc_cad=-25:5 --input soc_cad=-20:5 | --input soc_cad=-25:5 -> --input soc_cad is given twice
+--cycles 0 | --cycles 2 -> --cycles 0: must be >= 2
+--cycles 3000000 | --cycles 2 -> --cycles 3000000: must be <= 2000000
+--seed -1 | --seed 1 -> --seed -1: must be in [0, 2**64)
+--misfire 1.5 | --misfire 0.5 -> --misfire 1.5: must be in [0, 1]
+--noise -1 | --noise 0 -> --noise -1 %: must be in [0, 20]
+--soc-scatter-cad 6 | --soc-scatter-cad 5 -> --soc-scatter-cad 6 °CA: must be in [0, 5]
+--limit p_maxx=95 | --limit p_max_bar=95 -> --limit 'p_maxx' is not measured: must be one of
+--limit p_max_bar | --limit p_max_bar=95 -> write NAME=X
+--limit p_max_bar=99:9 | --limit p_max_bar=9:99 -> --limit p_max_bar=99:9: write NAME=X, or
+--limit p_max_bar=300: | --limit p_max_bar=:110 => keeps p_max_bar >= 300: move a limit
+--start soc_cad=50 | --start soc_cad=5 -> --start: soc_cad = 50: must be in [-30, 10]
+--tolerance egr=1 | --tolerance soc_cad=1 -> --tolerance has egr: must have one number for
+--seeker-set memory_cycles=x | -> --seeker-set: memory_cycles = 'x': must be
+--seeker-set limits=3 | -> --seeker-set: 'limits' is not one of them: the search gives it
+--fuel-mg -3 | --fuel-mg 30 -> --fuel-mg -3 mg: must be
+--limit p_max_bar=nan | --limit p_max_bar=95 -> p_max_bar = nan: must be a finite number
+--limit p_max_bar=20 | --limit p_max_bar=85 => no soc_cad in [-30, 10] keeps
+--seeker golden_section | --seeker golden_section --noise-sd 0.25 -> --seeker golden_section: needs --noise-sd
+--sensor analyser --seeker spsa | --seeker spsa -> --seeker spsa: takes J of the same cycle
+--sensor analyser --seeker golden_section --noise-sd 0.25 | --seeker golden_section --noise-sd 0.25 -> extremum_seeking
+--motored | -> leave --motored out
+--preset nonesuch | --preset puma_single -> nonesuch
+--set bore_mm=-1 | --set bore_mm=80 -> bore_mm = -1
+-o run.txt | -> -o run.txt: the ending
+"""
+
+
+@pytest.mark.parametrize("line", WRONG.strip().splitlines())
+def test_wrong_then_right(line: str, capsys: Capsys) -> None:
+    typed, arrow, message = line.partition(" => " if " => " in line else " -> ")
+    wrong, right = (each.split() for each in typed.split("|"))
+    short = ("--cycles", "40")
+    assert message in refused(capsys, *(() if "--cycles" in wrong else short), *wrong, code=3 if arrow == " => " else 2)
+    out = seek(capsys, *(() if "--cycles" in right else short), *right)
     assert math.isfinite(out["inputs"]["soc_cad"])
 
 
-def test_help_names_the_default_length(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_names_the_default_length(capsys: Capsys) -> None:
     with pytest.raises(SystemExit) as stop:
         main(["engine", "seek", "--help"])
     assert stop.value.code == 0

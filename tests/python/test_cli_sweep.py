@@ -16,11 +16,12 @@ import xarray as xr
 from mgdd import presets
 from mgdd.cli import main
 from mgdd.sweep import sweep
+from typed import Capsys
 
 OVER = ["--over", "soc_cad=-12:0:4", "--over", "bore-mm=80:90:3"]
 
 
-def test_the_file_holds_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_file_holds_the_table(tmp_path: Path, capsys: Capsys) -> None:
     file = tmp_path / "table.nc"
     assert main(["engine", "sweep", *OVER, "--workers", "1", "-o", str(file), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -52,20 +53,18 @@ def test_the_file_holds_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[
         ([*OVER, "--outputs", "p_max_ba"], "did you mean 'p_max_bar'"),
     ],
 )
-def test_bad_input_writes_nothing(
-    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input_writes_nothing(options: list[str], message: str, tmp_path: Path, capsys: Capsys) -> None:
     assert main(["engine", "sweep", *options, "-o", str(tmp_path / "table.nc")]) == 2
     assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
-def test_values_of_ones_own_are_an_axis(capsys: pytest.CaptureFixture[str]) -> None:
+def test_values_of_ones_own_are_an_axis(capsys: Capsys) -> None:
     assert main(["engine", "sweep", "--over", "speed_rpm=900,1500,2100", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["shape"] == {"speed_rpm": 3}
 
 
-def test_the_timing_holds_where_it_is_not_swept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_timing_holds_where_it_is_not_swept(tmp_path: Path, capsys: Capsys) -> None:
     file = tmp_path / "table.nc"
     options = ["--over", "bore_mm=80:90:2", "--soc-cad", "3.5", "--outputs", "p_max_bar", "-o", str(file)]
     assert main(["engine", "sweep", *options]) == 0
@@ -81,7 +80,7 @@ POINTS = "point;bore_mm;soc-note;soc_cad\n[-];[mm];;[deg]\n7;80;early;-12\n9;90;
 
 
 @pytest.mark.parametrize("ending", ["csv", "nc"])
-def test_points_of_a_file_are_simulated(ending: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_of_a_file_are_simulated(ending: str, tmp_path: Path, capsys: Capsys) -> None:
     (tmp_path / "points.csv").write_text(POINTS)
     file = tmp_path / f"table.{ending}"
     options = ["--outputs", "p_max_bar,ca50_cad", "-o", str(file), "--json"]
@@ -115,9 +114,7 @@ def test_points_of_a_file_are_simulated(ending: str, tmp_path: Path, capsys: pyt
         ("bore_mm\n80\n", ["--over", "soc_cad=0:1:2"], "not allowed with argument"),
     ],
 )
-def test_bad_points_write_nothing(
-    text: str, options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_points_write_nothing(text: str, options: list[str], message: str, tmp_path: Path, capsys: Capsys) -> None:
     file = tmp_path / "points.csv"
     file.write_text(text)
     command = ["engine", "sweep", "--points", str(file), *options, "-o", str(tmp_path / "table.nc")]
@@ -130,9 +127,15 @@ def test_bad_points_write_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["points.csv"]
 
 
-def test_a_table_of_a_grid_is_netcdf(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["engine", "sweep", *OVER, "-o", str(tmp_path / "table.csv")]) == 2
-    assert "the ending must be one of .nc" in capsys.readouterr().err
+def test_a_grid_is_csv_with_a_point_per_row(tmp_path: Path) -> None:
+    for ending in ("nc", "csv"):
+        assert main(["engine", "sweep", *OVER, "-o", str(tmp_path / f"table.{ending}")]) == 0
+    rows = np.genfromtxt(tmp_path / "table.csv", delimiter=",", names=True)
+    with xr.open_dataset(tmp_path / "table.nc", engine="scipy") as table:
+        for row in rows:
+            cell = table.sel(soc_cad=row["soc_cad"], bore_mm=row["bore_mm"])
+            assert row["p_max_bar"] == float(cell["p_max_bar"])
+    assert rows["point"].tolist() == list(range(12))
 
 
 # --- Ctrl-C -------------------------------------------------------------------------------------------------

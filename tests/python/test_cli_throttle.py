@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,23 +11,10 @@ import pytest
 from mgdd import identify, io, signals
 from mgdd.cli import main
 from mgdd.throttle import Throttle, simulate_throttle
+from typed import Capsys, refused
+from typed import ran as run_json
 
 KINDS = ("pw_r", "first_principle")
-
-
-def run_json(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> dict[str, Any]:
-    returned = main([*argv, "--json"])
-    captured = capsys.readouterr()
-    assert returned == code, captured.err
-    out: dict[str, Any] = json.loads(captured.out)
-    return out
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
-    assert main(list(argv)) == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    return captured.err
 
 
 def measured(signal: Any, name: str, seed: int) -> Any:
@@ -51,7 +37,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
 # --- excite -----------------------------------------------------------------------------------------------------
 
 
-def test_excite_designs_what_the_library_designs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_excite_designs_what_the_library_designs(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "chirp.csv"
     out = run_json(capsys, "throttle", "excite", "chirp", "--preset", "P1", "--duration-s", "4", "-o", str(file))
     signal, check = identify.design_excitation("chirp", Throttle(), duration_s=4.0)
@@ -66,7 +52,7 @@ def test_excite_designs_what_the_library_designs(capsys: pytest.CaptureFixture[s
     np.testing.assert_array_equal(log["angle_deg"], check.prediction["angle_deg"])
 
 
-def test_excite_takes_a_signal_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+def test_excite_takes_a_signal_of_ones_own(capsys: Capsys) -> None:
     argv = ("throttle", "excite", "amplitude_random_steps", "--offset", "0.15", "--amplitude", "0.15")
     out = run_json(capsys, *argv, "--duration-s", "3", "--hold-s", "0.1", "--set", "coulomb_nm=0.2")
     assert out["hold_s"] == 0.1
@@ -76,7 +62,7 @@ def test_excite_takes_a_signal_of_ones_own(capsys: pytest.CaptureFixture[str]) -
     assert text.startswith("amplitude_random_steps, offset 0.15, amplitude 0.15\ninside the limits")
 
 
-def test_excite_refuses_what_leaves_the_window(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_excite_refuses_what_leaves_the_window(capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "no.csv"
     argv = ("throttle", "excite", "chirp", "--offset", "0.15", "--amplitude", "0.3", "-o", str(file))
     said = refused(capsys, *argv)
@@ -91,10 +77,7 @@ def test_excite_refuses_what_leaves_the_window(capsys: pytest.CaptureFixture[str
     ("argv", "said"),
     [
         (("--offset", "0.1"), "--offset and --amplitude belong together"),
-        (
-            ("--offset", "0.1", "--amplitude", "0.1", "--hold-s", "0.1"),
-            "--hold-s is not an option of a chirp",
-        ),
+        (("--offset", "0.1", "--amplitude", "0.1", "--hold-s", "0.1"), "--hold-s is not an option of a chirp"),
         (("--low-hz", "0.5"), "--low-hz acts on a signal of your own only"),
         (("--offset", "0.5", "--amplitude", "0.9"), "the duty passes ±1"),
         (("--angle-window-deg", "50", "10"), "--angle-window-deg = (50, 10)"),
@@ -103,7 +86,7 @@ def test_excite_refuses_what_leaves_the_window(capsys: pytest.CaptureFixture[str
         (("-o", "chirp.txt"), "the ending must be one of .csv, .json"),
     ],
 )
-def test_excite_refuses_contradictions(capsys: pytest.CaptureFixture[str], argv: tuple[str, ...], said: str) -> None:
+def test_excite_refuses_contradictions(capsys: Capsys, argv: tuple[str, ...], said: str) -> None:
     assert said in refused(capsys, "throttle", "excite", "chirp", *argv)
 
 
@@ -111,31 +94,29 @@ def test_excite_refuses_contradictions(capsys: pytest.CaptureFixture[str], argv:
 
 
 @pytest.mark.parametrize("model", KINDS)
-def test_identify_then_validate(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, files: tuple[str, str], model: str
-) -> None:
+def test_identify_then_validate(capsys: Capsys, tmp_path: Path, files: tuple[str, str], model: str) -> None:
     train, test = files
     fit_file, figure = tmp_path / "fit.toml", tmp_path / "fit.png"
     out = run_json(
         capsys, "throttle", "identify", train, "--model", model, "--test", test, "--output", str(fit_file),
         "--figure", str(figure),
     )  # fmt: skip
-    assert out["model"] == model
-    assert out["fit_percent_train"] > 98.0
-    assert out["fit_percent_test"] > 92.0
-    assert 0.0 < out["rmse_test"] < 0.6
+    assert out["kind"] == model
+    assert out["train"]["nrmse_fit_percent"] > 98.0
+    assert out["test"]["nrmse_fit_percent"] > 92.0
+    assert 0.0 < out["test"]["rmse"] < 0.6
     assert out["parameters"]["limp_home_deg"] == pytest.approx(8.0, abs=0.2)
     assert isinstance(out["unidentifiable"], list)
     assert figure.stat().st_size > 10_000
     again = run_json(capsys, "throttle", "validate", str(fit_file), test)
     assert again["kind"] == model
-    assert again["fit_percent"] == pytest.approx(out["fit_percent_test"], rel=1e-9)
+    assert again["fit_percent"] == pytest.approx(out["test"]["nrmse_fit_percent"], rel=1e-9)
     assert again["n_step_rms"]["20"] < 0.3 * again["n_step_rms_persistence"]["20"]
     assert again["fit_percent"] == out["validation"]["fit_percent"]
 
 
 @pytest.mark.slow
-def test_columns_are_mapped(capsys: pytest.CaptureFixture[str], tmp_path: Path, files: tuple[str, str]) -> None:
+def test_columns_are_mapped(capsys: Capsys, tmp_path: Path, files: tuple[str, str]) -> None:
     log = io.read_throttle_log(files[0])
     rows = zip(log["time_s"].values * 1e3, log["duty"].values * 100.0, np.deg2rad(log["angle_deg"].values), strict=True)
     file = tmp_path / "own.csv"
@@ -157,18 +138,15 @@ def test_columns_are_mapped(capsys: pytest.CaptureFixture[str], tmp_path: Path, 
         "rad",
     )
     out = run_json(capsys, "throttle", "identify", str(file), *columns)
-    assert out["fit_percent_test"] is None
-    assert out["rmse_test"] is None
+    assert out["test"] is None
     plain = run_json(capsys, "throttle", "identify", files[0])
-    assert out["fit_percent_train"] == pytest.approx(plain["fit_percent_train"], abs=1e-6)
+    assert out["train"] == pytest.approx(plain["train"], abs=1e-6)
     said = refused(capsys, "throttle", "identify", str(file), *columns[:6])
     assert "time_unit" not in said
     assert "--time-unit 'ms'" in said, "remedies are those of the command line"
 
 
-def test_bad_logs_and_files_are_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, files: tuple[str, str]
-) -> None:
+def test_bad_logs_and_files_are_refused(capsys: Capsys, tmp_path: Path, files: tuple[str, str]) -> None:
     assert "no such file" in refused(capsys, "throttle", "identify", "nowhere.csv")
     assert "the ending must be" in refused(capsys, "throttle", "identify", files[0], "-o", "fit.yaml")
     assert "--figure fit.txt" in refused(capsys, "throttle", "identify", files[0], "--figure", "fit.txt")

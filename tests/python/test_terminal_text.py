@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.output import Table, gated_streams, show
+from mgdd.cli.output import Table, show
+from mgdd.cli.progress import gated_streams
 from mgdd.errors import DataError, Error
 
 ACTING = "\x1b]0;x\x07\x1b[2J\x00\x9b31m\u202e"

@@ -1,26 +1,28 @@
-"""`mgdd engine analyze`: pressure files, each one trace or a record of cycles, as numbers or as a page."""
+"""`mgdd engine analyze | check`: pressure files, as numbers or as a page, and whether they can be trusted."""
 
 from __future__ import annotations
 
 import argparse
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.from_library import Options
 from mgdd.cli.options import (
+    GEOMETRY,
     PEGGING,
-    add_command,
     add_engine,
     add_files,
     assumed_geometry,
     check_pegging,
     engine_of,
+    option,
     point_given,
     readers_of,
     refuse_idle,
 )
-from mgdd.cli.output import check_file, check_output, emit, error_of, lines, wrote
+from mgdd.cli.output import check_file, emit, error_of, lines, warn, wrote
 from mgdd.engine import Cylinder, OperatingPoint, Trust, analyze, trust
 from mgdd.engine.trust import Check
 from mgdd.errors import DataError, ParameterError
@@ -36,7 +38,6 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_analyze"]
 
 _LOG = logging.getLogger(__name__)
 
@@ -59,37 +60,27 @@ _COLUMNS = {
 _OF_RECORDS = ("lnv_", "ringing_", "tangential_", "knock_")
 
 
-def add_analyze(verbs: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        verbs, "analyze", _analyze,
-        help_text="analyse measured pressure, one file or many: pegging, heat release, burn angles, work; as a page",
-        example="mgdd engine analyze mean.csv --preset hd_diesel_128x144 --pressure-unit Pa --json",
-        endings=".json or .csv",
-    )  # fmt: skip
+def _add_analyze(parser: Any) -> None:
     add_files(parser, nargs="+")
     group = parser.add_argument_group("analysis")
     PEGGING.add(group)
     _ANALYSIS.add(group, knock_band_hz="4000 20000", knock_window_cad="-10 90")
     _BRAKE.add(group.add_mutually_exclusive_group())
-    group.add_argument(
-        "--tdc", action="store_true",
-        help="also estimate TDC, of a fired trace by calibrations over a scan of the angle (seconds), and doubt it",
+    option(group, "--tdc",
+           "also estimate TDC, of a fired trace by calibrations over a scan of the angle (seconds), and doubt it",
     )  # fmt: skip
-    group.add_argument(
-        "--chunk-cycles", type=int, metavar="N",
-        help="read N cycles at a time, for files larger than memory: the figures are those of the whole file",
+    option(group, "--chunk-cycles N",
+           "read N cycles at a time, for files larger than memory: the figures are those of the whole file",
     )  # fmt: skip
-    group.add_argument(
-        "--report", metavar="PAGE.html",
-        help="write a page that needs no network: of each file the checks, the figures and their pictures",
-    )  # fmt: skip
+    option(group, "--report PAGE.html",
+           "write a page that needs no network: of each file the checks, the figures and their pictures")  # fmt: skip
     add_engine(parser)
 
 
 def _analyze(args: argparse.Namespace) -> None:
     several = len(args.files) > 1
-    check_output(args, ".json", *(() if several else (".csv",)))  # a CSV holds one file
+    if several:  # a CSV holds one file
+        check_file("-o", args.output, (".json",))
     check_file("--report", args.report, (".html",))
     cylinder, point, preset = engine_of(args)
     check_pegging(args)
@@ -182,8 +173,7 @@ def _one(
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
         payload["tdc"] = found.figures
         payload["warnings"] += found.doubts()
-        for doubt in found.doubts():
-            _LOG.warning("%s: %s", payload["file"], doubt)
+        warn(*found.doubts(), of=payload["file"])
         place = f"{found.tdc_offset_cad:+.2f} °CA, {found.low_cad:+.2f} to {found.high_cad:+.2f} possible"
         text.append(f"TDC offset {place}; {found.cost}")
     return result, payload, text
@@ -269,3 +259,48 @@ def _check_analysis(args: argparse.Namespace) -> None:
         raise ParameterError("--smoothing-cutoff-hz acts with --smoothing low_pass only: choose it")
     if args.cylinders is not None and args.brake_torque_nm is None:
         raise ParameterError("--cylinders acts with --brake-torque-nm only: give it")
+
+
+_STATED = Options(trust, "bmep_bar", "brake_torque_nm", n_cylinders="cylinders")
+
+
+def _add_check(parser: Any) -> None:
+    add_files(parser, nargs="+")
+    group = parser.add_argument_group("what is known of the record")
+    PEGGING.add(group)
+    _STATED.add(group)
+    add_engine(parser)
+
+
+def _check(args: argparse.Namespace) -> None:
+    check_pegging(args)
+    cylinder, point, preset = engine_of(args)
+    given = PEGGING.given(args) | _STATED.given(args) | {"fuel_mg": point_given(args).get("fuel_mg")}
+    assumed = assumed_geometry(args)
+
+    def report(file: str, read: Callable[[], xr.Dataset]) -> Trust:
+        try:
+            return trust(read(), cylinder, point=point, assumed=assumed, **given)
+        except DataError as error:
+            return Trust(Path(file).name, (Check("file", "fail", str(error)),))
+
+    reports = [report(file, read) for file, read in readers_of(args).items()]
+    payload = {
+        "preset": preset.name,
+        "assumed": assumed,
+        "engine": {name: getattr(cylinder, name) for name in GEOMETRY},
+        "files": [
+            {
+                "file": each.file,
+                "verdict": each.verdict,
+                "checks_made": each.made,
+                "checks": [vars(check) for check in each.checks],
+                "warnings": [] if each.analysis is None else each.analysis.attrs["warnings"].splitlines(),
+            }
+            for each in reports
+        ],
+    }
+    emit(args, payload, text="\n\n".join(each.summary() for each in reports))
+
+
+COMMANDS = {"analyze": (_add_analyze, _analyze), "check": (_add_check, _check)}

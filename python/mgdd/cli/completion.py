@@ -7,31 +7,24 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-from mgdd.cli.options import Parser, UsageError, add_command
-from mgdd.cli.output import check_output, emit
+from mgdd.cli.commands import Parser, UsageError, root_parser
+from mgdd.cli.options import option
+from mgdd.cli.output import emit
 from mgdd.io.extras import import_extra
 
-__all__ = ["add"]
+
+def _add_completion(parser: Any) -> None:
+    option(parser, "shell", "whose script", choices=("bash", "zsh"))
 
 
-def add(commands: Any, root: argparse.ArgumentParser) -> None:
-    """Add the command, which completes what `root` parses."""
-
-    def run(args: argparse.Namespace) -> None:
-        check_output(args)
-        shtab = import_extra("shtab", "completion", "a script for the completion of a shell")
-        for action in _actions(root):
-            names = action.metavar if isinstance(action.metavar, tuple) else (str(action.metavar),)
-            if any(word in name for name in names for word in ("FILE", "DIR", "MAP", "TABLE", ".toml")):
-                action.complete = shtab.FILE
-        emit(args, {"shell": args.shell, "script": (script := shtab.complete(root, shell=args.shell))}, text=script)
-
-    parser = add_command(
-        commands, "completion", run,
-        help_text="print a script that completes commands, options and choices in a shell",
-        example='eval "$(mgdd completion bash)"',
-    )  # fmt: skip
-    parser.add_argument("shell", choices=("bash", "zsh"), help="whose script")
+def _completion(args: argparse.Namespace) -> None:
+    shtab = import_extra("shtab", "completion", "a script for the completion of a shell")
+    root = root_parser()
+    for action in _actions(root):
+        names = action.metavar if isinstance(action.metavar, tuple) else (str(action.metavar),)
+        if any(word in name for name in names for word in ("FILE", "DIR", "MAP", "TABLE", ".toml")):
+            action.complete = shtab.FILE
+    emit(args, {"shell": args.shell, "script": (script := shtab.complete(root, shell=args.shell))}, text=script)
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:
@@ -44,3 +37,6 @@ def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:
         if isinstance(action.choices, dict):
             for below in action.choices.values():
                 yield from _actions(below)
+
+
+COMMANDS = {"completion": (_add_completion, _completion)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,8 @@ import numpy as np
 
 from mgdd import datasets
 from mgdd.cli.from_library import Options, default_of
-from mgdd.cli.options import READING, add_command, add_encoder, add_group, encoder_of
-from mgdd.cli.output import check_output, emit, wrote
+from mgdd.cli.options import READING, add_encoder, encoder_of, option
+from mgdd.cli.output import emit, warn, wrote
 from mgdd.datasets.files import FILES, LICENCES, place
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read, read_pressure
@@ -31,10 +30,7 @@ from mgdd.results.labels import ANGLE
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add"]
-
 _SERIES = 12  # columns of one name that are shown one by one
-_LOG = logging.getLogger(__name__)
 _OWN = Options(read, "channels", "pressure_column", "angle_column")
 _SPEED, _FETCH = Options(read_pressure, "speed_rpm"), Options(datasets.read, "fetch")
 _WRITERS: Mapping[str, Callable[[xr.Dataset, str], None]] = {
@@ -44,38 +40,17 @@ _WRITERS: Mapping[str, Callable[[xr.Dataset, str], None]] = {
 }
 
 
-def add(commands: Any) -> None:
-    """Add the group and its commands."""
-    verbs = add_group(
-        commands, "data", help_text="files of a test cell: look into one, convert it; public data sets",
-        example="mgdd data info bench.tdms",
-    )  # fmt: skip
-    info = add_command(
-        verbs, "info", _info,
-        help_text="show format and columns of a file, what each is taken for, and what is doubtful",
-        example="mgdd data info bench.tdms --firing-tdc-deg 360",
-    )  # fmt: skip
-    convert = add_command(
-        verbs, "convert", _convert, help_text="cut a file of a test cell into cycles and write all its channels",
-        example="mgdd data convert bench.mf4 --firing-tdc-deg 360 -o bench.nc", endings=".nc, .csv or .parquet",
-    )  # fmt: skip
-    for parser in (info, convert):
-        parser.add_argument(
-            "file", metavar="FILE", help="text, MATLAB, HDF5, netCDF, TDMS, MDF, Parquet, NumPy or XLSX"
-        )
-        group = parser.add_argument_group("what the file holds, where it does not say it or says it otherwise")
-        for options in (_OWN, _SPEED, READING):
-            options.add(group)
-        add_encoder(parser)
-    add_command(
-        verbs, "list", _list, help_text="name the public data sets, with licence and place", example="mgdd data list"
-    )
-    get = add_command(
-        verbs, "get", _get, help_text="write a public data set, a numbered file for each of its records",
-        example="mgdd data get hd_diesel_128x144 -o diesel.csv", endings=".nc, .csv or .parquet",
-    )  # fmt: skip
-    get.add_argument("name", choices=tuple(FILES), help="data set")
-    _FETCH.add(get)
+def _add_file(parser: Any) -> None:
+    option(parser, "file FILE", "text, MATLAB, HDF5, netCDF, TDMS, MDF, Parquet, NumPy or XLSX")
+    group = parser.add_argument_group("what the file holds, where it does not say it or says it otherwise")
+    for options in (_OWN, _SPEED, READING):
+        options.add(group)
+    add_encoder(parser)
+
+
+def _add_get(parser: Any) -> None:
+    option(parser, "name", "data set", choices=tuple(FILES))
+    _FETCH.add(parser)
 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
@@ -83,7 +58,6 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _info(args: argparse.Namespace) -> None:
-    check_output(args)
     options = {name: default_of(read, name) for name in (*_OWN.options, *_SPEED.options, *READING.options)} | _given(
         args
     )
@@ -159,8 +133,7 @@ def _cell(value: Any) -> str:
 def _convert(args: argparse.Namespace) -> None:
     _check_written(args)
     bench = read(args.file, **_given(args))
-    for warning in bench.attrs["warnings"].splitlines():
-        _LOG.warning("%s: %s", bench.attrs["file"], warning)
+    warn(*bench.attrs["warnings"].splitlines(), of=bench.attrs["file"])
     files = _write(args, [bench])
     payload = {
         "file": files[0],
@@ -172,7 +145,6 @@ def _convert(args: argparse.Namespace) -> None:
 
 
 def _list(args: argparse.Namespace) -> None:
-    check_output(args)
     rows = [{"name": name, "licence": LICENCES[name], "place": place(name)} for name in FILES]
     table = Table(columns=("name", "place", "licence"), rows=tuple((r["name"], r["place"], r["licence"]) for r in rows))
     emit(args, {"datasets": rows}, text=[table])
@@ -190,7 +162,6 @@ def _get(args: argparse.Namespace) -> None:
 def _check_written(args: argparse.Namespace) -> None:
     if args.output is None:
         raise ParameterError(f"-o FILE is needed: a name that ends in {', '.join(_WRITERS)}")
-    check_output(args, *_WRITERS)
 
 
 def _write(args: argparse.Namespace, records: list[xr.Dataset]) -> list[str]:
@@ -207,3 +178,11 @@ def _write(args: argparse.Namespace, records: list[xr.Dataset]) -> list[str]:
 def _written(data: xr.Dataset) -> str:
     sizes = ", ".join(f"{size} {dim}" for dim, size in data.sizes.items())
     return f"{', '.join(map(str, data.data_vars))} over {sizes}"
+
+
+COMMANDS = {
+    "info": (_add_file, _info),
+    "convert": (_add_file, _convert),
+    "list": (None, _list),
+    "get": (_add_get, _get),
+}

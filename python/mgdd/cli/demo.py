@@ -6,16 +6,14 @@ import argparse
 from typing import Any
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command
-from mgdd.cli.output import Stopped, check_output, emit, whole_or_part
+from mgdd.cli.output import emit, whole_or_part
+from mgdd.cli.progress import Stopped
 from mgdd.cli.study import studies
 from mgdd.identify import ModelFamily
 from mgdd.identify.engine.timing_records import undetermined
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.report import Table, write_report
 from mgdd.report.calibration import shipped_report
-
-__all__ = ["add"]
 
 _REPORT = Options(write_report, "folder")
 _GUIDED = {
@@ -29,21 +27,12 @@ _GUIDED = {
 _CUT_SHORT = "\nInterrupted: these are the models that were finished, and not every check of them was made."
 
 
-def add(commands: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands,
-        "demo",
-        run,
-        help_text="calibrate four measured traces, find their best timing, report; a guided seeker, a throttle",
-        example="mgdd demo",
-    )
+def _add_demo(parser: Any) -> None:
     _REPORT.add(parser)
 
 
 def run(args: argparse.Namespace) -> None:
     """Calibrate, write the report, run two studies; Ctrl-C keeps what is finished."""
-    check_output(args)
     step = args.progress.expect(120)
     result, stopped = whole_or_part(shipped_report, name="mgdd demo", progress=step)
     step("write the report")
@@ -166,3 +155,6 @@ def _span(best: Any, name: str, digits: int) -> str:
     if name.endswith("shift_cad"):
         return f"{own:+z.{digits}f} ({low:+z.{digits}f} to {high:+z.{digits}f})"
     return f"{own:z.{digits}f} ({low:z.{digits}f} to {high:z.{digits}f})"
+
+
+COMMANDS = {"demo": (_add_demo, run)}

@@ -6,29 +6,13 @@ import argparse
 import importlib.metadata
 import os
 import platform
-from typing import Any
 
 from mgdd import _core, datasets, presets
-from mgdd.cli.options import add_command
-from mgdd.cli.output import check_output, emit
-
-__all__ = ["add"]
-
-
-def add(commands: Any) -> None:
-    """Add the command."""
-    add_command(
-        commands,
-        "doctor",
-        run,
-        help_text="print versions, SIMD level, extras and data sets",
-        example="mgdd doctor --json",
-    )
+from mgdd.cli.output import emit
 
 
 def run(args: argparse.Namespace) -> None:
     """Collect and print."""
-    check_output(args)
     report = {
         "mgdd": _core.__version__,
         "python": platform.python_version(),
@@ -80,3 +64,6 @@ def _version(name: str) -> str | None:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         return None
+
+
+COMMANDS = {"doctor": (None, run)}

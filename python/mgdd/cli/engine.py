@@ -1,33 +1,28 @@
-"""`mgdd engine simulate | calibrate | optimum`; `analyze`, `check`, `seek` and `sweep` have modules of their own."""
+"""`mgdd engine simulate | calibrate | optimum`."""
 
 from __future__ import annotations
 
 import argparse
-import logging
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.cli.analyze import add_analyze
-from mgdd.cli.check import add_check
 from mgdd.cli.from_library import Options, default_of, named_options, shown
 from mgdd.cli.options import (
     CYLINDER_CHOICES,
     PEGGING,
     SCHEME,
-    add_command,
     add_engine,
     add_files,
-    add_group,
     check_pegging,
     engine_of,
-    number_pairs,
+    option,
     point_given,
     refuse_idle,
     traces_of,
 )
-from mgdd.cli.output import Stopped, check_file, check_output, emit, lines, whole_or_part, wrote
-from mgdd.cli.seek import add_seek
-from mgdd.cli.sweep import add_sweep
+from mgdd.cli.output import check_file, emit, lines, warn, whole_or_part, wrote
+from mgdd.cli.progress import Stopped
+from mgdd.cli.ranges import number_pairs
 from mgdd.engine import ThermalNo, find_optimum, simulate, timing_sweep
 from mgdd.engine.ignition import ignited_soc_cad, reached_soi_cad
 from mgdd.errors import ConvergenceError
@@ -41,9 +36,6 @@ from mgdd.report import calibration_report, write_report
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add"]
-
-_LOG = logging.getLogger(__name__)
 _TIMING = Options(simulate, "soc_cad")
 _SEARCH = Options(find_optimum, "objective", "bounds_cad")
 _NO = Options(
@@ -53,43 +45,18 @@ _NO = Options(
 _RANGED = ("soc_cad", "ca50_cad", "shift_cad", "gain_percent")
 
 
-def add(commands: Any) -> None:
-    """Add the group and its commands."""
-    verbs = add_group(
-        commands, "engine",
-        help_text="one cycle: simulate, analyze, check, calibrate, optimum; many: seek, sweep",
-        example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
-    )  # fmt: skip
-    _add_simulate(verbs)
-    add_analyze(verbs)
-    add_check(verbs)
-    _add_calibrate(verbs)
-    _add_optimum(verbs)
-    add_seek(verbs)
-    add_sweep(verbs)
-
-
-def _add_simulate(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "simulate", _simulate,
-        help_text="simulate one closed cycle and print its indicators; -o FILE.csv writes the traces",
-        example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
-        endings=".json or .csv",
-    )  # fmt: skip
+def _add_simulate(parser: Any) -> None:
     timing = parser.add_mutually_exclusive_group()
     _TIMING.add(timing)
-    timing.add_argument(
-        "--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on"
-    )
+    option(timing, "--soi-cad X", "start of injection [°CA aTDC]; the delay model adds on")
     add_engine(parser)
     SCHEME.add(parser, "scheme")
     group = parser.add_argument_group("thermal NO")
-    group.add_argument("--thermal-no", action="store_true", help="also NOx by the extended Zeldovich mechanism")
+    option(group, "--thermal-no", "also NOx by the extended Zeldovich mechanism")
     _NO.add(group)
 
 
 def _simulate(args: argparse.Namespace) -> None:
-    check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
     timing = _TIMING.of(args)
     if args.soi_cad is not None:
@@ -108,22 +75,14 @@ def _simulate(args: argparse.Namespace) -> None:
     emit(args, {"preset": preset.name, **scheme, **scalars, **known}, traces=cycle)
 
 
-def _add_calibrate(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "calibrate", _calibrate,
-        help_text="calibrate the cycle model to measured traces, and name what the traces do not identify",
-        example="mgdd engine calibrate a25.csv a50.csv --preset hd_diesel_128x144 --conditions conditions.csv --json",
-    )  # fmt: skip
+def _add_calibrate(parser: Any) -> None:
     add_files(parser, nargs="+")
-    parser.add_argument(
-        "--free",
-        metavar="NAME[,NAME]",
-        help="parameters to fit (default: soc_cad,burn_duration_cad,fuel_heat_j per trace and wall_heat_scale; "
-        "the double Wiebe also its shape); gamma is that of the gamma law in use; with --fuel-mg the heat is held",
-    )
-    parser.add_argument(
-        "--report", metavar="PAGE.html",
-        help="also write a page that needs no network: best timing by every model, its limits, figures (a minute)",
+    option(parser, "--free NAME[,NAME]",
+           "parameters to fit (default: soc_cad,burn_duration_cad,fuel_heat_j per trace and wall_heat_scale; the "
+           "double Wiebe also its shape); gamma is that of the gamma law in use; with --fuel-mg the heat is held",
+    )  # fmt: skip
+    option(parser, "--report PAGE.html",
+           "also write a page that needs no network: best timing by every model, its limits, figures (a minute)",
     )  # fmt: skip
     _add_pressure(parser)
     add_engine(parser)
@@ -135,9 +94,7 @@ def _add_pressure(parser: argparse.ArgumentParser) -> None:
     """Add how the traces of a calibration are made absolute."""
     group = parser.add_argument_group("pressure of the traces")
     PEGGING.add(group)
-    group.add_argument(
-        "--mean-cycle", action="store_true", help="calibrate to the mean of a file's cycles (one cycle is needed)"
-    )
+    option(group, "--mean-cycle", "calibrate to the mean of a file's cycles (one cycle is needed)")
 
 
 def _traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
@@ -156,7 +113,6 @@ def _known(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
 
 def _calibrate(args: argparse.Namespace) -> None:
     """Fit, judge, compare, print."""
-    check_output(args)
     check_file("--report", args.report, (".html",))
     cylinder, point, preset = engine_of(args)
     traces = _traces_of(args)
@@ -182,17 +138,9 @@ def _calibrate(args: argparse.Namespace) -> None:
         raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 
 
-def _add_optimum(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "optimum", _optimum,
-        help_text="find the best start of combustion of the model, or of measured traces after calibration",
-        example="mgdd engine optimum --preset puma_single --limit p_max_bar=95 --json",
-        endings=".json, without files also .csv",
-    )  # fmt: skip
+def _add_optimum(parser: Any) -> None:
     add_files(parser, nargs="*")
-    parser.add_argument(
-        "--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable"
-    )
+    option(parser, "--limit NAME=X ...", "upper limit on an indicator, repeatable")
     objective, step_cad = (
         f"{shown(default_of(find_optimum, name))}, with files {shown(default_of(best_timing, name))}"
         for name in ("objective", "step_cad")
@@ -204,31 +152,20 @@ def _add_optimum(verbs: Any) -> None:
 
 
 def _optimum(args: argparse.Namespace) -> None:
-    check_output(args, *((".json",) if args.files else (".json", ".csv")))
     cylinder, point, preset = engine_of(args)
     limits = number_pairs(args.limit, "--limit")
     if args.files:
+        check_file("-o", args.output, (".json",))
         _optimum_of_files(args, cylinder, point, limits, preset.name)
         return
     scheme = SCHEME.given(args)
     best = find_optimum(cylinder, point, limits=limits, **_SEARCH.given(args), **scheme)
-    now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
-    payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}
-    payload |= {
-        "curvature_per_cad2": best.curvature,
-        "objective": best.objective,
-        "value": best.value,
-        "limits": limits,
-    }
-    payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
-    payload["findings"] = [str(finding) for finding in best.findings]
-    for finding in best.findings:
-        _LOG.warning("%s", finding)
-    payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
-    payload["soi_cad"] = reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])
+    warn(*best.findings)
+    known = {"preset": preset.name, "soi_cad": reached_soi_cad(cylinder, point, soc_cad=best["soc_cad"])}
     sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
     held = ", ".join(best.active_limits) or "no limit"
-    emit(args, payload, text=lines({**payload, "held_by": held}), traces=sweep)
+    text = lines({**best.inputs, **best.values, **known, "curvature": best.curvature, "held_by": held})
+    emit(args, {**known, **best.to_dict()}, text=text, traces=sweep)
 
 
 def _optimum_of_files(
@@ -286,3 +223,10 @@ def _optimum_of_files(
     emit(args, payload, text="\n\n".join(parts))
     if not any(row.plausible for row in rows):
         raise ConvergenceError("no model of the family is plausible for any trace: see what each of them fails")
+
+
+COMMANDS = {
+    "simulate": (_add_simulate, _simulate),
+    "calibrate": (_add_calibrate, _calibrate),
+    "optimum": (_add_optimum, _optimum),
+}

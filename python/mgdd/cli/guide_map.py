@@ -14,8 +14,9 @@ import numpy as np
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, default_of, named_options
-from mgdd.cli.options import assignments, refuse_idle
+from mgdd.cli.options import option, refuse_idle
 from mgdd.cli.output import check_file, wrote
+from mgdd.cli.ranges import assignments
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table
@@ -27,8 +28,6 @@ from mgdd.loop.engine_guide import KINDS, EngineGuide
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["GUIDE", "add_guide", "check_guide", "guide_of", "learn_map"]
-
 GUIDE = Options(EngineGuide, shape="guide_shape")
 _ENDINGS = (".csv", ".toml")
 _POINT = frozenset(OperatingPoint.fields())
@@ -37,22 +36,16 @@ _POINT = frozenset(OperatingPoint.fields())
 def add_guide(parser: argparse.ArgumentParser) -> None:
     """Add the options of the guide."""
     group = GUIDE.add(parser, "guide: a rough model that leads while the measurements decide")
-    group.add_argument(
-        "--guide", choices=("none", *KINDS, "map"), default="none",
-        help="curve: the model's whole curve; calibrated: the same while the model learns from the pressure; "
-        "feed_forward: the model's best timing; map: a table of timings (default: %(default)s)",
-    )  # fmt: skip
-    group.add_argument(
-        "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"
-    )
-    group.add_argument(
-        "--guide-set", action="append", default=[], metavar="FIELD=VALUE",
-        help="any field of the model's cylinder, repeatable, for example wall_heat_scale=1.0",
-    )  # fmt: skip
-    group.add_argument("--guide-map", metavar="FILE", help="the table of --guide map, .csv or .toml")
-    group.add_argument(
-        "--guide-map-out", metavar="FILE",
-        help="write that table, .csv or .toml, with the best timing of this run learnt, if the run has settled",
+    option(group, "--guide",
+           "curve: the model's whole curve; calibrated: the same while the model learns from the pressure; "
+           "feed_forward: the model's best timing; map: a table of timings",
+           default="none", choices=('none', *KINDS, 'map'))  # fmt: skip
+    option(group, "--guide-preset NAME_OR_FILE.toml", "cylinder of the model (default: that of the bench)")
+    option(group, "--guide-set FIELD=VALUE ...",
+           "any field of the model's cylinder, repeatable, for example wall_heat_scale=1.0")  # fmt: skip
+    option(group, "--guide-map FILE", "the table of --guide map, .csv or .toml")
+    option(group, "--guide-map-out FILE",
+           "write that table, .csv or .toml, with the best timing of this run learnt, if the run has settled",
     )  # fmt: skip
 
 

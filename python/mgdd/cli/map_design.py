@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import OperatingPoint
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import CSV, doubts_said, write_table
-from mgdd.cli.options import SCHEME, add_command, add_engine, engine_of, number_pairs, refuse_idle
-from mgdd.cli.output import check_output, emit, lines
-from mgdd.cli.ranges import factors_of
+from mgdd.cli.map_files import CSV, doubts_said, table_writers
+from mgdd.cli.options import SCHEME, add_engine, engine_of, option, refuse_idle
+from mgdd.cli.output import emit, lines
+from mgdd.cli.ranges import factors_of, number_pairs
 from mgdd.design import FeasibleRegion, design_points
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.point_table import read_points
@@ -24,45 +24,27 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["add_design"]
-
 _DESIGN = Options(design_points, "method", "seed", "model", "n_starts", n="points")
 _MARGIN, _TIMING = Options(FeasibleRegion.of_points, "margin"), Options(sweep, "soc_cad")
 _ENGINE = ("preset", "set", *OperatingPoint.fields(), "burn", "gamma", "wall_heat", "ignition", "soc_cad")
 
 
-def add_design(verbs: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        verbs, "design", _design,
-        help_text="choose the points of an experiment, inside limits that the model of the engine predicts",
-        example="mgdd map design --over speed_rpm=1000:3000 --over fuel_mg=6:30 --over soc_cad=-16:4 --points 64 "
-        "--limit p_max_bar=130 -o design.csv",
-        endings=".csv or .nc, the points; .json",
-    )  # fmt: skip
-    parser.add_argument(
-        "--over", action="append", default=[], required=True, metavar="NAME=LOW:HIGH[:N]",
-        help="range of a factor in the unit that its name ends in; with N, or as NAME=VALUE,VALUE, only these levels; "
-        "repeatable",
-    )  # fmt: skip
+def _add_design(parser: Any) -> None:
+    option(parser, "--over NAME=LOW:HIGH[:N] ...",
+           "range of a factor in the unit that its name ends in; with N, or as NAME=VALUE,VALUE, only these levels; "
+           "repeatable", required=True)  # fmt: skip
     _DESIGN.add(parser)
-    parser.add_argument(
-        "--limit", action="append", default=[], metavar="NAME=X",
-        help="keep an indicator of the model at or below X, in the unit that its name ends in; repeatable",
-    )  # fmt: skip
-    parser.add_argument(
-        "--within", metavar="FILE",
-        help="points that the engine was driven at, .csv or .nc: new ones stay between them, in their convex hull",
+    option(parser, "--limit NAME=X ...",
+           "keep an indicator of the model at or below X, in the unit that its name ends in; repeatable")  # fmt: skip
+    option(parser, "--within FILE",
+           "points that the engine was driven at, .csv or .nc: new ones stay between them, in their convex hull",
     )  # fmt: skip
     _MARGIN.add(parser)
-    parser.add_argument(
-        "--refused", metavar="FILE",
-        help="of --within: points that could not be driven; what is nearer to one of them than to a driven one is out",
+    option(parser, "--refused FILE",
+           "of --within: points that could not be driven; what is nearer to one of them than to a driven one is out",
     )  # fmt: skip
-    parser.add_argument(
-        "--extend", metavar="FILE",
-        help="points that were run, .csv or .nc: new ones keep away from them and are numbered behind them",
-    )  # fmt: skip
+    option(parser, "--extend FILE",
+           "points that were run, .csv or .nc: new ones keep away from them and are numbered behind them")  # fmt: skip
     _TIMING.add(parser)
     CSV.add(parser)
     add_engine(parser)
@@ -70,7 +52,6 @@ def add_design(verbs: Any) -> None:
 
 
 def _design(args: argparse.Namespace) -> None:
-    check_output(args, ".csv", ".nc", ".json")
     method = _DESIGN.of(args)["method"]
     if method != "d_optimal":
         refuse_idle(args, "model", why=f"--method {method} fits no polynomial")
@@ -82,11 +63,7 @@ def _design(args: argparse.Namespace) -> None:
     payload = _payload(plan, limits, region, said)
     payload["within"] = args.within
     payload["existing"] = 0 if before is None else before.sizes["point"]
-    file = args.output
-    if file is not None and Path(file).suffix != ".json":
-        write_table(plan, file)
-        args.output = None
-    emit(args, {**payload, "file": file}, text=_text(payload, plan if file is None else None))
+    emit(args, payload, text=_text(payload, plan if args.output is None else None), write=table_writers(plan))
 
 
 def _region(args: argparse.Namespace, limits: Mapping[str, float]) -> FeasibleRegion | None:
@@ -169,3 +146,6 @@ def _text(payload: dict[str, Any], shown: xr.Dataset | None) -> list[str | Table
     columns = {"point": shown["point"].to_numpy(), **payload["columns"]}
     rows = zip(*([f"{value:.6g}" for value in column] for column in columns.values()), strict=True)
     return [*out, "", Table(columns=tuple(columns), rows=tuple(rows)), "", "-o design.csv keeps the points"]
+
+
+COMMANDS = {"design": (_add_design, _design)}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import datasets
 from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, map_in
-from mgdd.cli.options import add_command, refuse_idle
+from mgdd.cli.options import option, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
@@ -18,38 +18,23 @@ from mgdd.maps import CalibrationMap, write_map
 if TYPE_CHECKING:
     from mgdd.guide import TimingMap
 
-__all__ = ["add_export"]
-
 _ENGINES = ("volkswagen", "mercedes")  # in the order of the set
 _GUIDE = (".csv", ".toml")
 _WRITING = Options(write_map, "encoding")
 
 
-def add_export(verbs: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        verbs, "export", _export,
-        help_text="write maps in another form: CSV, JSON, netCDF, DCM, CDFX, or the table of a guide",
-        example="mgdd map export smooth.json --label SocBase -o engine.dcm",
-        endings=".csv, .json or .nc, which hold everything; .dcm or .cdfx, which may hold several maps; with "
-        "--guide-map .toml",
-    )  # fmt: skip
-    parser.add_argument("files", nargs="*", metavar="MAP", help=f"{FORMS}; several only into a .dcm or .cdfx")
+def _add_export(parser: Any) -> None:
+    option(parser, "files MAP", f"{FORMS}; several only into a .dcm or .cdfx", nargs="*")
     READING.add(parser)
-    parser.add_argument(
-        "--label", action="append", default=[], metavar="NAME",
-        help="label in a DCM or CDFX file, one per map in their order (default: the names of the maps)",
-    )  # fmt: skip
+    option(parser, "--label NAME ...",
+           "label in a DCM or CDFX file, one per map in their order (default: the names of the maps)")  # fmt: skip
     _WRITING.add(parser)
-    parser.add_argument(
-        "--advisor", choices=_ENGINES,
-        help="instead of a file: the measured map of this engine of the data set advisor_engine_maps, whose variable "
-        "--name says (default: bsfc_g_per_kwh, brake specific fuel consumption [g/kWh])",
-    )  # fmt: skip
-    parser.add_argument(
-        "--guide-map", action="store_true",
-        help="write the table that mgdd engine seek --guide map --guide-map reads, another form of file",
-    )  # fmt: skip
+    option(parser, "--advisor",
+           "instead of a file: the measured map of this engine of the data set advisor_engine_maps, whose variable "
+           "--name says (default: bsfc_g_per_kwh, brake specific fuel consumption [g/kWh])",
+           choices=_ENGINES)  # fmt: skip
+    option(parser, "--guide-map",
+           "write the table that mgdd engine seek --guide map --guide-map reads, another form of file")  # fmt: skip
 
 
 def _export(args: argparse.Namespace) -> None:
@@ -123,3 +108,6 @@ def _write_guide(timing: TimingMap, args: argparse.Namespace) -> None:
         timing.write_csv(args.output)
     else:
         write_whole_text(args.output, timing.to_toml())
+
+
+COMMANDS = {"export": (_add_export, _export)}

@@ -1,10 +1,10 @@
-"""`mgdd map fit`: a model of one response over the points of an experiment."""
+"""`mgdd map fit | predict`: a model of one response over the points of an experiment, and what models say elsewhere."""
 
 from __future__ import annotations
 
 import argparse
-import logging
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,71 +12,54 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.map_files import CSV
-from mgdd.cli.options import add_command
-from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
-from mgdd.errors import DataError, ParameterError
+from mgdd.cli.map_files import CSV, table_writers
+from mgdd.cli.options import add_over, option
+from mgdd.cli.output import emit, warn
+from mgdd.cli.ranges import grid_of
+from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.files import write_whole_text
+from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import POINT, input_names, read_points
 from mgdd.plot.response import response_diagnostics
 from mgdd.plot.style import drawn
-from mgdd.results.fit import figures_of
-from mgdd.surrogate import fit_response
+from mgdd.results.labels import label_of
+from mgdd.surrogate import ResponseModel, fit_response
+from mgdd.surrogate.prediction_table import prediction_table
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
     from mgdd.results import Fit
 
-__all__ = ["add_fit"]
 
-_LOG = logging.getLogger(__name__)
 _COLUMN = Options(fit_response, "response")
 _FIT = Options(fit_response, "kind", "degree", "select", "folds", "n_starts", "seed")
 
 
-def add_fit(verbs: Any) -> None:
-    """Add the command of a fit."""
-    parser = add_command(
-        verbs, "fit", _fit,
-        help_text="fit a model of one response to measured or simulated points, and say how far it may be believed",
-        example="mgdd map fit table.nc --response efficiency_gross --factors speed_rpm,fuel_mg,soc_cad -o model.toml "
-        "--figure fit.png",
-        endings=".toml, the model with its points; .json, the figures of the fit",
-    )  # fmt: skip
-    parser.add_argument(
-        "file", metavar="TABLE",
-        help=".nc of mgdd engine sweep, or .csv with a point per row and the unit in each name, in brackets behind it "
-        "or in a second row",
-    )  # fmt: skip
+def _add_fit(parser: Any) -> None:
+    option(parser, "file TABLE",
+           ".nc of mgdd engine sweep, or .csv with a point per row and the unit in each name, in brackets behind it "
+           "or in a second row")  # fmt: skip
     _COLUMN.add(parser)
-    parser.add_argument(
-        "--factors",
-        metavar="NAME[,NAME]",
-        help="columns to fit it over (default: the inputs of a sweep; needed for .csv)",
-    )
+    option(parser, "--factors NAME[,NAME]", "columns to fit it over (default: the inputs of a sweep; needed for .csv)")
     _FIT.add(parser)
-    parser.add_argument("--figure", metavar="FILE", help="draw the diagnostics of the fit (.png, .svg or .pdf)")
+    option(parser, "--figure FILE", "draw the diagnostics of the fit (.png, .svg or .pdf)")
     CSV.add(parser)
 
 
 def _fit(args: argparse.Namespace) -> None:
-    check_output(args, ".toml", ".json")
-    check_figure(args.figure)
     table, left_out = _table(args)
     factors = [str(name) for name in table.data_vars if name != args.response]
     fit = fit_response(table, args.response, factors=factors, **_FIT.given(args))
-    if args.output is not None and Path(args.output).suffix == ".toml":
-        source = f"{args.response} of {Path(args.file).name}, {table.sizes[POINT]} points"
-        write_whole_text(args.output, replace(fit.model.to_parameters(), notes={"source": source}).to_toml())
-        wrote(args.output)
-        file, args.output = args.output, None
-    else:
-        file = None
-    emit(args, {**_figures(fit, factors), "left_out": left_out, "file": file}, text=fit.summary())
-    if args.figure is not None:
-        save_figure(_picture(fit, len(factors)), args.figure)
+    source = f"{args.response} of {Path(args.file).name}, {table.sizes[POINT]} points"
+    emit(
+        args, {**_figures(fit, factors), "left_out": left_out}, text=fit.summary(),
+        write={".toml": lambda file: write_whole_text(
+            file, replace(fit.model.to_parameters(), notes={"source": source}).to_toml())},
+        figure=lambda: drawn(response_diagnostics, fit.diagnostics, size=(6.6, 5.4 + 2.3 * -(-len(factors) // 3))),
+    )  # fmt: skip
 
 
 def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
@@ -95,7 +78,7 @@ def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
     if gone == known.size:
         raise DataError(f"{args.file}: {args.response} or a factor is NaN at every point: there is nothing to fit")
     if gone:
-        _LOG.warning("%s: %d of %d points have no value (NaN) and are left out", args.file, gone, known.size)
+        warn(f"{gone} of {known.size} points have no value (NaN) and are left out", of=args.file)
     return table.isel({POINT: known}), gone
 
 
@@ -108,28 +91,105 @@ def _inputs(file: str, response: str) -> list[str]:
 
 
 def _figures(fit: Fit, factors: Sequence[str]) -> dict[str, Any]:
-    model, figures = fit.model, fit.to_dict()
+    model = fit.model
     of_kind: dict[str, Any] = {"terms": list(model.terms)}
     if model.kind != "polynomial":
         of_kind = {"length_scales": dict(zip(factors, model.surface.length_scales.tolist(), strict=True))}
     return {
-        "model": fit.kind,
+        **fit.to_dict(),
         "response": model.name,
         "unit": model.label.units,
         "factors": list(factors),
         "points": model.values.size,
-        **figures_of(fit),
         "checked_by": fit.checked_by,
         "noise_sd": float(model.surface.noise_sd),
         **of_kind,
-        "parameters": figures["parameters"],
-        "stderr": figures["stderr"],
-        "unidentifiable": figures["unidentifiable"],
         "outliers": np.flatnonzero(fit.diagnostics["outlier"].to_numpy()).tolist(),  # type: ignore[attr-defined]
-        "findings": [str(finding) for finding in fit.findings],
-        "status": figures["status"],
     }
 
 
-def _picture(fit: Any, factors: int) -> Any:
-    return drawn(response_diagnostics, fit.diagnostics, size=(6.6, 5.4 + 2.3 * -(-factors // 3)))
+_LEVEL = Options(ResponseModel.predict, "level")
+
+
+def _add_predict(parser: Any) -> None:
+    option(parser, "files MODEL.toml", "models as mgdd map fit writes them", nargs="+")
+    what = parser.add_mutually_exclusive_group(required=True)
+    add_over(what, what="a factor")
+    option(what, "--points FILE", "the points of a .csv or .nc file instead of a grid")
+    _LEVEL.add(parser)
+    option(parser, "--extrapolate", "also give values outside of the points that were fitted; they are NaN otherwise")
+    CSV.add(parser)
+
+
+def _predict(args: argparse.Namespace) -> None:
+    models = [_model(file) for file in args.files]
+    twice = next((m.name for k, m in enumerate(models) if m.name in [o.name for o in models[:k]]), None)
+    if twice is not None:
+        raise ParameterError(f"two files hold a model of {twice}: give one of each response")
+    names = list(dict.fromkeys(name for model in models for name in model.factors))
+    axes, columns = _places(args, names)
+    table, outside = prediction_table(models, axes, columns, extrapolate=args.extrapolate, **_LEVEL.of(args))
+    table.attrs["models"] = ", ".join(args.files)
+    total = math.prod(table.sizes.values())
+    what = "kept, extrapolated)"
+    if not args.extrapolate:
+        fewer = "leave them out" if args.points else "narrow --over"
+        what = f"NaN): {fewer}, add points there (mgdd map design --extend), or keep them with --extrapolate"
+    said = [
+        f"{name}: {count} of {total} points lie outside of those that were fitted ({what}"
+        for name, count in outside.items()
+        if count
+    ]
+    warn(*said)
+    payload = {
+        "models": {model.name: file for model, file in zip(models, args.files, strict=True)},
+        "shape": dict(table.sizes),
+        "points": total,
+        "extrapolated": outside,
+        "ranges": {model.name: _range(table[model.name]) for model in models},
+        "warnings": said,
+    }
+    text = _predicted(payload, table, models, args.output)
+    emit(args, payload, text=text, write=table_writers(table))
+
+
+def _model(file: str) -> ResponseModel:
+    if Path(file).suffix != ".toml":
+        raise ParameterError(f"{file}: a model ends in .toml, as mgdd map fit -o model.toml writes it")
+    return ResponseModel.from_parameters(ParameterFile.read(file))
+
+
+def _places(
+    args: argparse.Namespace, names: Sequence[str]
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[np.float64]]]:
+    """Give the axes of the answer, and where the models are asked."""
+    if args.points:
+        table = read_points(args.points, names, **CSV.given(args))
+        return {POINT: table[POINT].to_numpy()}, {name: table[name].to_numpy() for name in names}
+    grid = grid_of(args.over)
+    lacking = [name for name in names if name not in grid]
+    if lacking:
+        raise ParameterError(f"--over {lacking[0]}=LOW:HIGH:N is missing: the models need {', '.join(names)}")
+    odd = [name for name in grid if name not in names]
+    if odd:
+        near = did_you_mean(odd[0], names) or f"they have {', '.join(names)}"
+        raise ParameterError(f"--over {odd[0]}: not a factor of the models: {near}")
+    return dict(grid), dict(zip(grid, np.meshgrid(*grid.values(), indexing="ij"), strict=True))
+
+
+def _range(values: xr.DataArray) -> list[float] | None:
+    known = values.to_numpy()[np.isfinite(values.to_numpy())]
+    return [float(known.min()), float(known.max())] if known.size else None
+
+
+def _predicted(payload: Mapping[str, Any], table: xr.Dataset, models: Sequence[ResponseModel], file: str | None) -> str:
+    size = " x ".join(f"{count} {name}" for name, count in payload["shape"].items())
+    out = [f"{payload['points']} points: {size}"]
+    for model in models:
+        found, label = payload["ranges"][model.name], label_of(table[model.name])
+        said = "no value inside of the fitted points" if found is None else f"{found[0]:.4g} to {found[1]:.4g}"
+        out.append(f"{model.name}: {said} {'' if label.units == '-' or found is None else label.units}".rstrip())
+    return "\n".join([*out, *([] if file else ["-o table.nc keeps the table"])])
+
+
+COMMANDS = {"fit": (_add_fit, _fit), "predict": (_add_predict, _predict)}

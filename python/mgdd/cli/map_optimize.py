@@ -10,52 +10,34 @@ from typing import Any
 import numpy as np
 
 from mgdd.cli.from_library import Options, named_options
-from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, doubts_said, emit_map, grid_table, map_in
-from mgdd.cli.map_text import map_blocks
-from mgdd.cli.options import add_command, assignments, number_pairs
-from mgdd.cli.output import check_figure, check_output
+from mgdd.cli.map_files import FORMS, READING, doubts_said, emit_map, grid_table, map_blocks, map_in
+from mgdd.cli.options import option
+from mgdd.cli.ranges import assignments, number_pairs
 from mgdd.maps import CalibrationMap, optimize_map, smooth_map
 from mgdd.maps.compare import steepest
-
-__all__ = ["add_optimize", "add_smooth"]
 
 _OPTIMUM = Options(optimize_map, "max_loss", "infeasible", over="along")
 _SMOOTH = Options(smooth_map, "weight", "fill", "tolerance")
 _ENDINGS = ".csv, .json or .nc, which hold everything; .dcm or .cdfx for calibration tools"
 
 
-def add_optimize(verbs: Any) -> None:
-    """Add the command of the optimum."""
-    parser = add_command(
-        verbs, "optimize", _optimize,
-        help_text="find the best value of an input at every operating point of a table, under limits",
-        example="mgdd map optimize table.nc --maximize efficiency_gross --along soc_cad --limit p_max_bar=130 "
-        "--max-loss 0.002 -o best.json",
-        endings=_ENDINGS,
-    )  # fmt: skip
-    parser.add_argument(
-        "file", metavar="TABLE.nc",
-        help="over a grid of one or two operating axes and the input: of mgdd engine sweep or mgdd map predict",
+def _add_optimize(parser: Any) -> None:
+    option(parser, "file TABLE.nc",
+           "over a grid of one or two operating axes and the input: of mgdd engine sweep or mgdd map predict",
     )  # fmt: skip
     goal = parser.add_mutually_exclusive_group(required=True)
-    goal.add_argument("--maximize", metavar="NAME", help="variable whose highest value is best, as efficiency_gross")
-    goal.add_argument("--minimize", metavar="NAME", help="variable whose lowest value is best, as a consumption")
-    parser.add_argument(
-        "--limit", action="append", default=[], metavar="NAME=X",
-        help="keep a variable of the table at or below X, in the unit that its name ends in; repeatable",
-    )  # fmt: skip
+    option(goal, "--maximize NAME", "variable whose highest value is best, as efficiency_gross")
+    option(goal, "--minimize NAME", "variable whose lowest value is best, as a consumption")
+    option(parser, "--limit NAME=X ...",
+           "keep a variable of the table at or below X, in the unit that its name ends in; repeatable")  # fmt: skip
     _OPTIMUM.add(parser)
-    parser.add_argument(
-        "--sd", action="append", default=[], metavar="NAME=X",
-        help="standard deviation of objective or limited variable at one point: a number, or a variable of the table; "
-        "it makes that of the optimum; repeatable",
-    )  # fmt: skip
+    option(parser, "--sd NAME=X ...",
+           "standard deviation of objective or limited variable at one point: a number, or a variable of the table; "
+           "it makes that of the optimum; repeatable")  # fmt: skip
     _add_figure(parser)
 
 
 def _optimize(args: argparse.Namespace) -> None:
-    check_output(args, *MAP_ENDINGS)
-    check_figure(args.figure)
     limits = number_pairs(args.limit, "--limit")
     scatter = assignments(args.sd, {}, "--sd")
     with named_options(over="along"):
@@ -71,29 +53,16 @@ def _optimize(args: argparse.Namespace) -> None:
     emit_map(args, best, _shown(args, best), n_held=_held(best))
 
 
-def add_smooth(verbs: Any) -> None:
-    """Add the command of the smooth map."""
-    parser = add_command(
-        verbs, "smooth", _smooth,
-        help_text="smooth a map inside of the allowed ranges of its cells, under limits on its slopes",
-        example="mgdd map smooth best.json --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.json",
-        endings=_ENDINGS,
-    )  # fmt: skip
-    parser.add_argument(
-        "file", metavar="MAP", help=f"of mgdd map optimize --max-loss; with --tolerance or --fill {FORMS}"
-    )
+def _add_smooth(parser: Any) -> None:
+    option(parser, "file MAP", f"of mgdd map optimize --max-loss; with --tolerance or --fill {FORMS}")
     READING.add(parser)
     _SMOOTH.add(parser)
-    parser.add_argument(
-        "--slope-limit", action="append", default=[], metavar="AXIS=X",
-        help="largest change of the value per unit of an axis, for example speed_rpm=0.004; repeatable",
-    )  # fmt: skip
+    option(parser, "--slope-limit AXIS=X ...",
+           "largest change of the value per unit of an axis, for example speed_rpm=0.004; repeatable")  # fmt: skip
     _add_figure(parser)
 
 
 def _smooth(args: argparse.Namespace) -> None:
-    check_output(args, *MAP_ENDINGS)
-    check_figure(args.figure)
     optimum = map_in(args, args.file)
     slopes = number_pairs(args.slope_limit, "--slope-limit")
     with doubts_said() as doubts:
@@ -117,7 +86,7 @@ def _smooth(args: argparse.Namespace) -> None:
 
 
 def _add_figure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--figure", metavar="FILE", help="draw the cells of the map (.png, .svg or .pdf)")
+    option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
 
 
 def _shown(args: argparse.Namespace, table: CalibrationMap) -> list[Any]:
@@ -126,3 +95,6 @@ def _shown(args: argparse.Namespace, table: CalibrationMap) -> list[Any]:
 
 def _held(table: CalibrationMap) -> dict[str, int]:
     return dict(sorted(Counter(name for name in table.cells["active_limit"].ravel().tolist() if name).items()))
+
+
+COMMANDS = {"optimize": (_add_optimize, _optimize), "smooth": (_add_smooth, _smooth)}

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, emit_map, grid_table, map_in, write_table
-from mgdd.cli.map_text import COLUMNS, grid_blocks, map_blocks
-from mgdd.cli.options import add_command
-from mgdd.cli.output import check_figure, check_output, emit, save_figure
+from mgdd.cli.map_files import (
+    COLUMNS,
+    FORMS,
+    READING,
+    emit_map,
+    grid_blocks,
+    grid_table,
+    map_blocks,
+    map_in,
+    table_writers,
+)
+from mgdd.cli.options import option
+from mgdd.cli.output import emit
 from mgdd.errors import ParameterError
 from mgdd.maps import CalibrationMap, apply_map, compare_maps
 from mgdd.maps.cells import TEXTS, cell_at
@@ -25,35 +34,21 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["add_diff", "add_show"]
-
 _COMPARED = Options(compare_maps, "grid", "tolerance")
 
 
-def add_show(verbs: Any) -> None:
-    """Add the command that shows one map."""
-    parser = add_command(
-        verbs, "show", _show,
-        help_text="show a map with breakpoints, units, and the limits and sources of its cells",
-        example="mgdd map show smooth.json --sweep table.nc --figure smooth.png",
-        endings=".csv, .json, .nc, .dcm or .cdfx, the map",
-    )  # fmt: skip
-    parser.add_argument("file", metavar="MAP", help=FORMS)
+def _add_show(parser: Any) -> None:
+    option(parser, "file MAP", FORMS)
     READING.add(parser)
-    parser.add_argument(
-        "--column", choices=COLUMNS, default="value",
-        help="what is shown of the cells: value, its standard deviation, the ends of its range (default: %(default)s)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--sweep", metavar="TABLE.nc", help="also say what the map achieves in the table that it was made of"
-    )
-    parser.add_argument("--figure", metavar="FILE", help="draw the cells of the map (.png, .svg or .pdf)")
-    parser.add_argument("--contour", action="store_true", help="draw contours instead of the cells")
+    option(parser, "--column",
+           "what is shown of the cells: value, its standard deviation, the ends of its range",
+           default="value", choices=COLUMNS)  # fmt: skip
+    option(parser, "--sweep TABLE.nc", "also say what the map achieves in the table that it was made of")
+    option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
+    option(parser, "--contour", "draw contours instead of the cells")
 
 
 def _show(args: argparse.Namespace) -> None:
-    check_output(args, *MAP_ENDINGS)
-    check_figure(args.figure)
     if args.contour and args.figure is None:
         raise ParameterError("--contour does not act here; it is a form of the picture: name one with --figure FILE")
     if args.contour and args.column in TEXTS:
@@ -86,30 +81,17 @@ def _achieved(table: CalibrationMap, sweep: xr.Dataset) -> tuple[dict[str, Any],
     return figures, said
 
 
-def add_diff(verbs: Any) -> None:
-    """Add the command that compares two maps."""
-    parser = add_command(
-        verbs, "diff", _diff,
-        help_text="subtract one map from another at the breakpoints of both",
-        example="mgdd map diff best.json smooth.json --tolerance 1 --figure diff.png",
-        endings=".nc, the differences, or .json",
-    )  # fmt: skip
-    parser.add_argument("first", metavar="FIRST", help=FORMS)
-    parser.add_argument("second", metavar="SECOND", help="the map that the first is subtracted from")
+def _add_diff(parser: Any) -> None:
+    option(parser, "first FIRST", FORMS)
+    option(parser, "second SECOND", "the map that the first is subtracted from")
     READING.add(parser)
     _COMPARED.add(parser)
-    parser.add_argument("--figure", metavar="FILE", help="draw the differences (.png, .svg or .pdf)")
+    option(parser, "--figure FILE", "draw the differences (.png, .svg or .pdf)")
 
 
 def _diff(args: argparse.Namespace) -> None:
-    check_output(args, ".nc", ".json")
-    check_figure(args.figure)
     first, second = (map_in(args, file) for file in (args.first, args.second))
     found = compare_maps(first, second, **_COMPARED.given(args))
-    file = args.output
-    if file is not None and Path(file).suffix == ".nc":
-        write_table(found, file)
-        args.output = None
     axes = {name: found[name].to_numpy() for name in first.axes}
     payload = {
         "name": first.name,
@@ -120,11 +102,10 @@ def _diff(args: argparse.Namespace) -> None:
         "tolerance": args.tolerance,
         "axes": [{"name": name, "entries": entries} for name, entries in axes.items()],
         **{name: found[name].to_numpy() for name in ("difference", "sd", "held_outside", "beyond")},
-        "file": file,
     }
-    emit(args, payload, text=_differences(args, found, first, second))
-    if args.figure is not None:
-        save_figure(drawn(map_cells, found, size=(6.6, 4.6), variable="difference"), args.figure)
+    picture = partial(drawn, map_cells, found, size=(6.6, 4.6), variable="difference")
+    text = _differences(args, found, first, second)
+    emit(args, payload, text=text, write=table_writers(found), figure=picture)
 
 
 def _differences(
@@ -150,3 +131,6 @@ def _differences(
         at = cell_at(axes, int(np.nanargmax(np.abs(values))))
         said = f"largest {largest:+.4g} {label.units} at {at}; root mean square {rms:.4g} {label.units}"
     return [*out, "", *grid_blocks(axes, first.labels, values, f"{label.long_name} [{label.units}]", flags), said]
+
+
+COMMANDS = {"show": (_add_show, _show), "diff": (_add_diff, _diff)}

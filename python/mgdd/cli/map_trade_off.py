@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import READING, grid_table, map_in
-from mgdd.cli.options import add_command, number_pairs, refuse_idle
-from mgdd.cli.output import check_figure, check_output, emit, save_figure
+from mgdd.cli.options import option, refuse_idle
+from mgdd.cli.output import emit
+from mgdd.cli.ranges import number_pairs
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.maps import apply_map
 from mgdd.plot import trade_off
@@ -23,42 +25,25 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["add_trade_off"]
-
 _ALONG, _EVERY = Options(trade_off, over="along"), Options(trade_off, "every")
-_SIZE = (6.6, 4.6)
 
 
-def add_trade_off(verbs: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        verbs, "trade-off", _trade_off,
-        help_text="set two variables of a table against each other along an input: what one costs in the other",
-        example="mgdd map trade-off table.nc --right p_max_bar --up efficiency_gross --at speed_rpm=2200 "
-        "--map smooth.json --figure trade_off.png",
-        endings=".json",
-    )  # fmt: skip
-    parser.add_argument(
-        "file", metavar="TABLE.nc",
-        help="over a grid of the input and perhaps operating axes: of mgdd engine sweep or mgdd map predict",
-    )  # fmt: skip
-    parser.add_argument("--right", required=True, metavar="NAME", help="variable to the right, as nox_affine_log_ppm")
-    parser.add_argument("--up", required=True, metavar="NAME", help="variable upwards, as efficiency_gross")
+def _add_trade_off(parser: Any) -> None:
+    option(parser, "file TABLE.nc",
+           "over a grid of the input and perhaps operating axes: of mgdd engine sweep or mgdd map predict")  # fmt: skip
+    option(parser, "--right NAME", "variable to the right, as nox_affine_log_ppm", required=True)
+    option(parser, "--up NAME", "variable upwards, as efficiency_gross", required=True)
     _ALONG.add(parser)
-    parser.add_argument(
-        "--at", action="append", default=[], metavar="AXIS=X",
-        help="keep an operating axis at one of its breakpoints; one axis may be left, with a line for each of its "
-        "breakpoints; repeatable",
-    )  # fmt: skip
-    parser.add_argument("--map", metavar="MAP", help="also say where the values of this map stand on the lines")
+    option(parser, "--at AXIS=X ...",
+           "keep an operating axis at one of its breakpoints; one axis may be left, with a line for each of its "
+           "breakpoints; repeatable")  # fmt: skip
+    option(parser, "--map MAP", "also say where the values of this map stand on the lines")
     READING.add(parser)
     _EVERY.add(parser)
-    parser.add_argument("--figure", metavar="FILE", help="draw it (.png, .svg or .pdf)")
+    option(parser, "--figure FILE", "draw it (.png, .svg or .pdf)")
 
 
 def _trade_off(args: argparse.Namespace) -> None:
-    check_output(args, ".json")
-    check_figure(args.figure)
     args.along = _ALONG.of(args)["over"]
     if args.map is None:
         refuse_idle(args, "name", "rows", "columns", why="without --map no map is read")
@@ -78,10 +63,9 @@ def _trade_off(args: argparse.Namespace) -> None:
         marked = marked[[args.along, args.right, args.up]].sel(fixed)
     lines = _lines(args, shown, marked, free)
     payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}
-    emit(args, payload, text=_text(args, shown, lines, free))
-    if args.figure is not None:
-        how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
-        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
+    how = {"x": args.right, "y": args.up, "over": args.along, **_EVERY.given(args)}
+    picture = partial(drawn, trade_off, shown, size=(6.6, 4.6), marked=marked, **how)
+    emit(args, payload, text=_text(args, shown, lines, free), figure=picture)
 
 
 def _axes(args: argparse.Namespace, table: xr.Dataset) -> tuple[str, ...]:
@@ -153,3 +137,6 @@ def _text(
         row += [f"{line['chosen'][name]:.4g}" for name in names if chosen]
         rows.append(tuple(row))
     return [Table(columns=columns, rows=tuple(rows))]
+
+
+COMMANDS = {"trade-off": (_add_trade_off, _trade_off)}

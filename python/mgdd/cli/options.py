@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import argparse
 import functools
-import logging
 import math
-import re
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, as_option
+from mgdd.cli.output import warn
+from mgdd.cli.ranges import assignments
 from mgdd.engine import analyze, simulate
-from mgdd.errors import ParameterError, hinted
+from mgdd.errors import ParameterError
 from mgdd.io import Encoder, pressure_chunks, read_pressure
 from mgdd.io.files import existing_file
 from mgdd.io.point_table import CONDITIONS, conditions_of
@@ -23,33 +23,8 @@ from mgdd.presets.preset import Preset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "CYLINDER_CHOICES",
-    "GEOMETRY",
-    "PEGGING",
-    "READING",
-    "SCHEME",
-    "Parser",
-    "UsageError",
-    "add_command",
-    "add_encoder",
-    "add_engine",
-    "add_files",
-    "add_group",
-    "assignments",
-    "assumed_geometry",
-    "check_pegging",
-    "encoder_of",
-    "engine_of",
-    "number_pairs",
-    "point_given",
-    "readers_of",
-    "refuse_idle",
-    "require_positive",
-    "traces_of",
-]
+__all__ = ["refuse_idle"]  # what other packages take
 
-_LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
 GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
@@ -64,11 +39,6 @@ _ENCODER = Options(
     Encoder, column="encoder", teeth="encoder_teeth", missing_teeth="encoder_missing_teeth",
     index_column="encoder_index", falling="encoder_falling", level="encoder_level",
 )  # fmt: skip
-# What other libraries of optimisation call an option.
-_OTHERWISE = {
-    "--method": "--seeker", "--optimizer": "--seeker", "--algorithm": "--seeker", "--bounds": "--input",
-    "--x0": "--start", "--iterations": "--cycles", "--options": "--seeker-set", "--constraint": "--limit",
-}  # fmt: skip
 CYLINDER_CHOICES = {
     "burn": "burn_shape",
     "gamma": "gamma_model",
@@ -77,120 +47,48 @@ CYLINDER_CHOICES = {
 }
 
 
-class UsageError(Exception):
-    """A command line that no command takes; it carries the parser that knows the usage."""
-
-    def __init__(self, message: str, parser: argparse.ArgumentParser) -> None:
-        super().__init__(message)
-        self.parser = parser
+_NUMBERS: dict[str, type] = {"X": float, "N": int}
 
 
-class Parser(argparse.ArgumentParser):
-    """An argument parser that raises usage errors, so that ``--json`` commands can print them as JSON."""
-
-    later: Callable[[Parser], None] | None = None  # adds the options of a command when they are wanted, not before
-
-    def filled(self) -> Parser:
-        """Give the parser with all its options."""
-        later, self.later = self.later, None
-        if later is not None:
-            try:
-                later(self)
-            except ImportError as error:
-                self.error(str(error))
-        return self
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse with all options."""
-        self.filled()
-        return super().parse_known_args(args, namespace)
-
-    def error(self, message: str) -> NoReturn:
-        """Raise the message, with the nearest choice behind one that is none."""
-        if found := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)$", message):
-            message = hinted(message, found[1], [choice.strip("' ") for choice in found[2].split(",")])
-        raise UsageError(message, self)
-
-    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuse what the command that was found does not know, with the nearest of its options."""
-        found, extra = self.parse_known_args(args, namespace)
-        if extra:
-            known = re.findall(r"--[a-z-]+", found.parser.format_usage())
-            strange = next((word.partition("=")[0] for word in extra if word.startswith("--")), "")
-            strange = _OTHERWISE.get(strange, strange)
-            found.parser.error(hinted(f"unrecognized arguments: {' '.join(extra)}", strange, known))
-        return found
-
-
-def add_group(commands: Any, name: str, *, help_text: str, example: str) -> Any:
-    """Add a group of commands, and return what they are added to."""
-    group = commands.add_parser(
-        name, help=help_text, epilog=f"example:\n  {example}", formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    group.set_defaults(parser=group)
-    return group.add_subparsers(title="commands", metavar="COMMAND")
-
-
-def add_command(
-    commands: Any,
-    name: str,
-    run: Callable[[argparse.Namespace], None],
-    *,
-    help_text: str,
-    example: str,
-    endings: str = ".json",
-) -> argparse.ArgumentParser:
-    """Add a command with its example, its JSON switch and its output file."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name,
-        help=help_text,
-        description=help_text,
-        epilog=f"example:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
-    parser.add_argument("-o", "--output", metavar="FILE", help=f"write the result to FILE ({endings})")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
-    parser.set_defaults(run=run, parser=parser)
-    return parser
+def option(parser: Any, form: str, text: str, **how: Any) -> None:
+    """Add an option, written as it is typed: `--step`, `--port N`, `--gain X`, `--limit NAME=X ...` if repeatable."""
+    name, _, value = form.removesuffix(" ...").partition(" ")
+    if form.endswith(" ..."):
+        how |= {"action": "append", "default": []}
+    if value:
+        how = {"metavar": value, "type": _NUMBERS.get(value), **how}
+    elif "choices" not in how:
+        how["action"] = "store_true"
+    shown = " (default: %(default)s)" if how.get("default") else ""
+    parser.add_argument(name, help=text + shown, **how)
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
     """Add the options of a cylinder and an operating point; their names are those of the parameters."""
     group = parser.add_argument_group("engine")
-    group.add_argument(
-        "--preset", metavar="NAME_OR_FILE.toml",
-        help=f"{', '.join(presets.available('engine'))} or a TOML file (default: {_DEFAULT_PRESET})",
-    )  # fmt: skip
-    group.add_argument(
-        "--set", action="append", default=[], metavar="FIELD=VALUE",
-        help="any field of the cylinder or point, repeatable, for example bore_mm=90",
-    )  # fmt: skip
+    option(group, "--preset NAME_OR_FILE.toml",
+           f"{', '.join(presets.available('engine'))} or a TOML file (default: {_DEFAULT_PRESET})")  # fmt: skip
+    option(group, "--set FIELD=VALUE ...", "any field of the cylinder or point, repeatable, for example bore_mm=90")
     for field, info in OperatingPoint.fields().items():
         unit = "" if info["unit"] == "-" else f" [{info['unit']}]"
-        meaning = info["meaning"].replace("; none = ", "; left out: ")
-        group.add_argument(as_option(field), type=float, metavar="X", help=f"{meaning}{unit}")
-    group.add_argument("--motored", action="store_true", help="no fuel")
-    for option, field in CYLINDER_CHOICES.items():
-        info = Cylinder.fields()[field]
-        group.add_argument(as_option(option), choices=info["choices"], help=info["meaning"])
+        option(group, f"{as_option(field)} X", info["meaning"].replace("; none = ", "; left out: ") + unit)
+    option(group, "--motored", "no fuel")
+    for name, field in CYLINDER_CHOICES.items():
+        option(group, as_option(name), Cylinder.fields()[field]["meaning"], choices=Cylinder.fields()[field]["choices"])
 
 
 def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     """Add pressure files and how to read them."""
-    parser.add_argument(
-        "files", nargs=nargs, metavar="FILE",
-        help="measured pressure as text: one column of crank angle [°CA aTDC: firing TDC = 0, compression negative] "
-        "and one of pressure, or one per cycle; several cycles may also stand below each other",
-    )  # fmt: skip
+    option(parser, "files FILE",
+           "measured pressure as text: one column of crank angle [°CA aTDC: firing TDC = 0, compression negative] and "
+           "one of pressure, or one per cycle; several cycles may also stand below each other",
+           nargs=nargs)  # fmt: skip
     group = parser.add_argument_group("what the files hold, where they do not say it or say it otherwise")
     for options in (_COLUMNS, READING):
         options.add(group)
     add_encoder(parser)
-    group.add_argument(
-        "--conditions", metavar="FILE.csv",
-        help=f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}",
-    )  # fmt: skip
+    option(group, "--conditions FILE.csv",
+           f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}")  # fmt: skip
 
 
 def add_encoder(parser: argparse.ArgumentParser) -> None:
@@ -240,12 +138,12 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, Prese
     preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
     cylinder = {name: value for name, value in _set(args).items() if name not in _POINT}
     if getattr(args, "files", None) and (assumed := assumed_geometry(args)):
-        _LOG.warning("no engine is given: the traces are read with %s; give --preset or --set", assumed)
-    for option, field in CYLINDER_CHOICES.items():
-        if getattr(args, option) is not None:
+        warn(f"no engine is given: the traces are read with {assumed}; give --preset or --set")
+    for name, field in CYLINDER_CHOICES.items():
+        if getattr(args, name) is not None:
             if field in cylinder:
-                raise ParameterError(f"{as_option(option)} and --set {field} contradict each other: give one")
-            cylinder[field] = getattr(args, option)
+                raise ParameterError(f"{as_option(name)} and --set {field} contradict each other: give one")
+            cylinder[field] = getattr(args, name)
     return preset.cylinder.replace(**cylinder), preset.point.replace(**point_given(args)), preset
 
 
@@ -276,8 +174,7 @@ def readers_of(args: argparse.Namespace) -> dict[str, Callable[[], Any]]:
         return noted(read_pressure(file, **how), file)
 
     def noted(trace: xr.Dataset, file: str) -> xr.Dataset:
-        for warning in trace.attrs["warnings"].splitlines():
-            _LOG.warning("%s: %s", trace.attrs["file"], warning)
+        warn(*trace.attrs["warnings"].splitlines(), of=trace.attrs["file"])
         return trace.assign_attrs(**rows[file])
 
     return {file: functools.partial(read, file) for file in args.files}
@@ -306,47 +203,8 @@ def require_positive(args: argparse.Namespace, *names: str) -> None:
             raise ParameterError.of(as_option(name), value, f"> 0 {name.rpartition('_')[2]} and finite")
 
 
-def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
-    """Read repeated NAME=NUMBER options."""
-    out: dict[str, float] = {}
-    for item in items:
-        name, value = _pair(item, option, "NAME=NUMBER")
-        number = _value(name, value, {})
-        if isinstance(number, str):
-            raise ParameterError(f"{option} {item}: {value!r} is not a number")
-        _once(name, option, out)
-        out[name] = number
-    return out
-
-
-def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]], option: str = "--set") -> dict[str, Any]:
-    """Read repeated FIELD=VALUE of an option; the caller judges a name that is not a field."""
-    out: dict[str, Any] = {}
-    for item in items:
-        name, value = _pair(item, option, "FIELD=VALUE")
-        _once(name, option, out)
-        out[name] = _value(name, value, fields)
-    return out
-
-
-def _once(name: str, option: str, known: Mapping[str, Any]) -> None:
-    if name in known:
-        raise ParameterError(f"{option} {name} is given twice: give it once")
-
-
-def _pair(item: str, option: str, form: str) -> tuple[str, str]:
-    name, sign, value = item.partition("=")
-    if not (sign and name.strip() and value.strip()):
-        raise ParameterError(f"{option} {item}: write {form}")
-    return name.strip().replace("-", "_"), value.strip()
-
-
-def _value(name: str, text: str, fields: Mapping[str, Mapping[str, Any]]) -> float | str:
-    if "choices" in fields.get(name, {}):
-        return text
-    try:
-        return float(text)
-    except ValueError:
-        if name in fields:
-            raise ParameterError.of(name, text, f"a number [{fields[name]['unit']}]") from None
-        return text
+def add_over(parser: Any, *, what: str) -> None:
+    """Add the option of a grid."""
+    option(parser, "--over NAME=LOW:HIGH:N ...",
+           f"N even values of {what} from LOW to HIGH, both included, or NAME=VALUE,VALUE for values of your own, in "
+           "the unit that the name ends in; repeatable, one dimension each")  # fmt: skip

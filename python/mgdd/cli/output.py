@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
+import logging
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any
 
+from mgdd.cli.progress import is_terminal, trusted
 from mgdd.errors import Interrupted, ParameterError, printable
 from mgdd.io.files import write_whole, write_whole_text
 from mgdd.io.plain_csv import write_traces
@@ -21,26 +23,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = [
-    "Stopped",
-    "check_figure",
-    "check_file",
-    "check_output",
-    "emit",
-    "error_of",
-    "fail",
-    "gated_streams",
-    "lines",
-    "save_figure",
-    "show",
-    "trusted",
-    "whole_or_part",
-    "wrote",
-]
 
+__all__ = ["emit", "whole_or_part"]  # what other packages take
 
-class Stopped(KeyboardInterrupt):
-    """Ctrl-C after which something was kept; the message says what."""
+_LOG = logging.getLogger(__name__)
 
 
 def whole_or_part(work: Callable[..., Report], *given: Any, **options: Any) -> tuple[Report, bool]:
@@ -53,49 +39,10 @@ def whole_or_part(work: Callable[..., Report], *given: Any, **options: Any) -> t
         return stop.partial, True
 
 
-class _Gate:
-    """A stream of text to which nothing goes that a terminal would obey."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self.trusted = stream
-
-    def write(self, text: str) -> int:
-        """Write a text with such letters written out."""
-        return self.trusted.write(printable(text))
-
-    def writelines(self, lines: Iterable[str]) -> None:
-        """Write texts as `write` does."""
-        for each in lines:
-            self.write(each)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.trusted, name)
-
-
-def trusted(stream: TextIO) -> TextIO:
-    """Give the stream behind the gate, for colours and cursors of our own."""
-    found: TextIO = getattr(stream, "trusted", stream)
-    return found
-
-
-@contextlib.contextmanager
-def gated_streams() -> Iterator[None]:
-    """Put a gate before stdout and stderr: results, errors, warnings, logs and usage have texts of files in them."""
-    with (
-        contextlib.redirect_stdout(cast("TextIO", _Gate(sys.stdout))),
-        contextlib.redirect_stderr(cast("TextIO", _Gate(sys.stderr))),
-    ):
-        yield
-
-
-def check_output(args: argparse.Namespace, *endings: str) -> None:
-    """Refuse an output file of unknown kind before any work is done; JSON is known where nothing is said."""
-    check_file("-o", args.output, endings or (".json",))
-
-
-def check_figure(file: str | None) -> None:
-    """Refuse a figure of unknown kind before any work is done."""
-    check_file("--figure", file, (".png", ".svg", ".pdf"))
+def check_files(args: argparse.Namespace) -> None:
+    """Refuse an output file or a figure of unknown kind before any work is done."""
+    check_file("-o", args.output, args.endings)
+    check_file("--figure", vars(args).get("figure"), (".png", ".svg", ".pdf"))
 
 
 def check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
@@ -120,27 +67,42 @@ def wrote(file: str) -> None:
     print(f"wrote {file}", file=sys.stderr)
 
 
+def warn(*doubts: object, of: str = "") -> None:
+    """Say doubts on stderr, of a file if it is named."""
+    for doubt in doubts:
+        _LOG.warning("%s%s", f"{of}: " if of else "", doubt)
+
+
 def emit(
     args: argparse.Namespace,
     payload: Mapping[str, Any],
     *,
     text: str | Sequence[str | Table] | None = None,
     traces: xr.Dataset | None = None,
+    write: Mapping[str, Callable[[str], None]] | None = None,
+    figure: Callable[[], Figure] | None = None,
 ) -> None:
-    """Print the result, as one JSON object or as text, and write it to the output file."""
-    plain = to_jsonable(payload)
+    """Print the result, as one JSON object or as text, and write it to the output file, then the figure.
+
+    `write` has by its ending what writes a file that is not this JSON; the object names the file then.
+    """
+    file, write = args.output, write if write is not None or traces is None else {".csv": partial(write_traces, traces)}
+    plain = to_jsonable({**payload, "file": file} if write is not None and traces is None else payload)
     args.progress.close()
-    if args.output is not None:
-        if Path(args.output).suffix == ".csv" and traces is not None:
-            write_traces(traces, args.output)
+    if file is not None:
+        writer = (write or {}).get(Path(file).suffix)
+        if writer is None:
+            write_whole_text(file, json_text(plain) + "\n")
         else:
-            write_whole_text(args.output, _json(plain) + "\n")
-        wrote(args.output)
+            writer(file)
+        wrote(file)
     args.emitted = True
     if args.json:
-        print(_json(plain))
+        print(json_text(plain))
     else:
         print(show([text] if isinstance(text, str) else text or [lines(plain)]), file=trusted(sys.stdout))
+    if figure is not None and args.figure is not None:
+        save_figure(figure(), args.figure)
 
 
 def lines(payload: Mapping[str, Any]) -> str:
@@ -156,12 +118,6 @@ def lines(payload: Mapping[str, Any]) -> str:
     return "\n".join(out)
 
 
-def fail(args: argparse.Namespace, error: BaseException, message: str) -> None:
-    """Print an error as the one JSON object of a ``--json`` command, unless its result is there already."""
-    if not vars(args).get("emitted") and vars(args).get("json"):
-        print(_json({"error": error_of(error, message)}))
-
-
 def error_of(error: BaseException, message: str) -> dict[str, Any]:
     """Give type, field, value, bound and message of an error; what it does not know is None."""
     known = {name: getattr(error, name, None) for name in ("field", "value", "bound")}
@@ -174,11 +130,6 @@ def _plain(value: Any) -> Any:
         return to_jsonable(value)
     except TypeError:
         return repr(value)
-
-
-def is_terminal() -> bool:
-    """Whether a person reads stdout."""
-    return sys.stdout.isatty()
 
 
 def show(blocks: Sequence[str | Table]) -> str:
@@ -243,5 +194,6 @@ def _columns(table: Table) -> str:
     )
 
 
-def _json(plain: Any) -> str:
+def json_text(plain: Any) -> str:
+    """Write plain data as JSON."""
     return json.dumps(plain, indent=2, ensure_ascii=False, allow_nan=False)

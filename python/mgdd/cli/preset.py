@@ -8,42 +8,26 @@ from typing import Any
 
 from mgdd import presets
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, add_group
-from mgdd.cli.output import check_file, check_output, emit, wrote
+from mgdd.cli.options import option
+from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
 from mgdd.io.files import write_whole_text
 from mgdd.presets.preset import Preset
 from mgdd.report import Table
 
-__all__ = ["add"]
-
 _KIND = Options(presets.available, "kind")
 
 
-def add(commands: Any) -> None:
-    """Add the group and its commands."""
-    verbs = add_group(
-        commands, "preset", help_text="named engines and throttles: list, show, copy", example="mgdd preset show P1"
-    )
-    listed = add_command(
-        verbs, "list", _list, help_text="name the shipped presets", example="mgdd preset list --kind throttle"
-    )
-    _KIND.add(listed)
-    shown = add_command(
-        verbs, "show", _show, help_text="show every value of a preset with its unit and source",
-        example="mgdd preset show puma_single --json",
-    )  # fmt: skip
-    copied = add_command(
-        verbs, "copy", _copy, help_text="write a preset into a new file, which --preset reads after you changed it",
-        example="mgdd preset copy puma_single mine.toml",
-    )  # fmt: skip
-    for parser in (shown, copied):
-        parser.add_argument("name", metavar="NAME_OR_FILE.toml", help=", ".join(presets.available()))
-    copied.add_argument("file", metavar="FILE.toml", help="new file")
+def _add_name(parser: Any) -> None:
+    option(parser, "name NAME_OR_FILE.toml", ", ".join(presets.available()))
+
+
+def _add_copy(parser: Any) -> None:
+    _add_name(parser)
+    option(parser, "file FILE.toml", "new file (default: NAME.toml)", nargs="?")
 
 
 def _list(args: argparse.Namespace) -> None:
-    check_output(args)
     found = [presets.load(name) for name in presets.available(**_KIND.given(args))]
     rows = [{"name": preset.name, "kind": preset.kind, "title": preset.title} for preset in found]
     table = Table(columns=("name", "kind", "title"), rows=tuple(tuple(row.values()) for row in rows))
@@ -51,7 +35,6 @@ def _list(args: argparse.Namespace) -> None:
 
 
 def _show(args: argparse.Namespace) -> None:
-    check_output(args)
     preset = presets.load(args.name)
     tables = preset.to_parameters().tables
     values = {
@@ -69,7 +52,7 @@ def _show(args: argparse.Namespace) -> None:
 
 
 def _copy(args: argparse.Namespace) -> None:
-    check_output(args)
+    args.file = args.file or f"{Path(args.name).stem}.toml"
     check_file("FILE", args.file, (".toml",))
     preset = presets.load(args.name)
     if Path(args.file).exists():
@@ -79,3 +62,6 @@ def _copy(args: argparse.Namespace) -> None:
     write_whole_text(args.file, own.to_toml())
     emit(args, {"name": preset.name, "file": args.file}, text=f"--preset {args.file} reads it")
     wrote(args.file)
+
+
+COMMANDS = {"list": (_KIND.add, _list), "show": (_add_name, _show), "copy": (_add_copy, _copy)}

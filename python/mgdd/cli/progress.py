@@ -1,21 +1,64 @@
-"""Progress on stderr: a bar in a terminal, elsewhere a line every few seconds; no command is silent for long."""
+"""What goes to the terminal: nothing that it would obey, and progress, so that no command is silent for long."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import threading
 import time
+from collections.abc import Iterable, Iterator
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self, TextIO, cast
 
-from mgdd.cli.output import trusted
+from mgdd.errors import printable
 
-if TYPE_CHECKING:
-    from typing import TextIO
-
-__all__ = ["Progress"]
+__all__ = ["Progress", "Stopped"]  # what other packages take
 
 _INTERVAL_S = 12.0
+
+
+class Stopped(KeyboardInterrupt):
+    """Ctrl-C after which something was kept; the message says what."""
+
+
+class _Gate:
+    """A stream of text to which nothing goes that a terminal would obey."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.trusted = stream
+
+    def write(self, text: str) -> int:
+        """Write a text with such letters written out."""
+        return self.trusted.write(printable(text))
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        """Write texts as `write` does."""
+        for each in lines:
+            self.write(each)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.trusted, name)
+
+
+def trusted(stream: TextIO) -> TextIO:
+    """Give the stream behind the gate, for colours and cursors of our own."""
+    found: TextIO = getattr(stream, "trusted", stream)
+    return found
+
+
+@contextlib.contextmanager
+def gated_streams() -> Iterator[None]:
+    """Put a gate before stdout and stderr: results, errors, warnings, logs and usage have texts of files in them."""
+    with (
+        contextlib.redirect_stdout(cast("TextIO", _Gate(sys.stdout))),
+        contextlib.redirect_stderr(cast("TextIO", _Gate(sys.stderr))),
+    ):
+        yield
+
+
+def is_terminal() -> bool:
+    """Whether a person reads stdout."""
+    return sys.stdout.isatty()
 
 
 class Progress:

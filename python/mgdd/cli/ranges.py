@@ -1,9 +1,9 @@
-"""Ranges by name: `--over NAME=LOW:HIGH:N` or `NAME=VALUE,VALUE` of grids and designs, `--input NAME=LOW:HIGH`."""
+"""What stands behind a name: `--set NAME=VALUE`, `--over NAME=LOW:HIGH:N` of a grid, `--input NAME=LOW:HIGH`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -13,23 +13,12 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["add_over", "bounds_of", "factors_of", "grid_of", "limits_given"]
-
 _Number = TypeVar("_Number", int, float)
 
 _FORM = "write NAME=LOW:HIGH:N, for example soc_cad=-20:5:51, or NAME=VALUE,VALUE"
 _FACTOR_FORM = "write NAME=LOW:HIGH, for example fuel_mg=6:36, NAME=LOW:HIGH:N or NAME=VALUE,VALUE"
 _LIMIT_FORM = "write NAME=X, or NAME=LOW:HIGH, LOW < HIGH, of which one may be left out, as imep_gross_bar=9:"
 _INPUT_FORM = "write NAME=LOW:HIGH, for example soc_cad=-20:5, or NAME=LOW:HIGH:STEP"
-
-
-def add_over(parser: Any, *, what: str) -> None:
-    """Add the option of a grid."""
-    parser.add_argument(
-        "--over", action="append", default=[], metavar="NAME=LOW:HIGH:N",
-        help=f"N even values of {what} from LOW to HIGH, both included, or NAME=VALUE,VALUE for values of your own, in "
-        "the unit that the name ends in; repeatable, one dimension each",
-    )  # fmt: skip
 
 
 def grid_of(given: Sequence[str]) -> dict[str, NDArray[np.float64]]:
@@ -96,6 +85,33 @@ def limits_given(given: Sequence[str]) -> dict[str, float | tuple[float, float]]
             raise ParameterError(f"--limit {item}: {_LIMIT_FORM}") from None
         limits[name] = sides
     return limits
+
+
+def number_pairs(given: Sequence[str], option: str) -> dict[str, float]:
+    """Read repeated NAME=NUMBER options."""
+    out = assignments(given, {}, option, "NAME=NUMBER")
+    for name, value in out.items():
+        if isinstance(value, str):
+            raise ParameterError(f"{option} {name}={value}: {value!r} is not a number")
+    return out
+
+
+def assignments(
+    given: Sequence[str], fields: Mapping[str, Mapping[str, Any]], option: str = "--set", form: str = "FIELD=VALUE"
+) -> dict[str, Any]:
+    """Read repeated FIELD=VALUE of an option; the caller judges a name that is not a field."""
+    out: dict[str, Any] = {}
+    for item in given:
+        name, value = _split(item, out, f"write {form}", option)
+        out[name] = value.strip()
+        if "choices" in fields.get(name, {}):
+            continue
+        try:
+            out[name] = float(value)
+        except ValueError:
+            if name in fields:
+                raise ParameterError.of(name, value.strip(), f"a number [{fields[name]['unit']}]") from None
+    return out
 
 
 def _split(item: str, known: Any, form: str, option: str = "--over") -> tuple[str, str]:

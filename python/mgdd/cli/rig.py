@@ -10,10 +10,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from mgdd.cli import rig_records, rig_run, rig_watch
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
-from mgdd.cli.output import check_file, check_output, emit
+from mgdd.cli.options import option, refuse_idle, require_positive
+from mgdd.cli.output import check_file, emit
+from mgdd.cli.rig_records import add_bus
 from mgdd.report import Table
 from mgdd.rig import Experiment, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub import Hub
@@ -25,8 +25,6 @@ from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import simulated_plant
 from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test
 
-__all__ = ["add"]
-
 _HUB = Options(Hub, "host", "bit_rate", "seed")
 _NODE, _PLANT = Options(run_node, "step"), Options(node_of, "seed")
 _SELF_TEST = Options(run_self_test, "loop")
@@ -34,70 +32,32 @@ _FAILED = 1
 _LOOK_S = 0.2  # how often the hub looks for the process that started it
 
 
-def add(commands: Any) -> None:
-    """Add the group and its commands."""
-    verbs = add_group(
-        commands, "rig",
-        help_text="experiments in process, over a CAN bus and on a bench",
-        example="mgdd rig run track.toml --mode hil",
-    )  # fmt: skip
-    rig_run.add(verbs)
-    rig_records.add(verbs)
-    _add_selftest(verbs)
-    rig_watch.add(verbs)
-    _add_hub(verbs)
-    _add_node(verbs)
-
-
-def _add_hub(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "hub", _hub,
-        help_text="join processes of this machine by a bus of the socketcand protocol, until Ctrl-C or its parent ends",
-        example="mgdd rig hub --port 29536 --fault drop:p=0.01 --bit-rate 500000",
-    )  # fmt: skip
+def _add_hub(parser: Any) -> None:
     _HUB.add(parser)
-    parser.add_argument(
-        "--port", type=int, default=29536, metavar="N", help="0 takes a free one (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--fault", action="append", default=[], metavar="KIND:KEY=VALUE,...",
-        help="drop, duplicate, delay, reorder, corrupt, error or freeze, with p, id, from_s, until_s, ms, class, "
-        "client; repeatable, for example delay:ms=5,id=0x121",
-    )  # fmt: skip
+    option(parser, "--port N", "0 takes a free one", default=29536)
+    option(parser, "--fault KIND:KEY=VALUE,... ...",
+           "drop, duplicate, delay, reorder, corrupt, error or freeze, with p, id, from_s, until_s, ms, class, "
+           "client; repeatable, for example delay:ms=5,id=0x121")  # fmt: skip
 
 
-def _add_node(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "node", _node,
-        help_text="serve a virtual throttle or engine bench behind a bus, until Ctrl-C or its parent ends",
-        example="mgdd rig node --map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv",
-    )  # fmt: skip
-    parser.add_argument(
-        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: %(default)s)"
-    )
-    rig_records.add_bus(parser)
-    parser.add_argument(
-        "--envelope", default="etb_node", metavar="NAME_OR_FILE.toml",
-        help="of the safety gate of the node; cycle and time limit come from the map (default: %(default)s)",
-    )  # fmt: skip
+def _add_node(parser: Any) -> None:
+    option(parser, "--map NAME_OR_FILE.toml", "etb, engine or a file", default="etb")
+    add_bus(parser)
+    option(parser, "--envelope NAME_OR_FILE.toml",
+           "of the safety gate of the node; cycle and time limit come from the map", default="etb_node")  # fmt: skip
     _NODE.add(parser)
-    parser.add_argument("--period-ms", type=float, metavar="X", help="between samples (default: that of the map)")
-    parser.add_argument(
-        "--sample-ms", type=float, metavar="X", help="time in the throttle per sample (default: the same)"
-    )
-    parser.add_argument(
-        "--fault", action="append", default=[], metavar="KIND:KEY=VALUE,...",
-        help="of the throttle and its sensors, with from_s, until_s, size, sensor; repeatable, for example "
-        "offset:sensor=2,size=0.3,from_s=1",
-    )  # fmt: skip
+    option(parser, "--period-ms X", "between samples (default: that of the map)")
+    option(parser, "--sample-ms X", "time in the throttle per sample (default: the same)")
+    option(parser, "--fault KIND:KEY=VALUE,... ...",
+           "of the throttle and its sensors, with from_s, until_s, size, sensor; repeatable, for example "
+           "offset:sensor=2,size=0.3,from_s=1")  # fmt: skip
     _PLANT.add(parser)
-    parser.add_argument("--experiment", metavar="FILE.toml", help="serve the plant of this experiment, with its seed")
-    parser.add_argument("--truth", metavar="FILE.csv", help="write a line per sample: what really happened")
-    parser.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
+    option(parser, "--experiment FILE.toml", "serve the plant of this experiment, with its seed")
+    option(parser, "--truth FILE.csv", "write a line per sample: what really happened")
+    option(parser, "--duration-s X", "end after this time (default: never)")
 
 
 def _hub(args: argparse.Namespace) -> None:
-    check_output(args)
     hub = Hub(port=args.port, faults=[BusFault.parse(text) for text in args.fault], **_HUB.given(args))
     args.progress.close()
     asyncio.run(_serve(args, hub))
@@ -120,7 +80,6 @@ async def _serve(args: argparse.Namespace, hub: Hub) -> None:
 
 
 def _node(args: argparse.Namespace) -> None:
-    check_output(args)
     check_file("--truth", args.truth, (".csv",))
     require_positive(args, "period_ms", "sample_ms", "duration_s")
     signal_map = SignalMap.load(args.map)
@@ -170,18 +129,11 @@ def _say(args: argparse.Namespace, text: str) -> None:
     print(text, file=sys.stderr if args.json else sys.stdout, flush=True)
 
 
-def _add_selftest(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "selftest", _selftest,
-        help_text="let a process that drives a simulated throttle over a bus die in six ways, and time the plate's way "
-        "to limp-home; exit code 1 above 0.4 s",
-        example="mgdd rig selftest --json",
-    )  # fmt: skip
+def _add_selftest(parser: Any) -> None:
     _SELF_TEST.add(parser)
 
 
 def _selftest(args: argparse.Namespace) -> None:
-    check_output(args)
     how = _SELF_TEST.of(args)
     test = run_self_test(progress=args.progress.expect(len(WAYS_OF[how["loop"]])), **how)
     rows = tuple(
@@ -192,3 +144,6 @@ def _selftest(args: argparse.Namespace) -> None:
     emit(args, test.to_dict(), text=[Table(columns=("way to die", "home after [s]", "note"), rows=rows), said])
     if not test.passed:
         args.exit_code = _FAILED
+
+
+COMMANDS = {"hub": (_add_hub, _hub), "node": (_add_node, _node), "selftest": (_add_selftest, _selftest)}

@@ -1,23 +1,26 @@
-"""`mgdd rig record | replay | export`: frames of a bus into a file, a recorded run again, a record for other tools."""
+"""`mgdd rig record | replay | export | watch`: frames of a bus into a file, again, for other tools, and as a page."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import os
+import sys
 import time
+import webbrowser
+from html import escape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, require_positive
-from mgdd.cli.output import check_output, emit, lines, wrote
-from mgdd.errors import DataError
-from mgdd.rig import Experiment, Recorder, export_record, run_experiment
+from mgdd.cli.options import option, require_positive
+from mgdd.cli.output import emit, lines, wrote
+from mgdd.errors import DataError, ParameterError
+from mgdd.rig import Experiment, Recorder, export_record, run_experiment, watch
 from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment import check_experiment
-
-__all__ = ["add", "add_bus"]
 
 _KEEP, _EXPORT = Options(run_experiment, "folder"), Options(export_record, "kind")
 _POLL_S = 0.1
@@ -25,42 +28,30 @@ _SYNC_S = 1.0
 _DIFFERENT = 1
 
 
-def add(verbs: Any) -> None:
-    """Add the three commands."""
-    record = add_command(
-        verbs, "record", _record,
-        help_text="listen on a bus and write every frame into a record, until Ctrl-C; nothing is sent",
-        example="mgdd rig record bench.rec --bus socketcan:can0 --duration-s 60",
-    )  # fmt: skip
-    record.add_argument("file", metavar="FILE.rec", help="new record")
-    add_bus(record)
-    record.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
-    replay = add_command(
-        verbs, "replay", _replay,
-        help_text="give the measurements of a recorded run to its controller again, and compare every output bit for "
-        "bit; exit code 1 where one differs",
-        example="mgdd rig replay mgdd-runs/first --json",
-    )  # fmt: skip
-    replay.add_argument("source", metavar="DIR", help="folder of a run, with experiment.toml and run.rec")
-    _KEEP.add(replay)
-    export = add_command(
-        verbs, "export", _export,
-        help_text="write a record in the format of other tools",
-        example="mgdd rig export run.rec run.mf4",
-    )  # fmt: skip
-    export.add_argument("file", metavar="FILE.rec", help="record")
-    export.add_argument("target", metavar="TARGET", help="file, or a new folder for netcdf, csv and parquet")
-    _EXPORT.add(export)
+def _add_record(parser: Any) -> None:
+    option(parser, "file FILE.rec", "new record")
+    add_bus(parser)
+    option(parser, "--duration-s X", "end after this time (default: never)")
+
+
+def _add_replay(parser: Any) -> None:
+    option(parser, "source DIR", "folder of a run, with experiment.toml and run.rec")
+    _KEEP.add(parser)
+
+
+def _add_export(parser: Any) -> None:
+    option(parser, "file FILE.rec", "record")
+    option(parser, "target TARGET", "file, or a new folder for netcdf, csv and parquet")
+    _EXPORT.add(parser)
 
 
 def add_bus(parser: argparse.ArgumentParser) -> None:
     """Add the bus of a command that needs one."""
     what = "any interface of python-can, ?OPTION=VALUE&... behind"
-    parser.add_argument("--bus", required=True, metavar="INTERFACE:CHANNEL", help=what)
+    option(parser, "--bus INTERFACE:CHANNEL", what, required=True)
 
 
 def _record(args: argparse.Namespace) -> None:
-    check_output(args)
     require_positive(args, "duration_s")
     transport, frames = CanTransport.parse(args.bus), 0
     with transport, Recorder(args.file, config={"bus": args.bus}) as recorder:
@@ -82,7 +73,6 @@ def _record(args: argparse.Namespace) -> None:
 
 
 def _replay(args: argparse.Namespace) -> None:
-    check_output(args)
     folder = Path(args.source)
     for name in ("experiment.toml", "run.rec"):
         if not (folder / name).is_file():
@@ -92,16 +82,72 @@ def _replay(args: argparse.Namespace) -> None:
     compared = result.counters["replay"]
     same = compared["different"] == 0 and compared["samples"] > 0
     verdict = "every output is the recorded one, bit for bit" if same else "the outputs differ"
-    emit(
-        args,
-        {"same": same, "replay": compared, "result": result.figures},
-        text=f"{lines(compared)}\n\n{verdict}",
-    )
+    emit(args, {"same": same, "replay": compared, "result": result.figures}, text=f"{lines(compared)}\n\n{verdict}")
     if not same:
         args.exit_code = _DIFFERENT
 
 
 def _export(args: argparse.Namespace) -> None:
-    check_output(args)
     written = [str(path) for path in export_record(args.file, args.target, **_EXPORT.given(args))]
     emit(args, {"files": written}, text="\n".join(written))
+
+
+_LAST_PORT = 65_535
+_NICE = 10  # a loop that is late costs more than a picture that is
+_OPTIONS = Options(watch, "port", signal_map="map")
+
+
+def _add_watch(parser: Any) -> None:
+    option(parser, "source RUN | FILE.rec | INTERFACE:CHANNEL | simulate",
+           "folder of a run that goes on or is over, a record, a bus to listen on, or a simulated throttle",
+           default="simulate", nargs="?")  # fmt: skip
+    _OPTIONS.add(parser)
+    option(parser, "--no-browser", "print the address and open nothing")
+
+
+def _way_to(address: str, folder: Path) -> Path:
+    """Write a page that leads to the address: all users of the machine may read the arguments of a browser."""
+    file = folder / "mgdd.html"  # in a folder of this user alone
+    file.write_text(
+        f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={escape(address)}">'
+        f'<title>mgdd rig watch</title><a href="{escape(address)}">mgdd rig watch</a>\n',
+        encoding="utf-8",
+    )
+    return file
+
+
+def _watch(args: argparse.Namespace) -> None:
+    from mgdd.io.extras import import_extra
+    from mgdd.rig.can.node import parent_watch
+    from mgdd.rig.live.page import serve
+    from mgdd.rig.live.sources import source_of
+
+    how = _OPTIONS.of(args)
+    if not 0 <= how["port"] <= _LAST_PORT:
+        raise ParameterError.of("--port", how["port"], f"0 to {_LAST_PORT}")
+    import_extra("bokeh", "watch", "a live page")  # before a simulation is started
+    args.progress.close()
+    source = source_of(args.source, how["signal_map"])
+
+    with TemporaryDirectory(prefix="mgdd-watch-", ignore_cleanup_errors=True) as folder:
+
+        def ready(address: str) -> None:
+            if hasattr(os, "nice"):
+                os.nice(_NICE)  # now that the simulation has begun: that one shall not yield
+            print(address, file=sys.stderr if args.json else sys.stdout, flush=True)
+            if not args.no_browser:
+                webbrowser.open(_way_to(address, Path(folder)).as_uri())
+
+        try:
+            serve(source, how["port"], ready, alive=parent_watch())
+        finally:
+            source.close()
+    emit(args, {"watched": source.name, "said": source.said, "trouble": source.trouble})
+
+
+COMMANDS = {
+    "record": (_add_record, _record),
+    "replay": (_add_replay, _replay),
+    "export": (_add_export, _export),
+    "watch": (_add_watch, _watch),
+}

@@ -1,19 +1,21 @@
-"""`mgdd rig run | check`: an experiment from a file, and what it would do."""
+"""`mgdd rig run | check`: an experiment from a file, with a live view in a terminal, and what it would do."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import logging
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, refuse_idle
-from mgdd.cli.output import Stopped, check_output, emit, is_terminal, lines, wrote
+from mgdd.cli.options import option, refuse_idle
+from mgdd.cli.output import emit, lines, warn, wrote
+from mgdd.cli.progress import Stopped, is_terminal
 from mgdd.rig import CanRig, Experiment, run_experiment
 from mgdd.rig.can.modes import MODES
 from mgdd.rig.experiment import CheckedExperiment, ExperimentResult, check_experiment
@@ -21,38 +23,22 @@ from mgdd.rig.experiment import CheckedExperiment, ExperimentResult, check_exper
 if TYPE_CHECKING:
     from mgdd.rig.experiment.stand import Cycle
 
-__all__ = ["add"]
 
-_LOG = logging.getLogger(__name__)
 _WHERE = Options(Experiment.with_mode, "connection", "pace", "record")
 _ARMED = Options(run_experiment, "arm", "key_file")
 
 
-def add(verbs: Any) -> None:
-    """Add both commands."""
-    run = add_command(
-        verbs, "run", _run,
-        help_text="run an experiment: identify or track on a throttle, seek on an engine; in process, over a bus, on a "
-        "record or on a bench",
-        example="mgdd rig run track.toml --mode hil --folder runs/first",
+def _add_run(parser: Any) -> None:
+    _add_experiment(parser)
+    option(parser, "--folder DIR",
+           "new folder for record, signals, timing, result and figures (default: mgdd-runs/TASK-MODE-TIME)",
     )  # fmt: skip
-    _add_experiment(run)
-    run.add_argument(
-        "--folder", metavar="DIR", help="new folder for record, signals, timing, result and figures (default: "
-        "mgdd-runs/TASK-MODE-TIME)",
-    )  # fmt: skip
-    _ARMED.add(run)
-    check = add_command(
-        verbs, "check", _check,
-        help_text="check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
-        example="mgdd rig check track.toml --mode bench --connection socketcan:can0 --pace real_time --json",
-    )  # fmt: skip
-    _add_experiment(check)
+    _ARMED.add(parser)
 
 
 def _add_experiment(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="EXPERIMENT.toml", help="what to do; the page Experiments lists its keys")
-    parser.add_argument("--mode", choices=MODES, help="instead of the mode of the file")
+    option(parser, "file EXPERIMENT.toml", "what to do; the page Experiments lists its keys")
+    option(parser, "--mode", "instead of the mode of the file", choices=MODES)
     _WHERE.add(parser)
 
 
@@ -67,10 +53,8 @@ def _checked(args: argparse.Namespace) -> CheckedExperiment:
 
 
 def _run(args: argparse.Namespace) -> None:
-    check_output(args)
     checked = _checked(args)
-    for doubt in checked.to_dict().get("warnings", []):
-        _LOG.warning("%s", doubt)
+    warn(*checked.to_dict().get("warnings", []))
     experiment = checked.experiment
     stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
     folder = args.folder or str(Path("mgdd-runs") / f"{experiment.task}-{experiment.mode}-{stamp}")
@@ -89,8 +73,6 @@ def _watching(args: argparse.Namespace, checked: CheckedExperiment) -> Iterator[
     if args.quiet or args.json or not is_terminal():
         yield None
         return
-    from mgdd.cli.rig_live import LiveView
-
     args.progress.close()
     with LiveView(f"{checked.experiment.task}, {checked.experiment.mode}", checked.plan.samples) as view:
         yield view
@@ -102,7 +84,6 @@ def _text(result: ExperimentResult, folder: str) -> str:
 
 
 def _check(args: argparse.Namespace) -> None:
-    check_output(args)
     checked = _checked(args)
     found = checked.to_dict()
     if checked.experiment.bus.connection is not None and checked.signal_map is not None:
@@ -126,3 +107,70 @@ def _listen(checked: CheckedExperiment) -> dict[str, Any]:
     """Listen on the bus without sending; RigError where nobody is there, or another one sends our commands."""
     with CanRig(checked.bus_map, checked.experiment.bus.connection, mode="dry_run") as rig:
         return {"connection": checked.experiment.bus.connection, "state": rig.state, **rig.counters}
+
+
+_REFRESH_S = 0.125
+_BAR = 30  # characters
+
+
+class LiveView:
+    """A table that follows a run; it leaves the terminal as it was.
+
+    Parameters
+    ----------
+    title : str
+        What runs.
+    cycles : int
+        How many there will be.
+    console : rich.console.Console, optional
+        Where to draw; standard output if left out.
+    """
+
+    def __init__(self, title: str, cycles: int, *, console: Any = None) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        self._title, self._cycles = title, cycles
+        self._live = Live(console=console or Console(), auto_refresh=False, transient=True)
+        self._begun = self._drawn = time.monotonic()
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def __call__(self, cycle: Cycle) -> None:
+        """Take a cycle; it is drawn if the last one was drawn long enough ago."""
+        now = time.monotonic()
+        if now - self._drawn >= _REFRESH_S or cycle.number + 1 == self._cycles:
+            self._drawn = now
+            self._live.update(self._table(cycle, now - self._begun), refresh=True)
+
+    def _table(self, cycle: Cycle, elapsed_s: float) -> Any:
+        from rich.console import Group
+        from rich.table import Table
+        from rich.text import Text
+
+        bar = "█" * round((cycle.number + 1) / max(self._cycles, 1) * _BAR)
+        table = Table(box=None, pad_edge=False, show_header=False)
+        for justify in ("left", "right", "left"):
+            table.add_column(justify=justify)
+        for kind, values in (
+            ("asked", cycle.asked), ("applied", cycle.measured.applied), ("limit", cycle.measured.limits),
+            ("measured", cycle.measured.values),
+        ):  # fmt: skip
+            _add(table, kind, values)
+        head = Text(f"{self._title}  {elapsed_s:.1f} s", style="bold")
+        return Group(head, table, Text(f"{bar:░<{_BAR}} {cycle.number + 1} of {self._cycles}"))
+
+
+def _add(table: Any, kind: str, values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        table.add_row(name, f"{value:.4g}", kind)
+
+
+COMMANDS = {"run": (_add_run, _run), "check": (_add_experiment, _check)}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +15,10 @@ from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import bench_inputs, bench_limits
 from mgdd.cli.from_library import Options, as_option, named_options
 from mgdd.cli.guide_map import add_guide, check_guide, guide_of, learn_map
-from mgdd.cli.options import add_command, add_engine, assignments, engine_of, number_pairs
-from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
-from mgdd.cli.ranges import bounds_of, limits_given
+from mgdd.cli.options import add_engine, engine_of, option
+from mgdd.cli.output import emit, lines, warn
+from mgdd.cli.progress import Stopped
+from mgdd.cli.ranges import assignments, bounds_of, limits_given, number_pairs
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
@@ -29,6 +30,7 @@ from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize import ComponentLag
 from mgdd.optimize.optimum import Optimum
+from mgdd.plot import seeking
 from mgdd.plot.style import drawn
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.results.units import unit_attributes
@@ -36,9 +38,6 @@ from mgdd.results.units import unit_attributes
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_seek"]
-
-_LOG = logging.getLogger(__name__)
 _BENCH = Options(
     EngineBench, "soc_scatter_cad", "seed", efficiency_noise_percent="noise", misfire_probability="misfire"
 )  # fmt: skip
@@ -53,68 +52,34 @@ _NAMES = {**_BENCH.options, **_SEARCH.options, "start": "start", "limits": "limi
           "settings": "seeker_set", **{name: name for name in OperatingPoint.fields()}}  # fmt: skip
 
 
-def add_seek(verbs: Any) -> None:
-    """Add the command."""
-    parser = add_command(
-        verbs, "seek", _seek,
-        help_text="seek the best start of combustion, or several inputs, on the virtual bench, one cycle at a time",
-        example="mgdd engine seek --input soc_cad=-20:5 --limit p_max_bar=95 --json",
-        endings=".json or .csv, the cycles",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seeker", choices=("auto", *SEEKERS), default="auto", metavar="NAME",
-        help=f"the seeker: auto or one of {', '.join(SEEKERS)} (default: %(default)s)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seeker-set",
-        action="append",
-        default=[],
-        metavar="FIELD=VALUE",
-        help="any setting of the seeker, repeatable, for example form=washout",
-    )
-    parser.add_argument(
-        "--input", action="append", default=[], metavar="NAME=LOW:HIGH[:STEP]",
-        help=f"bounds of an input of the bench ({', '.join(bench_inputs)}), and the step in which it is set; "
-        "repeatable: several are sought at once (default: soc_cad=-30:10)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--start",
-        action="append",
-        default=[],
-        metavar="NAME=X",
-        help="first value of an input, repeatable; left out: the best of the guide, or the "
-        "middle of the bounds, under limits the safe side of the timing",
-    )
+def _add_seek(parser: Any) -> None:
+    option(parser, "--seeker NAME",
+           f"the seeker: auto or one of {', '.join(SEEKERS)}", default="auto", choices=('auto', *SEEKERS))  # fmt: skip
+    option(parser, "--seeker-set FIELD=VALUE ...", "any setting of the seeker, repeatable, for example form=washout")
+    option(parser, "--input NAME=LOW:HIGH[:STEP] ...",
+           f"bounds of an input of the bench ({', '.join(bench_inputs)}), and the step in which it is set; "
+           "repeatable: several are sought at once (default: soc_cad=-30:10)")  # fmt: skip
+    option(parser, "--start NAME=X ...",
+           "first value of an input, repeatable; left out: the best of the guide, or the middle of the bounds, under "
+           "limits the safe side of the timing")  # fmt: skip
     _SEARCH.add(parser)
-    parser.add_argument(
-        "--tolerance",
-        action="append",
-        default=[],
-        metavar="NAME=X",
-        help="stop before all cycles once the estimate moves by less, one for each input",
-    )
-    parser.add_argument(
-        "--limit", action="append", default=[], metavar="NAME=X",
-        help=f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X, or with NAME=LOW:HIGH between two, of "
-        "which one may be left out; repeatable",
-    )  # fmt: skip
-    parser.add_argument(
-        "--known", metavar="FILE.csv", help="readings of before, as -o writes them: they are told to the seeker first"
-    )
-    parser.add_argument("--figure", metavar="FILE", help="draw the run (.png, .svg or .pdf)")
+    option(parser, "--tolerance NAME=X ...",
+           "stop before all cycles once the estimate moves by less, one for each input")  # fmt: skip
+    option(parser, "--limit NAME=X ...",
+           f"keep an indicator, {', '.join(bench_limits)} or {_COV} below X, or with NAME=LOW:HIGH between two, of "
+           "which one may be left out; repeatable")  # fmt: skip
+    option(parser, "--known FILE.csv", "readings of before, as -o writes them: they are told to the seeker first")
+    option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
     group = parser.add_argument_group("bench")
-    group.add_argument(
-        "--sensor", choices=("none", "analyser", "soft"), default="none",
-        help="none: J is the efficiency in percent; else less 0.004 per ppm NOx by that sensor (default: %(default)s)",
-    )  # fmt: skip
+    option(group, "--sensor",
+           "none: J is the efficiency in percent; else less 0.004 per ppm NOx by that sensor",
+           default="none", choices=('none', 'analyser', 'soft'))  # fmt: skip
     _BENCH.add(group)
     add_guide(parser)
     add_engine(parser)
 
 
 def _seek(args: argparse.Namespace) -> None:
-    check_output(args, ".json", ".csv")
-    check_figure(args.figure)
     check_guide(args)
     limits, start = limits_given(args.limit), number_pairs(args.start, "--start")
     known = None if args.known is None else read_points(args.known)
@@ -141,16 +106,12 @@ def _seek(args: argparse.Namespace) -> None:
     run, table = found.run, guide if isinstance(guide, TimingMap) else None
     learnt, unlearnt = learn_map(args, table, found.seeker, bench.point, interrupted=run.interrupted)
     doubts = [*map(str, found.findings), *unlearnt]
-    for doubt in doubts:
-        _LOG.warning("%s", doubt)
+    warn(*doubts)
     payload = found.to_dict() | {"preset": preset, "sensor": args.sensor, "seed": bench.seed}
     payload |= _judged(bench, best, found) | _guided(args, found, guide) | learnt | {"warnings": doubts}
-    emit(args, payload, text=_text(payload, found), traces=_table(run.dataset))
-    if args.figure:
-        from mgdd import plot
-
-        how = {"optimum_cad": best["soc_cad"]} if len(best.inputs) == 1 else {}
-        save_figure(drawn(plot.seeking, run.dataset, size=(8.0, 7.0), **how), args.figure)
+    how = {"optimum_cad": best["soc_cad"]} if len(best.inputs) == 1 else {}
+    picture = partial(drawn, seeking, run.dataset, size=(8.0, 7.0), **how)
+    emit(args, payload, text=_text(payload, found), traces=_table(run.dataset), figure=picture)
     if run.interrupted:
         raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 
@@ -279,3 +240,6 @@ def _option_names() -> Iterator[None]:
             raise
         said = str(error).removeprefix(error.field or "").removeprefix(" =").removeprefix(":")
         raise error.reworded(as_option(option) + said) from error
+
+
+COMMANDS = {"seek": (_add_seek, _seek)}

@@ -5,23 +5,9 @@ from __future__ import annotations
 from importlib import metadata
 from typing import Any
 
-from mgdd.cli.options import add_command
-
-__all__ = ["add", "studies"]
-
 _GROUP = "mgdd.studies"
 # What pyproject.toml enters, for the tree of developers: links on PYTHONPATH have no metadata in which to look.
 _OURS = metadata.EntryPoint("command", "mgdd_studies.command", _GROUP)
-
-
-def add(commands: Any) -> None:
-    """Add the command; its options are those of the studies."""
-    parser: Any = add_command(
-        commands, "study", lambda args: studies().run(args),
-        help_text="run a study: a table over seeds, with figures",
-        example="mgdd study sensor-delay --figures figures",
-    )  # fmt: skip
-    parser.later = lambda own: studies().fill(own)
 
 
 def studies() -> Any:
@@ -42,3 +28,6 @@ def studies() -> Any:
         raise ImportError(
             f"{package} is not installed, the package of the studies: it comes with mgdd, install that again"
         ) from None
+
+
+COMMANDS = {"study": (lambda parser: studies().fill(parser), lambda args: studies().run(args))}

@@ -1,52 +1,95 @@
-"""`mgdd throttle simulate | demand | excite | identify | validate | track | tune`, each in a module of its own."""
+"""`mgdd throttle simulate | demand`: the plant under a duty, and what a pedal wants."""
 
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from mgdd.cli import throttle_excite, throttle_identify, throttle_simulate, throttle_track
-from mgdd.cli.options import add_command, add_group
-from mgdd.cli.output import check_output, emit
-from mgdd.cli.throttle_parameters import changes_of
+import numpy as np
+
+from mgdd import presets
+from mgdd.cli.from_library import Options, as_option
+from mgdd.cli.options import option
+from mgdd.cli.output import emit, warn
+from mgdd.cli.ranges import assignments
+from mgdd.errors import ParameterError, did_you_mean
+from mgdd.io import read_throttle_log
 from mgdd.io.parameters import ParameterFile
-from mgdd.throttle import DemandChain
+from mgdd.plot import throttle_run
+from mgdd.plot.style import drawn
+from mgdd.presets.preset import Preset
+from mgdd.throttle import DemandChain, Throttle, simulate_throttle
+from mgdd.throttle.duty_file import read_duty
+from mgdd.throttle.simulation import step_summary
 
-__all__ = ["add"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+LOG = Options(
+    read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
+    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal", "sheet",
+)  # fmt: skip
+
+_DEFAULT_PRESET = "P1"
 
 
-def add(commands: Any) -> None:
-    """Add the group and its commands."""
-    verbs = add_group(
-        commands, "throttle",
-        help_text="an electronic throttle: simulate, demand, excite, identify, validate, track, tune",
-        example="mgdd throttle identify chirp.csv --model pw_r --test steps.csv --json",
-    )  # fmt: skip
-    throttle_simulate.add(verbs)
-    _add_demand(verbs)
-    throttle_excite.add(verbs)
-    throttle_identify.add(verbs)
-    throttle_track.add(verbs)
+def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
+    """Read a log as the options of `LOG` say, and say what was left out of it."""
+    log = read_throttle_log(file, **LOG.given(args))
+    warn(*log.attrs["warnings"].splitlines(), of=file)
+    return log
 
 
-def _add_demand(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "demand", _demand,
-        help_text="steady torque, air flow, manifold pressure and opening that a pedal wants at a speed",
-        example="mgdd throttle demand --pedal-percent 30 --speed-rpm 2000 --json",
-    )  # fmt: skip
-    parser.add_argument("--pedal-percent", type=float, required=True, metavar="X", help="pedal, 0 to 100")
-    parser.add_argument("--speed-rpm", type=float, required=True, metavar="X", help="engine speed")
+def add_preset(group: Any, name: str) -> None:
+    """Add the preset of a throttle."""
+    what = f"{', '.join(presets.available('throttle'))} or a TOML file (default: {_DEFAULT_PRESET})"
+    option(group, f"{name} NAME_OR_FILE.toml", what, dest="preset")
+
+
+def add_throttle(parser: argparse.ArgumentParser) -> None:
+    """Add preset and fields; the names are those of the parameters."""
+    group = parser.add_argument_group("throttle")
+    add_preset(group, "--preset")
+    option(group, "--set FIELD=VALUE ...", "any field of the throttle, repeatable, for example coulomb_nm=0.3")
+
+
+def preset_of(args: argparse.Namespace) -> Preset:
+    """Load the preset of a throttle; it refuses to be an engine when it is asked for its throttle."""
+    return presets.load(args.preset or _DEFAULT_PRESET)
+
+
+def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
+    """Make the throttle of a preset and the fields over it."""
+    preset = preset_of(args)
+    return preset.throttle.replace(**changes_of(args, Throttle.fields())), preset.name
+
+
+def changes_of(args: argparse.Namespace, fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Read ``--set FIELD=VALUE`` over the fields of a record; an unknown name is refused with the closest one."""
+    return known_only(assignments(args.set, fields), fields, "--set")
+
+
+def known_only(values: dict[str, Any], fields: Iterable[str], option: str) -> dict[str, Any]:
+    """Refuse a name that is not among the fields."""
+    for name in values:
+        if name not in fields:
+            guess = did_you_mean(name, fields)
+            have = f"{guess + '; ' if guess else ''}the fields are {', '.join(fields)}"
+            raise ParameterError(f"{option} {name}: no field {name!r}; {have}")
+    return values
+
+
+def _add_demand(parser: Any) -> None:
+    option(parser, "--pedal-percent X", "pedal, 0 to 100", required=True)
+    option(parser, "--speed-rpm X", "engine speed", required=True)
     group = parser.add_argument_group("chain")
-    group.add_argument("--chain", metavar="FILE.toml", help="parameters of the chain (default: an engine of 2 L)")
-    group.add_argument(
-        "--set", action="append", default=[], metavar="FIELD=VALUE",
-        help="any field of the chain, repeatable, for example bore_mm=52",
-    )  # fmt: skip
+    option(group, "--chain FILE.toml", "parameters of the chain (default: an engine of 2 L)")
+    option(group, "--set FIELD=VALUE ...", "any field of the chain, repeatable, for example bore_mm=52")
 
 
 def _demand(args: argparse.Namespace) -> None:
-    check_output(args)
     chain = _chain(args)
     steady = chain.steady(args.pedal_percent, args.speed_rpm).isel(pedal_percent=0, speed_rpm=0)
     numbers = {str(name): float(steady[name]) for name in steady.data_vars}
@@ -66,3 +109,47 @@ def _chain(args: argparse.Namespace) -> DemandChain:
     chain = DemandChain() if args.chain is None else DemandChain.of_file(ParameterFile.read(args.chain))
     fields = {name: field for name, field in DemandChain.fields().items() if name != "pedal_map"}
     return chain.replace(**changes_of(args, fields))
+
+
+_TIME = Options(simulate_throttle, "duration_s", "sample_s")
+_SIGNALS = Options(simulate_throttle, "supply_v", "airflow_torque_nm")  # columns of the input beside time and duty, too
+_RUN = Options(simulate_throttle, "start_deg", "bridge", "step_s")
+
+
+def _add_simulate(parser: Any) -> None:
+    signal = parser.add_mutually_exclusive_group(required=True)
+    option(signal, "--duty X", "constant duty, -1 to 1; positive opens")
+    option(signal, "--input FILE.csv", "columns time_s and duty, evenly sampled; supply_v, airflow_torque_nm if there")
+    group = parser.add_argument_group("run")
+    _TIME.add(group)
+    _SIGNALS.add(group)
+    _RUN.add(group)
+    option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
+    add_throttle(parser)
+
+
+def _simulate(args: argparse.Namespace) -> None:
+    throttle, preset = throttle_of(args)
+    timed, signals = _TIME.given(args), _SIGNALS.given(args)
+    if args.input is None:
+        given = {"duty": args.duty, **timed, **signals}
+    elif timed:
+        raise ParameterError(f"{as_option(next(iter(timed)))} goes with --duty: the times of --input are its own")
+    else:
+        given = read_duty(args.input, signals)
+    run = simulate_throttle(throttle, **given, **_RUN.given(args))
+    payload = {
+        "preset": preset,
+        "duty": args.duty,
+        "bridge": _RUN.of(args)["bridge"],
+        **step_summary(run),
+        "max_current_a": float(np.abs(run["current_a"]).max()),
+        "duration_s": float(run["time_s"][-1] - run["time_s"][0]),
+        "samples": run.sizes["time_s"],
+        "step_s": _RUN.of(args)["step_s"],
+        "parameters": throttle.to_dict(),
+    }
+    emit(args, payload, traces=run, figure=partial(drawn, throttle_run, run, size=(7.0, 5.4)))
+
+
+COMMANDS = {"simulate": (_add_simulate, _simulate), "demand": (_add_demand, _demand)}

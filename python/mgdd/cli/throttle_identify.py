@@ -1,69 +1,56 @@
-"""`mgdd throttle identify | validate`: a model from a log, and a model against a log."""
+"""`mgdd throttle excite | identify | validate`: a signal, a model from its log, and a model against a log."""
 
 from __future__ import annotations
 
 import argparse
-import logging
-from pathlib import Path
+import inspect
 from typing import TYPE_CHECKING, Any
 
-from mgdd import identify
-from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command
-from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
-from mgdd.cli.throttle_parameters import LOG, log_in
-from mgdd.errors import ConvergenceError
+from mgdd import identify, signals
+from mgdd.cli.from_library import Options, as_option, default_of, shown
+from mgdd.cli.options import option
+from mgdd.cli.output import emit, warn
+from mgdd.cli.throttle import LOG, add_throttle, log_in, throttle_of
+from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.io.files import write_whole_text
 from mgdd.optimize import FitOptions
-from mgdd.results.fit import figures_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
+    from mgdd.identify.throttle.excitation_check import ExcitationCheck
     from mgdd.identify.throttle.validation import ThrottleValidation
-    from mgdd.results import Fit
 
-__all__ = ["add"]
 
 _MODEL = Options(identify.identify_throttle, "model")
 _FIT = Options(identify.identify_throttle, "limp_home_deg", "two_sided", "closed_deg", "open_deg")
 _SEARCH = Options(FitOptions, "seed")
 _LOG_TITLE = "columns of the log, by name, or by number from 0"
-_LOG = logging.getLogger(__name__)
 
 # Searches that ended without a tolerance met, but with a model: stiction makes the last of the cost rough.
 _ENDED = ("stalled", "iteration_limit")
 
 
-def add(verbs: Any) -> None:
-    """Add both commands."""
-    fit = add_command(
-        verbs, "identify", _identify,
-        help_text="fit a model to a log, test it on another, and name the parameters that the log does not identify",
-        example="mgdd throttle identify chirp.csv --model pw_r --test steps.csv --output fit.toml --json",
-        endings=".toml, the parameters, or .json",
-    )  # fmt: skip
-    fit.add_argument("file", metavar="FILE", help="log to fit: CSV, plain columns or .mat")
-    _MODEL.add(fit)
-    fit.add_argument("--test", metavar="FILE", help="log to test on, with the same columns")
-    _FIT.add(fit)
-    fit.add_argument(
-        "--delay-samples",
-        type=_counts,
-        metavar="N[,N...]",
-        help="samples until the duty acts; of several the best (default: searched for the groups, 0 for pw_*)",
-    )
-    _SEARCH.add(fit)
-    fit.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
-    LOG.add(fit, _LOG_TITLE)
-    check = add_command(
-        verbs, "validate", _validate,
-        help_text="run a fitted model against a log: free run, 5, 20 and 50 ms ahead, residual tests",
-        example="mgdd throttle validate fit.toml steps.csv --json",
-    )  # fmt: skip
-    check.add_argument("fit", metavar="FIT.toml", help="parameters written by identify")
-    check.add_argument("file", metavar="FILE", help="log: CSV, plain columns or .mat")
-    check.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
-    LOG.add(check, _LOG_TITLE)
+def _add_identify(parser: Any) -> None:
+    option(parser, "file FILE", "log to fit: CSV, plain columns or .mat")
+    _MODEL.add(parser)
+    option(parser, "--test FILE", "log to test on, with the same columns")
+    _FIT.add(parser)
+    option(parser, "--delay-samples N[,N...]",
+           "samples until the duty acts; of several the best (default: searched for the groups, 0 for pw_*)",
+           type=_counts)  # fmt: skip
+    _SEARCH.add(parser)
+    option(parser, "--figure FILE", "draw the validation (.png, .svg or .pdf)")
+    LOG.add(parser, _LOG_TITLE)
+
+
+def _add_validate(parser: Any) -> None:
+    option(parser, "fit FIT.toml", "parameters written by identify")
+    option(parser, "file FILE", "log: CSV, plain columns or .mat")
+    option(parser, "--figure FILE", "draw the validation (.png, .svg or .pdf)")
+    LOG.add(parser, _LOG_TITLE)
 
 
 def _counts(text: str) -> list[int]:
@@ -74,52 +61,29 @@ def _counts(text: str) -> list[int]:
 
 
 def _identify(args: argparse.Namespace) -> None:
-    check_output(args, ".toml", ".json")
-    check_figure(args.figure)
     log = log_in(args, args.file)
     test = None if args.test is None else log_in(args, args.test)
     options = FitOptions(**_SEARCH.given(args))
     given = _MODEL.given(args) | _FIT.given(args)
     fit = identify.identify_throttle(log, test=test, delay_samples=args.delay_samples, options=options, **given)
-    own = args.output if args.output is not None and Path(args.output).suffix == ".toml" else None
-    if own is not None:
-        Path(own).write_text(fit.to_toml(), encoding="utf-8", newline="\n")
-        wrote(own)
-        args.output = None
     validation = identify.validate_throttle(fit, log if test is None else test)
-    payload = _payload(fit) | {"validation": validation.to_dict()}
-    emit(args, payload, text=f"{fit.summary()}\n\n{validation.summary()}")
-    if args.figure:
-        _draw(validation, args.figure, fit.report.to_dataset())
+    emit(args, {**fit.to_dict(), "validation": validation.to_dict()}, text=f"{fit.summary()}\n\n{validation.summary()}",
+         write={".toml": lambda file: write_whole_text(file, fit.to_toml())},
+         figure=lambda: _drawn(validation, fit.report.to_dataset()))  # fmt: skip
     report = fit.report
     if not report.success and report.status not in _ENDED:
         raise ConvergenceError(f"{args.file}: the fit has failed ({report.message}); look at the log, or excite more")
     if report.status == "iteration_limit":
-        _LOG.warning("%s: the search %s; the figures hold for what it has found", args.file, report.message)
-
-
-def _payload(fit: Fit) -> dict[str, Any]:
-    figures = fit.to_dict()
-    same = ("source", "parameters", "stderr", "unidentifiable", "status", "success", "nit", "nfev")
-    return {
-        "model": fit.kind,
-        **figures_of(fit),
-        "findings": [str(finding) for finding in fit.findings],
-        **{name: figures[name] for name in same},
-    }
+        warn(f"the search {report.message}; the figures hold for what it has found", of=args.file)
 
 
 def _validate(args: argparse.Namespace) -> None:
-    check_output(args)
-    check_figure(args.figure)
     model = identify.load_throttle_model(args.fit)
     validation = identify.validate_throttle(model, log_in(args, args.file))
-    emit(args, validation.to_dict(), text=validation.summary())
-    if args.figure:
-        _draw(validation, args.figure, None)
+    emit(args, validation.to_dict(), text=validation.summary(), figure=lambda: _drawn(validation, None))
 
 
-def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | None) -> None:
+def _drawn(validation: ThrottleValidation, correlation: xr.Dataset | None) -> Figure:
     from matplotlib.figure import Figure
 
     from mgdd import plot
@@ -131,4 +95,84 @@ def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | N
         validation.plot(what, ax=pane)
     if correlation is not None:
         plot.correlation_matrix(correlation, ax=axes[3])
-    save_figure(figure, file)
+    return figure
+
+
+_DESIGN = Options(identify.design_excitation, "side", "duration_s", "step_s")
+_CHECK = Options(
+    identify.check_excitation, "angle_window_deg", "max_rate_deg_per_s", "max_current_a", "start_deg"
+)  # fmt: skip
+_COMMON = ("offset", "amplitude", "step_s")
+# Options that only some of the signals have, as the arguments of their functions.
+_OF_KIND = {
+    kind: tuple(name for name in inspect.signature(getattr(signals, kind)).parameters if name not in _COMMON)
+    for kind in EXCITATIONS
+}
+_OWN = {
+    name: Options(getattr(signals, kind), name)
+    for kind in EXCITATIONS
+    for name in _OF_KIND[kind]
+    if name != "duration_s"
+}
+
+
+def _add_excite(parser: Any) -> None:
+    option(parser, "kind KIND", ", ".join(EXCITATIONS), choices=EXCITATIONS)
+    add_throttle(parser)
+    group = parser.add_argument_group("signal")
+    option(group, "--offset X", "mean duty, with --amplitude: no design, only the check")
+    option(group, "--amplitude X", "half the swing of the duty")
+    _DESIGN.add(group, **_defaults_of("duration_s"))
+    for name, options in _OWN.items():
+        options.add(group, **_defaults_of(name))
+    _CHECK.add(parser, "limits")
+
+
+def _defaults_of(name: str) -> dict[str, str]:
+    """Write the default of every signal that has this option and a default."""
+    kinds = (kind for kind, names in _OF_KIND.items() if name in names)
+    own = {kind: default_of(getattr(signals, kind), name) for kind in kinds}
+    said = ", ".join(f"{kind} {shown(value)}" for kind, value in own.items() if value is not None)
+    return {name: said} if said else {}
+
+
+def _excite(args: argparse.Namespace) -> None:
+    throttle, preset = throttle_of(args)
+    limits = _CHECK.given(args)
+    designed = _DESIGN.given(args)
+    step_s = _DESIGN.of(args)["step_s"]
+    given = {name: getattr(args, name) for name in ("duration_s", *_OWN) if getattr(args, name) is not None}
+    for name in given:
+        if name not in _OF_KIND[args.kind]:
+            have = ", ".join(as_option(n) for n in _OF_KIND[args.kind])
+            raise ParameterError(f"{as_option(name)} is not an option of a {args.kind}, which has {have}")
+    if (args.offset is None) != (args.amplitude is None):
+        raise ParameterError("--offset and --amplitude belong together: give both, or none for a designed signal")
+    if args.offset is None:
+        others = [name for name in given if name != "duration_s"]
+        if others:
+            raise ParameterError(
+                f"{as_option(others[0])} acts on a signal of your own only: give --offset and --amplitude too"
+            )
+        signal, check = identify.design_excitation(args.kind, throttle, **designed, **limits)
+    else:
+        make = getattr(signals, args.kind)
+        signal = make(offset=args.offset, amplitude=args.amplitude, step_s=step_s, **given)
+        check = identify.check_excitation(signal, throttle, **limits)
+        if not check.passed:
+            raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
+    attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
+    payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": step_s}
+    payload |= attrs | check.to_dict()
+    emit(args, payload, text=_text(args.kind, attrs, check), traces=check.prediction)
+
+
+def _text(kind: str, attrs: dict[str, Any], check: ExcitationCheck) -> str:
+    return f"{kind}, offset {attrs['offset']:.4g}, amplitude {attrs['amplitude']:.4g}\n{check.summary()}"
+
+
+COMMANDS = {
+    "excite": (_add_excite, _excite),
+    "identify": (_add_identify, _identify),
+    "validate": (_add_validate, _validate),
+}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import logging
+from functools import partial
 from typing import Any
 
 from mgdd.cli.from_library import Options
-from mgdd.cli.options import add_command, number_pairs
-from mgdd.cli.output import check_figure, check_output, emit, save_figure
-from mgdd.cli.throttle_parameters import add_preset, add_throttle, known_only, preset_of, throttle_of
+from mgdd.cli.options import option
+from mgdd.cli.output import emit, warn
+from mgdd.cli.ranges import number_pairs
+from mgdd.cli.throttle import add_preset, add_throttle, known_only, preset_of, throttle_of
 from mgdd.identify import load_throttle_model
 from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
@@ -21,71 +22,42 @@ from mgdd.plot.style import drawn
 from mgdd.report import Table
 from mgdd.throttle import Throttle
 
-__all__ = ["add"]
-
 _AIR = Options(track, airflow_torque_nm="airflow")
 _RUN = Options(track, "delay_samples", "noise_deg", "seed")
 _TUNE = Options(tune_controller, "spread", "budget", "seed", "delay_samples", "noise_deg", n_throttles="throttles")
-_LOG = logging.getLogger(__name__)
 
 
-def add(verbs: Any) -> None:
-    """Add both commands."""
-    _add_track(verbs)
-    _add_tune(verbs)
-
-
-def _add_track(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "track", _track,
-        help_text="run a controller on the virtual throttle along a reference; -o FILE.csv writes the run",
-        example="mgdd throttle track --controller guided --reference step:40:42 --plant-scale coulomb_nm=1.2 --json",
-        endings=".json or .csv",
-    )  # fmt: skip
+def _add_track(parser: Any) -> None:
     _add_controller(parser)
-    parser.add_argument(
-        "--reference", default="step:40:42", metavar="REFERENCE",
-        help="step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg (default: %(default)s)",
-    )  # fmt: skip
+    option(parser, "--reference REFERENCE",
+           "step:FROM:TO, sine:MEAN:AMPLITUDE:HZ, or a CSV file with time_s, reference_deg",
+           default="step:40:42")  # fmt: skip
     _AIR.add(parser)
     _add_plant(parser)
-    parser.add_argument(
-        "--model",
-        metavar="FIT.toml",
-        help="what the controller knows: a fit of mgdd throttle identify (default: preset)",
-    )
-    parser.add_argument("--figure", metavar="FILE", help="draw the run (.png, .svg or .pdf)")
+    option(parser, "--model FIT.toml", "what the controller knows: a fit of mgdd throttle identify (default: preset)")
+    option(parser, "--figure FILE", "draw the run (.png, .svg or .pdf)")
 
 
 def _add_plant(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("plant")
     add_preset(group, "--plant")
-    group.add_argument(
-        "--plant-scale", action="append", default=[], metavar="FIELD=FACTOR",
-        help="multiply a field of the plant, repeatable; the controller does not know, for example coulomb_nm=1.4 "
-        "(stiction goes with it)",
-    )  # fmt: skip
+    option(group, "--plant-scale FIELD=FACTOR ...",
+           "multiply a field of the plant, repeatable; the controller does not know, for example coulomb_nm=1.4 "
+           "(stiction goes with it)")  # fmt: skip
     _RUN.add(group)
 
 
-def _add_tune(verbs: Any) -> None:
-    parser = add_command(
-        verbs, "tune", _tune,
-        help_text="tune a controller for throttles around a preset, with one cost and budget for every kind",
-        example="mgdd throttle tune --controller pid --preset P2 --budget 60 --throttles 8 --json",
-    )  # fmt: skip
+def _add_tune(parser: Any) -> None:
     _add_controller(parser)
     _TUNE.add(parser)
     add_throttle(parser)
 
 
 def _add_controller(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--controller", choices=tuple(FAMILIES), default="guided", help="kind (default: %(default)s)")
+    option(parser, "--controller", "kind", default="guided", choices=tuple(FAMILIES))
 
 
 def _track(args: argparse.Namespace) -> None:
-    check_output(args, ".json", ".csv")
-    check_figure(args.figure)
     preset = preset_of(args)
     known = preset.throttle
     numbers = [name for name, field in Throttle.fields().items() if "choices" not in field]
@@ -101,8 +73,7 @@ def _track(args: argparse.Namespace) -> None:
         delay_samples=None if args.model is not None else how["delay_samples"],
         noise_deg=how["noise_deg"],
     )
-    for doubt in doubts:
-        _LOG.warning("%s", doubt)
+    warn(*doubts)
     run = track(controller, reference, throttle=plant, **_AIR.given(args), **how)
     p50, p999 = step_times_us(controller, run)
     payload = {
@@ -117,13 +88,11 @@ def _track(args: argparse.Namespace) -> None:
         "step_us_p999": p999,
         "warnings": list(doubts),
     }
-    emit(args, payload, traces=run.drop_vars([name for name in FIGURES if name in run]))
-    if args.figure is not None:
-        save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
+    traces = run.drop_vars([name for name in FIGURES if name in run])
+    emit(args, payload, traces=traces, figure=partial(drawn, throttle_run, run, size=(7.0, 5.4)))
 
 
 def _tune(args: argparse.Namespace) -> None:
-    check_output(args)
     throttle, preset = throttle_of(args)
     found = tune_controller(args.controller, throttle, **_TUNE.given(args))
     payload = {
@@ -147,3 +116,6 @@ def _tune(args: argparse.Namespace) -> None:
         f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, {delay})",
     ]
     emit(args, payload, text=text)
+
+
+COMMANDS = {"track": (_add_track, _track), "tune": (_add_tune, _tune)}
