@@ -21,13 +21,7 @@ _CFuncPtr: Any = C_TYPE.__mro__[1]
 
 
 def address_of(function: Any) -> tuple[int, int] | None:
-    """Give the addresses of a compiled function and of data that it brings; None for anything else.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Null, or another signature.
-    """
+    """Give the addresses of a compiled function and of data that it brings; None for anything else."""
     if isinstance(function, bool):
         return None
     data = 0

@@ -34,40 +34,7 @@ def of_first_input(figures: Mapping[str, Any], inputs: Sequence[str]) -> dict[st
 
 
 def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -> dict[str, float]:
-    """Sum up the cycles of a run, whether it came to its end or not.
-
-    Parameters
-    ----------
-    cycles : xarray.Dataset
-        Over ``cycle``: ``misfire`` and ``j``, and over ``input`` as well ``estimate`` and ``applied``; where known also
-        ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``,
-        ``limits`` and ``noise_free_limits`` over ``limit``.
-    criteria : LoopCriteria, optional
-        As in `run_seeker`; cycles are counted from the first row. No seeker is at hand, so ``limits`` must be named for
-        their figures.
-
-    Returns
-    -------
-    dict
-        The summary of `run_seeker`, to rounding, with the halves and the tail of the cycles at hand. NaN where nothing
-        was measured.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A limit in ``exceed_above`` or ``limits`` that was not measured.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
-    >>> from mgdd.loop.summary import summarize_cycles
-    >>> from mgdd.optimize import GoldenSection
-    >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
-    >>> run = run_seeker(EngineBench(seed=1), seeker, 300, criteria=LoopCriteria(optimum=-5.63))
-    >>> again = summarize_cycles(run.dataset, LoopCriteria(optimum=-5.63))
-    >>> again["cycles_to"] == run.summary["cycles_to"]
-    True
-    """
+    """Sum up the cycles of a run, whether it came to its end or not."""
     criteria = criteria or LoopCriteria()
     measured = tuple(str(name) for name in cycles["limit"].to_numpy()) if "limits" in cycles else ()
     uppers = list[float]()

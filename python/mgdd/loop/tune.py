@@ -46,37 +46,7 @@ def with_stiction(factors: Mapping[str, float]) -> dict[str, float]:
 
 
 def draw_throttles(throttle: Throttle, n: int, *, spread: float = 0.2, seed: int = 0) -> list[Throttle]:
-    """Draw throttles around one: inertia, viscous friction, motor, resistance, springs, preloads and dry friction.
-
-    Parameters
-    ----------
-    throttle : Throttle
-        The centre.
-    n : int
-        How many.
-    spread : float
-        Each of the seven numbers is multiplied by one from ``1 - spread`` to ``1 + spread``, evenly.
-    seed : int
-        Of the draw.
-
-    Returns
-    -------
-    list of Throttle
-        Equal seeds draw equal throttles.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A spread outside [0, 0.9] or a negative number of throttles.
-
-    Examples
-    --------
-    >>> from mgdd.loop.tune import draw_throttles
-    >>> from mgdd.throttle import Throttle
-    >>> first, second = draw_throttles(Throttle(), 2, seed=1)
-    >>> 0.8 <= first.coulomb_nm / Throttle().coulomb_nm <= 1.2, first == second
-    (True, False)
-    """
+    """Draw throttles around one: inertia, viscous friction, motor, resistance, springs, preloads and dry friction."""
     if not 0.0 <= spread <= 0.9:
         raise ParameterError.of("spread", spread, "in [0, 0.9]")
     if n < 0:

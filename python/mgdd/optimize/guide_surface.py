@@ -20,29 +20,7 @@ _NODES = {1: 41, 2: 17, 3: 11, 4: 7, 5: 5}  # per input: 5 inputs are asked for 
 def surface_of(
     guide: Any, names: Sequence[str], lower: Sequence[float], upper: Sequence[float], *, argument: str
 ) -> Any:
-    """Read a guide in any of its forms.
-
-    Parameters
-    ----------
-    guide : callable, fitted response, DataArray or Surface
-        A callable takes what `ask` gives and returns a number; a fitted response has ``predict``; a DataArray has one
-        dimension with coordinates per input. None for none.
-    names : sequence of str
-        Of the inputs; empty where they have none.
-    lower, upper : sequence of float
-        Bounds, between which a callable is asked on a grid.
-    argument : str
-        That messages name.
-
-    Returns
-    -------
-    Surface or None
-
-    Raises
-    ------
-    ParameterError, ShapeError
-        Something else, a guide that fails or is not finite somewhere, or more than five inputs.
-    """
+    """Read a guide in any of its forms."""
     if guide is None or isinstance(guide, Surface):
         return guide
     if hasattr(guide, "dims") and hasattr(guide, "coords"):

@@ -13,23 +13,7 @@ __all__ = ["inputs_of", "named_values", "unit_of_input", "with_inputs"]
 
 
 def inputs_of(inputs: Any) -> tuple[Input, ...]:
-    """Read inputs in either form: `Input` objects, or bounds by name.
-
-    Parameters
-    ----------
-    inputs : mapping of str to (float, float) or (float, float, float), or sequence of Input, optional
-        Bounds, and the step in which an input is set; None for none.
-
-    Returns
-    -------
-    tuple of Input
-        In the order given.
-
-    Raises
-    ------
-    ParameterError
-        Neither of the two, a name twice, or bounds that are not numbers with something between them.
-    """
+    """Read inputs in either form: `Input` objects, or bounds by name."""
     if inputs is None:
         return ()
     if isinstance(inputs, Mapping):

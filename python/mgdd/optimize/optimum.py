@@ -97,13 +97,7 @@ class Optimum(NumbersResult):
         return f"<Optimum {self.objective} {self.value:.4g} at {at}{held}{edge}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Give everything as plain Python values.
-
-        Returns
-        -------
-        dict
-            Fields by name; ``limits`` as name to upper value.
-        """
+        """Give everything as plain Python values."""
         out = {name: getattr(self, name) for name in self.__dataclass_fields__}
         out["limits"] = {limit.name: limit.upper for limit in self.limits}
         out["findings"] = [vars(finding) for finding in self.findings]
@@ -126,23 +120,7 @@ def idle_limits(caps: Mapping[str, float], highest: Mapping[str, float], where: 
 
 
 def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Limit, ...]:
-    """Read limits in either form: `Limit` objects, or upper values by name.
-
-    Parameters
-    ----------
-    limits : mapping of str to float, or sequence of Limit, optional
-        None for none.
-
-    Returns
-    -------
-    tuple of Limit
-        In the order given.
-
-    Raises
-    ------
-    ParameterError
-        Neither of the two, a name twice, or a value that is not a finite number.
-    """
+    """Read limits in either form: `Limit` objects, or upper values by name."""
     if limits is None:
         return ()
     if isinstance(limits, Mapping):

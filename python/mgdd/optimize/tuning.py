@@ -113,19 +113,7 @@ class Tuning(InputNumbers):
     harmonics: NDArray[np.int64] | None = field(default=None, metadata=SEVERAL_ONLY)
 
     def summary(self) -> str:
-        """Say settings, prediction and verdict as text.
-
-        Returns
-        -------
-        str
-            A few lines; the last ones say why the specification is infeasible.
-
-        Examples
-        --------
-        >>> from mgdd.optimize import tune
-        >>> print(tune(0.25, -0.051, cycles=10.0).summary().splitlines()[-2])
-        The specification cannot be met:
-        """
+        """Say settings, prediction and verdict as text."""
         spsa = self.method == "spsa"
         period = f"{self.period} measurements per iteration" if spsa else f"period {self.period} cycles"
         if self.harmonics is not None:

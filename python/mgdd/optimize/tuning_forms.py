@@ -46,15 +46,6 @@ def harmonics_of(inputs: int, *, least: int, per_harmonic: float = 0.0) -> tuple
 
     The fastest input is as slow as possible. No harmonic is twice another one, nor sum or difference of two, also not
     where sampling folds them back; so the curvatures of J echo beside the slopes.
-
-    Parameters
-    ----------
-    inputs : int
-        How many.
-    least : int
-        Cycles of the period at least.
-    per_harmonic : float
-        Cycles that the period must have for each oscillation of the fastest input.
     """
     period = least
     while True:

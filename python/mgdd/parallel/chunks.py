@@ -45,38 +45,6 @@ def run_chunks(
 
     Chunks begin in order and end in any; what is kept must not depend on how the items were cut. `cut` and `keep`
     are called here, one at a time; only `function` and what `cut` returns go to the workers.
-
-    Parameters
-    ----------
-    function : callable
-        The work; picklable for executors that leave the process.
-    cut : callable
-        Gives the arguments of the items from ``start`` to ``stop`` (exclusive).
-    keep : callable
-        Takes ``start``, ``stop`` and the result.
-    n_items : int
-        How many items there are.
-    executor, workers
-        As in `map_items`.
-    seconds_per_item : float, optional
-        What an item costs [s]; measured if left out.
-    largest : int, optional
-        Most items of a chunk.
-    progress : callable, optional
-        Called with the finished items and all of them.
-
-    Returns
-    -------
-    Interrupted, WorkerLostError or None
-        What ended the work before its end, for `mgdd.parallel.finished.hand_over`: Ctrl-C, or a lost worker. What runs
-        then is waited for and kept.
-
-    Raises
-    ------
-    Exception
-        Of the work itself: that of the lowest items, as a plain loop would raise it.
-    mgdd.errors.ParameterError
-        A bad executor or number of workers, work that cannot be pickled.
     """
     with nullcontext(executor) if isinstance(executor, Pool) else Pool(executor, workers) as pool:
         return _Run(function, cut, keep, n_items, pool, seconds_per_item, largest, progress).go()

@@ -24,13 +24,7 @@ def or_partial(call: Callable[[], Result]) -> tuple[Result, Interrupted | None]:
 
 
 def keep_finished(call: Callable[[Item], Result], items: Iterable[Item], done: list[Result]) -> Interrupted | None:
-    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included.
-
-    Returns
-    -------
-    Interrupted or None
-        What ended it, for `hand_over`; raised at once where `done` is empty. `items` may look at `done` as it grows.
-    """
+    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included."""
     try:
         for item in items:
             done += [call(item)]

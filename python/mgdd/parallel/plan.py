@@ -31,19 +31,7 @@ class Chunk:
 
 
 class Plan:
-    """Cuts ``n_items`` into chunks, in order; the cost of an item is measured while the work goes on.
-
-    Parameters
-    ----------
-    n_items : int
-        Of the whole work.
-    workers : int
-        How many chunks can be worked on at the same time.
-    seconds_per_item : float, optional
-        What an item costs [s]; measured if left out.
-    largest : int, optional
-        Most items of a chunk.
-    """
+    """Cuts ``n_items`` into chunks, in order; the cost of an item is measured while the work goes on."""
 
     def __init__(
         self, n_items: int, workers: int, *, seconds_per_item: float | None = None, largest: int | None = None

@@ -86,13 +86,7 @@ class PointHull:
 
 
 def hull_of(points: NDArray[np.float64], names: Sequence[str]) -> PointHull:
-    """Find the convex hull of points, shape (n, m).
-
-    Raises
-    ------
-    DataError
-        Too many factors, a factor that does not vary, too few points, points in a plane.
-    """
+    """Find the convex hull of points, shape (n, m)."""
     n, m = points.shape
     if m > MOST_FACTORS:
         raise DataError(f"{m} factors: the hull of measured points takes at most {MOST_FACTORS}; hold some constant")

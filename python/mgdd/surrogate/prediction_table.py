@@ -31,26 +31,7 @@ def prediction_table(
     extrapolate: bool,
     level: float,
 ) -> tuple[xr.Dataset, dict[str, int]]:
-    """Predict every response over a grid, or over a list of points.
-
-    Parameters
-    ----------
-    models : sequence of ResponseModel
-        One of each response.
-    axes : mapping of str to ndarray
-        Axes of the table: factors, or ``point`` alone.
-    columns : mapping of str to ndarray
-        Every factor at every place, in the shape of the axes.
-    extrapolate : bool
-        Keep values outside of the fitted points, with ``NAME_extrapolated``; they are NaN otherwise.
-    level : float
-        As in `ResponseModel.predict`.
-
-    Returns
-    -------
-    tuple of Dataset and dict
-        ``NAME``, ``NAME_sd``, ``NAME_lower`` and ``NAME_upper`` of each; places outside of the fitted points, by name.
-    """
+    """Predict every response over a grid, or over a list of points."""
     labels = {name: label for model in models for name, label in model.factors.items()}
     dims, shape = tuple(axes), tuple(len(values) for values in axes.values())
     variables: dict[str, tuple[Any, ...]] = {

@@ -130,15 +130,7 @@ class _Search:
 def fit_process(
     points: NDArray[np.float64], values: NDArray[np.float64], names: Sequence[str], *, n_starts: int, seed: int
 ) -> tuple[ProcessSurface, FitReport]:
-    """Fit signal, length scales and noise by maximum likelihood.
-
-    Raises
-    ------
-    ImportError
-        The extra ``gp`` is not installed.
-    DataError
-        Too many points.
-    """
+    """Fit signal, length scales and noise by maximum likelihood."""
     if len(values) > MOST_POINTS:
         raise DataError(
             f"{len(values)} points: a Gaussian process takes at most {MOST_POINTS}; thin them or use a polynomial"

@@ -42,20 +42,7 @@ class Request:
 
 
 def simulate_cases(request: Request, columns: NDArray[np.float64]) -> dict[str, NDArray[np.generic]]:
-    """Simulate cases that differ in the named inputs, on one thread.
-
-    Parameters
-    ----------
-    request : Request
-        What they share.
-    columns : array, shape (cases, names)
-        Values of the inputs.
-
-    Returns
-    -------
-    dict of str to array
-        The wanted outputs (cases,), the traces (cases, angles), and the numbers of the `VOID` cases, which are NaN.
-    """
+    """Simulate cases that differ in the named inputs, on one thread."""
     wanted = dict.fromkeys(name for name in request.outputs if name not in NOX)
     wanted |= dict.fromkeys(["t_max_k"] if set(NOX) & set(request.outputs) else [])
     found = _batch(request, columns, [*wanted, *([] if _ALWAYS in wanted else [_ALWAYS])])

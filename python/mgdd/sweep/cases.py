@@ -25,13 +25,6 @@ class Cases:
 
     The cases of a grid are numbered with the timing fastest, then the burn, and the geometry slowest: cycles in a row
     share then what the kernel computes once for an operating point. `arranged` brings results into the given order.
-
-    Parameters
-    ----------
-    inputs : mapping of str to array
-        Values of each input: the axes of a grid, or equally long columns.
-    numbers : array, optional
-        The numbers of the points; a grid if left out.
     """
 
     def __init__(self, inputs: Mapping[str, NDArray[np.float64]], numbers: NDArray[Any] | None) -> None:

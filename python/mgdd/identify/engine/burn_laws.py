@@ -44,28 +44,6 @@ def compare_laws(
     """Fit every burn law to the same traces, each free to start before the injection if that fits better.
 
     What a law does with that freedom shows how wrong it is; `mgdd.identify.best_timing` bounds it.
-
-    Parameters
-    ----------
-    traces, cylinder, point, fuel_heat_j, step_cad, integrator
-        As in `mgdd.identify.fit_cylinder`.
-    laws : sequence of (burn_shape, gamma_model)
-        Laws to compare.
-    progress : callable, optional
-        Called with a short text before each fit.
-
-    Returns
-    -------
-    list of mgdd.results.Fit
-        In the order of ``laws``.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify.engine.burn_laws import compare_laws
-    >>> fits = compare_laws(datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
-    >>> [fit.kind for fit in fits][:2]
-    ['triangle, gamma 1.37', 'wiebe, gamma 1.37']
     """
     cylinder, fits = cylinder_of(cylinder), []
     for shape, gamma in laws:

@@ -31,10 +31,6 @@ def with_model_error(report: FitReport, request: Request, fit: _core.identify.Cy
 
     Considered, not estimated (Schmidt 1966): each held quantity is spread evenly over its width, and everything is
     fitted again with it at one end. A parameter at a bound or in a null direction stays as it is.
-
-    References
-    ----------
-    Schmidt (1966).
     """
     known = np.flatnonzero(np.isfinite(report.stderr))
     if known.size == 0:

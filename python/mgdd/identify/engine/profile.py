@@ -86,13 +86,7 @@ class WallHeatProfile(Result):
         return draw(self.dataset, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give everything but the Dataset as a dict.
-
-        Returns
-        -------
-        dict
-            Field names to values.
-        """
+        """Give everything but the Dataset as a dict."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "dataset"}
 
 

@@ -100,13 +100,7 @@ class MemberTiming:
     at_bound: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Give law, gamma and wall heat of the member and its answer as plain values.
-
-        Returns
-        -------
-        dict
-            Names to values.
-        """
+        """Give law, gamma and wall heat of the member and its answer as plain values."""
         names = ("law", "gamma_model", "gamma", "wall_heat_model", "wall_heat_scale")
         model = {name: getattr(self.member, name) for name in names}
         own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
@@ -190,13 +184,7 @@ class BestTiming(Result):
         return labelled_dataset({"member": members, **columns}, attrs=attrs)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give file, ranges, directions, best member and all members as plain values.
-
-        Returns
-        -------
-        dict
-            Names to values; ranges as lists.
-        """
+        """Give file, ranges, directions, best member and all members as plain values."""
         return {
             "file": self.file,
             **{name: list(getattr(self, name)) for name in RANGED},

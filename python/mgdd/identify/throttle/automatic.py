@@ -69,38 +69,11 @@ def fit_groups(
     stops_deg: tuple[float, float] = (0.0, 90.0),
     options: FitOptions | None = None,
 ) -> Fit:
-    """Fit the first-principle groups and keep of lag, delay, Stribeck drop, presliding and gap what the log supports.
+    """Fit the first-principle groups, and keep of lag, delay, drop, presliding and gap what the log supports.
 
     Coulomb friction with lag and delay comes first; then the others, each from several starts, with the delay free.
     The structure with the lowest n ln(cost) + k ln(n) is kept (Schwarz 1978), n counting independent samples of the
     residual. It is then fitted with fine steps at the delays about the one found, and every term is tried without.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], evenly sampled.
-    fixed : mapping of str to float, optional
-        Groups that are known.
-    delays : sequence of float
-        Delays that may be, in samples; long ones are looked at where the best of those before are the longest.
-    stops_deg : tuple of float
-        Mechanical stops [deg].
-    options : FitOptions, optional
-        4 starts of a Stribeck drop with seed 0, 40 trial steps per search, tolerance 1e-7 of the last.
-
-    Returns
-    -------
-    mgdd.results.Fit
-        ``kind`` is ``first_principle``; the finding ``structure_chosen`` says what was compared.
-
-    Raises
-    ------
-    DataError, ParameterError
-        As `fit_first_principle`.
-
-    References
-    ----------
-    Schwarz (1978) for the comparison of structures.
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=40, tolerance=1e-7)
     problem = groups_problem(log, fixed=fixed, stops_deg=stops_deg)

@@ -26,17 +26,6 @@ def block_losses(
 
     A free run leaves the plate where the model is wrong (where it crosses a gap, rebounds from a stop), and those few
     blocks would decide. A loss is therefore cut off a quarter above the usual error of the best model.
-
-    Parameters
-    ----------
-    residual : mapping of float to ndarray, shape (n,)
-        Of the rivals [deg].
-    angle : ndarray, shape (n,)
-        As measured [deg].
-    step_s : float
-        Sample time [s].
-    floor_deg : float
-        Error that no model undercuts [deg].
     """
     size = max(round(_BLOCK_S / step_s), _FEWEST)
     of_sample = np.minimum(np.arange(angle.size) // size, max(angle.size // size - 1, 0))

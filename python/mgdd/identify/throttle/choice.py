@@ -43,19 +43,8 @@ def fit_auto(
 ) -> Fit:
     """Fit the groups with the structure that the log supports, and PW-R from their result; keep the better.
 
-    Both are fitted to the first three quarters of the log and run on to its end; PW-R is taken where its free run
-    meets the last quarter better by more than 0.3 points, and if, fitted to the whole log, it meets that better, too:
-    a plate that stuck elsewhere once before the last quarter stays there through it.
-
-    Parameters
-    ----------
-    log, fixed, delays, stops_deg, options
-        As of `mgdd.identify.throttle.automatic.fit_groups`.
-
-    Returns
-    -------
-    mgdd.results.Fit
-        Of either kind; the finding ``model_chosen`` says what was compared.
+    Both are fitted to three quarters of the log and run on to its end. PW-R must be better there, and also when it is
+    fitted to the whole log: a plate that stuck elsewhere once before the last quarter stays there through it.
     """
     groups = fit_groups(log, fixed=fixed, delays=delays, stops_deg=stops_deg, options=options)
     first = round(_EARLY * log.sizes["time_s"])

@@ -26,24 +26,8 @@ def with_delay(
 ) -> FitReport:
     """Add the chosen delay, with the error of the flattest parabola through the costs of the others.
 
-    Parameters
-    ----------
-    report : FitReport
-        Of the fit at the chosen delay.
-    delay : float
-        The chosen delay [samples].
-    rmse : mapping of float to float
-        Error by delay, the chosen one included; at least two.
-    n : float
-        Independent samples of the residual.
-    tried : sequence of float, optional
-        Delays that may be; those of `rmse` if left out.
-
-    Returns
-    -------
-    FitReport
-        With `delay_samples` last; a delay that fits as well as the chosen one leaves a whole sample open. At the end of
-        what may be the error is NaN: the search did not go further; those of lag and time constant, too.
+    A delay that fits as well as the chosen one leaves a whole sample open. At the end of what may be the error is NaN:
+    the search did not go further; those of lag and time constant, too.
     """
     curvature = min(
         2.0 * n * math.log(other / rmse[delay]) / (at - delay) ** 2 for at, other in rmse.items() if at != delay

@@ -73,13 +73,7 @@ class ExcitationCheck(Result):
         return throttle_run(self.prediction, ax=ax)
 
     def summary(self) -> str:
-        """Return a short summary.
-
-        Returns
-        -------
-        str
-            Verdict, predicted figures, limits passed, and what stays open.
-        """
+        """Return a short summary."""
         c = self.content
         lines = [
             "inside the limits" if self.passed else "outside the limits",
@@ -94,13 +88,7 @@ class ExcitationCheck(Result):
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the figures and sentences as a dict, without the prediction.
-
-        Returns
-        -------
-        dict
-            Names to values; those of `content` stand beside the others.
-        """
+        """Give the figures and sentences as a dict, without the prediction."""
         own = {name: getattr(self, name) for name in ("passed", "peak_current_a", "rms_current_a")}
         words = {name: [str(finding) for finding in getattr(self, name)] for name in ("findings", "unanswered")}
         return own | {name: getattr(self.content, name) for name in RecordContent.__dataclass_fields__} | words

@@ -32,40 +32,7 @@ def n_step_rms(
     horizons_s: Sequence[float] | None = None,
     true_deg: ArrayLike | None = None,
 ) -> xr.Dataset:
-    """Give the error of predictions that start anew from the measurement at every sample.
-
-    Parameters
-    ----------
-    model : Model
-        The model.
-    log : xarray.Dataset
-        A throttle log.
-    horizons_s : sequence of float
-        How far ahead [s]; whole numbers of samples. None: 5, 20 and 50 ms, each as the nearest whole sample.
-    true_deg : array_like, optional
-        True angle [deg] to compare with, where it is known; None compares with the measured one.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``n_step_rms_deg`` [deg] over ``predictor`` (the model, and an angle that stays where it is) and ``horizon_s``.
-
-    Raises
-    ------
-    ParameterError
-        A horizon that is not a whole number of samples, or longer than the log.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-    >>> from mgdd.identify.throttle.n_step import n_step_rms
-    >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
-    >>> log = model.simulate({"time_s": time, "duty": 0.1 + 0.2 * np.sin(6.0 * time)})
-    >>> rms = n_step_rms(model, log)["n_step_rms_deg"]
-    >>> bool((rms[0] < 1e-9).all()), bool((rms[1] > 0.1).all())
-    (True, True)
-    """
+    """Give the error of predictions that start anew from the measurement at every sample."""
     time, _, angle = columns_of(log, LOG_COLUMNS)
     truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
     step = even_step(time)

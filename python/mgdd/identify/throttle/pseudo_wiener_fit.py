@@ -74,36 +74,10 @@ def fit_pseudo_wiener(
         9 searches per delay of PW-R and 16 of the others (per delay and start rule of the lags), seed 1 of their Latin
         hypercube, and 150 trial steps per search by default.
 
-    Returns
-    -------
-    mgdd.results.Fit
-        The best of all searches; `n_best` counts those that ended there, `start_rmse` has the error of each [deg].
-
-    Raises
-    ------
-    DataError
-        Logs of different or uneven sample time, a duty beyond ±1.
-    ParameterError
-        A kind or name that does not exist.
-
     Notes
     -----
     Output error with exact forward sensitivities on Levenberg-Marquardt. Only groups of the physical parameters can be
     identified from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
-    >>> from mgdd.optimize import FitOptions
-    >>> from mgdd.throttle import PseudoWiener
-    >>> time = np.arange(4000) * 1e-3
-    >>> duty = 0.15 + 0.2 * np.sin(2.0 * np.pi * (0.5 * time + 0.6 * time**2))
-    >>> truth = PseudoWiener("pw_r", {"above_coulomb_duty": 0.08, "below_coulomb_duty": 0.08})
-    >>> log = truth.simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 8.0})
-    >>> fit = fit_pseudo_wiener(log, limp_home_deg=8.0, options=FitOptions(n_starts=2))
-    >>> round(fit.parameters["above_coulomb_duty"], 4)
-    0.08
     """
     chosen = fit_options(options, n_starts=_STARTS.get(kind, 1), seed=1, max_iterations=150)
     logs = [as_log(one) for one in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]

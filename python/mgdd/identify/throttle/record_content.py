@@ -54,14 +54,6 @@ class RecordContent(NumbersResult):
         Length [s].
     limp_home_deg : float
         As given, or NaN [deg].
-
-    Examples
-    --------
-    >>> from mgdd.identify import check_excitation
-    >>> from mgdd.signals import triangle
-    >>> check = check_excitation(triangle(offset=0.0, amplitude=0.2), lambda time, duty, start: 30.0 + 100.0 * duty)
-    >>> round(check.content.angle_high_deg, 6)
-    50.0
     """
 
     angle_low_deg: float

@@ -79,13 +79,7 @@ class ThrottleValidation(Result):
         return merged(self.free_run, self.n_step, self.tests.dataset)
 
     def summary(self) -> str:
-        """Return a short summary.
-
-        Returns
-        -------
-        str
-            Free run, n steps ahead, residual tests, findings.
-        """
+        """Return a short summary."""
         figures = f"free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF {self.vaf_percent:.2f} %"
         rows = [
             f"{self.kind} on {self.source}: {figures}",
@@ -132,13 +126,7 @@ class ThrottleValidation(Result):
         return drawn_by(engine, lambda place: parts[what](self, ax=place), ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give figures and sentences as a dict, without the runs.
-
-        Returns
-        -------
-        dict
-            With ``n_step_rms`` by horizon in milliseconds.
-        """
+        """Give figures and sentences as a dict, without the runs."""
         figures = {
             "kind": self.kind,
             "source": self.source,
