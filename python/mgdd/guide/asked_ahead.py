@@ -7,8 +7,6 @@ from typing import Any
 
 from mgdd.guide.feed_forward import FeedForward
 
-__all__ = ["Said", "answers_along"]
-
 # First cycle and end of an answer, its optimum (None: nothing was said), curvature and cause.
 Said = tuple[int, int, "list[float] | None", list[float], str]
 

@@ -9,8 +9,6 @@ from typing import Any, Literal
 from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError
 
-__all__ = ["Change", "change_between", "numbers_of"]
-
 NEW_POINT = 0.05  # relative change of any number that makes a new operating point, as of the engine bench
 Change = Literal["same", "following", "new_point"]
 

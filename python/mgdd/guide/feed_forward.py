@@ -20,8 +20,6 @@ from mgdd.optimize.seeker import Seeker, rebuilt
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FeedForward", "Guide"]
-
 Guide = Callable[[Any], "float | Sequence[float] | Optimum | None"]
 Answer = Literal["same", "followed", "held", "refused"]
 

@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 else:
     _CoreGuided = object
 
-__all__ = ["TOLD", "Column", "Guided"]
-
 
 class Column(NamedTuple):
     """A variable of the history: units and long name as `labelled_dataset` takes them."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-__all__ = ["GuidedEngine"]
-
 _CAD = "°CA aTDC"
 
 

@@ -14,8 +14,6 @@ from mgdd.optimize.optimum import Optimum
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, core_rows
 
-__all__ = ["ModelOptimum"]
-
 _MOST_POINTS = 4096  # of the cache
 
 

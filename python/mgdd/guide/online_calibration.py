@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["OnlineCalibration"]
-
 _FIGURES = {
     "residual_rms_bar": ("bar", "root mean square residual of the mean trace"),
     "noise_bar": ("bar", "standard deviation of a sample of the mean trace"),

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from mgdd.results.result import NumbersResult
 
-__all__ = ["ParameterVerdict"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ParameterVerdict(NumbersResult):

@@ -12,8 +12,6 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["settled_estimate"]
-
 _LEAST_SHARE = 1e-3  # of the spread: standard deviation of an estimate that does not move at all
 
 

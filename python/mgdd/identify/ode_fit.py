@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from mgdd.identify.ode_model import Derivative, Output
 
-__all__ = ["fit_ode"]
-
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
     Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 
-__all__ = ["OdeModel", "output_or_first_state", "run_in_lockstep"]
-
 _FUNCTIONS = ("derivative", "output")
 _STATE = "unit of the state"
 

@@ -13,8 +13,6 @@ from mgdd.parallel.pool import MakesExecutor
 from mgdd.results.fit import ARRIVED
 from mgdd.results.fit_report import FitReport
 
-__all__ = ["rank", "search_starts", "spread_starts"]
-
 Start = TypeVar("Start")
 Found = TypeVar("Found")
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["EngineBench"]
-
 _SEARCHED_CAD = (-30.0, 10.0)  # where nobody says, as `mgdd engine seek` does
 _RANDOM = (
     "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",

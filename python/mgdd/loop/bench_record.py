@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["FLAGS", "OWN_LABELS", "cycles_to_dataset"]
-
 FLAGS = {
     "misfire": "nothing burned",
     "clamped": "request outside the timing window",

@@ -23,8 +23,6 @@ from mgdd.results.result import Figures
 if TYPE_CHECKING:
     from mgdd.loop.plant import Plant
 
-__all__ = ["run_seeker"]
-
 
 def run_seeker(
     plant: Plant,

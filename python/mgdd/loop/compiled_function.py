@@ -9,8 +9,6 @@ import numpy as np
 
 from mgdd.errors import ParameterError
 
-__all__ = ["C_TYPE", "address_of", "data_address_of"]
-
 C_TYPE = ctypes.CFUNCTYPE(
     ctypes.c_int,
     ctypes.POINTER(ctypes.c_double), ctypes.c_size_t, ctypes.POINTER(ctypes.c_double), ctypes.c_size_t, ctypes.c_void_p,

@@ -15,8 +15,6 @@ from mgdd.presets.meant import throttle_model_of
 if TYPE_CHECKING:
     from mgdd.throttle.pseudo_wiener import PseudoWiener
 
-__all__ = ["FAMILIES", "Family", "Groups", "Setup", "groups_of"]
-
 Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
 _SIDES = ("above", "below")
 _CONVERTER_DEG = 0.01  # what 12 bits leave of a sensor without noise

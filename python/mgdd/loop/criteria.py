@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from mgdd.guide import FeedForward, GuidedEngine
     from mgdd.optimize import Seeker
 
-__all__ = ["LoopCriteria"]
-
 _LONGEST_SETTLING = 1000  # cycles that do not count for the limits unless the caller says so; as in the core
 
 

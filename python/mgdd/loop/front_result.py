@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-__all__ = ["FrontResult", "fit_of", "front_of", "undominated"]
-
 _DEGREES, _MOST_TERMS = (2, 3, 4), 40
 _SLACK = 1.05  # of the left-out error: a higher degree has to be better by more
 _CANDIDATES, _SPREAD = 4096, (0.1, 0.03, 0.01)  # of the range of the readings, round by round

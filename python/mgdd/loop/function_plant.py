@@ -17,8 +17,6 @@ from mgdd.loop.plant import Measurement, checked_inputs
 if TYPE_CHECKING:
     from mgdd.optimize import Seeker
 
-__all__ = ["FunctionPlant", "core_of"]
-
 _FORMS = "return J, or (J, {limit: value}), or None for a failed cycle"
 
 

@@ -14,8 +14,6 @@ from mgdd.guide import CurveSeeking
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.optimize import GaussianProcessSeeking
 
-__all__ = ["tell_known"]
-
 
 def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tuple[Question, Choice]:
     """Tell the readings, in their order, to a seeker that begins at the best of them where no start is given."""

@@ -13,8 +13,6 @@ from mgdd.results.labels import VARIABLES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["FIGURES", "NOISE_FREE", "limit_figures", "limit_label", "noise_free_variable", "with_a_limit"]
-
 NOISE_FREE = "noise_free_"
 _OWN = "unit of the limit"
 FIGURES = {

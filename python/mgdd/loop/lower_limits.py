@@ -12,8 +12,6 @@ from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import limits_of
 
-__all__ = ["both_sides", "measured_names", "plain_name", "with_lower_sides"]
-
 _LOWER = "-"
 
 

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     _Seeker = Seeker | FeedForward | GuidedEngine
     _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
 
-__all__ = ["monte_carlo"]
-
 _SUMMARY = {
     "cycles_to": ("cycle", "first cycle at which the estimate has arrived"),
     "cycles_stays": ("cycle", "cycle from which the estimate stays"),

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["track_many"]
-
 
 def track_many(
     controllers: Mapping[str, AngleController],

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from mgdd.optimize import Input, Limit
     from mgdd.results.finding import Finding
 
-__all__ = ["OwnSeeker"]
-
 
 class OwnSeeker:
     """Hold the user's object as `own`, which maximises; it is told what its ``tell`` takes."""

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["AnnouncingPlant", "Measurement", "Plant", "checked_inputs"]
-
 
 @described
 @dataclass(frozen=True, kw_only=True)

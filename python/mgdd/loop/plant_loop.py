@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-__all__ = ["LoopRun", "require_inputs_of", "require_point_for", "steer"]
-
 _CHANGED = "operating_point_changed"
 
 

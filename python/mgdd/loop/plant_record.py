@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-__all__ = ["VOID", "Cycles", "Row", "cycles_told", "dataset_of", "steered"]
-
 _UNKNOWN = "not given by the plant"
 VOID = "cycle that the seeker did not use"
 _OWN = ("soc_requested_cad", "soc_applied_cad", "j", "misfire")  # columns that the loop itself knows

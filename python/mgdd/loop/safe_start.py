@@ -10,8 +10,6 @@ from mgdd.loop.lower_limits import plain_name
 if TYPE_CHECKING:
     from mgdd.optimize import Input, Limit
 
-__all__ = ["middle_of", "safe_side"]
-
 _TIMINGS = ("soc_cad", "soi_cad", "spark_cad")
 _FALLS = ("p_max_", "dp_max_", "t_max_k", "nox_", "ringing_", "mapo_", "mean_noise_", "noise_level_")  # with it later
 _RISES = ("t_evo_", "ca10_", "ca50_", "ca90_", "p_max_cad", "t_max_cad", "dp_max_cad")

@@ -26,8 +26,6 @@ from mgdd.optimize.inputs import inputs_of, named_values
 if TYPE_CHECKING:
     from mgdd.optimize import ComponentLag, Input, Limit
 
-__all__ = ["plant_of", "require_cycles", "searched", "seek", "seek_inputs", "started"]
-
 _MOST_CYCLES = 2_000_000
 
 

@@ -31,8 +31,6 @@ from mgdd.optimize import (
 if TYPE_CHECKING:
     from mgdd._core.engine import OperatingPoint
 
-__all__ = ["SEEKERS", "Choice", "Question", "chosen"]
-
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither
 _PER_LATE = 25.0  # cycles more per cycle that J is late: each reading says as much, and comes that much later

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mgdd.loop.seek_choice import Question
     from mgdd.optimize import Input
 
-__all__ = ["Mean", "Readings", "doubts_about"]
-
 _NEAREST = 10  # readings that say what J and limits are at the estimate
 _PER_INPUT = 10  # cycles; the estimate is near after 7 to 10 in the median, docs/benchmarks.md
 _MOVES, _EDGE = 0.1, 0.01  # shares of the bounds

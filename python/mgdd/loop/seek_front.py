@@ -20,8 +20,6 @@ from mgdd.optimize.optimum import limits_of
 if TYPE_CHECKING:
     from mgdd.optimize import Input, Limit
 
-__all__ = ["seek_front"]
-
 _ENDS = 0.3  # share of the cycles that looks for the best of each objective alone
 _NEAREST = 6
 

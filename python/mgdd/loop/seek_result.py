@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from mgdd.loop.seek_choice import Question
 
-__all__ = ["SeekResult", "found_by"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SeekResult(Result):

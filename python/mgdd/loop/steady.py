@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     Point = tuple[float, ...] | NDArray[np.float64]
 
-__all__ = ["find_optimum", "limits_to_keep", "split_inputs", "steady_map"]
-
 _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
 _SCAN_POINTS = {2: 31, 3: 13, 4: 7, 5: 5}  # per input, of several

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["FIGURES_OF_INPUT", "of_first_input", "summarize_cycles"]
-
 FIGURES_OF_INPUT = {
     "final": "mean estimate of the last cycles",
     "mean": "mean estimate, second half",

@@ -20,8 +20,6 @@ from mgdd.surrogate.surrogate import EngineSurrogate
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["SurrogatePlant"]
-
 _LEVERAGE = "leverage_share"
 
 

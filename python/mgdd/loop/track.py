@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "FIGURES",
-    "AngleController",
-    "column_of",
-    "core_of",
-    "plant_of",
-    "reference_of",
-    "sensors_of",
-    "step_times_us",
-    "track",
-]
-
 FIGURES = (
     "settling_ms",
     "mse_deg2",

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from mgdd.throttle import Throttle
 
-__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller", "with_stiction"]
-
 _SPREAD_FIELDS = (
     ("inertia_kgm2",),
     ("viscous_nms_per_rad",),

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
 
-__all__ = ["family_of", "require_known_delay", "shipped_numbers", "tuned_controller", "tuned_with_doubts"]
-
 
 def tuned_controller(
     kind: str,

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["TUNED_SETS"]
-
 TUNED_SETS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "guided": {
         "P1": {

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from mgdd.loop.plant import Plant
     from mgdd.loop.seek_choice import Question
 
-__all__ = ["run_until_still", "stillness"]
-
 _CYCLES = 20  # per input: twice what an estimate takes to arrive, docs/benchmarks.md
 _LOOK = 5  # cycles between two looks
 

@@ -12,8 +12,6 @@ from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.throttle import SensorPair, Throttle
 from mgdd.throttle.faults import ThrottleFault, fault_pair
 
-__all__ = ["VirtualThrottle"]
-
 _INPUTS = ("duty", "supply_v", "airflow_torque_nm", "bridge_open")
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["approach_gain"]
-
 
 def approach_gain(curvature: float, time_constant_cycles: float, *, amplitude: float = 1.0) -> float:
     """Give the gain by which extremum seeking nears an optimum of this curvature with this time constant [cycles]."""

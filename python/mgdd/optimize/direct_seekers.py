@@ -7,8 +7,6 @@ from typing import ClassVar
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
-__all__ = ["GoldenSection", "GradientDescent", "Spsa"]
-
 
 class Spsa(Seeker, _core.optimize.Spsa):
     """Simultaneous perturbation: the slope in every direction from two measurements.

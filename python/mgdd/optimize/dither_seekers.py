@@ -7,8 +7,6 @@ from typing import ClassVar
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
-__all__ = ["ExtremumSeeking"]
-
 
 class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     """Extremum seeking by a sinusoidal dither, one measurement of J per engine cycle.

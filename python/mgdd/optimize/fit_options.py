@@ -6,8 +6,6 @@ from dataclasses import dataclass, fields, replace
 
 from mgdd.errors import ParameterError
 
-__all__ = ["FitOptions", "fit_options"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:

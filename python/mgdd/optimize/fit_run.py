@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.fit_report import FitReport
 
-__all__ = ["draw_run", "fit_of", "fit_run", "quality_of"]
-
 
 def fit_run(time_s: ArrayLike, measured: ArrayLike, model: ArrayLike, label: Label) -> xr.Dataset:
     """Put measurement and free run into one Dataset."""

@@ -12,8 +12,6 @@ import numpy as np
 from mgdd._core.optimize import Surface
 from mgdd.errors import Error, ParameterError, ShapeError
 
-__all__ = ["with_guides"]
-
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7, 5: 5}  # per input: 5 inputs are asked for 3,125 times
 
 

@@ -14,8 +14,6 @@ from mgdd.results.result import NumbersResult
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SEVERAL_ONLY", "InputNumbers"]
-
 SEVERAL_ONLY = {"several": True}  # metadata of a field that is not shown while it is None or empty
 _AXES = {1: ("input",), 2: ("input", "with_input")}
 

@@ -9,8 +9,6 @@ from mgdd._core.optimize import Input
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.results.units import unit_of
 
-__all__ = ["inputs_of", "named_values", "unit_of_input", "with_inputs"]
-
 
 def inputs_of(inputs: Any) -> tuple[Input, ...]:
     """Read inputs in either form: `Input` objects, or bounds by name."""

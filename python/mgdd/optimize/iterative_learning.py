@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ConvergenceReport", "IterativeLearning"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConvergenceReport(NumbersResult):

@@ -17,8 +17,6 @@ from mgdd.results.finding import Finding
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["MeasuredMap", "measure_map"]
-
 _SURE = 2.0  # standard errors
 
 

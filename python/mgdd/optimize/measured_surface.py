@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Surface", "fewest", "fit_surface", "narrowed", "span_of", "twice_as_wide"]
-
 _SIGNIFICANCE = 0.01  # of the test of lack of fit
 _FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test believes
 _ILL = 1e8  # condition of a design that shows nothing

@@ -15,8 +15,6 @@ from mgdd.results.finding import Finding
 from mgdd.results.labels import to_jsonable
 from mgdd.results.result import NumbersResult
 
-__all__ = ["Optimum", "idle_limits", "limit_names_of", "limits_of"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Optimum(NumbersResult):

@@ -12,8 +12,6 @@ from mgdd.errors import ParameterError
 from mgdd.optimize.guide_surface import with_guides
 from mgdd.optimize.seeker import Seeker
 
-__all__ = ["GaussianProcessSeeking"]
-
 
 class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     """Seek with a Gaussian process: few readings, several inputs, limits with a stated probability.

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["Seeker"]
-
 _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["SeekerFindings", "findings_of"]
-
 _FROZEN = 12  # as many failures say that a plant fails; rounded readings near an optimum are seldom alike for longer
 _FOLLOWED = 0.5
 

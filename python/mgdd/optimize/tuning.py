@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
     PerInput = float | ArrayLike | Mapping[str, float]
 
-__all__ = ["Tuning", "tune"]
-
-
 _COUPLED = 0.5  # of the curvature of the flattest direction beside that of the inputs
 
 

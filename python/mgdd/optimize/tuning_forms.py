@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["coupling_of", "harmonics_of", "spsa_moments", "tuned"]
-
 _RMS, _DISTANCE, _ARRIVAL, _AMPLITUDE_MAX = 0.2, 5.0, 0.45, 1.8  # of sqrt(noise_sd/abs(J''))
 _CYCLES = 50.0
 _RESERVE = 0.85  # noise makes arrival later than the mean path

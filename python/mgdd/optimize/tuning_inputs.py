@@ -15,8 +15,6 @@ from mgdd.optimize.tuning_forms import coupling_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["check_wish", "hessian_of", "of_each", "per_input"]
-
 _METHODS = ("batch", "moving_average", "spsa")
 _MOST_INPUTS = 8
 _FLAT = 1e-6  # of the curvature along the inputs

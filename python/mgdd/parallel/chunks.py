@@ -16,8 +16,6 @@ from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.parallel.plan import Chunk, Plan
 from mgdd.parallel.pool import MakesExecutor, Pool, single_threaded
 
-__all__ = ["run_chunks"]
-
 Part = TypeVar("Part")
 
 

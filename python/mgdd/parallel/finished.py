@@ -7,8 +7,6 @@ from typing import TypeVar
 
 from mgdd.errors import Interrupted, WorkerLostError
 
-__all__ = ["hand_over", "keep_finished", "or_partial"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 

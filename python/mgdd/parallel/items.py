@@ -9,8 +9,6 @@ from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.finished import hand_over
 from mgdd.parallel.pool import MakesExecutor
 
-__all__ = ["map_items"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 

@@ -6,8 +6,6 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-__all__ = ["Chunk", "Plan"]
-
 _WANTED_S = 0.25  # of a chunk: far above the cost of handing it over, short enough for progress and Ctrl-C
 _GROWTH = 8  # a chunk may be that much larger than the largest one measured
 _ATTEMPTS = 3

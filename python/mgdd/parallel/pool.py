@@ -14,8 +14,6 @@ from typing import Any, Self
 
 from mgdd.errors import ParameterError
 
-__all__ = ["MakesExecutor", "Pool", "cores", "processes", "single_threaded", "threads_of"]
-
 _single: ContextVar[bool] = ContextVar("single", default=False)
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-__all__ = ["pieces"]
-
 
 def pieces(start: int, stop: int, width: int) -> Iterator[tuple[int, int, int]]:
     """Cut a range of cells, counted row by row, where a row ends."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["fit_surrogate"]
-
 _FOLDS = 5
 _MAX_DELAY = 8  # cycles, of a slow signal
 _SETTLE = 40  # cycles of excitation that a slow signal needs before its first row counts

@@ -16,8 +16,6 @@ from mgdd.surrogate.polynomial import Support
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["best_along"]
-
 _TINY = 1e-9  # relative slack of a limit at its own crossing
 
 

@@ -15,17 +15,6 @@ from mgdd.signals.model import columns_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = [
-    "EDGE",
-    "MOST_FACTORS",
-    "PointHull",
-    "column_label",
-    "column_names",
-    "farthest_inside",
-    "hull_of",
-    "points_of",
-]
-
 MOST_FACTORS = 6  # of a hull: its facets grow beyond all memory with more
 EDGE = 1e-9  # of a range: a point so far outside of a boundary lies on it
 _HALVINGS = 40  # of the way to a boundary

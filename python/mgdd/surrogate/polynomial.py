@@ -17,18 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = [
-    "MODELS",
-    "PolynomialBasis",
-    "PolynomialSurface",
-    "Support",
-    "choose_terms",
-    "least_squares_of",
-    "leverage_of",
-    "r_squared",
-    "support_of",
-]
-
 MODELS = ("linear", "interactions", "quadratic", "cubic")
 
 

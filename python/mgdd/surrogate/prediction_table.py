@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from mgdd.surrogate.response_model import ResponseModel
 
-__all__ = ["prediction_table"]
-
 # What stands behind the name of a response, and the part of a prediction that it is.
 _PARTS = {"": "mean", "_sd": "sd", "_lower": "lower", "_upper": "upper"}
 

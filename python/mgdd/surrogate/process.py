@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["ProcessSurface", "fit_process", "matern"]
-
 _NUGGET = 1e-10  # of the signal variance: keeps a noise-free covariance positive
 
 

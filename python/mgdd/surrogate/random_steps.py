@@ -12,8 +12,6 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["random_step_records"]
-
 _BOX = {"soi_cad": (-8.0, 10.0), "doi_main_ms": (0.25, 0.5), "doi_h2_ms": (2.5, 4.0), "p2m_us": (700.0, 1400.0)}
 _LABELS = {
     "soi_cad": ("°CA aTDC", "start of injection"),

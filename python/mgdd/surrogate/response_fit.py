@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ResponseFit", "fit_response"]
-
 KINDS = ("polynomial", "gaussian_process")
 SELECTIONS = ("bic", "press", "all")
 _MOST_DEGREE = 4

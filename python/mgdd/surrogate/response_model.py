@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["RESERVED", "ResponseModel"]
-
 RESERVED = ("point", "mean", "mean_sd", "sd", "lower", "upper", "extrapolated")
 
 

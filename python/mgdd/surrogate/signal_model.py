@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["SensorLag", "SignalModel", "find_sensor_lag", "lagged"]
-
 # Trial time constants [cycles]; the best is refined by a parabola through its neighbours.
 _TAUS = np.r_[0.0, np.geomspace(0.5, 40.0, 36)]
 _BLOCK = 250  # cycles; longer than the memory of the residual

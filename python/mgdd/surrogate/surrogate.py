@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["STEERED", "EngineSurrogate"]
-
 STEERED = "soi_cad"
 
 

@@ -18,8 +18,6 @@ from mgdd.sweep.inputs import case_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["NOX", "VOID", "Request", "angles_of", "said", "simulate_cases"]
-
 NOX = ("nox_affine_log_ppm", "nox_arrhenius_ppm")
 VOID = "void"  # numbers of the cases whose pressure leaves the physical range
 _ALWAYS = "p_max_bar"  # finite for every cycle that is one

@@ -15,8 +15,6 @@ from mgdd.sweep.inputs import input_labels, rank_of, require_input
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Cases", "cases_of"]
-
 POINT = "point"
 
 

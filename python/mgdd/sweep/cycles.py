@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["sweep"]
-
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 8 * 2**20  # what a chunk carries at most: few are under way, so they stay small beside the result
 _SAMPLE = 100_000  # cases that show how many in a row share an operating point

@@ -12,8 +12,6 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, argument, did_you_mean
 from mgdd.results.labels import VARIABLES, Label
 
-__all__ = ["case_of", "input_labels", "rank_of", "require_input"]
-
 _TIMING = "soc_cad"
 _REMARK = re.compile(r"[,;] (0|none) = .*")  # what a value stands for is not a name for an axis
 _BURN = ("burn_", "wiebe_", "second_", "lower_heating_value")

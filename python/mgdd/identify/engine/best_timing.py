@@ -22,8 +22,6 @@ from mgdd.presets.meant import CylinderLike, PointLike
 if TYPE_CHECKING:
     from mgdd.identify.engine.tdc import TdcEstimate
 
-__all__ = ["best_timing", "doubts_of", "headline_of"]
-
 _MARGIN_CAD = 15.0  # the search reaches this far beyond the fitted timing
 
 

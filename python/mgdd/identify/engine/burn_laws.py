@@ -15,8 +15,6 @@ from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LAWS", "better_laws", "compare_laws", "law_row"]
-
 _PER_LOAD = "rmse_percent imep_closed_error_percent soc_cad largest_error_bar largest_error_cad".split()
 _MUCH_BETTER = 0.7  # of the RMSE
 

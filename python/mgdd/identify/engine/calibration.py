@@ -12,8 +12,6 @@ from mgdd.identify.engine.profile import WallHeatProfile, wall_heat_profile
 from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.identify.engine.tdc import TdcEstimate, estimate_tdc
 
-__all__ = ["TDC_SPAN_CAD", "Calibration", "judge_fit"]
-
 TDC_SPAN_CAD = 2.0
 _PER_TRACE = (
     "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "

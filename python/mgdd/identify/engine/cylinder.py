@@ -26,8 +26,6 @@ from mgdd.results.labels import ANGLE, labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["fit_cylinder", "fit_request"]
-
 
 def fit_cylinder(
     traces: Sequence[Any],

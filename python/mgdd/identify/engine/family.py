@@ -16,8 +16,6 @@ from mgdd.identify.engine.request import BURN_FIELDS, GAMMA_PARAMETER, SHAPE_FIE
 from mgdd.parallel.finished import hand_over
 from mgdd.results.describe import described
 
-__all__ = ["Member", "ModelFamily", "fit_family"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ModelFamily(Plausibility):

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mgdd.identify.engine.records import CylinderFit
 
-__all__ = ["findings_of"]
-
 _PLAUSIBLE = Plausibility()
 _RMSE_LIMIT_PERCENT = 2.0
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mgdd._core.engine import Cylinder
     from mgdd.results.fit_report import FitReport
 
-__all__ = ["WIDTHS", "with_model_error"]
-
 # How far gamma, pressure and angle of a usual bench may be off, where nobody has said better.
 WIDTHS: Mapping[str, float] = MappingProxyType({"gamma": 0.03, "pegging_bar": 0.1, "tdc_cad": 0.3})
 _FUEL = 0.05  # of the stated fuel that may not burn, or not be there

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from mgdd._core.engine import Cylinder
     from mgdd.identify.engine.records import Load
 
-__all__ = ["Plausibility"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Plausibility:

@@ -21,8 +21,6 @@ from mgdd.results.result import Result
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["WallHeatProfile", "wall_heat_profile"]
-
 NAME = "wall_heat_scale"
 UPPER = float(_core.identify.wall_heat_scale_upper)
 _RISE = 1.10  # a scale counts as possible while the refitted RMSE stays within 10 % of the best

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mgdd.identify.engine.request import Request
 
-__all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table", "starts_of"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Load(Result):

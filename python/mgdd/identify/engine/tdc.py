@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["TdcEstimate", "estimate_tdc"]
-
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
 # Gamma of charge and burned gas, at 300 K and its slope; at 3500 K it stays above 1.
 _GAS = {"gamma_linear_300k": (1.36, 1.45), "gamma_linear_slope_per_k": (-1.1e-4, -2.0e-5)}

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["RANGED", "BestTiming", "MemberTiming", "undetermined"]
-
 RANGED = (
     "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
     "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",

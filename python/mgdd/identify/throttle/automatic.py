@@ -43,8 +43,6 @@ from mgdd.results.fit_report import FitReport
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["fit_groups"]
-
 LAG, RAMP, DELAY = ("electrical_s",), ("ramp_deg",), ("delay_samples",)
 DROP = ("stribeck_drop", "stribeck_deg_per_s")
 PRESLIDING = ("presliding_deg", "presliding_damping")

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["block_losses", "certainly_less"]
-
 _BLOCK_S, _FEWEST = 0.1, 10
 _MOVED_DEG = 1.0
 _SPREAD = 1.25  # of the errors of blocks that differ by noise alone

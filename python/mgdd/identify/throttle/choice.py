@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.model import Model
 
-__all__ = ["fit_auto"]
-
 _EARLY = 0.75  # of the log, for both models; they are compared on the rest
 _BETTER_PERCENT = 0.3  # PW-R must gain that much to replace the groups, which have physical meaning
 _STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups know stiffer ones below limp-home

@@ -15,8 +15,6 @@ from mgdd.results.fit_report import FitReport
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["delay_at_end", "with_delay"]
-
 _NAME = "delay_samples"
 _STAND_IN = ("electrical_s", "tau_s")
 

@@ -20,8 +20,6 @@ from mgdd.signals.model import as_signal
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ExcitationCheck", "check_excitation"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ExcitationCheck(Result):

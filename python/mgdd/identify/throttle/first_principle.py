@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["fit_first_principle"]
-
 STATIC = (*GROUP_NAMES[2:7], "limp_home_deg")
 SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
 

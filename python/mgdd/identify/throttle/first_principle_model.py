@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-__all__ = ["FirstPrincipleModel"]
-
 GROUP_NAMES = tuple(_core.identify.group_names)
 # What a throttle need not have: without a word its friction does not drop or bend, its gear has no gap, its
 # stops are rigid, its damping is back-EMF and its duty acts at once.

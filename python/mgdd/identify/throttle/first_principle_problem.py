@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["GroupsProblem", "Search", "groups_problem", "log_columns", "shows_limp_home"]
-
 ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
 BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
 SIDE_S = 0.1  # shorter visits cannot settle a side's two parameters

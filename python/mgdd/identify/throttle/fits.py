@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from mgdd.results import Fit
     from mgdd.results.model import Model
 
-__all__ = ["CHOICES", "KINDS", "PSEUDO_WIENER", "check_kind", "fit_kind", "load_throttle_model"]
-
 PSEUDO_WIENER = ("pw_r", "pw_w", "pw_p")
 KINDS = ("first_principle", *PSEUDO_WIENER)
 CHOICES = ("auto", *KINDS)

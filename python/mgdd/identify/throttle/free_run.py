@@ -19,8 +19,6 @@ from mgdd.signals.model import as_signal, columns_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LOG_COLUMNS", "as_log", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
-
 # What the start of a free run still carries of the unknown speed and current.
 DISCARD_S = 0.05
 LOG_COLUMNS = ("time_s", "duty", "angle_deg")

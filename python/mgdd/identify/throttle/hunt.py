@@ -12,20 +12,6 @@ from mgdd import _core
 from mgdd.errors import Interrupted
 from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search
 
-__all__ = [
-    "AT_NOISE",
-    "BRISTLES",
-    "FINE",
-    "FLOOR_DEG",
-    "MOVING",
-    "WORTH",
-    "Hunt",
-    "best_of",
-    "independent_samples",
-    "missed",
-    "names_of",
-]
-
 # Steps per sample of the look at bristles, and of what is handed over.
 BRISTLES, FINE = 4, 8
 # What a wrong time constant spoils at once: searched first, as the rest would make up for it.

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import FitOptions
 
-__all__ = ["identify_throttle"]
-
 _LOST_PERCENT = 10.0
 _SIDE_DEG = 2.0
 _PLATEAU_DEG, _PLATEAU_VISITS = 0.4, 3

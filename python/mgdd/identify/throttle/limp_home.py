@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.model import Model
 
-__all__ = ["doubts", "read_off"]
-
 _IDLE_DUTY = 0.03
 # Rest, as the noise of a sensor and the soft corner of the preload leave it.
 _REST_S, _REST_DEG, _READ_S = 0.01, 0.5, 0.004

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["n_step_rms"]
-
 HORIZONS_S = (0.005, 0.020, 0.050)
 _WHOLE = 1e-6
 
@@ -62,6 +60,7 @@ def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:
 
 
 def samples_of(horizon_s: float, step_s: float, size: int) -> int:
+    """Give how many whole samples a horizon is; ParameterError where it is none, or more than half of the log."""
     n = round(horizon_s / step_s)
     if n < 1 or abs(n * step_s - horizon_s) > _WHOLE * step_s * max(n, 1) + 1e-9:
         raise ParameterError(f"horizons_s: {horizon_s:g} s is not a whole number of samples of {step_s:g} s")

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.fit import FitQuality
 
-__all__ = ["below_ceiling", "noise_of"]
-
 _MISSED_PERCENT = 3.0  # points of the fit below what noise alone would leave
 _LEAST_FOUR_FIFTHS = 0.4377  # mean square of the least four fifths of a normal variable, over its variance
 

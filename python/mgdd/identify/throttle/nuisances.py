@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from mgdd.identify.throttle.first_principle_problem import GroupsProblem
     from mgdd.results.fit_report import FitReport
 
-__all__ = ["SHARE", "TYPICAL_SHARE", "delay_weights", "independent_values", "with_nuisances"]
-
 SHARE, _DELAY = "viscous_share", "delay_samples"
 # A shorted motor brakes more than its bearings: what is not back-EMF is anything from none to half of the damping.
 _SHARES = (0.0, 0.5)

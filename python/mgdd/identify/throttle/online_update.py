@@ -14,8 +14,6 @@ from mgdd.throttle import PseudoWiener
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["OnlineUpdate"]
-
 _ALL = ("tau_s", "gain_deg_per_s2_per_duty", "preload_duty", "spring_duty_per_deg", "coulomb_duty")
 
 

@@ -24,8 +24,6 @@ from mgdd.throttle import PseudoWiener
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["fit_pseudo_wiener"]
-
 # Enough that the best of PW-W and PW-P is found more than once on the records of the study.
 _STARTS = MappingProxyType({"pw_r": 9, "pw_w": 16, "pw_p": 16})
 

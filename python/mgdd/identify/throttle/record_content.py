@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["RecordContent", "open_questions", "record_content"]
-
 # Speed and travel are taken over 20 ms, travel with a play of 0.1 deg: beyond the noise of a 12-bit sensor.
 _SPEED_WINDOW_S = 0.02
 _PLAY_DEG = 0.1

@@ -29,8 +29,6 @@ from mgdd.signals.model import RunInputs, SampledModel, columns_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SmoothThrottle"]
-
 _EXAMPLE = MappingProxyType(dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True)))
 _START_RAD = 0.14
 

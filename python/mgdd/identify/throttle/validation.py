@@ -28,8 +28,6 @@ from mgdd.signals.model import columns_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ThrottleValidation", "entangled", "validate_throttle"]
-
 _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
 

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from mgdd.identify.throttle.first_principle_problem import Search
 
-__all__ = ["RAMPS", "Delays", "whole_delay"]
-
 RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
 _MOVED = 0.25  # samples by which a delay may differ before the time constant is searched anew
 _RIVAL = 1.5  # a delay whose coarse search ends that far above the best is not fitted finely
