@@ -21,7 +21,7 @@ from mgdd.io.parameters import ParameterFile
 from mgdd.io.point_table import POINT, read_points
 from mgdd.results.labels import label_of
 from mgdd.surrogate import ResponseModel
-from mgdd.surrogate.prediction_table import prediction_table
+from mgdd.surrogate.response_model import prediction_table
 
 if TYPE_CHECKING:
     import xarray as xr

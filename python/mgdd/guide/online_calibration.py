@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,14 +11,45 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.guide.parameter_verdict import ParameterVerdict
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ParameterVerdict(NumbersResult):
+    """How much one parameter of an online calibration deserves belief.
+
+    Attributes
+    ----------
+    name : str
+        Of the parameter.
+    value, standard_error : float
+        Estimate, and its standard error with everything that is not known exactly counted.
+    knowledge : str
+        ``"determined"``, ``"uncertain"``, ``"held"`` (the data know less than was known beforehand), ``"at bound"``,
+        ``"contradicted"`` (the model does not fit this pressure) or ``"no data"``.
+    sentence : str
+        All of it in words, with the reason.
+
+    Examples
+    --------
+    >>> from mgdd.guide import OnlineCalibration
+    >>> OnlineCalibration("puma_single").verdicts["wall_heat_scale"].knowledge
+    'no data'
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    knowledge: str
+    sentence: str
+
 
 _FIGURES = {
     "residual_rms_bar": ("bar", "root mean square residual of the mean trace"),

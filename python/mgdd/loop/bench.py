@@ -13,9 +13,9 @@ from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import SensorDynamics
 from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError, hinted
-from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.lower_limits import measured_names
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.loop.plant_record import cycles_to_dataset
 from mgdd.loop.steady import find_optimum, limits_to_keep, split_inputs, steady_map
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum, limit_names_of

@@ -11,10 +11,9 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.loop.reference import Reference
 from mgdd.loop.track import FIGURES, AngleController, column_of, core_of, plant_of, reference_of, sensors_of
-from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.chunks import pieces, run_chunks
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
-from mgdd.parallel.rows import pieces
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import Throttle

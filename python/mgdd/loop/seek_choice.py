@@ -14,7 +14,7 @@ import numpy as np
 from mgdd.errors import ParameterError, argument, hinted
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.safe_start import middle_of, safe_side
+from mgdd.loop.lower_limits import middle_of, safe_side
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,

@@ -11,8 +11,8 @@ import numpy as np
 
 from mgdd.errors import DataError, Interrupted, ParameterError, hinted
 from mgdd.loop.front_result import FrontResult, front_of
+from mgdd.loop.lower_limits import middle_of
 from mgdd.loop.plant import Measurement, Plant
-from mgdd.loop.safe_start import middle_of
 from mgdd.loop.seek import plant_of, seek_inputs, started
 from mgdd.optimize import GaussianProcessSeeking
 from mgdd.optimize.optimum import limits_of

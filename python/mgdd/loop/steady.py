@@ -12,8 +12,8 @@ import numpy as np
 from mgdd._core.loop import EngineBench, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
-from mgdd.loop.bench_record import OWN_LABELS
 from mgdd.loop.lower_limits import both_sides, measured_names, plain_name
+from mgdd.loop.plant_record import OWN_LABELS
 from mgdd.optimize.optimum import Optimum
 from mgdd.results.labels import labelled_dataset
 

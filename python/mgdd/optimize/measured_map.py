@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
+from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers
 from mgdd.optimize.measured_surface import Surface, fewest, fit_surface, narrowed, span_of, twice_as_wide
 from mgdd.results.finding import Finding
 

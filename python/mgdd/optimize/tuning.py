@@ -11,13 +11,10 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.optimize.direct_seekers import Spsa
-from mgdd.optimize.dither_seekers import ExtremumSeeking
-from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
-from mgdd.optimize.inputs import inputs_of, named_values
+from mgdd.optimize.direct_seekers import ExtremumSeeking, Spsa
+from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers, inputs_of, named_values
 from mgdd.optimize.optimum import limits_of
-from mgdd.optimize.tuning_forms import coupling_of, tuned
-from mgdd.optimize.tuning_inputs import check_wish, hessian_of, of_each, per_input
+from mgdd.optimize.tuning_forms import check_wish, coupling_of, hessian_of, of_each, per_input, tuned
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

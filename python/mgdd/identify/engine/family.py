@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from mgdd._core.engine import Cylinder
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.identify.engine.cylinder import fit_request
-from mgdd.identify.engine.plausible import Plausibility
+from mgdd.identify.engine.findings import Plausibility
 from mgdd.identify.engine.records import CylinderFit, Load
 from mgdd.identify.engine.request import BURN_FIELDS, GAMMA_PARAMETER, SHAPE_FIELDS, Request
 from mgdd.parallel.finished import hand_over

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from mgdd import _core
 from mgdd.errors import Interrupted
 from mgdd.identify.starts import spread_starts
-from mgdd.identify.throttle.delay_report import delay_at_end, with_delay
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
-from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import below_ceiling, draw_free_run, free_run, noise_of, quality_of, source_of
 from mgdd.identify.throttle.hunt import (
     AT_NOISE,
     BRISTLES,
@@ -25,7 +24,6 @@ from mgdd.identify.throttle.hunt import (
     missed,
     names_of,
 )
-from mgdd.identify.throttle.noise_ceiling import below_ceiling, noise_of
 from mgdd.identify.throttle.nuisances import (
     SHARE,
     TYPICAL_SHARE,
@@ -33,7 +31,7 @@ from mgdd.identify.throttle.nuisances import (
     independent_values,
     with_nuisances,
 )
-from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
+from mgdd.identify.throttle.whole_delay import RAMPS, Delays, delay_at_end, whole_delay, with_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over
 from mgdd.results import Fit

@@ -11,10 +11,8 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.identify.starts import rank, search_starts
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
-from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
-from mgdd.identify.throttle.first_principle_start import group_starts
-from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
-from mgdd.identify.throttle.noise_ceiling import below_ceiling
+from mgdd.identify.throttle.first_principle_problem import group_starts, groups_problem, log_columns
+from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial

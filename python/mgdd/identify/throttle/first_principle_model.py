@@ -12,7 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.io.parameters import FIT_NOTES, ModelParameters, ParameterFile, Wanted, wanted
+from mgdd.io.parameters import ModelParameters, Wanted, wanted
 from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -94,8 +94,7 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
     kind = "first_principle"
     parameter_names = GROUP_NAMES
     settings = MappingProxyType(
-        wanted(("closed_deg", "open_deg"))
-        | {"substeps": Wanted(form="integer"), "sample_s": Wanted("s", required=False)}
+        wanted(("closed_deg", "open_deg")) | {"substeps": Wanted(form="integer"), "sample_s": Wanted("s")}
     )
     input_names = ("duty",)
     output_name = observed_state = "angle_deg"
@@ -145,33 +144,6 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             open_deg=self.open_deg,
             substeps=self.substeps,
         )
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
-        """Make the model of a file that `to_toml` or a fit wrote; older ones have fewer groups, the ramp as a setting.
-
-        Parameters
-        ----------
-        file : ParameterFile
-            The file.
-
-        Returns
-        -------
-        FirstPrincipleModel
-            What older files do not name is not there: no drop, no presliding, no delay.
-        """
-        file.expect(kinds=(cls.kind,), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
-        names = wanted(cls.parameter_names)
-        # A file with some of them and the ramp among them is not an older one: what it lacks was lost.
-        older = REFINEMENTS.keys().isdisjoint(file.tables["parameters"]) or "ramp_deg" in file.tables["settings"]
-        may_lack = {name: want._replace(required=not older) for name, want in names.items() if name in REFINEMENTS}
-        values = file.values("parameters", names | may_lack)
-        own = {name: want._replace(required=want.required or not older) for name, want in cls.settings.items()}
-        settings = file.values("settings", {**own, "ramp_deg": names["ramp_deg"]._replace(required=False)})
-        ramp = settings.pop("ramp_deg", None)
-        if ramp is not None:
-            values.setdefault("ramp_deg", ramp)
-        return cls(parameters=values, **settings)
 
     def physical_parameters(
         self,
