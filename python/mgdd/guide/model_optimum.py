@@ -116,8 +116,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
         mgdd.errors.ParameterError
             Not an operating point.
         """
-        if not isinstance(point, OperatingPoint):
-            raise ParameterError.of("point", point, "an OperatingPoint")
+        _require_point(point)
         if point in self._known:
             return self._known[point]
         found = self._find(point)
@@ -164,9 +163,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
         >>> round(curve.best, 1), round(curve.top - curve(-20.0), 1)
         (-5.6, 5.7)
         """
-        if not isinstance(point, OperatingPoint):
-            raise ParameterError.of("point", point, "an OperatingPoint")
-        drawn: list[Curve] | None = self._curves(point, [])
+        drawn = self._drawn(point, ())
         return None if drawn is None else drawn[0]
 
     def limit_curves(self, point: OperatingPoint, names: Sequence[str]) -> list[Curve] | None:
@@ -190,10 +187,13 @@ class ModelOptimum(_core.guide.ModelOptimum):
         mgdd.errors.ParameterError
             Not an operating point.
         """
-        if not isinstance(point, OperatingPoint):
-            raise ParameterError.of("point", point, "an OperatingPoint")
-        drawn: list[Curve] | None = self._curves(point, list(names))
+        drawn = self._drawn(point, names)
         return None if drawn is None else drawn[1:]
+
+    def _drawn(self, point: OperatingPoint, names: Sequence[str]) -> list[Curve] | None:
+        _require_point(point)
+        drawn: list[Curve] | None = self._curves(point, list(names))
+        return drawn
 
     def calibrate(self, cylinder: Cylinder) -> None:
         """Go on with other parameters of the same cylinder, as a calibration finds them.
@@ -221,6 +221,11 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
     def _repr_html_(self) -> str:
         return as_html("ModelOptimum", core_rows(self.cylinder))
+
+
+def _require_point(point: Any) -> None:
+    if not isinstance(point, OperatingPoint):
+        raise ParameterError.of("point", point, "an OperatingPoint")
 
 
 def _rebuild(cls: type[ModelOptimum], cylinder: Cylinder, settings: dict[str, Any]) -> ModelOptimum:

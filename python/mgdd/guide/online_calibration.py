@@ -36,12 +36,6 @@ class ParameterVerdict(NumbersResult):
         ``"contradicted"`` (the model does not fit this pressure) or ``"no data"``.
     sentence : str
         All of it in words, with the reason.
-
-    Examples
-    --------
-    >>> from mgdd.guide import OnlineCalibration
-    >>> OnlineCalibration("puma_single").verdicts["wall_heat_scale"].knowledge
-    'no data'
     """
 
     name: str

@@ -92,13 +92,7 @@ class OdeModel(SampledModel):
         return VARIABLES.get(name, Label(f"unit of {name}", name))
 
     def to_toml(self) -> str:
-        """Write parameters, initial state, columns and substeps as TOML, with the names of the two functions.
-
-        Returns
-        -------
-        str
-            The text of a parameter file, for `from_toml`.
-        """
+        """Write parameters, initial state, columns and substeps as TOML, with the names of the two functions."""
         settings = {
             "initial_state": Entry(value=[float(x) for x in self.initial_state], unit=_STATE),
             "substeps": Entry(value=self.substeps),

@@ -128,11 +128,6 @@ class EngineBench(_core.loop.EngineBench):
         ----------
         inputs : mapping of str to float
             All of `input_names`; the bench clamps them to `input_bounds` and says so in ``values["clamped"]``.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input.
         """
         self._applied = checked_inputs(inputs, self.input_names)
 
@@ -145,11 +140,6 @@ class EngineBench(_core.loop.EngineBench):
             ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1;
             ``applied`` are the inputs within `input_bounds`; ``noise_free_limits`` are the limits there without
             scatter, noise and misfire, the true steady NOx for every sensor and COV of IMEP as NaN.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
         """
         applied = getattr(self, "_applied", None)
         if applied is None:
@@ -185,18 +175,6 @@ class EngineBench(_core.loop.EngineBench):
             repeat the last one, at first the value of the operating point.
         further : sequence of float
             The other inputs in their order, where ``soc_cad`` is a number.
-
-        Returns
-        -------
-        dict
-            What was measured, by name.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown input.
-        mgdd.errors.ShapeError
-            More further inputs than the bench has.
 
         Examples
         --------

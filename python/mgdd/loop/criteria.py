@@ -82,124 +82,33 @@ class LoopCriteria:
         return own if isinstance(own, Mapping) else {limit.name: limit.upper for limit in limits_of(own)}
 
     def counted_from(self, cycles: int) -> int:
-        """Give the first cycle that counts for ``exceeded_fraction``.
-
-        Parameters
-        ----------
-        cycles : int
-            Length of the run.
-
-        Returns
-        -------
-        int
-            ``exceed_from`` or its default for that length.
-
-        Examples
-        --------
-        >>> from mgdd.loop import LoopCriteria
-        >>> [LoopCriteria().counted_from(cycles) for cycles in (300, 5000)]
-        [150, 1000]
-        """
+        """Give the first cycle that counts for ``exceeded_fraction``."""
         return min(_LONGEST_SETTLING, cycles // 2) if self.exceed_from is None else self.exceed_from
 
     def require_counted(self, cycles: int) -> None:
-        """Raise where no cycle of a run would count for ``exceeded_fraction``.
-
-        Parameters
-        ----------
-        cycles : int
-            Length of the run.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            ``exceed_from`` is not below ``cycles``.
-        """
+        """Raise where no cycle of a run would count for ``exceeded_fraction``."""
         if self.exceed_above and self.exceed_from is not None and self.exceed_from >= cycles:
             raise ParameterError.of("exceed_from", self.exceed_from, f"< cycles = {cycles}, or no cycle counts")
 
     def thresholds(self, names: tuple[str, ...]) -> list[float]:
-        """Give ``exceed_above`` in the order of the limits, infinite where it has none; empty if it is empty.
-
-        Parameters
-        ----------
-        names : tuple of str
-            Limits of the plant or of the seeker.
-
-        Returns
-        -------
-        list of float
-            One per name.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            ``exceed_above`` names another limit.
-        """
+        """Give ``exceed_above`` in the order of the limits, infinite where it has none; empty if it is empty."""
         return _in_order("exceed_above", self.exceed_above, names) if self.exceed_above else []
 
     def limits_of(
         self, names: tuple[str, ...], seeker: Seeker | FeedForward | GuidedEngine | None = None
     ) -> list[float]:
-        """Give ``limits`` or those of the seeker in the order of the names, infinite where there is none.
-
-        Parameters
-        ----------
-        names : tuple of str
-            Limited quantities that are measured.
-        seeker : optional
-            Any seeker of `mgdd.optimize` or `mgdd.guide`.
-
-        Returns
-        -------
-        list of float
-            One per name.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            ``limits`` names another quantity.
-        """
+        """Give ``limits`` or those of the seeker in the order of the names, infinite where there is none."""
         if self.limits is not None or seeker is None:
             return _in_order("limits", self._uppers(), names)
         return _in_order("limits", {limit.name: limit.upper for limit in seeker.settings["limits"]}, names)
 
     def attributes(self, names: tuple[str, ...], uppers: Sequence[float]) -> dict[str, float]:
-        """Give what a figure of the run marks: ``optimum``, and ``limit_NAME`` where there is one.
-
-        Parameters
-        ----------
-        names : tuple of str
-            Limited quantities that are measured.
-        uppers : sequence of float
-            Their limits, infinite where there is none.
-
-        Returns
-        -------
-        dict of str to float
-            In the units of the input and of the limits.
-        """
+        """Give what a figure of the run marks: ``optimum``, and ``limit_NAME`` where there is one."""
         found = {f"limit_{name}": upper for name, upper in zip(names, uppers, strict=True) if math.isfinite(upper)}
         return found if self.optimum is None else {"optimum": float(self.optimum), **found}
 
     def to_core(self, names: tuple[str, ...]) -> dict[str, Any]:
-        """Give what the loops of the core take.
-
-        Parameters
-        ----------
-        names : tuple of str
-            Limits of the bench.
-
-        Returns
-        -------
-        dict of str to object
-            Keywords; limits are empty where each seeker brings its own.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            ``exceed_above`` or ``limits`` names another limit.
-        """
+        """Give what the loops of the core take."""
         return {
             "optimum_cad": math.nan if self.optimum is None else self.optimum,
             "arrival_cad": self.arrival,

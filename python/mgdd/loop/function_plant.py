@@ -197,18 +197,7 @@ class FunctionPlant:
         return self._core is not None and not self._values
 
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Set the inputs of the next call.
-
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            One finite number for every name of `input_names`.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input.
-        """
+        """Set the inputs of the next call."""
         self._applied = dict(zip(self.input_names, checked_inputs(inputs, self.input_names), strict=True))
 
     def measure(self) -> Measurement:
@@ -218,13 +207,6 @@ class FunctionPlant:
         -------
         Measurement
             J with its noise, or the values, and the limits; NaN in a failed cycle, which is a misfire.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            An answer of a Python function that is not one.
-        mgdd.errors.RigError
-            Nothing was applied yet.
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply inputs first")

@@ -125,14 +125,6 @@ class LoopRun(Result):
         Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
     findings : tuple of Finding
         What the seeker holds against the run at its end, as its ``findings``: inputs that make the plant fail.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, run_seeker
-    >>> from mgdd.optimize import ExtremumSeeking
-    >>> run = run_seeker(EngineBench(seed=1), ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), 600)
-    >>> abs(run.summary["final_soc_cad"] + 5.63) < 2.0
-    True
     """
 
     dataset: xr.Dataset

@@ -236,13 +236,6 @@ class SeekResult(Result):
         Every cycle.
     asked : Question
         Inputs, limits and what was said of J.
-
-    Examples
-    --------
-    >>> from mgdd.loop import seek
-    >>> found = seek(lambda x: -0.03 * (x["soc_cad"] + 4.0) ** 2, {"soc_cad": (-25.0, 15.0)}, cycles=40)
-    >>> round(found.inputs["soc_cad"], 1), found.seeker.kind, found.findings
-    (-4.0, 'CurveSeeking', ())
     """
 
     inputs: dict[str, float]

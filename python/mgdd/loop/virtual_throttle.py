@@ -130,11 +130,6 @@ class VirtualThrottle:
         ----------
         inputs : mapping of str to float
             One number per name of `input_names`; a duty is clipped to -1..1.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input.
         """
         values = checked_inputs(inputs, self._inputs)
         self._applied = {**self._still, **dict(zip(self._inputs, values, strict=True))}
@@ -148,11 +143,6 @@ class VirtualThrottle:
             ``values``: ``time_s``, ``sensed_angle_deg``, both sensors as ``first_v``, ``second_v``, ``first_angle_deg``
             and ``second_angle_deg``, ``fault`` of their check as 0 or 1, ``age_s`` of what arrived last, ``supply_v``
             of the bridge, and the truth ``angle_deg``, ``speed_deg_per_s`` and ``current_a``. What is missing is NaN.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")

@@ -60,13 +60,6 @@ class ConvergenceReport(NumbersResult):
     References
     ----------
     Bristow, Tharayil and Alleyne (2006), A survey of iterative learning control.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import IterativeLearning
-    >>> report = IterativeLearning([0.0] * 5, impulse_response=[1.0, 0.5], k_p=1.9).convergence()
-    >>> report.asymptotic, report.monotone, round(report.spectral_radius, 9)
-    (True, False, 0.9)
     """
 
     asymptotic: bool

@@ -52,13 +52,6 @@ class MeasuredMap(InputNumbers):
     See Also
     --------
     measure_map : makes one.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import measure_map
-    >>> found = measure_map([-2, -1, 0, 1, 2], [-4.0, -1.1, 0.0, -0.9, -4.0])
-    >>> round(found.curvature, 3), round(found.optimum, 3)
-    (-2.0, 0.01)
     """
 
     noise_sd: float

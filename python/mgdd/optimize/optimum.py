@@ -47,17 +47,6 @@ class Optimum(NumbersResult):
         The best point without limits, where it was sought.
     findings : tuple of Finding
         ``idle_limit``: a limit that nothing in the searched range reaches.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import Limit
-    >>> from mgdd.optimize.optimum import Optimum
-    >>> best = Optimum(inputs={"soc_cad": -3.1}, objective="efficiency_gross", value=0.56,
-    ...                limits=(Limit("p_max_bar", 95.0),), active_limits=("p_max_bar",))
-    >>> best["soc_cad"]
-    -3.1
-    >>> best
-    <Optimum efficiency_gross 0.56 at soc_cad -3.1, held by p_max_bar>
     """
 
     inputs: Mapping[str, float]

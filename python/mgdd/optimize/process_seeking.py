@@ -286,21 +286,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     ) -> None:
         """Accept what was measured: at the input of the last `ask`, or at `applied`, one of several asked at once.
 
-        Parameters
-        ----------
-        J : float or array_like
-            Performance, or one number per component.
-        limits : sequence or mapping of str to float, optional
-            One value per limit.
-        misfire : bool
-            The cycle is counted and its J and limits are not read.
-        applied : array_like or mapping, optional
-            What the plant really applied, if not what was asked for.
-
-        Raises
-        ------
-        ParameterError, ShapeError, DataError
-            Neither asked nor told where, a wrong count, a number that is not finite; nothing has changed then.
+        Everything else is as of the other seekers: a refused reading changes nothing.
         """
         if applied is not None:
             super().ask()  # which gives the same where it was asked already

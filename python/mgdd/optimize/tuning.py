@@ -74,13 +74,6 @@ class Tuning(InputNumbers):
     See Also
     --------
     tune : makes one.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import tune
-    >>> tuning = tune(0.25, -0.051, distance=12.0, arrival=1.0)
-    >>> tuning.met, tuning.period
-    (True, 6)
     """
 
     method: str

@@ -46,14 +46,6 @@ class ResponseFit(Fit):
         ``residual`` (measured minus fitted), ``studentised``, ``leverage``, ``normal_score`` and ``outlier``; the
         number ``outlier_bound``; cuts through the medians of the points, ``cut``, ``cut_mean``, ``cut_lower`` and
         ``cut_upper`` over ``factor`` and ``step``.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_response
-    >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
-    >>> fit = fit_response(line, "imep_bar", degree=1)
-    >>> fit.diagnostics["left_out"].values.round(1).tolist()
-    [1.4, 2.7, 5.8, 9.1, 12.0]
     """
 
     diagnostics: xr.Dataset

@@ -142,14 +142,6 @@ class EngineSurrogate(Parameters):
         Record minus model by row of the log, one column per signal, NaN where a record was not used.
     source : mapping of str to object
         Attributes of the records.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.random_steps import random_step_records
-    >>> surrogate = fit_surrogate(random_step_records(1500))
-    >>> surrogate.inputs
-    ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')
     """
 
     signals: Mapping[str, SignalModel]
@@ -287,14 +279,7 @@ class EngineSurrogate(Parameters):
         )
 
     def quality(self) -> xr.Dataset:
-        """Tabulate how well each surface does.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``r2``, ``r2_held_out``, ``lag_cycles``, ``residual_sd`` and ``cyclic_sd`` over ``signal``; the last two
-            in the unit of each signal.
-        """
+        """Tabulate how well each surface does."""
         models = list(self.signals.values())
         own = "unit of the signal"
         return labelled_dataset(
@@ -318,23 +303,7 @@ class EngineSurrogate(Parameters):
         return cls(**read_surrogate(file))
 
     def operating_point(self, at: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Complete a choice of inputs with the medians of the rest, and check it.
-
-        Parameters
-        ----------
-        at : mapping of str to float, optional
-            Inputs other than ``soi_cad``, in their units.
-
-        Returns
-        -------
-        dict
-            A value for every input.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown input, ``soi_cad``, or a value that is not finite.
-        """
+        """Complete a choice of inputs with the medians of the rest, and check it."""
         for name, value in (at or {}).items():
             if name not in self.inputs or name == STEERED:
                 others = ", ".join(n for n in self.inputs if n != STEERED)

@@ -152,15 +152,6 @@ class Member:
         Per trace: RMSE with gamma and wall heat of the other traces [% of p_max]; its own where they are held.
     why_not : tuple of str
         Per trace: why it is not plausible there; empty if it is.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import ModelFamily, best_timing
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[0].best.member.law
-    'double_wiebe'
     """
 
     law: str

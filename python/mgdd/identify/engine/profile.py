@@ -55,14 +55,6 @@ class WallHeatProfile(Result):
         Why not, in words.
     dataset : xarray.Dataset
         ``rmse_percent`` of all traces together, and per trace, over ``wall_heat_scale``.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
-    >>> wall_heat_profile(fit_cylinder(traces, cylinder)).identifiable
-    False
     """
 
     value: float

@@ -62,15 +62,6 @@ class TdcEstimate(Result):
         Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
         ``low_cad`` and ``high_cad``; fired also ``rmse_percent`` over ``tdc_offset_cad``.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import estimate_tdc
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> found = estimate_tdc(datasets.read("hd_diesel_128x144"), cylinder, span_cad=1.0)
-    >>> found.suspect
-    False
     """
 
     tdc_offset_cad: float

@@ -120,16 +120,6 @@ class BestTiming(Result):
         family on both sides, gains from 0 where the range of moves spans it. NaN without any.
     free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
         The same without the limit of the load's own p_max.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import ModelFamily, best_timing
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[0.5, 1.0])
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
-    >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
-    ([1, 9], 8)
     """
 
     file: str

@@ -39,17 +39,6 @@ class ExcitationCheck(Result):
         Predicted motor current [A]; NaN if the prior model has none.
     prediction : xarray.Dataset
         ``duty``, ``angle_deg`` and, where the model has it, ``current_a`` over ``time_s``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify import check_excitation
-    >>> from mgdd.signals import chirp
-    >>> def lazy(time_s, duty, start_deg):
-    ...     return 30.0 + 100.0 * np.asarray(duty)
-    >>> check = check_excitation(chirp(offset=0.15, amplitude=0.2), lazy, angle_window_deg=(1.0, 60.0))
-    >>> check.passed, check.findings[0].text
-    (False, 'the plate opens to 65.0 deg, beyond 60')
     """
 
     passed: bool

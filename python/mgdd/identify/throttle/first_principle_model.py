@@ -82,13 +82,6 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         Steps per sample.
     sample_s : float
         Sample time that the delay counts [s].
-
-    Examples
-    --------
-    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-    >>> run = FirstPrincipleModel().simulate({"time_s": [0.0, 0.001, 0.002], "duty": [0.0, 0.0, 0.0]})
-    >>> run["angle_deg"].values.tolist()
-    [8.0, 8.0, 8.0]
     """
 
     kind = "first_principle"

@@ -49,14 +49,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
     ------
     ParameterError
         A parameter that is missing or unknown.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.smooth import SmoothThrottle
-    >>> run = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(5), "duty": np.zeros(5)})
-    >>> run["angle_deg"].values.round(3).tolist()
-    [8.021, 8.021, 8.021, 8.021, 8.021]
     """
 
     kind = "smooth"

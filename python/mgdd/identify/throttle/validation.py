@@ -105,12 +105,6 @@ class ThrottleValidation(Result):
         Limitations found, what the log does not identify, and which excitation would.
     source : str
         Name of the log.
-
-    Examples
-    --------
-    >>> from mgdd.identify.throttle.validation import ThrottleValidation
-    >>> "quality" in ThrottleValidation.__dataclass_fields__
-    True
     """
 
     kind: str
