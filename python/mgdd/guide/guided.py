@@ -18,26 +18,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     class _CoreGuided:
-        """What both have of their class of the core, and what each brings itself."""
+        """What both have of their class of the core beside a seeker, and what each brings itself."""
 
-        @property
-        def estimate(self) -> NDArray[np.float64]: ...
         @property
         def applied(self) -> NDArray[np.float64]: ...
         @property
-        def cycle(self) -> int: ...
-        @property
-        def input_names(self) -> list[str]: ...
-        @property
         def trust(self) -> float: ...
-        def tell(
-            self,
-            J: Any = None,  # noqa: N803
-            limits: Any = None,
-            *,
-            misfire: bool = False,
-            applied: Any = None,
-        ) -> None: ...
         def _standing(self) -> Mapping[str, Any]: ...  # what stands before the next cycle, by column
         def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...  # of __init__, beside the options
 
@@ -70,7 +56,6 @@ class Guided(SeekerFindings, _CoreGuided):
     _seeker_settings: dict[str, Any]
     _options: dict[str, Any]
     _rows: list[tuple[Any, ...]]
-    state: Any
 
     def tell(
         self,

@@ -13,7 +13,7 @@ from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
 from mgdd.identify.starts import search_starts, spread_starts
 from mgdd.optimize import least_squares
-from mgdd.optimize.fit_options import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of
+from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit

@@ -11,10 +11,9 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, argument
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.bench import EngineBench
-from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
 from mgdd.loop.plant_record import VOID, cycles_to_dataset, steered
-from mgdd.loop.summary import NOISE_FREE, limit_figures, of_first_input, summarize_cycles, with_a_limit
+from mgdd.loop.summary import NOISE_FREE, LoopCriteria, limit_figures, of_first_input, summarize_cycles, with_a_limit
 from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import named_values
 from mgdd.optimize.seeker_findings import findings_of
@@ -29,11 +28,7 @@ if TYPE_CHECKING:
 
 
 def run_seeker(
-    plant: Plant,
-    seeker: Seeker | FeedForward | GuidedEngine,
-    cycles: int,
-    *,
-    criteria: LoopCriteria | None = None,
+    plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, *, criteria: LoopCriteria | None = None
 ) -> LoopRun:
     """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
 

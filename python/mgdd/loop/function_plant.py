@@ -260,8 +260,7 @@ class FunctionPlant:
                 f"limits = {gave or 'none'}{self._where()}: must name {', '.join(self.limit_names) or 'none'}; {_FORMS}"
             )
         return Measurement(
-            components=(number,),
-            limits={name: self._number(name, limits[name]) for name in self.limit_names},
+            components=(number,), limits={name: self._number(name, limits[name]) for name in self.limit_names}
         )
 
     def _named(self, answer: Any) -> Measurement:

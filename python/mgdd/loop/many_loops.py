@@ -14,10 +14,9 @@ from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.guide.feed_forward import Said, answers_along
 from mgdd.loop.bench import EngineBench
-from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.plant_loop import require_inputs_of, require_point_for
-from mgdd.loop.summary import FIGURES_OF_INPUT, limit_label, of_first_input, with_a_limit
+from mgdd.loop.summary import FIGURES_OF_INPUT, LoopCriteria, limit_label, of_first_input, with_a_limit
 from mgdd.parallel.chunks import pieces, run_chunks
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of

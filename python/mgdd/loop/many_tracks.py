@@ -178,11 +178,7 @@ def _tracks(runs: _Runs, *, threads: int = 1) -> tuple[dict[str, NDArray[np.floa
 
 
 def _in_chunks(
-    runs: _Runs,
-    *,
-    executor: MakesExecutor | None,
-    workers: int | None,
-    progress: Callable[[int, int], None] | None,
+    runs: _Runs, *, executor: MakesExecutor | None, workers: int | None, progress: Callable[[int, int], None] | None
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_], Interrupted | WorkerLostError | None]:
     n_throttles, n_controllers, n_scenarios = runs.shape
     # A scenario that the core refuses is found before any work, on one throttle.

@@ -14,11 +14,10 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, hinted
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.function_plant import core_of
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.plant_record import Cycles, Row, cycles_told, dataset_of
-from mgdd.loop.summary import summarize_cycles
+from mgdd.loop.summary import LoopCriteria, summarize_cycles
 from mgdd.optimize import Seeker
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.finding import Finding

@@ -157,10 +157,7 @@ class VirtualThrottle:
 
 
 def _restored(
-    kind: type[VirtualThrottle],
-    given: dict[str, Any],
-    state: dict[str, list[float]],
-    applied: dict[str, float] | None,
+    kind: type[VirtualThrottle], given: dict[str, Any], state: dict[str, list[float]], applied: dict[str, float] | None
 ) -> VirtualThrottle:
     made = kind(**given)
     made.state = state

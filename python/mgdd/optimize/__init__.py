@@ -34,9 +34,8 @@ from __future__ import annotations
 from mgdd._core.optimize import ComponentLag, Input, Limit
 from mgdd.errors import former_seeker as _former_seeker
 from mgdd.optimize.direct_seekers import ExtremumSeeking, GoldenSection, GradientDescent, Spsa
-from mgdd.optimize.fit_options import FitOptions
 from mgdd.optimize.iterative_learning import IterativeLearning
-from mgdd.optimize.least_squares import least_squares
+from mgdd.optimize.least_squares import FitOptions, least_squares
 from mgdd.optimize.measured_map import measure_map
 from mgdd.optimize.process_seeking import GaussianProcessSeeking
 from mgdd.optimize.seeker import Seeker

@@ -26,54 +26,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
-    from numpy.typing import NDArray
 
 _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 
 
-if TYPE_CHECKING:
-
-    class _CoreSeeker:
-        """What every seeker has of its class of the core."""
-
-        @property
-        def settings(self) -> dict[str, Any]: ...
-        @property
-        def state(self) -> dict[str, list[float]]: ...
-        @state.setter
-        def state(self, saved: Any) -> None: ...
-        @property
-        def estimate(self) -> NDArray[np.float64]: ...
-        @property
-        def settable(self) -> NDArray[np.float64]: ...
-        @property
-        def cycle(self) -> int: ...
-        @property
-        def component_count(self) -> int: ...
-        @property
-        def input_names(self) -> list[str]: ...
-        @property
-        def limit_names(self) -> list[str]: ...
-        @property
-        def limit_states(self) -> dict[str, str]: ...
-        def ask(self) -> Any: ...
-        def tell(
-            self,
-            J: Any = None,  # noqa: N803
-            limits: Any = None,
-            *,
-            misfire: bool = False,
-            applied: Any = None,
-        ) -> None: ...
-        def restart(self) -> None: ...
-        def _history_columns(self) -> dict[str, Any]: ...
-        def _clear_history(self) -> None: ...
-else:
-    _CoreSeeker = object
-
-
-class Seeker(SeekerFindings, _CoreSeeker):
+class Seeker(SeekerFindings):
     """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
 
     Parameters

@@ -12,11 +12,10 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace import conditions
-from mgdd.identify.engine.findings import findings_of
-from mgdd.identify.engine.model_error import with_model_error
+from mgdd.identify.engine.findings import findings_of, with_model_error
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed, with_burn
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.presets.meant import CylinderLike, PointLike
 from mgdd.results.fit import FitQuality

@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_request
-from mgdd.identify.engine.model_error import WIDTHS
+from mgdd.identify.engine.findings import WIDTHS
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
 from mgdd.results.labels import labelled_dataset

@@ -12,12 +12,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd._core.identify import LoadBurn, with_burn
 from mgdd.engine import analyze
 from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.pressure import one_cycle
-from mgdd.optimize.fit_options import FitOptions
+from mgdd.optimize.least_squares import FitOptions
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of, stated
 from mgdd.results.labels import ANGLE
 
@@ -25,18 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = [
-    "BURN_FIELDS",
-    "GAMMA_PARAMETER",
-    "SHAPE_FIELDS",
-    "LoadBurn",
-    "Request",
-    "default_free",
-    "listed",
-    "pegged",
-    "with_burn",
-]
-
+LoadBurn = _core.identify.LoadBurn
+with_burn = _core.identify.with_burn
 SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
 BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
 _EARLIEST = ("soi_cad", "spark_cad")

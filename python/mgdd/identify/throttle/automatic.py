@@ -12,27 +12,25 @@ from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
 from mgdd.identify.throttle.free_run import below_ceiling, draw_free_run, free_run, noise_of, quality_of, source_of
-from mgdd.identify.throttle.hunt import (
+from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, delay_weights, independent_values, with_nuisances
+from mgdd.identify.throttle.whole_delay import (
     AT_NOISE,
     BRISTLES,
     FINE,
     FLOOR_DEG,
     MOVING,
+    RAMPS,
+    Delays,
     Hunt,
     best_of,
+    delay_at_end,
     independent_samples,
     missed,
     names_of,
+    whole_delay,
+    with_delay,
 )
-from mgdd.identify.throttle.nuisances import (
-    SHARE,
-    TYPICAL_SHARE,
-    delay_weights,
-    independent_values,
-    with_nuisances,
-)
-from mgdd.identify.throttle.whole_delay import RAMPS, Delays, delay_at_end, whole_delay, with_delay
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over
 from mgdd.results import Fit
 from mgdd.results.finding import Finding

@@ -129,13 +129,7 @@ def design_excitation(
 
 
 def _rule(
-    groups: DutyGroups,
-    limp_home_deg: float,
-    window: tuple[float, float],
-    side: str,
-    factor: float,
-    *,
-    slow: bool,
+    groups: DutyGroups, limp_home_deg: float, window: tuple[float, float], side: str, factor: float, *, slow: bool
 ) -> tuple[float, float]:
     """Return offset and amplitude."""
     reach_up, reach_down = max(window[1] - limp_home_deg, 0.0), max(limp_home_deg - window[0], 0.0)

@@ -14,7 +14,7 @@ from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrinc
 from mgdd.identify.throttle.first_principle_problem import group_starts, groups_problem, log_columns
 from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.results import Fit

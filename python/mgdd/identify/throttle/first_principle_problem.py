@@ -88,13 +88,7 @@ class GroupsProblem:
         return self.step_s, duty, self.angle, state, 0, [0, 1] if moving else [0]
 
     def search(
-        self,
-        values: Mapping[str, float],
-        free: Sequence[str],
-        *,
-        substeps: int,
-        tolerance: float,
-        max_iterations: int,
+        self, values: Mapping[str, float], free: Sequence[str], *, substeps: int, tolerance: float, max_iterations: int
     ) -> Search:
         """Search the groups `free` from `values`, all others kept; Interrupted carries what it had."""
         # A search needs room for a delay that is free; the rest of a long one is taken off the duty.
@@ -287,12 +281,7 @@ def regression_start(
     return found
 
 
-def group_starts(
-    values: Mapping[str, float],
-    free: list[str],
-    n_starts: int,
-    seed: int,
-) -> list[list[float]]:
+def group_starts(values: Mapping[str, float], free: list[str], n_starts: int, seed: int) -> list[list[float]]:
     """Spread the free groups that are searched as logarithms from half to twice their first value."""
     bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     box = [

@@ -13,7 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, LONGEST_DELAY, whole_shift
 from mgdd.identify.throttle.free_run import noise_of
-from mgdd.identify.throttle.hunt import AT_NOISE, FLOOR_DEG
+from mgdd.identify.throttle.whole_delay import AT_NOISE, FLOOR_DEG
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,7 +12,7 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.whole_delay import delay_at_end
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results import Fit
 from mgdd.results.finding import Finding

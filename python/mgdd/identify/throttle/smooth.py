@@ -15,7 +15,7 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.identify.starts import rank, search_starts
 from mgdd.io.parameters import ModelParameters, wanted
-from mgdd.optimize.fit_options import FitOptions, fit_of, fit_options, fit_run
+from mgdd.optimize.least_squares import FitOptions, fit_of, fit_options, fit_run
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit

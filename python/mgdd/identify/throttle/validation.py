@@ -34,11 +34,7 @@ _WHOLE = 1e-6
 
 
 def n_step_rms(
-    model: Model,
-    log: xr.Dataset,
-    *,
-    horizons_s: Sequence[float] | None = None,
-    true_deg: ArrayLike | None = None,
+    model: Model, log: xr.Dataset, *, horizons_s: Sequence[float] | None = None, true_deg: ArrayLike | None = None
 ) -> xr.Dataset:
     """Give the error of predictions that start anew from the measurement at every sample."""
     time, _, angle = columns_of(log, LOG_COLUMNS)
@@ -198,11 +194,7 @@ class ThrottleValidation(Result):
 
 
 def validate_throttle(
-    model: Model | Fit,
-    log: Any,
-    *,
-    horizons_s: Sequence[float] | None = None,
-    limp_home_deg: float | None = None,
+    model: Model | Fit, log: Any, *, horizons_s: Sequence[float] | None = None, limp_home_deg: float | None = None
 ) -> ThrottleValidation:
     """Validate a model, or a fit, on a log, best on one that it was not fitted to.
 
