@@ -77,11 +77,6 @@ class Guided(SeekerFindings, _CoreGuided):
             The cycle is counted and its J and limits are not read.
         applied : array_like, optional
             What the plant really applied, if not what was asked for.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
-            As by the seeker; nothing has changed then.
         """
         with self._recorded(J, misfire, applied):
             super().tell(J, limits, misfire=misfire, applied=applied)

@@ -51,7 +51,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
     Raises
     ------
     mgdd.errors.ParameterError
-        A setting outside its domain.
+        A setting outside its domain; what is asked for a point that is no operating point.
 
     References
     ----------
@@ -102,11 +102,6 @@ class ModelOptimum(_core.guide.ModelOptimum):
         Optimum or None
             Input ``soc_cad``, value and curvature in the unit of the performance, in ``values`` the ``iterations`` of
             the ascent; None where the model has no optimum, as of a motored point.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Not an operating point.
         """
         _require_point(point)
         if point in self._known:
@@ -142,11 +137,6 @@ class ModelOptimum(_core.guide.ModelOptimum):
             J over SOC [°CA aTDC], from 15 °CA before the bounds to 10 °CA behind them as far as the bench goes; None
             where the model has no such cycle, as of a motored point.
 
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Not an operating point.
-
         Examples
         --------
         >>> from mgdd.engine import Cylinder, OperatingPoint
@@ -173,11 +163,6 @@ class ModelOptimum(_core.guide.ModelOptimum):
         list of Curve or None
             One per name, each in its unit over SOC [°CA aTDC]; None where the model has no such cycle, or no such
             indicator.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Not an operating point.
         """
         drawn = self._drawn(point, names)
         return None if drawn is None else drawn[1:]

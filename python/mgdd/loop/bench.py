@@ -233,13 +233,6 @@ class EngineBench(_core.loop.EngineBench):
             ``components`` over ``component`` and their sum ``j``, and ``limits`` over ``limit`` where limits were
             named.
 
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown input.
-        mgdd.errors.ShapeError
-            Requests that are not columns of one length.
-
         Examples
         --------
         >>> from mgdd.loop import EngineBench
@@ -268,11 +261,6 @@ class EngineBench(_core.loop.EngineBench):
         xarray.Dataset
             Over ``soc_cad`` and the other inputs named: ``j``, ``efficiency_gross``, ``imep_gross_bar``, ``p_max_bar``,
             ``dp_max_bar_per_cad``, ``t_max_k``, ``nox_true_ppm``, ``nox_soft_ppm``.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A value outside the window of the bench, or an unknown input.
 
         Examples
         --------

@@ -19,8 +19,6 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
         Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
         inside by `amplitude`.
@@ -56,10 +54,8 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
         Slope of J at which the dither is full [unit of J per unit of the input]; > 0 with a floor below 1.
     limit_amplitude : float
         Share of the dither while a limit holds the estimate back [-].
-    maximize : bool
-        False to minimise J.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep; ``tell(J, limits)`` then takes their values.
+    inputs, maximize, limits
+        As of every `Seeker`.
     curvature : float, optional
         J'' if known: makes the gain (time constant of four periods), or, where a gain above the bound of averaging is
         given, a UserWarning with that bound.
@@ -108,8 +104,6 @@ class Spsa(Seeker, _core.optimize.Spsa):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
         Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
         inside by the perturbation (twice that in the second-order form).
@@ -143,10 +137,8 @@ class Spsa(Seeker, _core.optimize.Spsa):
         Share of the perturbation while a limit holds the estimate back [-].
     seed : int
         Of the random signs: the same seed gives the same run.
-    maximize : bool
-        False to minimise J.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep.
+    inputs, maximize, limits
+        As of every `Seeker`.
     curvature : float, optional
         J'' if known: makes the gain; a first step factor gain abs(J'') above 1 gives a UserWarning.
 
@@ -186,8 +178,6 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
         Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
         inside by `difference`.
@@ -202,10 +192,8 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
         Converged once every entry of a step is smaller, per input, in its unit; a fiftieth of its scale.
     iterations : int
         Steps within which `converged_at` is looked for; the search goes on all the same.
-    maximize : bool
-        False to minimise J.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep.
+    inputs, maximize, limits
+        As of every `Seeker`.
     curvature : float, optional
         J'' if known: makes the step size; one given that cannot converge gives a UserWarning with the bound.
 
@@ -245,8 +233,6 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     ----------
     start : float or mapping
         Estimate before the first decision.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Name, unit, bounds and scale of the input; `ask` then gives a mapping.
     lower, upper : float
         The bracket, finite, where `inputs` does not say it; also the bounds of the applied input.
     noise_sd : float
@@ -257,8 +243,8 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
         Measurements of each inner point before it counts as inconclusive.
     tolerance : float, optional
         Width of the bracket at which a noise-free search ends, in the unit of the input, > 0; a fiftieth of its scale.
-    maximize : bool
-        False to minimise J.
+    inputs, maximize
+        As of every `Seeker`.
     limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep. Points on both sides of a limit are tried until the bracket is small, so it is
         broken during the search; behind a delay each point is measured for as long as the limits take to show it.

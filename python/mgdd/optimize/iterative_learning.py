@@ -201,11 +201,6 @@ class IterativeLearning:
         -------
         ndarray, shape (N,)
             A copy. Asking again before `tell` gives the same.
-
-        Examples
-        --------
-        >>> IterativeLearning([1.0, 2.0], k_p=0.5).ask().tolist()
-        [1.0, 2.0]
         """
         return self._core.ask()
 
@@ -227,14 +222,6 @@ class IterativeLearning:
             A value that is not finite or beyond 1e30 in magnitude, with trial and sample, or trials that diverge
             beyond the range of a float.
             As after every refusal, the learner is as it was.
-
-        Examples
-        --------
-        >>> learner = IterativeLearning([1.0, 2.0], k_p=0.5)
-        >>> _ = learner.ask()
-        >>> learner.tell([0.2, -0.2])
-        >>> learner.ask().tolist()
-        [1.1, 1.9]
         """
         self._core.tell(_column(error, "error"))
 

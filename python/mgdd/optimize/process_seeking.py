@@ -134,8 +134,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs. Limits should hold there.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and rates of the inputs; `ask` then gives a mapping. A rate bounds the applied input.
+    inputs, maximize
+        As of every `Seeker`; a rate of an input bounds what is applied.
     lower, upper : float or array_like
         Bounds of the applied input, per input, finite, where `inputs` does not say them.
     noise_sd : float, optional
@@ -170,8 +170,6 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         farther beyond what was read than a first step, or 0.4 of its width.
     seed : int
         Of the inputs that are compared: the same seed gives the same run.
-    maximize : bool
-        False to minimise J.
     limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep, each with a process of its own; ``tell(J, limits)`` then takes their values.
 

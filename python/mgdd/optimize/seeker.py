@@ -36,10 +36,15 @@ class Seeker(SeekerFindings):
 
     Parameters
     ----------
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds, scales and rates of the inputs; `ask` then gives a mapping, and ``start`` and whatever is
+        given per input may be one.
+    limits : sequence of Limit, or mapping of str to float
+        Measured quantities to keep, or their upper values by name; ``tell(J, limits)`` then takes what was read.
+    maximize : bool
+        False to minimise J.
     *given, **settings
-        As each kind says them; ``limits`` is a sequence of `Limit`, or a mapping of names to upper values. With
-        ``inputs``, a sequence of `Input` or a mapping of names to (lower, upper), inputs have names: `ask` gives a
-        mapping, and ``start`` and whatever is given per input may be one.
+        As each kind says them.
 
     Examples
     --------

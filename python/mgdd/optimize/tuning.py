@@ -168,13 +168,6 @@ class Tuning(InputNumbers):
         ExtremumSeeking or Spsa
             Extremum seeking of the tuned form, or SPSA with constant gains.
 
-        Raises
-        ------
-        ParameterError
-            Bounds that exclude the start, or inputs of other names.
-        ShapeError
-            Not one number per input.
-
         Examples
         --------
         >>> from mgdd.optimize import tune

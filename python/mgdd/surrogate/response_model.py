@@ -128,15 +128,6 @@ class ResponseModel(Parameters):
             A level outside 0 to 1.
         mgdd.errors.DataError
             A factor is missing or not finite.
-
-        Examples
-        --------
-        >>> from mgdd.surrogate import fit_response
-        >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
-        >>> model = fit_response(line, "imep_bar", degree=1).model
-        >>> found = model.predict({"fuel_mg": [15.0]})
-        >>> found["lower"].item() < found["mean"].item() < found["upper"].item()
-        True
         """
         from scipy.stats import t
 

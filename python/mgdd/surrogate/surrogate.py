@@ -186,14 +186,6 @@ class EngineSurrogate(Parameters):
         ------
         mgdd.errors.ParameterError
             An unknown input, a value that is not finite, or a point outside the support with ``outside="raise"``.
-
-        Examples
-        --------
-        >>> from mgdd.surrogate import fit_surrogate
-        >>> from mgdd.surrogate.random_steps import random_step_records
-        >>> surrogate = fit_surrogate(random_step_records(1500))
-        >>> surrogate.predict([-4.0, 0.0, 40.0])["supported"].values.tolist()
-        [True, True, False]
         """
         if outside not in ("flag", "raise"):
             raise ParameterError.of("outside", outside, "'flag' or 'raise'")
@@ -250,14 +242,6 @@ class EngineSurrogate(Parameters):
             An unknown signal or input, a weight or limit that is not finite.
         mgdd.errors.ConvergenceError
             No supported SOI meets the limits.
-
-        Examples
-        --------
-        >>> from mgdd.surrogate import fit_surrogate
-        >>> from mgdd.surrogate.random_steps import random_step_records
-        >>> best = fit_surrogate(random_step_records(1500)).find_optimum("imep_bar", {"mprr": 5.0})
-        >>> best.active_limits, best.at_bound
-        (('mprr',), False)
         """
         weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         kept = limits_of(limits)

@@ -98,19 +98,6 @@ def fit_first_principle(
     References
     ----------
     Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.first_principle import fit_first_principle
-    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-    >>> from mgdd.optimize import FitOptions
-    >>> time = 1e-3 * np.arange(4000)
-    >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))
-    >>> log = FirstPrincipleModel().simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 30.0})
-    >>> fit = fit_first_principle(log, options=FitOptions(n_starts=1))
-    >>> fit.train.nrmse_fit_percent > 99.0
-    True
     """
     log = as_log(log)
     test = None if test is None else as_log(test, "test")

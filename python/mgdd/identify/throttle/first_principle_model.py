@@ -158,13 +158,6 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         ------
         ParameterError
             A number that is not positive, or none or both of the two.
-
-        Examples
-        --------
-        >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-        >>> found = FirstPrincipleModel().physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
-        >>> round(found["torque_constant_nm_per_a"], 4)
-        0.2291
         """
         known = {
             "resistance_ohm": resistance_ohm,

@@ -147,18 +147,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
         References
         ----------
         Nielsen (1999) for the damping; Moré (1978) for the scaling; Griewank and Walther (2008) for the sensitivities.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from mgdd.identify.throttle.smooth import SmoothThrottle
-        >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
-        >>> time, truth = 1e-3 * np.arange(8000), np.array(list(SmoothThrottle().parameters.values()))
-        >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
-        >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
-        >>> fit = SmoothThrottle().fit(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
-        >>> bool(fit.report.rmse < 0.051)
-        True
         """
         chosen = fit_options(options, tolerance=1e-9)
         table = np.atleast_2d(np.asarray(start_values, dtype=np.float64))
