@@ -30,27 +30,10 @@ from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
-    "EngineBench",
-    "EngineGuide",
-    "FunctionPlant",
-    "LoopCriteria",
-    "Measurement",
-    "Plant",
-    "Reference",
-    "SensorDynamics",
-    "SurrogatePlant",
-    "ThrottleFault",
-    "VirtualThrottle",
-    "monte_carlo",
-    "run_seeker",
-    "seek",
-    "seek_front",
-    "simulate_drive",
-    "track",
-    "track_many",
-    "tune_controller",
-    "tuned_controller",
-]
+    "EngineBench", "EngineGuide", "FunctionPlant", "LoopCriteria", "Measurement", "Plant", "Reference",
+    "SensorDynamics", "SurrogatePlant", "ThrottleFault", "VirtualThrottle", "monte_carlo", "run_seeker", "seek",
+    "seek_front", "simulate_drive", "track", "track_many", "tune_controller", "tuned_controller",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:
