@@ -169,7 +169,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
         Parameters
         ----------
         J, limits, misfire, applied
-            As of `FeedForward.tell`.
+            As of the seeker, the applied timing in °CA aTDC.
         pressure_bar : array_like, optional
             Pressure of the cycle on the angles of the calibration [bar]; not used without one.
         """
