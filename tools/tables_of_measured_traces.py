@@ -10,7 +10,7 @@ from tables_of_model import Rows, values_of
 from mgdd import datasets, presets
 from mgdd.engine import Cylinder, analyze
 from mgdd.identify import best_timing, wall_heat_profile
-from mgdd.identify.engine.burn_laws import compare_laws
+from mgdd.identify.engine.calibration import compare_laws
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.identify.engine.timing_records import BestTiming
 

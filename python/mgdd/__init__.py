@@ -46,8 +46,6 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in __all__:
         return importlib.import_module(f"mgdd.{name}")
-    if name in ("BoundedSeeking", "NewtonSeeking"):
-        return getattr(importlib.import_module("mgdd.optimize"), name)  # which says what to take
     raise AttributeError(f"module 'mgdd' has no attribute {name!r}")
 
 

@@ -284,18 +284,6 @@ class Interrupted(KeyboardInterrupt):
         self.partial = partial
 
 
-_OWN = "the page 'A seeker of your own' has it in Python"
-_FORMER_SEEKERS = {
-    "newton": f"the Newton form left mgdd: GaussianProcessSeeking, or CurveSeeking, learns a curvature; {_OWN}",
-    "bounded": f"the bounded form left mgdd: ExtremumSeeking keeps a largest step, its rate; {_OWN}",
-}
-
-
-def former_seeker(name: str) -> str:
-    """Say what to take for a seeker that once was; nothing for another name."""
-    return _FORMER_SEEKERS.get(_letters(name).removesuffix("seeking"), "")
-
-
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Ask for the known names that begin alike, else for the nearest one, or say nothing where none is near.
 
@@ -305,8 +293,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     if len(name) > _LONGEST_NAME:
         return ""
     near = [other for other in known if len(other) <= _LONGEST_NAME]
-    if "extremumseeking" in map(_letters, near) and (instead := former_seeker(name)):
-        return instead
     stem = _letters(name)
     close = [other for other in near if len(stem) >= _SHORTEST_STEM and _letters(other).startswith(stem)]
     if not 0 < len(close) <= _MOST_NAMES:

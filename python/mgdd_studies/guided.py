@@ -12,7 +12,7 @@ import numpy as np
 from mgdd.guide import Curve, CurveSeeking, ModelOptimum
 from mgdd.loop import EngineBench, SurrogatePlant, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
-from mgdd.optimize.by_curvature import approach_gain
+from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd.surrogate import fit_surrogate

@@ -12,8 +12,8 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking
-from mgdd.optimize.by_curvature import approach_gain
 from mgdd.optimize.optimum import Optimum
+from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.convergence import convergence
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset

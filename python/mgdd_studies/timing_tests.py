@@ -12,8 +12,8 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit
-from mgdd.optimize.by_curvature import approach_gain
 from mgdd.optimize.optimum import Optimum
+from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds

@@ -18,8 +18,8 @@ from mgdd import identify
 from mgdd.errors import DataError, ShapeError
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.n_step import n_step_rms
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
+from mgdd.identify.throttle.validation import n_step_rms
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.labels import labelled_dataset

@@ -19,7 +19,7 @@ from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions, least_squares
-from mgdd.optimize.fit_options import fit_options
+from mgdd.optimize.least_squares import fit_options
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality

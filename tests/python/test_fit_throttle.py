@@ -9,7 +9,7 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import TYPICAL, FirstPrincipleModel
-from mgdd.identify.throttle.first_principle_start import regression_start
+from mgdd.identify.throttle.first_principle_problem import regression_start
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions

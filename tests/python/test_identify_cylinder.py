@@ -15,7 +15,7 @@ from mgdd.cli.from_library import named_options
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import fit_cylinder, wall_heat_profile
-from mgdd.identify.engine.burn_laws import better_laws
+from mgdd.identify.engine.calibration import better_laws
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.io import pressure_trace
 from mgdd.results.labels import check_labels

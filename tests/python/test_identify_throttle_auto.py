@@ -13,10 +13,9 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.identify import identify_throttle, load_throttle_model
-from mgdd.identify.throttle.block_losses import block_losses, certainly_less
-from mgdd.identify.throttle.delay_report import with_delay
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.noise_ceiling import noise_of
+from mgdd.identify.throttle.free_run import noise_of
+from mgdd.identify.throttle.whole_delay import block_losses, certainly_less, with_delay
 from mgdd.io import throttle_log
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.optimize import FitOptions, least_squares

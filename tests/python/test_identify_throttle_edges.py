@@ -14,7 +14,7 @@ from mgdd.cli import main
 from mgdd.errors import ParameterError
 from mgdd.identify import design_excitation, identify_throttle, validate_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.limp_home import doubts
+from mgdd.identify.throttle.identify import doubts
 from mgdd.io import throttle_log, write_csv
 from mgdd.optimize import FitOptions
 from mgdd.signals import amplitude_random_steps, chirp

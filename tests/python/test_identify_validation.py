@@ -13,10 +13,9 @@ from hypothesis.extra.numpy import arrays
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.throttle.first_principle import fit_first_principle
-from mgdd.identify.throttle.n_step import n_step_rms
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.throttle.record_content import open_questions, record_content
-from mgdd.identify.throttle.validation import ThrottleValidation
+from mgdd.identify.throttle.validation import ThrottleValidation, n_step_rms
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mgdd
-from mgdd.cli import main
 from mgdd.engine import OperatingPoint
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import ParameterError, ShapeError
 from mgdd.loop import EngineBench, seek
-from mgdd.optimize import Limit, Seeker, Spsa
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "own_seeker.md"
 BOUNDS = {"soc_cad": (-25.0, 10.0)}
@@ -113,26 +110,3 @@ def test_an_object_that_cannot_seek_is_refused_by_what_it_lacks() -> None:
         seek(EngineBench(), BOUNDS, seeker=Walk(0.0), start=1.0)
     with pytest.raises(ParameterError, match="seeker"):
         seek(EngineBench(), BOUNDS, seeker=object())
-
-
-@pytest.mark.parametrize("name", ["newton", "newton_seeking", "NewtonSeeking", "bounded", "bounded_seeking"])
-def test_names_of_before_say_what_to_take(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    take = "GaussianProcessSeeking" if "ewton" in name else "ExtremumSeeking"
-    with pytest.raises(ParameterError, match=f"left mgdd: {take}.*A seeker of your own"):
-        seek(EngineBench(), BOUNDS, seeker=name)
-    with pytest.raises(SystemExit):
-        main(["engine", "seek", "--seeker", name])
-    assert take in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("kind", ["NewtonSeeking", "BoundedSeeking"])
-def test_classes_and_files_of_before_say_what_to_take(kind: str, tmp_path: Path) -> None:
-    with pytest.raises(ImportError, match="A seeker of your own"):
-        exec(f"from mgdd.optimize import {kind}")  # noqa: S102
-    with pytest.raises(ImportError, match="A seeker of your own"):
-        getattr(mgdd, kind)
-    file = tmp_path / "seeker.json"
-    Spsa(start=0.0, limits=[Limit("p", 1.0)]).save(file)
-    file.write_text(file.read_text().replace('"Spsa"', f'"{kind}"'))
-    with pytest.raises(DataError, match=f"holds a {kind}, not.* left mgdd"):
-        Seeker.load(file)

@@ -21,8 +21,7 @@ from hypothesis import strategies as st
 import parallel_work as work
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.parallel import map_items
-from mgdd.parallel.chunks import run_chunks
-from mgdd.parallel.plan import Plan
+from mgdd.parallel.chunks import Plan, run_chunks
 
 NUMBERS = [float(n) for n in range(40)]
 SQUARES = [n * n for n in NUMBERS]

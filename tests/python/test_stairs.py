@@ -218,7 +218,8 @@ THEIR_OWN = "mgdd._core.systems"
 def private_uses(root: Path) -> list[str]:
     """What the studies take of mgdd that is not public.
 
-    Public is a module, and a name in the list of a module, where no part of the path begins with an underscore.
+    Public is a module, and a name that a module lists or, without a list, defines, where no part of the path begins
+    with an underscore.
     """
     ours = {module: path for module, path in modules(root).items() if module.partition(".")[0] == "mgdd"}
     lists = {module: {"__version__", *listed_names(path)} for module, path in ours.items()}
@@ -249,11 +250,17 @@ def private_uses(root: Path) -> list[str]:
 
 
 def listed_names(path: Path) -> set[str]:
-    """Read the list of public names of a module."""
+    """Read the list of public names of a module, or what it defines where it has none."""
+    found = set()
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["__all__"]:
             return set(ast.literal_eval(node.value))
-    return set()
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            stored = (each for each in ast.walk(node) if isinstance(each, ast.Name))
+            found |= {each.id for each in stored if isinstance(each.ctx, ast.Store)}
+    return found
 
 
 def test_the_studies_take_nothing_private(root: Path) -> None:
@@ -269,6 +276,8 @@ def test_the_studies_take_nothing_private(root: Path) -> None:
         ("from mgdd import _core", ["a.py: mgdd._core"]),
         ("from mgdd._core.engine import Cylinder", ["a.py: mgdd._core.engine.Cylinder"]),
         ("from mgdd.io import helper", ["a.py: mgdd.io.helper"]),
+        ("from mgdd.io.plain import load, LARGEST", []),
+        ("from mgdd.io.plain import os", ["a.py: mgdd.io.plain.os"]),
         ("def f():\n    from mgdd.io import _load", ["a.py: mgdd.io._load"]),
         ("from mgdd import io as files\nfiles.helper()", ["a.py: mgdd.io.helper"]),
         ("import mgdd.io\nmgdd.io.helper()", ["a.py: mgdd.io.helper"]),
@@ -280,6 +289,7 @@ def test_what_is_private_is_seen(tmp_path: Path, text: str, found: list[str]) ->
     write(tmp_path, "python/mgdd/__init__.py", "")
     write(tmp_path, "python/mgdd/io/__init__.py", '__all__ = ["load"]\n')
     write(tmp_path, "python/mgdd/io/deep.py", '__all__ = ["load"]\n')
+    write(tmp_path, "python/mgdd/io/plain.py", "import os\nLARGEST: int = 1\ndef load(): pass\n")
     write(tmp_path, "python/mgdd_studies/a.py", text)
     assert private_uses(tmp_path) == found
 

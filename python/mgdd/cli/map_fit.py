@@ -25,7 +25,7 @@ from mgdd.plot.response import response_diagnostics
 from mgdd.plot.style import drawn
 from mgdd.results.labels import label_of
 from mgdd.surrogate import ResponseModel, fit_response
-from mgdd.surrogate.prediction_table import prediction_table
+from mgdd.surrogate.response_model import prediction_table
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -24,10 +24,10 @@ from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
 from mgdd.io.point_table import read_points
 from mgdd.loop import EngineBench, seek
-from mgdd.loop.limit_figures import FIGURES, NOISE_FREE
 from mgdd.loop.lower_limits import plain_name
 from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
+from mgdd.loop.summary import FIGURES, NOISE_FREE
 from mgdd.optimize import ComponentLag
 from mgdd.optimize.optimum import Optimum
 from mgdd.plot import seeking

@@ -9,30 +9,12 @@ from typing import Any, Literal
 from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError
 
-__all__ = ["Change", "change_between", "numbers_of"]
-
 NEW_POINT = 0.05  # relative change of any number that makes a new operating point, as of the engine bench
 Change = Literal["same", "following", "new_point"]
 
 
 def numbers_of(point: Any) -> dict[str, float]:
-    """Give the numbers of an operating point by name.
-
-    Parameters
-    ----------
-    point : OperatingPoint, mapping of str to float, sequence of float, or float
-        Numbers of a sequence are named by their place.
-
-    Returns
-    -------
-    dict of str to float
-        NaN included; what an `OperatingPoint` leaves open is left out.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Anything else.
-    """
+    """Give the numbers of an operating point by name."""
     if isinstance(point, OperatingPoint):
         return {name: float(value) for name, value in point.to_dict().items() if value is not None}
     try:

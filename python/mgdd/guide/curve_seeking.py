@@ -7,8 +7,6 @@ from typing import ClassVar
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
-__all__ = ["CurveSeeking"]
-
 
 class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     """Seeking guided by a curve: a rough model gives the shape of J, the measurements give its place.

@@ -20,8 +20,6 @@ from mgdd.optimize.seeker import Seeker, rebuilt
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FeedForward", "Guide"]
-
 Guide = Callable[[Any], "float | Sequence[float] | Optimum | None"]
 Answer = Literal["same", "followed", "held", "refused"]
 
@@ -138,17 +136,11 @@ class FeedForward(Guided, _core.guide.FeedForward):
             raise ParameterError.of("keep_start", keep_start, "True or False")
         settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
-            "trust": trust,
-            "calibration_rate": calibration_rate,
-            "following_share": following_share,
+            "trust": trust, "calibration_rate": calibration_rate, "following_share": following_share,
             "probe_cycles": int(settling <= _LONGEST_SETTLING) if probe_cycles is None else probe_cycles,
-            "probe_settling": settling,
-            "noise_sd": noise_sd,
-            "trust_sd": trust_sd,
-            "doubt": doubt,
-            "curvature_spread": curvature_spread,
-            "significance": significance,
-        }
+            "probe_settling": settling, "noise_sd": noise_sd, "trust_sd": trust_sd, "doubt": doubt,
+            "curvature_spread": curvature_spread, "significance": significance,
+        }  # fmt: skip
         super().__init__(seeker, **self._options)
         self._options["keep_start"] = bool(keep_start)
         self._set_seeker_history(seeker._history_columns())
@@ -306,3 +298,41 @@ def _numbers_said(said: Any) -> tuple[list[float], list[float]]:
         bend = [said.curvature] if len(said.inputs) == 1 and said.curvature < 0.0 else []
         return [float(value) for value in said.inputs.values()], bend
     return np.atleast_1d(np.asarray(math.nan if said is None else said, np.float64)).ravel().tolist(), []
+
+
+# First cycle and end of an answer, its optimum (None: nothing was said), curvature and cause.
+Said = tuple[int, int, "list[float] | None", list[float], str]
+
+
+class _Recording(FeedForward):
+    """A feed-forward that keeps what goes to its core."""
+
+    heard: list[tuple[list[float] | None, list[float], str]]
+
+    def _offer(self, optimum: Any, curvature: Any, cause: str) -> bool:
+        self.heard.append((optimum, curvature, cause))
+        return super()._offer(optimum, curvature, cause)
+
+    def _hold(self) -> None:
+        self.heard.append((None, [], "new_point"))
+        super()._hold()
+
+
+def answers_along(seeker: FeedForward, schedule: Sequence[tuple[int, Any]], cycles: int) -> list[Said]:
+    """Ask the guide at every operating point of a schedule, for a loop that cannot ask it; the seeker stays as it is.
+
+    A guide that held or refused is asked once more, and counts as saying the same until the next operating point.
+    """
+    asked: _Recording = seeker._as(_Recording, seeker.seeker, seeker.guide)
+    out = list[Said]()
+    ends = [first for first, _ in schedule[1:]] + [cycles]
+    for (first, point), end in zip(schedule, ends, strict=True):
+        for begin, stop in ((first, first + 1), (first + 1, end)):
+            if begin >= min(stop, cycles):
+                break
+            asked.heard = []
+            answer = asked.at(point)
+            out += [(begin, begin + 1 if answer == "followed" else stop, *said) for said in asked.heard]
+            if answer in ("same", "followed"):
+                break
+    return out

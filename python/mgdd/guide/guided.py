@@ -18,33 +18,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     class _CoreGuided:
-        """What both have of their class of the core, and what each brings itself."""
+        """What both have of their class of the core beside a seeker, and what each brings itself."""
 
-        @property
-        def estimate(self) -> NDArray[np.float64]: ...
         @property
         def applied(self) -> NDArray[np.float64]: ...
         @property
-        def cycle(self) -> int: ...
-        @property
-        def input_names(self) -> list[str]: ...
-        @property
         def trust(self) -> float: ...
-        def tell(
-            self,
-            J: Any = None,  # noqa: N803
-            limits: Any = None,
-            *,
-            misfire: bool = False,
-            applied: Any = None,
-        ) -> None: ...
         def _standing(self) -> Mapping[str, Any]: ...  # what stands before the next cycle, by column
         def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...  # of __init__, beside the options
 
 else:
     _CoreGuided = object
-
-__all__ = ["TOLD", "Column", "Guided"]
 
 
 class Column(NamedTuple):
@@ -72,7 +56,6 @@ class Guided(SeekerFindings, _CoreGuided):
     _seeker_settings: dict[str, Any]
     _options: dict[str, Any]
     _rows: list[tuple[Any, ...]]
-    state: Any
 
     def tell(
         self,
@@ -94,11 +77,6 @@ class Guided(SeekerFindings, _CoreGuided):
             The cycle is counted and its J and limits are not read.
         applied : array_like, optional
             What the plant really applied, if not what was asked for.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
-            As by the seeker; nothing has changed then.
         """
         with self._recorded(J, misfire, applied):
             super().tell(J, limits, misfire=misfire, applied=applied)

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-__all__ = ["GuidedEngine"]
-
 _CAD = "°CA aTDC"
 
 
@@ -170,21 +168,10 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
 
         Parameters
         ----------
-        J : float or array_like
-            Performance, or one number per component.
-        limits : sequence or mapping of str to float, optional
-            One value per limit of the seeker.
-        misfire : bool
-            The cycle is counted and its J and limits are not read.
-        applied : array_like, optional
-            What the plant really applied, if not what was asked for [°CA aTDC].
+        J, limits, misfire, applied
+            As of the seeker, the applied timing in °CA aTDC.
         pressure_bar : array_like, optional
             Pressure of the cycle on the angles of the calibration [bar]; not used without one.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
-            As by the seeker; nothing has changed then.
         """
         with self._recorded(J, misfire, applied):
             self._tell(J, limits, misfire, applied, pressure_bar)

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["MapForms"]
-
 _CAD, _SQUARED = "°CA aTDC", "degree**2"
 _CELLS = {"timing_cad": _CAD, "variance_cad2": _SQUARED, "support": "-"}
 _SETTINGS = {"prior_sd_cad": "°CA", "forgetting": "-"}

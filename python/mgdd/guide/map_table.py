@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SETTINGS", "read_map_table", "write_map_table"]
-
 SETTINGS = {"prior_sd_cad": 3.0, "forgetting": 0.95}  # of a map where nothing is said
 _CELLS = {"timing_cad": (-180.0, 180.0), "sd_cad": (0.0, math.inf), "support": (0.0, math.inf)}
 _KNOWN = (*_CELLS, *SETTINGS, "source")

@@ -14,8 +14,6 @@ from mgdd.optimize.optimum import Optimum
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, core_rows
 
-__all__ = ["ModelOptimum"]
-
 _MOST_POINTS = 4096  # of the cache
 
 
@@ -53,7 +51,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
     Raises
     ------
     mgdd.errors.ParameterError
-        A setting outside its domain.
+        A setting outside its domain; what is asked for a point that is no operating point.
 
     References
     ----------
@@ -85,18 +83,10 @@ class ModelOptimum(_core.guide.ModelOptimum):
         integrator: str = "trapezoid",
     ) -> None:
         super().__init__(
-            cylinder_of(cylinder),
-            performance=performance or Performance(),
-            nox=nox or NoxModel(),
-            method=method,
-            bounds_cad=bounds_cad,
-            step_size=step_size,
-            difference_cad=difference_cad,
-            tolerance_cad=tolerance_cad,
-            iterations=iterations,
-            step_cad=step_cad,
-            integrator=integrator,
-        )
+            cylinder_of(cylinder), performance=performance or Performance(), nox=nox or NoxModel(), method=method,
+            bounds_cad=bounds_cad, step_size=step_size, difference_cad=difference_cad, tolerance_cad=tolerance_cad,
+            iterations=iterations, step_cad=step_cad, integrator=integrator,
+        )  # fmt: skip
         self._known: dict[OperatingPoint, Optimum] = {}
 
     def __call__(self, point: OperatingPoint) -> Optimum | None:
@@ -112,14 +102,8 @@ class ModelOptimum(_core.guide.ModelOptimum):
         Optimum or None
             Input ``soc_cad``, value and curvature in the unit of the performance, in ``values`` the ``iterations`` of
             the ascent; None where the model has no optimum, as of a motored point.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Not an operating point.
         """
-        if not isinstance(point, OperatingPoint):
-            raise ParameterError.of("point", point, "an OperatingPoint")
+        _require_point(point)
         if point in self._known:
             return self._known[point]
         found = self._find(point)
@@ -153,11 +137,6 @@ class ModelOptimum(_core.guide.ModelOptimum):
             J over SOC [°CA aTDC], from 15 °CA before the bounds to 10 °CA behind them as far as the bench goes; None
             where the model has no such cycle, as of a motored point.
 
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Not an operating point.
-
         Examples
         --------
         >>> from mgdd.engine import Cylinder, OperatingPoint
@@ -166,9 +145,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
         >>> round(curve.best, 1), round(curve.top - curve(-20.0), 1)
         (-5.6, 5.7)
         """
-        if not isinstance(point, OperatingPoint):
-            raise ParameterError.of("point", point, "an OperatingPoint")
-        drawn: list[Curve] | None = self._curves(point, [])
+        drawn = self._drawn(point, ())
         return None if drawn is None else drawn[0]
 
     def limit_curves(self, point: OperatingPoint, names: Sequence[str]) -> list[Curve] | None:
@@ -186,16 +163,14 @@ class ModelOptimum(_core.guide.ModelOptimum):
         list of Curve or None
             One per name, each in its unit over SOC [°CA aTDC]; None where the model has no such cycle, or no such
             indicator.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Not an operating point.
         """
-        if not isinstance(point, OperatingPoint):
-            raise ParameterError.of("point", point, "an OperatingPoint")
-        drawn: list[Curve] | None = self._curves(point, list(names))
+        drawn = self._drawn(point, names)
         return None if drawn is None else drawn[1:]
+
+    def _drawn(self, point: OperatingPoint, names: Sequence[str]) -> list[Curve] | None:
+        _require_point(point)
+        drawn: list[Curve] | None = self._curves(point, list(names))
+        return drawn
 
     def calibrate(self, cylinder: Cylinder) -> None:
         """Go on with other parameters of the same cylinder, as a calibration finds them.
@@ -223,6 +198,11 @@ class ModelOptimum(_core.guide.ModelOptimum):
 
     def _repr_html_(self) -> str:
         return as_html("ModelOptimum", core_rows(self.cylinder))
+
+
+def _require_point(point: Any) -> None:
+    if not isinstance(point, OperatingPoint):
+        raise ParameterError.of("point", point, "an OperatingPoint")
 
 
 def _rebuild(cls: type[ModelOptimum], cylinder: Cylinder, settings: dict[str, Any]) -> ModelOptimum:

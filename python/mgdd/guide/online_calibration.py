@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,16 +11,39 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.guide.parameter_verdict import ParameterVerdict
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
+from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["OnlineCalibration"]
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ParameterVerdict(NumbersResult):
+    """How much one parameter of an online calibration deserves belief.
+
+    Attributes
+    ----------
+    name : str
+        Of the parameter.
+    value, standard_error : float
+        Estimate, and its standard error with everything that is not known exactly counted.
+    knowledge : str
+        ``"determined"``, ``"uncertain"``, ``"held"`` (the data know less than was known beforehand), ``"at bound"``,
+        ``"contradicted"`` (the model does not fit this pressure) or ``"no data"``.
+    sentence : str
+        All of it in words, with the reason.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    knowledge: str
+    sentence: str
+
 
 _FIGURES = {
     "residual_rms_bar": ("bar", "root mean square residual of the mean trace"),
@@ -117,20 +141,11 @@ class OnlineCalibration:
         if isinstance(parameters, str):
             raise ParameterError.of("parameters", parameters, "a sequence of names")
         self._core = _core.guide.OnlineCalibration(
-            cylinder=cylinder_of(engine, "engine"),
-            method=method,
-            parameters=list(parameters),
-            uncertainty=dict(uncertainty or {}),
-            window_cycles=window_cycles,
-            steady_cycles=steady_cycles,
-            cov_limit_percent=cov_limit_percent,
-            forgetting=forgetting,
-            soc_scatter_cad=soc_scatter_cad,
-            jump_factor=jump_factor,
-            trials_per_update=trials_per_update,
-            step_cad=step_cad,
-            integrator=integrator,
-        )
+            cylinder=cylinder_of(engine, "engine"), method=method, parameters=list(parameters),
+            uncertainty=dict(uncertainty or {}), window_cycles=window_cycles, steady_cycles=steady_cycles,
+            cov_limit_percent=cov_limit_percent, forgetting=forgetting, soc_scatter_cad=soc_scatter_cad,
+            jump_factor=jump_factor, trials_per_update=trials_per_update, step_cad=step_cad, integrator=integrator,
+        )  # fmt: skip
         self._size = len(self._core.angles_cad)
         self._history: list[tuple[str, list[float]]] = []
 

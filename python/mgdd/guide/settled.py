@@ -12,35 +12,11 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["settled_estimate"]
-
 _LEAST_SHARE = 1e-3  # of the spread: standard deviation of an estimate that does not move at all
 
 
 def settled_estimate(history: xr.Dataset, cycles: int, spread: float) -> tuple[float, float] | None:
-    """Judge the last cycles of a seeker with one input.
-
-    Parameters
-    ----------
-    history : xarray.Dataset
-        Of a seeker or a feed-forward.
-    cycles : int
-        How many of the last cycles must agree, >= 2.
-    spread : float
-        Their mean absolute deviation from their mean, and the distance between the means of their halves, must lie
-        below this [unit of the input].
-
-    Returns
-    -------
-    tuple of float, or None
-        Mean and standard deviation; None where there are fewer cycles, where they belong to two operating points, where
-        a test of the guide is among them, or where they do not agree.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than two cycles.
-    """
+    """Give mean and standard deviation of the last cycles of a seeker with one input; None where they do not agree."""
     if cycles < 2:
         raise ParameterError.of("cycles", cycles, ">= 2")
     last = history.isel(cycle=slice(-cycles, None))

@@ -22,20 +22,9 @@ from mgdd.identify.throttle.online_update import OnlineUpdate
 from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
-    "ModelFamily",
-    "OdeModel",
-    "OnlineUpdate",
-    "best_timing",
-    "check_excitation",
-    "design_excitation",
-    "estimate_tdc",
-    "fit_cylinder",
-    "fit_ode",
-    "identify_throttle",
-    "load_throttle_model",
-    "validate_throttle",
-    "wall_heat_profile",
-]
+    "ModelFamily", "OdeModel", "OnlineUpdate", "best_timing", "check_excitation", "design_excitation", "estimate_tdc",
+    "fit_cylinder", "fit_ode", "identify_throttle", "load_throttle_model", "validate_throttle", "wall_heat_profile",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

@@ -13,8 +13,7 @@ from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
 from mgdd.identify.starts import search_starts, spread_starts
 from mgdd.optimize import least_squares
-from mgdd.optimize.fit_options import FitOptions, Resolved, fit_options
-from mgdd.optimize.fit_run import fit_of, fit_run, quality_of
+from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from mgdd.identify.ode_model import Derivative, Output
-
-__all__ = ["fit_ode"]
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
@@ -175,24 +172,10 @@ def fit_ode(
     logs = [name in set(log_scaled) for name in unknowns]
     read = output_or_first_state(output)
     search = _Search(
-        derivative=derivative,
-        output=read,
-        time=time,
-        inputs=inputs,
-        measured=measured,
-        substeps=substeps,
-        skip=skip,
-        sigma=sigma,
-        p0=p0.copy(),
-        state=state.copy(),
-        where=where,
-        free_state=tuple(free_state),
-        names=tuple(unknowns),
-        lower=lower,
-        upper=upper,
-        logs=logs,
-        options=chosen_options,
-    )
+        derivative=derivative, output=read, time=time, inputs=inputs, measured=measured, substeps=substeps, skip=skip,
+        sigma=sigma, p0=p0.copy(), state=state.copy(), where=where, free_state=tuple(free_state), names=tuple(unknowns),
+        lower=lower, upper=upper, logs=logs, options=chosen_options,
+    )  # fmt: skip
     first = dict(zip(unknowns, [*p0[where].tolist(), *state[list(free_state)].tolist()], strict=True))
     box = [
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=log)
@@ -211,14 +194,9 @@ def fit_ode(
     p0[where] = best.values[: len(chosen)]
     state[list(free_state)] = best.values[len(chosen) :]
     model = OdeModel(
-        derivative=derivative,
-        output=read,
-        parameters=dict(zip(names, p0.tolist(), strict=True)),
-        initial_state=tuple(state.tolist()),
-        substeps=substeps,
-        input_names=tuple(input_names),
-        output_name=output_name,
-    )
+        derivative=derivative, output=read, parameters=dict(zip(names, p0.tolist(), strict=True)),
+        initial_state=tuple(state.tolist()), substeps=substeps, input_names=tuple(input_names), output_name=output_name,
+    )  # fmt: skip
     errors = [report.rmse if np.isfinite(report.rmse) else np.inf for report in reports]
     run, quality = None, None
     if np.isfinite(best.rmse):
@@ -256,16 +234,10 @@ class _Search:
 
     def one(self, start: Mapping[str, float]) -> FitReport:
         return least_squares(
-            self.residual,
-            list(start.values()),
-            names=self.names,
-            lower=self.lower,
-            upper=self.upper,
-            log_scaled=self.logs,
-            data=self.measured[self.skip :] / self.sigma,
-            max_iterations=self.options.max_iterations,
-            cost_tolerance=self.options.tolerance,
-        )
+            self.residual, list(start.values()), names=self.names, lower=self.lower, upper=self.upper,
+            log_scaled=self.logs, data=self.measured[self.skip :] / self.sigma,
+            max_iterations=self.options.max_iterations, cost_tolerance=self.options.tolerance,
+        )  # fmt: skip
 
     def residual(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         p, s, widths = self.stack(x)

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
     Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 
-__all__ = ["OdeModel", "output_or_first_state", "run_in_lockstep"]
-
 _FUNCTIONS = ("derivative", "output")
 _STATE = "unit of the state"
 
@@ -94,13 +92,7 @@ class OdeModel(SampledModel):
         return VARIABLES.get(name, Label(f"unit of {name}", name))
 
     def to_toml(self) -> str:
-        """Write parameters, initial state, columns and substeps as TOML, with the names of the two functions.
-
-        Returns
-        -------
-        str
-            The text of a parameter file, for `from_toml`.
-        """
+        """Write parameters, initial state, columns and substeps as TOML, with the names of the two functions."""
         settings = {
             "initial_state": Entry(value=[float(x) for x in self.initial_state], unit=_STATE),
             "substeps": Entry(value=self.substeps),

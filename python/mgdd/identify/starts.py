@@ -13,8 +13,6 @@ from mgdd.parallel.pool import MakesExecutor
 from mgdd.results.fit import ARRIVED
 from mgdd.results.fit_report import FitReport
 
-__all__ = ["rank", "search_starts", "spread_starts"]
-
 Start = TypeVar("Start")
 Found = TypeVar("Found")
 
@@ -22,37 +20,7 @@ Found = TypeVar("Found")
 def spread_starts(
     first: Mapping[str, float], box: Sequence[_core.optimize.Parameter], n_starts: int, seed: int
 ) -> list[dict[str, float]]:
-    """Give the first start as it is, and further ones from a Latin hypercube between the bounds of the box.
-
-    Parameters
-    ----------
-    first : mapping of str to float
-        Values by name; those outside the box stay.
-    box : sequence of _core.optimize.Parameter
-        Names, finite bounds and scales of what is spread.
-    n_starts : int
-        All starts, the first included.
-    seed : int
-        Of the hypercube.
-
-    Returns
-    -------
-    list of dict of str to float
-        In the order of `first`.
-
-    Raises
-    ------
-    ParameterError
-        Bounds that are not finite, where there is more than one start.
-
-    Examples
-    --------
-    >>> from mgdd import _core
-    >>> from mgdd.identify.starts import spread_starts
-    >>> gain = _core.optimize.Parameter(name="gain", lower=0.0, upper=1.0)
-    >>> [sorted(start) for start in spread_starts({"gain": 0.5, "time_s": 2.0}, [gain], 2, 0)]
-    [['gain', 'time_s'], ['gain', 'time_s']]
-    """
+    """Give the first start as it is, and further ones from a Latin hypercube between the bounds of the box."""
     further = _core.optimize.latin_hypercube(box, n_starts - 1, seed) if n_starts > 1 else []
     names = [parameter.name for parameter in box]
     return [dict(first), *({**first, **dict(zip(names, point.tolist(), strict=True))} for point in further)]
@@ -65,28 +33,7 @@ def search_starts(
     executor: MakesExecutor | None,
     workers: int | None,
 ) -> tuple[list[Found], Interrupted | WorkerLostError | None]:
-    """Search from every start on an executor.
-
-    Parameters
-    ----------
-    search : callable
-        Takes some starts and gives what it finds from each; picklable, as are both.
-    starts : sequence
-        All of them.
-    executor, workers
-        As in `mgdd.parallel.map_items`.
-
-    Returns
-    -------
-    tuple
-        What was found, in the order of the starts, and what ended the work before its end, for
-        `mgdd.parallel.finished.hand_over`.
-
-    Raises
-    ------
-    mgdd.errors.Interrupted, mgdd.errors.WorkerLostError
-        Nothing was found until then.
-    """
+    """Search from every start on an executor."""
     found: dict[int, Found] = {}
 
     def keep(start: int, stop: int, part: Sequence[Found]) -> None:

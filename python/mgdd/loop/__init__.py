@@ -12,7 +12,6 @@ from __future__ import annotations
 from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.closed_loop import run_seeker
-from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.drive import simulate_drive
 from mgdd.loop.engine_guide import EngineGuide
 from mgdd.loop.function_plant import FunctionPlant
@@ -22,6 +21,7 @@ from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import seek
 from mgdd.loop.seek_front import seek_front
+from mgdd.loop.summary import LoopCriteria
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
@@ -30,27 +30,10 @@ from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
-    "EngineBench",
-    "EngineGuide",
-    "FunctionPlant",
-    "LoopCriteria",
-    "Measurement",
-    "Plant",
-    "Reference",
-    "SensorDynamics",
-    "SurrogatePlant",
-    "ThrottleFault",
-    "VirtualThrottle",
-    "monte_carlo",
-    "run_seeker",
-    "seek",
-    "seek_front",
-    "simulate_drive",
-    "track",
-    "track_many",
-    "tune_controller",
-    "tuned_controller",
-]
+    "EngineBench", "EngineGuide", "FunctionPlant", "LoopCriteria", "Measurement", "Plant", "Reference",
+    "SensorDynamics", "SurrogatePlant", "ThrottleFault", "VirtualThrottle", "monte_carlo", "run_seeker", "seek",
+    "seek_front", "simulate_drive", "track", "track_many", "tune_controller", "tuned_controller",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

@@ -13,9 +13,9 @@ from mgdd._core.engine import OperatingPoint
 from mgdd._core.loop import SensorDynamics
 from mgdd._settings import takes_settings_of
 from mgdd.errors import ParameterError, RigError, hinted
-from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.lower_limits import measured_names
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.loop.plant_record import cycles_to_dataset
 from mgdd.loop.steady import find_optimum, limits_to_keep, split_inputs, steady_map
 from mgdd.optimize import Limit
 from mgdd.optimize.optimum import Optimum, limit_names_of
@@ -25,8 +25,6 @@ from mgdd.results.describe import as_html, rows_of
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
-
-__all__ = ["EngineBench"]
 
 _SEARCHED_CAD = (-30.0, 10.0)  # where nobody says, as `mgdd engine seek` does
 _RANDOM = (
@@ -130,11 +128,6 @@ class EngineBench(_core.loop.EngineBench):
         ----------
         inputs : mapping of str to float
             All of `input_names`; the bench clamps them to `input_bounds` and says so in ``values["clamped"]``.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input.
         """
         self._applied = checked_inputs(inputs, self.input_names)
 
@@ -147,11 +140,6 @@ class EngineBench(_core.loop.EngineBench):
             ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1;
             ``applied`` are the inputs within `input_bounds`; ``noise_free_limits`` are the limits there without
             scatter, noise and misfire, the true steady NOx for every sensor and COV of IMEP as NaN.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
         """
         applied = getattr(self, "_applied", None)
         if applied is None:
@@ -187,18 +175,6 @@ class EngineBench(_core.loop.EngineBench):
             repeat the last one, at first the value of the operating point.
         further : sequence of float
             The other inputs in their order, where ``soc_cad`` is a number.
-
-        Returns
-        -------
-        dict
-            What was measured, by name.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown input.
-        mgdd.errors.ShapeError
-            More further inputs than the bench has.
 
         Examples
         --------
@@ -257,13 +233,6 @@ class EngineBench(_core.loop.EngineBench):
             ``components`` over ``component`` and their sum ``j``, and ``limits`` over ``limit`` where limits were
             named.
 
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown input.
-        mgdd.errors.ShapeError
-            Requests that are not columns of one length.
-
         Examples
         --------
         >>> from mgdd.loop import EngineBench
@@ -292,11 +261,6 @@ class EngineBench(_core.loop.EngineBench):
         xarray.Dataset
             Over ``soc_cad`` and the other inputs named: ``j``, ``efficiency_gross``, ``imep_gross_bar``, ``p_max_bar``,
             ``dp_max_bar_per_cad``, ``t_max_k``, ``nox_true_ppm``, ``nox_soft_ppm``.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A value outside the window of the bench, or an unknown input.
 
         Examples
         --------

@@ -2,36 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
+from mgdd.errors import Interrupted, ParameterError, argument
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.bench import EngineBench
-from mgdd.loop.bench_record import cycles_to_dataset
-from mgdd.loop.criteria import LoopCriteria
-from mgdd.loop.limit_figures import NOISE_FREE, limit_figures, with_a_limit
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
-from mgdd.loop.plant_record import VOID, steered
-from mgdd.loop.summary import of_first_input
+from mgdd.loop.plant_record import VOID, cycles_to_dataset, steered
+from mgdd.loop.summary import NOISE_FREE, LoopCriteria, limit_figures, of_first_input, summarize_cycles, with_a_limit
 from mgdd.optimize import Seeker
+from mgdd.optimize.inputs import named_values
 from mgdd.optimize.seeker_findings import findings_of
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.result import Figures
 
 if TYPE_CHECKING:
-    from mgdd.loop.plant import Plant
+    from numpy.typing import NDArray
 
-__all__ = ["run_seeker"]
+    from mgdd.loop.plant import Plant
+    from mgdd.loop.seek_choice import Question
 
 
 def run_seeker(
-    plant: Plant,
-    seeker: Seeker | FeedForward | GuidedEngine,
-    cycles: int,
-    *,
-    criteria: LoopCriteria | None = None,
+    plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, *, criteria: LoopCriteria | None = None
 ) -> LoopRun:
     """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
 
@@ -110,3 +107,54 @@ def run_seeker(
     findings = findings_of(seeker.settings, **raw["watched"])
     run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=findings)
     return hand_over(run, stop)
+
+
+_CYCLES = 20  # per input: twice what an estimate takes to arrive, docs/benchmarks.md
+_LOOK = 5  # cycles between two looks
+
+
+def stillness(asked: Question, tolerance: Any) -> NDArray[np.float64] | None:
+    """Read a tolerance, a number per input, by name or alone; None for none."""
+    if tolerance is None:
+        return None
+    still = np.atleast_1d(
+        np.asarray(named_values(argument("tolerance"), tolerance, [one.name for one in asked.inputs]), np.float64)
+    )
+    if still.shape != (len(asked.inputs),) or not (np.isfinite(still) & (still > 0.0)).all():
+        raise ParameterError(f"{argument('tolerance')} = {tolerance}: must be > 0, one number for each input")
+    return still
+
+
+def run_until_still(plant: Plant, seeker: Any, cycles: int, asked: Question, tolerance: NDArray[np.float64]) -> LoopRun:
+    """Run at most `cycles`, a few at a time; the partial result of an error holds those before as well."""
+    parts, estimates = list[LoopRun](), [seeker.estimate.copy()]
+    window = _CYCLES * len(asked.inputs) + math.ceil(asked.late_cycles)
+    done = 0
+    while done < cycles:
+        count = min(_LOOK, cycles - done)
+        try:
+            parts.append(run_seeker(plant, seeker, count))
+        except (Exception, Interrupted) as stop:
+            part = getattr(stop, "partial", None)
+            if isinstance(part, LoopRun):
+                stop.partial = _joined([*parts, part], asked)  # type: ignore[union-attr]
+            raise
+        done += count
+        estimates.append(seeker.estimate.copy())
+        if done >= window and (np.ptp(estimates[-(window // _LOOK) - 1 :], axis=0) < tolerance).all():
+            break
+    return _joined(parts, asked)
+
+
+def _joined(parts: list[LoopRun], asked: Question) -> LoopRun:
+    import xarray as xr
+
+    held = [one for one in parts if one.dataset.sizes["cycle"]] or parts[:1]
+    whole = xr.concat(
+        [one.dataset for one in held], "cycle", data_vars="minimal", coords="minimal", compat="override",
+        combine_attrs="override",
+    )  # fmt: skip
+    whole.attrs["interrupted"] = int(parts[-1].interrupted)
+    limits = {limit.name: limit.upper for limit in asked.limits}
+    summary = Figures(summarize_cycles(whole, LoopCriteria(limits=limits or None)))
+    return LoopRun(dataset=whole, summary=summary, interrupted=parts[-1].interrupted, findings=parts[-1].findings)

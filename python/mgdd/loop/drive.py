@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["PositionController", "simulate_drive"]
-
 _LABELS = {
     "wanted_torque_nm": ("N m", "torque wanted"),
     "torque_nm": ("N m", "torque"),

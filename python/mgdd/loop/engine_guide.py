@@ -12,8 +12,6 @@ from mgdd.guide import Curve, ModelOptimum, OnlineCalibration
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import described
 
-__all__ = ["KINDS", "EngineGuide"]
-
 KINDS = ("curve", "calibrated", "feed_forward")
 _PARABOLA_BEND = -0.05  # of ten cycle models, wall heat 0 to 1 and 25 to 60 °CA of burn: -0.037 to -0.054
 _REACH_CAD = 60.0

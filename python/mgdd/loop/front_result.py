@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-__all__ = ["FrontResult", "fit_of", "front_of", "undominated"]
-
 _DEGREES, _MOST_TERMS = (2, 3, 4), 40
 _SLACK = 1.05  # of the left-out error: a higher degree has to be better by more
 _CANDIDATES, _SPREAD = 4096, (0.1, 0.03, 0.01)  # of the range of the readings, round by round
@@ -53,16 +51,6 @@ class FrontResult(Result):
     findings : tuple of Finding
         What speaks against it: codes ``few_cycles``, ``one_best``, ``above_limit``, ``uncertain``, ``interrupted``, and
         those of the fits, with the name of the objective or limit in front.
-
-    Examples
-    --------
-    >>> from mgdd.loop import seek_front
-    >>> def engine(x):
-    ...     return {"efficiency": 45.0 - (x["soc_cad"] + 6.0) ** 2 / 40.0, "nox_ppm": 900.0 - 25.0 * x["soc_cad"]}
-    >>> front = seek_front(engine, {"soc_cad": (-15.0, 5.0)}, {"efficiency": "max", "nox_ppm": "min"}, cycles=60)
-    >>> ends = front.dataset["inputs"].sel(input="soc_cad")[[0, -1]]
-    >>> ends.to_numpy().round().tolist()
-    [-6.0, 5.0]
     """
 
     dataset: xr.Dataset

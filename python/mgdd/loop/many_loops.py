@@ -12,17 +12,14 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.guide.asked_ahead import Said, answers_along
+from mgdd.guide.feed_forward import Said, answers_along
 from mgdd.loop.bench import EngineBench
-from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.function_plant import FunctionPlant
-from mgdd.loop.limit_figures import limit_label, with_a_limit
 from mgdd.loop.plant_loop import require_inputs_of, require_point_for
-from mgdd.loop.summary import FIGURES_OF_INPUT, of_first_input
-from mgdd.parallel.chunks import run_chunks
+from mgdd.loop.summary import FIGURES_OF_INPUT, LoopCriteria, limit_label, of_first_input, with_a_limit
+from mgdd.parallel.chunks import pieces, run_chunks
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
-from mgdd.parallel.rows import pieces
 from mgdd.results.labels import labelled_dataset, said_unit
 
 if TYPE_CHECKING:
@@ -34,8 +31,6 @@ if TYPE_CHECKING:
     _Plant = EngineBench | FunctionPlant
     _Seeker = Seeker | FeedForward | GuidedEngine
     _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
-
-__all__ = ["monte_carlo"]
 
 _SUMMARY = {
     "cycles_to": ("cycle", "first cycle at which the estimate has arrived"),

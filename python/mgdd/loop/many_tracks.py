@@ -11,10 +11,9 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.loop.reference import Reference
 from mgdd.loop.track import FIGURES, AngleController, column_of, core_of, plant_of, reference_of, sensors_of
-from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.chunks import pieces, run_chunks
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
-from mgdd.parallel.rows import pieces
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
 from mgdd.throttle import Throttle
@@ -22,8 +21,6 @@ from mgdd.throttle import Throttle
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
-
-__all__ = ["track_many"]
 
 
 def track_many(
@@ -181,11 +178,7 @@ def _tracks(runs: _Runs, *, threads: int = 1) -> tuple[dict[str, NDArray[np.floa
 
 
 def _in_chunks(
-    runs: _Runs,
-    *,
-    executor: MakesExecutor | None,
-    workers: int | None,
-    progress: Callable[[int, int], None] | None,
+    runs: _Runs, *, executor: MakesExecutor | None, workers: int | None, progress: Callable[[int, int], None] | None
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_], Interrupted | WorkerLostError | None]:
     n_throttles, n_controllers, n_scenarios = runs.shape
     # A scenario that the core refuses is found before any work, on one throttle.

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["AnnouncingPlant", "Measurement", "Plant", "checked_inputs"]
-
 
 @described
 @dataclass(frozen=True, kw_only=True)
@@ -57,13 +55,7 @@ class Measurement:
 
     @property
     def performance(self) -> float:
-        """Sum of the components, J.
-
-        Returns
-        -------
-        float
-            In the unit of J.
-        """
+        """Sum of the components, J."""
         total = 0.0
         for component in self.components:  # plain order: the built-in sum rounds otherwise from Python 3.12 on
             total += component
@@ -129,14 +121,6 @@ class AnnouncingPlant(Plant, Protocol):
     """A plant that knows of a new operating point before the cycle, as one that sets speed and fuel itself does.
 
     Other plants may say it afterwards, in ``values["operating_point_changed"]``; that costs one cycle.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench
-    >>> from mgdd.loop.plant import AnnouncingPlant
-    >>> bench = EngineBench()
-    >>> isinstance(bench, AnnouncingPlant), bench.operating_point_changes
-    (True, False)
     """
 
     @property

@@ -17,8 +17,6 @@ from mgdd.results.describe import described
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Reference"]
-
 
 @described
 @dataclass(frozen=True, kw_only=True)

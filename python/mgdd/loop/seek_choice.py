@@ -14,7 +14,7 @@ import numpy as np
 from mgdd.errors import ParameterError, argument, hinted
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, TimingMap
 from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.safe_start import middle_of, safe_side
+from mgdd.loop.lower_limits import middle_of, safe_side
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,
@@ -30,8 +30,6 @@ from mgdd.optimize import (
 
 if TYPE_CHECKING:
     from mgdd._core.engine import OperatingPoint
-
-__all__ = ["SEEKERS", "Choice", "Question", "chosen"]
 
 _BEND, _REACH = -80.0, 1.5  # of the parabola; -0.05 over bounds that are 40 wide, as in the benchmark
 _CYCLES, _DITHER_CYCLES = 200, 2000  # estimates stand after tens of readings, after hundreds with a dither

@@ -11,16 +11,14 @@ import numpy as np
 
 from mgdd.errors import DataError, Interrupted, ParameterError, hinted
 from mgdd.loop.front_result import FrontResult, front_of
+from mgdd.loop.lower_limits import middle_of
 from mgdd.loop.plant import Measurement, Plant
-from mgdd.loop.safe_start import middle_of
 from mgdd.loop.seek import plant_of, seek_inputs, started
 from mgdd.optimize import GaussianProcessSeeking
 from mgdd.optimize.optimum import limits_of
 
 if TYPE_CHECKING:
     from mgdd.optimize import Input, Limit
-
-__all__ = ["seek_front"]
 
 _ENDS = 0.3  # share of the cycles that looks for the best of each objective alone
 _NEAREST = 6

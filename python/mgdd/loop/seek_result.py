@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from mgdd.loop.lower_limits import plain_name
+import numpy as np
+
+from mgdd.errors import argument
+from mgdd.loop.lower_limits import measured_names, plain_name
 from mgdd.loop.plant_loop import LoopRun
-from mgdd.loop.seek_doubts import Mean, Readings, doubts_about
 from mgdd.optimize.inputs import unit_of_input
 from mgdd.results.describe import Row
 from mgdd.results.finding import Finding, findings_html, unique
@@ -20,10 +22,188 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
     from mgdd.loop.seek_choice import Question
+    from mgdd.optimize import Input
 
-__all__ = ["SeekResult", "found_by"]
+_NEAREST = 10  # readings that say what J and limits are at the estimate
+_PER_INPUT = 10  # cycles; the estimate is near after 7 to 10 in the median, docs/benchmarks.md
+_MOVES, _EDGE = 0.1, 0.01  # shares of the bounds
+_SURE = 2.0  # standard deviations
+_BLOCKS, _FEWEST = 6, 60  # of the last half, where a move that goes on shows; cycles
+# Standard deviations of the steps between blocks; share of the bounds.
+_GOES_ON, _FAR = 2.2, 0.05  # one jump in the second block or later has 1.0 to 1.7 of the first
+_TRUSTED = 0.5
+_PER_DOUBT = 200  # cycles; maps that stand still make a seeker doubt once in them in 15 of 100 runs, never twice
+
+
+class Mean(NamedTuple):
+    """A mean with its standard deviation."""
+
+    value: float
+    sd: float
+
+
+class Readings:
+    """The cycles of a run whose reading counts."""
+
+    def __init__(
+        self, data: xr.Dataset, inputs: Sequence[Input], estimate: NDArray[np.float64], noise_sd: float
+    ) -> None:
+        self._data, self._estimate, self._noise_sd = data, estimate, noise_sd
+        names = [one.name for one in inputs]
+        self.estimates, self.applied = (data[name].sel(input=names).to_numpy() for name in ("estimate", "applied"))
+        bounds = np.array([(each.lower, each.upper) for each in inputs])
+        tried = np.maximum(np.ptp(self.applied, axis=0), 1e-300) if len(self.applied) else np.ones(len(names))
+        width = bounds[:, 1] - bounds[:, 0]
+        self.width = np.where(np.isfinite(width), width, tried)
+        self.counts = ~data["void"].to_numpy().astype(bool)
+        self.j = np.where(self.counts, data["j"].to_numpy(), math.nan)
+
+    def limit(self, name: str) -> NDArray[np.float64]:
+        """Give the readings of a limit, NaN where the cycle does not count."""
+        if "limits" not in self._data:
+            return np.full(self.j.size, math.nan)
+        values = self._data["limits"].sel(limit=name).to_numpy()
+        return np.where(self.counts, values, math.nan)
+
+    def near_estimate(self, values: NDArray[np.float64], late_cycles: float) -> Mean:
+        """Average the readings whose inputs were nearest to the last estimate."""
+        late = round(late_cycles)
+        read, caused = values[late:], self.applied[: max(values.size - late, 0)]
+        known = np.isfinite(read)
+        away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[known]
+        return _mean(read[known][np.argsort(away, kind="stable")[:_NEAREST]])
+
+    def velocities(self, late_cycles: float, *, maximize: bool) -> list[Mean]:
+        """Give the steady velocity of the best of every input per cycle in the last half, NaN where there is none.
+
+        One jump, or an estimate that wanders, has steps from block to block that scatter as far as their mean. One
+        that still approaches has steady ones, but then the slope of J over the input changes by the input alone.
+        """
+        late, cycles, names = round(late_cycles), self.j.size, self.width.size
+        out = [Mean(math.nan, math.nan)] * names
+        if cycles < _FEWEST:
+            return out
+        half = np.array_split(np.arange(cycles // 2, cycles), _BLOCKS)
+        steps = np.diff([self.estimates[block].mean(axis=0) for block in half], axis=0) / (len(half[0]))
+        known = np.flatnonzero(np.isfinite(self.j[max(cycles // 2, late) :])) + max(cycles // 2, late)
+        u = (self.applied[known - late] - self.applied[known - late].mean(axis=0)) / self.width
+        k = (known - known.mean()) / cycles
+        for i in range(names):
+            mean, sd = float(steps[:, i].mean()), float(np.std(steps[:, i], ddof=1)) / math.sqrt(len(steps))
+            slower = 2.0 * abs(steps[-2:, i].mean()) < abs(steps[:2, i].mean())  # as towards a best that stands still
+            if slower or abs(mean) <= _GOES_ON * sd or abs(mean) * cycles / 2 <= _FAR * self.width[i]:
+                continue
+            terms = np.column_stack([np.ones_like(k), k, k**2, u, u**2, k * u[:, i]])
+            fit, left, rank, _ = np.linalg.lstsq(terms, self.j[known], rcond=None)
+            if rank < terms.shape[1] or len(known) <= rank:
+                continue
+            turn = math.sqrt(float(left[0]) / (len(known) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
+            if math.copysign(1.0 if maximize else -1.0, mean) * float(fit[-1]) > _SURE * turn:
+                out[i] = Mean(mean, sd)
+        return out
+
+    def gain(self, late_cycles: float) -> Mean:
+        """Compare the mean of the last quarter with the first reading."""
+        first = self.j[math.ceil(late_cycles) :]
+        first, last = first[np.isfinite(first)], self.j[self.j.size - max(self.j.size // 4, 1) :]
+        last = last[np.isfinite(last)]
+        if first.size < 2 or not last.size:
+            return Mean(math.nan, math.nan)
+        noise = self._noise_sd
+        if not math.isfinite(noise):
+            noise = float(np.std(last))
+        return Mean(float(last.mean() - first[0]), noise * math.sqrt(1.0 + 1.0 / last.size))
+
+
+def _mean(values: NDArray[np.float64]) -> Mean:
+    if not values.size:
+        return Mean(math.nan, math.nan)
+    sd = float(np.std(values, ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
+    return Mean(float(values.mean()), sd)
+
+
+def doubts_about(
+    seeker: Any, run: LoopRun, readings: Readings, gain: Mean, kept: Mapping[str, Mean], asked: Question
+) -> list[Finding]:
+    """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
+    return [
+        *_about_run(run, readings, asked, gain),
+        *_about_limits(readings, asked, kept),
+        *_about_seeker(seeker, asked, readings.j.size, seen=gain.value > _SURE * gain.sd),
+    ]
+
+
+def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) -> Iterator[Finding]:
+    inputs, cycles = asked.inputs, readings.j.size
+    if run.interrupted:
+        yield Finding(
+            "interrupted", (), f"interrupted after {cycles} cycles", "seek(plant, seeker=found.seeker) goes on"
+        )
+    if not readings.counts.any():
+        yield Finding("no_reading", (), "no cycle gave a reading of J", "look at the plant, or start where it runs")
+        return
+    if cycles < _PER_INPUT * len(inputs):
+        remedy = f"take {_PER_INPUT * len(inputs)} cycles at least"
+        yield Finding("few_cycles", (), f"{cycles} cycles of {len(inputs)} inputs are few", remedy)
+    late = readings.estimates[cycles - max(cycles // 4, 1) :]
+    moves = np.ptp(late, axis=0) / readings.width
+    velocities = readings.velocities(asked.late_cycles, maximize=asked.maximize)
+    for one, move, velocity in zip(inputs, moves, velocities, strict=True):
+        if math.isfinite(velocity.value):
+            per = f"{100.0 * velocity.value:.3g} ± {100.0 * velocity.sd:.1g}"
+            text = f"the best {one.name} moves all the time, by {per} in 100 cycles; the estimate lags behind"
+            yield Finding("moving", (one.name,), text, "go on seeking while the plant runs, or find what moves it")
+        elif move > _MOVES:
+            text = f"the estimate of {one.name} moved by {move:.0%} of its bounds over the last {len(late)} cycles"
+            yield Finding("not_settled", (one.name,), text, "take more cycles; J may be flat along it")
+    for one, value, width in zip(inputs, late[-1], readings.width, strict=True):
+        if min(value - one.lower, one.upper - value) <= _EDGE * width:
+            side = "lower" if value - one.lower <= _EDGE * width else "upper"
+            text = f"the best {one.name} lies at its {side} bound, {getattr(one, side):.6g}"
+            yield Finding("at_bound", (one.name,), text, "widen it where the plant allows that")
+    if gain.value <= _SURE * gain.sd:
+        text = f"J is better than at the start by {gain.value:.3g} ± {gain.sd:.2g}, which the noise may be"
+        yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
+
+
+def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean]) -> Iterator[Finding]:
+    if asked.started_blindly:
+        names = tuple(measured_names(asked.limits))
+        text = f"no start was given, and nobody knows where {', '.join(names)} would hold: it began where that was open"
+        yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
+    for limit in asked.limits:
+        values = readings.limit(limit.name)
+        values = values[np.isfinite(values)]
+        mean = kept[limit.name]
+        name, side = plain_name(limit.name)
+        bound = f"{'above its' if side > 0.0 else 'below its lower'} limit, {side * limit.upper:.6g}"
+        if values.size and values[0] > limit.upper:
+            text = f"the first reading of {name}, {side * values[0]:.6g}, is {bound}"
+            yield Finding("start_above_limit", (name,), text, "start where it holds")
+        if mean.value - _SURE * mean.sd > limit.upper:
+            text = f"{name} is {side * mean.value:.6g} at the best inputs, {bound}"
+            yield Finding("limit_broken", (name,), text, "widen the bounds: none of the inputs tried holds it")
+
+
+def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> Iterator[Finding]:
+    guided, doubts = asked.guide is not None, int(getattr(seeker, "doubts", 0))
+    if doubts > 1 + cycles // _PER_DOUBT:
+        text = f"readings were not explained by earlier ones, {doubts} times: J drifts or jumps"
+        yield Finding("unexplained", (), text, "look at what else changes; the newest readings count")
+    if getattr(seeker, "handed_over", False):
+        which = "of the guide" if guided else "of a parabola"
+        text = f"the shape {which} did not explain the readings, and extremum seeking took over"
+        yield Finding("handed_over", (), text, "take more cycles" + ("" if guided else ", or give a guide"))
+    elif guided and getattr(seeker, "trust", 1.0) < _TRUSTED:
+        text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"
+        yield Finding("untrusted_guide", (), text, "look at its shape and its height")
+    told, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
+    if seen and isinstance(taken, int | float) and asked.components is None and taken != told:
+        text = f"the readings fit a delay of {taken:g} cycles, not {told:g} as stated"
+        yield Finding("delay", (), text, "mend delay_cycles")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -56,13 +236,6 @@ class SeekResult(Result):
         Every cycle.
     asked : Question
         Inputs, limits and what was said of J.
-
-    Examples
-    --------
-    >>> from mgdd.loop import seek
-    >>> found = seek(lambda x: -0.03 * (x["soc_cad"] + 4.0) ** 2, {"soc_cad": (-25.0, 15.0)}, cycles=40)
-    >>> round(found.inputs["soc_cad"], 1), found.seeker.kind, found.findings
-    (-4.0, 'CurveSeeking', ())
     """
 
     inputs: dict[str, float]
@@ -172,18 +345,10 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     doubts = doubts_about(seeker, run, readings, gain, kept, asked)
     return SeekResult(
         inputs=dict(zip([one.name for one in asked.inputs], seeker.settable.tolist(), strict=True)),
-        value=at_best.value,
-        value_sd=at_best.sd,
-        gain=gain.value,
-        gain_sd=gain.sd,
-        start=dict(start),
-        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]},
-        seeker=seeker,
-        reason=reason,
-        findings=unique([*seeker.findings, *doubts]),
-        run=run,
-        asked=asked,
-    )
+        value=at_best.value, value_sd=at_best.sd, gain=gain.value, gain_sd=gain.sd, start=dict(start),
+        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]}, seeker=seeker,
+        reason=reason, findings=unique([*seeker.findings, *doubts]), run=run, asked=asked,
+    )  # fmt: skip
 
 
 def _known(value: Any) -> float | None:

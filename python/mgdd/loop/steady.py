@@ -12,8 +12,8 @@ import numpy as np
 from mgdd._core.loop import EngineBench, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
-from mgdd.loop.bench_record import OWN_LABELS
 from mgdd.loop.lower_limits import both_sides, measured_names, plain_name
+from mgdd.loop.plant_record import OWN_LABELS
 from mgdd.optimize.optimum import Optimum
 from mgdd.results.labels import labelled_dataset
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from mgdd._core.optimize import Limit
 
     Point = tuple[float, ...] | NDArray[np.float64]
-
-__all__ = ["find_optimum", "limits_to_keep", "split_inputs", "steady_map"]
 
 _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
@@ -105,17 +103,12 @@ def find_optimum(
     edges = [min(x - low, high - x) / (1.0 if name == "soc_cad" else high - low)
              for x, (name, (low, high)) in zip(best, bounds.items(), strict=True)]  # fmt: skip
     return Optimum(
-        inputs=dict(zip(bounds, map(float, best), strict=True)),
-        objective="j",
-        value=float(at["j"]),
-        values={**numbers, **limited, **spread},
-        limits=kept,
+        inputs=dict(zip(bounds, map(float, best), strict=True)), objective="j", value=float(at["j"]),
+        values={**numbers, **limited, **spread}, limits=kept,
         active_limits=tuple(name for name, cap in caps.items() if sides[name] > cap - 1e-3 * max(1.0, abs(cap))),
-        at_bound=min(edges) < 1e-3,
-        bounds=dict(bounds),
-        curvature=curvature,
+        at_bound=min(edges) < 1e-3, bounds=dict(bounds), curvature=curvature,
         free_inputs=dict(zip(bounds, map(float, free), strict=True)),
-    )
+    )  # fmt: skip
 
 
 def _best_timing(

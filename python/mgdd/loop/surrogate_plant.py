@@ -20,8 +20,6 @@ from mgdd.surrogate.surrogate import EngineSurrogate
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["SurrogatePlant"]
-
 _LEVERAGE = "leverage_share"
 
 
@@ -142,18 +140,7 @@ class SurrogatePlant:
         return self._limits
 
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Set the injection of the next cycle.
-
-        Parameters
-        ----------
-        inputs : mapping of str to float
-            One number per name of `input_names`, in its unit.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input.
-        """
+        """Set the injection of the next cycle."""
         self._applied = checked_inputs(inputs, self._inputs)
 
     def measure(self) -> Measurement:
@@ -164,13 +151,6 @@ class SurrogatePlant:
         Measurement
             ``values`` holds the reading of every signal, and ``supported`` as 0 or 1; ``noise_free_limits`` are the
             limits without the residuals, lags included.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
-        mgdd.errors.ParameterError
-            Inputs outside the support, with ``outside="raise"``.
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply the inputs first")

@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "FIGURES",
-    "AngleController",
-    "column_of",
-    "core_of",
-    "plant_of",
-    "reference_of",
-    "sensors_of",
-    "step_times_us",
-    "track",
-]
-
 FIGURES = (
     "settling_ms",
     "mse_deg2",
@@ -136,15 +124,9 @@ def track(
     inner = core_of(controller)
     if inner is not None:
         run = _core.loop.track_throttle(
-            inner,
-            plant._core,
-            delay_samples=delay_samples,
-            reference_deg=wanted.angle_deg,
-            airflow_torque_nm=airflow,
-            supply_v=supply,
-            from_sample=wanted.from_sample,
-            band_deg=wanted.band_deg,
-        )
+            inner, plant._core, delay_samples=delay_samples, reference_deg=wanted.angle_deg, airflow_torque_nm=airflow,
+            supply_v=supply, from_sample=wanted.from_sample, band_deg=wanted.band_deg,
+        )  # fmt: skip
         figures = {name: float(column[0]) for name, column in run.pop("figures").items()}
     elif callable(getattr(controller, "step", None)):
         run = _run_in_python(controller, plant, wanted.angle_deg, delay_samples, airflow, supply)

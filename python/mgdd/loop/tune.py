@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from mgdd.throttle import Throttle
 
-__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller", "with_stiction"]
-
 _SPREAD_FIELDS = (
     ("inertia_kgm2",),
     ("viscous_nms_per_rad",),
@@ -46,37 +44,7 @@ def with_stiction(factors: Mapping[str, float]) -> dict[str, float]:
 
 
 def draw_throttles(throttle: Throttle, n: int, *, spread: float = 0.2, seed: int = 0) -> list[Throttle]:
-    """Draw throttles around one: inertia, viscous friction, motor, resistance, springs, preloads and dry friction.
-
-    Parameters
-    ----------
-    throttle : Throttle
-        The centre.
-    n : int
-        How many.
-    spread : float
-        Each of the seven numbers is multiplied by one from ``1 - spread`` to ``1 + spread``, evenly.
-    seed : int
-        Of the draw.
-
-    Returns
-    -------
-    list of Throttle
-        Equal seeds draw equal throttles.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A spread outside [0, 0.9] or a negative number of throttles.
-
-    Examples
-    --------
-    >>> from mgdd.loop.tune import draw_throttles
-    >>> from mgdd.throttle import Throttle
-    >>> first, second = draw_throttles(Throttle(), 2, seed=1)
-    >>> 0.8 <= first.coulomb_nm / Throttle().coulomb_nm <= 1.2, first == second
-    (True, False)
-    """
+    """Draw throttles around one: inertia, viscous friction, motor, resistance, springs, preloads and dry friction."""
     if not 0.0 <= spread <= 0.9:
         raise ParameterError.of("spread", spread, "in [0, 0.9]")
     if n < 0:
@@ -216,15 +184,9 @@ def tune_controller(
         inside = np.clip(np.asarray(shares, float), 0.0, 1.0)
         controller = family.build(groups, _numbers(family.space, inside), setup)
         runs = track_many(
-            {kind: controller},
-            references,
-            throttles,
-            delay_samples=delay_samples,
-            noise_deg=noise_deg,
-            first_seed=seed,
-            executor=pool,
-            workers=workers,
-        )
+            {kind: controller}, references, throttles, delay_samples=delay_samples, noise_deg=noise_deg,
+            first_seed=seed, executor=pool, workers=workers,
+        )  # fmt: skip
         outside = float(np.abs(np.asarray(shares, float) - inside).sum())
         cost = tracking_cost(runs.isel(controller=0)) + 10.0 * outside
         seen.append((cost, tuple(map(float, inside))))

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
+import tomllib
 import warnings
 from collections.abc import Mapping
+from functools import cache
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.loop.controller_families import FAMILIES, Family, Groups, Setup, groups_of
-from mgdd.loop.tuned_sets import TUNED_SETS
 
 if TYPE_CHECKING:
     from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 
     Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
-
-__all__ = ["family_of", "require_known_delay", "shipped_numbers", "tuned_controller", "tuned_with_doubts"]
 
 
 def tuned_controller(
@@ -152,10 +152,16 @@ def _distance(a: Groups, b: Groups) -> float:
     return sum(math.log(max(x, 1e-9) / max(y, 1e-9)) ** 2 for x, y in pairs)
 
 
+@cache
+def tuned_sets() -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+    """Read the numbers of each kind of controller and each preset, as ``tools/tune_controllers.py`` found them."""
+    return tomllib.loads((resources.files("mgdd") / "data" / "tuned_controllers.toml").read_text(encoding="utf-8"))
+
+
 def shipped_numbers(kind: str, groups: Groups) -> dict[str, float]:
     """Give the tuned numbers of the preset whose groups are nearest."""
     from mgdd import presets
 
-    sets = TUNED_SETS[kind]
+    sets = tuned_sets()[kind]
     near = min(sets, key=lambda name: _distance(groups, groups_of(presets.load(name, kind="throttle").throttle)))
     return dict(sets[near])

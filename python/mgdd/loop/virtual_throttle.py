@@ -12,8 +12,6 @@ from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.throttle import SensorPair, Throttle
 from mgdd.throttle.faults import ThrottleFault, fault_pair
 
-__all__ = ["VirtualThrottle"]
-
 _INPUTS = ("duty", "supply_v", "airflow_torque_nm", "bridge_open")
 
 
@@ -80,27 +78,16 @@ class VirtualThrottle:
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._given: dict[str, Any] = {
-            "throttle": self.throttle,
-            "inputs": self._inputs,
-            "sensors": sensors or SensorPair(),
-            "faults": tuple(faults),
-            "start_deg": self.start_deg,
-            "sample_s": sample_s,
-            "step_s": step_s,
-            "bridge": bridge,
-            "seed": seed,
-        }
+            "throttle": self.throttle, "inputs": self._inputs, "sensors": sensors or SensorPair(),
+            "faults": tuple(faults), "start_deg": self.start_deg, "sample_s": sample_s, "step_s": step_s,
+            "bridge": bridge, "seed": seed,
+        }  # fmt: skip
         self._core = _core.loop.VirtualThrottle(
-            throttle=self.throttle,
-            sensors=self._given["sensors"],
+            throttle=self.throttle, sensors=self._given["sensors"],
             faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
-            plant_faults=[fault.to_core() for fault in faults if fault.sensor is None],
-            sample_s=sample_s,
-            step_s=step_s,
-            start_deg=self.start_deg,
-            bridge=bridge,
-            seed=seed,
-        )
+            plant_faults=[fault.to_core() for fault in faults if fault.sensor is None], sample_s=sample_s,
+            step_s=step_s, start_deg=self.start_deg, bridge=bridge, seed=seed,
+        )  # fmt: skip
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self._given, self.state, self._applied)
@@ -132,11 +119,6 @@ class VirtualThrottle:
         ----------
         inputs : mapping of str to float
             One number per name of `input_names`; a duty is clipped to -1..1.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input.
         """
         values = checked_inputs(inputs, self._inputs)
         self._applied = {**self._still, **dict(zip(self._inputs, values, strict=True))}
@@ -150,11 +132,6 @@ class VirtualThrottle:
             ``values``: ``time_s``, ``sensed_angle_deg``, both sensors as ``first_v``, ``second_v``, ``first_angle_deg``
             and ``second_angle_deg``, ``fault`` of their check as 0 or 1, ``age_s`` of what arrived last, ``supply_v``
             of the bridge, and the truth ``angle_deg``, ``speed_deg_per_s`` and ``current_a``. What is missing is NaN.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet.
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
@@ -169,10 +146,7 @@ class VirtualThrottle:
 
 
 def _restored(
-    kind: type[VirtualThrottle],
-    given: dict[str, Any],
-    state: dict[str, list[float]],
-    applied: dict[str, float] | None,
+    kind: type[VirtualThrottle], given: dict[str, Any], state: dict[str, list[float]], applied: dict[str, float] | None
 ) -> VirtualThrottle:
     made = kind(**given)
     made.state = state

@@ -32,39 +32,18 @@ np.True_
 from __future__ import annotations
 
 from mgdd._core.optimize import ComponentLag, Input, Limit
-from mgdd.errors import former_seeker as _former_seeker
-from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
-from mgdd.optimize.dither_seekers import ExtremumSeeking
-from mgdd.optimize.fit_options import FitOptions
+from mgdd.optimize.direct_seekers import ExtremumSeeking, GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.iterative_learning import IterativeLearning
-from mgdd.optimize.least_squares import least_squares
+from mgdd.optimize.least_squares import FitOptions, least_squares
 from mgdd.optimize.measured_map import measure_map
 from mgdd.optimize.process_seeking import GaussianProcessSeeking
 from mgdd.optimize.seeker import Seeker
 from mgdd.optimize.tuning import tune
 
 __all__ = [
-    "ComponentLag",
-    "ExtremumSeeking",
-    "FitOptions",
-    "GaussianProcessSeeking",
-    "GoldenSection",
-    "GradientDescent",
-    "Input",
-    "IterativeLearning",
-    "Limit",
-    "Seeker",
-    "Spsa",
-    "least_squares",
-    "measure_map",
-    "tune",
-]
-
-
-def __getattr__(name: str) -> object:
-    if instead := _former_seeker(name):
-        raise ImportError(f"{name}: {instead}")  # of an AttributeError `from ... import` would drop the text
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    "ComponentLag", "ExtremumSeeking", "FitOptions", "GaussianProcessSeeking", "GoldenSection", "GradientDescent",
+    "Input", "IterativeLearning", "Limit", "Seeker", "Spsa", "least_squares", "measure_map", "tune",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

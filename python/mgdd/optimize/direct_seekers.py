@@ -1,4 +1,4 @@
-"""Seekers that compare measurements at chosen inputs: SPSA, two-sided differences, golden section."""
+"""Extremum seeking, and seekers that compare readings at chosen inputs: SPSA, two-sided differences, golden section."""
 
 from __future__ import annotations
 
@@ -7,7 +7,90 @@ from typing import ClassVar
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
-__all__ = ["GoldenSection", "GradientDescent", "Spsa"]
+
+class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
+    """Extremum seeking by a sinusoidal dither, one measurement of J per engine cycle.
+
+    ``ask()`` gives the input of the next cycle, ``tell(J)`` takes what was measured there. Near an optimum of
+    curvature J'' the estimate approaches with the time constant 2/(gain amplitude abs(J'')) cycles. All
+    arguments are keywords; "per input" means a number for all or one number for each.
+
+    Parameters
+    ----------
+    start : float or array_like, shape (inputs,), or mapping
+        First estimate, in the unit of the input; one to eight inputs.
+    lower, upper : float or array_like
+        Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
+        inside by `amplitude`.
+    form : {"batch", "moving_average", "washout"}
+        How the mean of J is removed: regression over one period with the estimate held, mean of the last
+        period, or a first-order high-pass.
+    amplitude : float or array_like, optional
+        Of the dither, per input, in its unit, > 0; its scale.
+    period : int
+        Cycles of the window that all inputs share, >= 4.
+    harmonics : sequence of int, optional
+        Oscillations per window, one per input, that do not mix (4, 5, 7 on a period of 40); [1] for one input.
+    gain : float or array_like, optional
+        Adaptation gain, per input [unit of the input per unit of J]. Without, it is made of `curvature` or, where that
+        is not given either, of first readings: start, above, start, below it by `amplitude`, per input, six times,
+        before the search begins; so any unit of J does. The property `gain` shows it. `tune` gives a better one.
+    rate : float or array_like, optional
+        Largest change of the estimate per cycle, per input; amplitude/period in batches (once per period) and
+        3 amplitude/period otherwise.
+    recovery_rate : float or array_like, optional
+        The same on the way back below a broken limit; `rate` where that is given, else one amplitude.
+    washout_pole : float
+        h of (z - 1)/(z - h) for the form ``"washout"`` [-].
+    low_pass : float
+        b of y += b (x - y) after demodulation, in (0, 1]; 1 for none [-].
+    components : sequence of ComponentLag, optional
+        Delay and lag of each component of J, whose phase is turned back; one immediate component without.
+    hold_cycles : int, optional
+        Cycles that the estimate is held at the start and after `restart`; one period without.
+    amplitude_floor : float
+        Vanishing dither: share of `amplitude` that is left where J is flat; 1 for a constant dither [-].
+    full_gradient : float
+        Slope of J at which the dither is full [unit of J per unit of the input]; > 0 with a floor below 1.
+    limit_amplitude : float
+        Share of the dither while a limit holds the estimate back [-].
+    inputs, maximize, limits
+        As of every `Seeker`.
+    curvature : float, optional
+        J'' if known: makes the gain (time constant of four periods), or, where a gain above the bound of averaging is
+        given, a UserWarning with that bound.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, bounds that exclude the start, harmonics that mix.
+    mgdd.errors.ShapeError
+        Entries that are not one per input.
+
+    See Also
+    --------
+    tune : amplitude, period and gain from noise, curvature and sensor delay.
+
+    References
+    ----------
+    Tan, Nesic and Mareels (2006), On non-local stability properties of extremum seeking control.
+    Choi, Krstic, Ariyur and Lee (2002), Extremum seeking control for discrete-time systems.
+    Ghaffari, Krstic and Nesic (2012), Multivariable Newton-based extremum seeking.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import ExtremumSeeking
+    >>> seeker = ExtremumSeeking(start=-18.0, lower=-30.0, upper=10.0)
+    >>> for _ in range(400):
+    ...     soi = seeker.ask()[0]
+    ...     seeker.tell(56.0 - 0.0255 * (soi + 6.0) ** 2)
+    >>> abs(seeker.estimate[0] + 6.0) < 0.01
+    np.True_
+    >>> seeker.history["applied"].sizes["cycle"]
+    400
+    """
+
+    kind: ClassVar[str] = "ExtremumSeeking"
 
 
 class Spsa(Seeker, _core.optimize.Spsa):
@@ -21,8 +104,6 @@ class Spsa(Seeker, _core.optimize.Spsa):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
         Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
         inside by the perturbation (twice that in the second-order form).
@@ -56,10 +137,8 @@ class Spsa(Seeker, _core.optimize.Spsa):
         Share of the perturbation while a limit holds the estimate back [-].
     seed : int
         Of the random signs: the same seed gives the same run.
-    maximize : bool
-        False to minimise J.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep.
+    inputs, maximize, limits
+        As of every `Seeker`.
     curvature : float, optional
         J'' if known: makes the gain; a first step factor gain abs(J'') above 1 gives a UserWarning.
 
@@ -99,8 +178,6 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
     ----------
     start : float or array_like, shape (inputs,), or mapping
         First estimate, in the unit of the input; one to eight inputs.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Names, units, bounds and scales of the inputs; `ask` then gives a mapping.
     lower, upper : float or array_like
         Bounds of the applied input, per input, where `inputs` does not say them; infinite for none. The start must lie
         inside by `difference`.
@@ -115,10 +192,8 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
         Converged once every entry of a step is smaller, per input, in its unit; a fiftieth of its scale.
     iterations : int
         Steps within which `converged_at` is looked for; the search goes on all the same.
-    maximize : bool
-        False to minimise J.
-    limits : sequence of Limit, or mapping of str to float
-        Measured quantities to keep.
+    inputs, maximize, limits
+        As of every `Seeker`.
     curvature : float, optional
         J'' if known: makes the step size; one given that cannot converge gives a UserWarning with the bound.
 
@@ -158,8 +233,6 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     ----------
     start : float or mapping
         Estimate before the first decision.
-    inputs : sequence of Input, or mapping of str to (float, float), optional
-        Name, unit, bounds and scale of the input; `ask` then gives a mapping.
     lower, upper : float
         The bracket, finite, where `inputs` does not say it; also the bounds of the applied input.
     noise_sd : float
@@ -170,8 +243,8 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
         Measurements of each inner point before it counts as inconclusive.
     tolerance : float, optional
         Width of the bracket at which a noise-free search ends, in the unit of the input, > 0; a fiftieth of its scale.
-    maximize : bool
-        False to minimise J.
+    inputs, maximize
+        As of every `Seeker`.
     limits : sequence of Limit, or mapping of str to float
         Measured quantities to keep. Points on both sides of a limit are tried until the bracket is small, so it is
         broken during the search; behind a delay each point is measured for as long as the limits take to show it.

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ConvergenceReport", "IterativeLearning"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConvergenceReport(NumbersResult):
@@ -62,13 +60,6 @@ class ConvergenceReport(NumbersResult):
     References
     ----------
     Bristow, Tharayil and Alleyne (2006), A survey of iterative learning control.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import IterativeLearning
-    >>> report = IterativeLearning([0.0] * 5, impulse_response=[1.0, 0.5], k_p=1.9).convergence()
-    >>> report.asymptotic, report.monotone, round(report.spectral_radius, 9)
-    (True, False, 0.9)
     """
 
     asymptotic: bool
@@ -190,23 +181,14 @@ class IterativeLearning:
         guard: bool = True,
     ) -> None:
         self._settings: dict[str, Any] = {
-            "initial": _column(initial, "initial"),
-            "law": law,
+            "initial": _column(initial, "initial"), "law": law,
             "impulse_response": _column([] if impulse_response is None else impulse_response, "impulse_response"),
-            "relative_degree": relative_degree,
-            "k_p": k_p,
-            "k_d": k_d,
+            "relative_degree": relative_degree, "k_p": k_p, "k_d": k_d,
             "learning_function": _column([] if learning_function is None else learning_function, "learning_function"),
-            "lead": lead,
-            "cutoff": cutoff,
-            "error_weight": error_weight,
-            "input_weight": input_weight,
-            "change_weight": change_weight,
-            "lower": -np.inf if lower is None else lower,
-            "upper": np.inf if upper is None else upper,
-            "rate": np.inf if rate is None else rate,
-            "guard": guard,
-        }
+            "lead": lead, "cutoff": cutoff, "error_weight": error_weight, "input_weight": input_weight,
+            "change_weight": change_weight, "lower": -np.inf if lower is None else lower,
+            "upper": np.inf if upper is None else upper, "rate": np.inf if rate is None else rate, "guard": guard,
+        }  # fmt: skip
         self._core = _core.optimize.IterativeLearning(**self._settings)
         self._report: ConvergenceReport | None = None
         if self._settings["impulse_response"].size and not self.convergence().asymptotic:
@@ -219,11 +201,6 @@ class IterativeLearning:
         -------
         ndarray, shape (N,)
             A copy. Asking again before `tell` gives the same.
-
-        Examples
-        --------
-        >>> IterativeLearning([1.0, 2.0], k_p=0.5).ask().tolist()
-        [1.0, 2.0]
         """
         return self._core.ask()
 
@@ -245,14 +222,6 @@ class IterativeLearning:
             A value that is not finite or beyond 1e30 in magnitude, with trial and sample, or trials that diverge
             beyond the range of a float.
             As after every refusal, the learner is as it was.
-
-        Examples
-        --------
-        >>> learner = IterativeLearning([1.0, 2.0], k_p=0.5)
-        >>> _ = learner.ask()
-        >>> learner.tell([0.2, -0.2])
-        >>> learner.ask().tolist()
-        [1.1, 1.9]
         """
         self._core.tell(_column(error, "error"))
 

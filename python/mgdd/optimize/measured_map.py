@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
+from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers
 from mgdd.optimize.measured_surface import Surface, fewest, fit_surface, narrowed, span_of, twice_as_wide
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-__all__ = ["MeasuredMap", "measure_map"]
 
 _SURE = 2.0  # standard errors
 
@@ -54,13 +52,6 @@ class MeasuredMap(InputNumbers):
     See Also
     --------
     measure_map : makes one.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import measure_map
-    >>> found = measure_map([-2, -1, 0, 1, 2], [-4.0, -1.1, 0.0, -0.9, -4.0])
-    >>> round(found.curvature, 3), round(found.optimum, 3)
-    (-2.0, 0.01)
     """
 
     noise_sd: float

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Surface", "fewest", "fit_surface", "narrowed", "span_of", "twice_as_wide"]
-
 _SIGNIFICANCE = 0.01  # of the test of lack of fit
 _FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test believes
 _ILL = 1e8  # condition of a design that shows nothing
@@ -87,15 +85,10 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
     lever = np.asarray(-np.linalg.solve(bend, lever))
     area = np.outer(half, half)
     return Surface(
-        variance=variance,
-        freedom=freedom,
-        curvature=bend / area,
-        curvature_variance=bend_variance / area**2,
-        optimum=middle + half * best,
-        optimum_variance=(lever @ spread @ lever.T) * area,
-        bends=bends,
+        variance=variance, freedom=freedom, curvature=bend / area, curvature_variance=bend_variance / area**2,
+        optimum=middle + half * best, optimum_variance=(lever @ spread @ lever.T) * area, bends=bends,
         directions=directions * half,
-    )
+    )  # fmt: skip
 
 
 def _numbered(x: Array) -> tuple[str, ...]:

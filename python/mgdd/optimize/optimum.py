@@ -15,8 +15,6 @@ from mgdd.results.finding import Finding
 from mgdd.results.labels import to_jsonable
 from mgdd.results.result import NumbersResult
 
-__all__ = ["Optimum", "idle_limits", "limit_names_of", "limits_of"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Optimum(NumbersResult):
@@ -49,17 +47,6 @@ class Optimum(NumbersResult):
         The best point without limits, where it was sought.
     findings : tuple of Finding
         ``idle_limit``: a limit that nothing in the searched range reaches.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import Limit
-    >>> from mgdd.optimize.optimum import Optimum
-    >>> best = Optimum(inputs={"soc_cad": -3.1}, objective="efficiency_gross", value=0.56,
-    ...                limits=(Limit("p_max_bar", 95.0),), active_limits=("p_max_bar",))
-    >>> best["soc_cad"]
-    -3.1
-    >>> best
-    <Optimum efficiency_gross 0.56 at soc_cad -3.1, held by p_max_bar>
     """
 
     inputs: Mapping[str, float]
@@ -97,13 +84,7 @@ class Optimum(NumbersResult):
         return f"<Optimum {self.objective} {self.value:.4g} at {at}{held}{edge}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Give everything as plain Python values.
-
-        Returns
-        -------
-        dict
-            Fields by name; ``limits`` as name to upper value.
-        """
+        """Give everything as plain Python values."""
         out = {name: getattr(self, name) for name in self.__dataclass_fields__}
         out["limits"] = {limit.name: limit.upper for limit in self.limits}
         out["findings"] = [vars(finding) for finding in self.findings]
@@ -126,23 +107,7 @@ def idle_limits(caps: Mapping[str, float], highest: Mapping[str, float], where: 
 
 
 def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Limit, ...]:
-    """Read limits in either form: `Limit` objects, or upper values by name.
-
-    Parameters
-    ----------
-    limits : mapping of str to float, or sequence of Limit, optional
-        None for none.
-
-    Returns
-    -------
-    tuple of Limit
-        In the order given.
-
-    Raises
-    ------
-    ParameterError
-        Neither of the two, a name twice, or a value that is not a finite number.
-    """
+    """Read limits in either form: `Limit` objects, or upper values by name."""
     if limits is None:
         return ()
     if isinstance(limits, Mapping):

@@ -26,64 +26,25 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
-    from numpy.typing import NDArray
-
-__all__ = ["Seeker"]
 
 _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 
 
-if TYPE_CHECKING:
-
-    class _CoreSeeker:
-        """What every seeker has of its class of the core."""
-
-        @property
-        def settings(self) -> dict[str, Any]: ...
-        @property
-        def state(self) -> dict[str, list[float]]: ...
-        @state.setter
-        def state(self, saved: Any) -> None: ...
-        @property
-        def estimate(self) -> NDArray[np.float64]: ...
-        @property
-        def settable(self) -> NDArray[np.float64]: ...
-        @property
-        def cycle(self) -> int: ...
-        @property
-        def component_count(self) -> int: ...
-        @property
-        def input_names(self) -> list[str]: ...
-        @property
-        def limit_names(self) -> list[str]: ...
-        @property
-        def limit_states(self) -> dict[str, str]: ...
-        def ask(self) -> Any: ...
-        def tell(
-            self,
-            J: Any = None,  # noqa: N803
-            limits: Any = None,
-            *,
-            misfire: bool = False,
-            applied: Any = None,
-        ) -> None: ...
-        def restart(self) -> None: ...
-        def _history_columns(self) -> dict[str, Any]: ...
-        def _clear_history(self) -> None: ...
-else:
-    _CoreSeeker = object
-
-
-class Seeker(SeekerFindings, _CoreSeeker):
+class Seeker(SeekerFindings):
     """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
 
     Parameters
     ----------
+    inputs : sequence of Input, or mapping of str to (float, float), optional
+        Names, units, bounds, scales and rates of the inputs; `ask` then gives a mapping, and ``start`` and whatever is
+        given per input may be one.
+    limits : sequence of Limit, or mapping of str to float
+        Measured quantities to keep, or their upper values by name; ``tell(J, limits)`` then takes what was read.
+    maximize : bool
+        False to minimise J.
     *given, **settings
-        As each kind says them; ``limits`` is a sequence of `Limit`, or a mapping of names to upper values. With
-        ``inputs``, a sequence of `Input` or a mapping of names to (lower, upper), inputs have names: `ask` gives a
-        mapping, and ``start`` and whatever is given per input may be one.
+        As each kind says them.
 
     Examples
     --------

@@ -13,26 +13,54 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["SeekerFindings", "findings_of"]
-
 _FROZEN = 12  # as many failures say that a plant fails; rounded readings near an optimum are seldom alike for longer
 _FOLLOWED = 0.5
 
 
 if TYPE_CHECKING:
 
-    class _Watching:
-        """What every seeker has of its class of the core, and what stands around one."""
+    class _CoreSeeker:
+        """What every seeker, and what stands around one, has of its class of the core."""
 
-        @property
-        def _watched(self) -> dict[str, Any]: ...
         @property
         def settings(self) -> dict[str, Any]: ...
+        @property
+        def state(self) -> dict[str, list[float]]: ...
+        @state.setter
+        def state(self, saved: Any) -> None: ...
+        @property
+        def estimate(self) -> NDArray[np.float64]: ...
+        @property
+        def settable(self) -> NDArray[np.float64]: ...
+        @property
+        def cycle(self) -> int: ...
+        @property
+        def component_count(self) -> int: ...
+        @property
+        def input_names(self) -> list[str]: ...
+        @property
+        def limit_names(self) -> list[str]: ...
+        @property
+        def limit_states(self) -> dict[str, str]: ...
+        def ask(self) -> Any: ...
+        def tell(
+            self,
+            J: Any = None,  # noqa: N803
+            limits: Any = None,
+            *,
+            misfire: bool = False,
+            applied: Any = None,
+        ) -> None: ...
+        def restart(self) -> None: ...
+        @property
+        def _watched(self) -> dict[str, Any]: ...
+        def _history_columns(self) -> dict[str, Any]: ...
+        def _clear_history(self) -> None: ...
 else:
-    _Watching = object
+    _CoreSeeker = object
 
 
-class SeekerFindings(_Watching):
+class SeekerFindings(_CoreSeeker):
     """Mixed into every seeker: its findings."""
 
     @property

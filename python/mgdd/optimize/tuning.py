@@ -11,21 +11,15 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.optimize.direct_seekers import Spsa
-from mgdd.optimize.dither_seekers import ExtremumSeeking
-from mgdd.optimize.input_numbers import SEVERAL_ONLY, InputNumbers
-from mgdd.optimize.inputs import inputs_of, named_values
+from mgdd.optimize.direct_seekers import ExtremumSeeking, Spsa
+from mgdd.optimize.inputs import SEVERAL_ONLY, InputNumbers, inputs_of, named_values
 from mgdd.optimize.optimum import limits_of
-from mgdd.optimize.tuning_forms import coupling_of, tuned
-from mgdd.optimize.tuning_inputs import check_wish, hessian_of, of_each, per_input
+from mgdd.optimize.tuning_forms import check_wish, coupling_of, hessian_of, of_each, per_input, tuned
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     PerInput = float | ArrayLike | Mapping[str, float]
-
-__all__ = ["Tuning", "tune"]
-
 
 _COUPLED = 0.5  # of the curvature of the flattest direction beside that of the inputs
 
@@ -80,13 +74,6 @@ class Tuning(InputNumbers):
     See Also
     --------
     tune : makes one.
-
-    Examples
-    --------
-    >>> from mgdd.optimize import tune
-    >>> tuning = tune(0.25, -0.051, distance=12.0, arrival=1.0)
-    >>> tuning.met, tuning.period
-    (True, 6)
     """
 
     method: str
@@ -113,19 +100,7 @@ class Tuning(InputNumbers):
     harmonics: NDArray[np.int64] | None = field(default=None, metadata=SEVERAL_ONLY)
 
     def summary(self) -> str:
-        """Say settings, prediction and verdict as text.
-
-        Returns
-        -------
-        str
-            A few lines; the last ones say why the specification is infeasible.
-
-        Examples
-        --------
-        >>> from mgdd.optimize import tune
-        >>> print(tune(0.25, -0.051, cycles=10.0).summary().splitlines()[-2])
-        The specification cannot be met:
-        """
+        """Say settings, prediction and verdict as text."""
         spsa = self.method == "spsa"
         period = f"{self.period} measurements per iteration" if spsa else f"period {self.period} cycles"
         if self.harmonics is not None:
@@ -193,13 +168,6 @@ class Tuning(InputNumbers):
         ExtremumSeeking or Spsa
             Extremum seeking of the tuned form, or SPSA with constant gains.
 
-        Raises
-        ------
-        ParameterError
-            Bounds that exclude the start, or inputs of other names.
-        ShapeError
-            Not one number per input.
-
         Examples
         --------
         >>> from mgdd.optimize import tune
@@ -231,17 +199,10 @@ class Tuning(InputNumbers):
         one = not np.ndim(self.curvature)
         if self.method == "spsa":
             return Spsa(
-                **space,
-                schedule="constant",
-                gain=each(self.gain),
-                perturbation=each(self.amplitude),
-                step_max=each(self.rate),
-                noise_sd=self.noise_sd,
-                seed=seed,
-                maximize=maximize,
-                limits=list(limits_of(limits)),
-                curvature=self.curvature if one else None,
-            )
+                **space, schedule="constant", gain=each(self.gain), perturbation=each(self.amplitude),
+                step_max=each(self.rate), noise_sd=self.noise_sd, seed=seed, maximize=maximize,
+                limits=list(limits_of(limits)), curvature=self.curvature if one else None,
+            )  # fmt: skip
         lag = _core.optimize.ComponentLag()
         seen = self.curvature if one else None
         if self.compensated:
@@ -249,19 +210,11 @@ class Tuning(InputNumbers):
         elif one:  # the demodulation sees what the sensor leaves in phase
             seen *= self.sensor_gain * math.cos(math.radians(self.sensor_phase_deg))
         return ExtremumSeeking(
-            **space,
-            form=self.method,
-            amplitude=each(self.amplitude),
-            period=self.period,
-            gain=each(self.gain),
-            rate=each(self.rate),
-            components=[lag],
-            hold_cycles=hold_cycles,
-            maximize=maximize,
-            limits=list(limits_of(limits)),
-            curvature=seen,
+            **space, form=self.method, amplitude=each(self.amplitude), period=self.period, gain=each(self.gain),
+            rate=each(self.rate), components=[lag], hold_cycles=hold_cycles, maximize=maximize,
+            limits=list(limits_of(limits)), curvature=seen,
             **({} if self.harmonics is None else {"harmonics": each(self.harmonics)}),
-        )
+        )  # fmt: skip
 
 
 def _joined(numbers: Any, digits: int = 4) -> str:
@@ -372,11 +325,6 @@ def tune(
         del values["harmonics"]
         values = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in values.items()}
     return Tuning(
-        **values,
-        noise_sd=noise_sd,
-        curvature=hessian,
-        delay_cycles=delay_cycles,
-        lag_cycles=lag_cycles,
-        compensated=compensated,
-        inputs=names,
-    )
+        **values, noise_sd=noise_sd, curvature=hessian, delay_cycles=delay_cycles, lag_cycles=lag_cycles,
+        compensated=compensated, inputs=names,
+    )  # fmt: skip

@@ -7,21 +7,20 @@ diagonal.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.optimize.inputs import named_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-__all__ = ["coupling_of", "harmonics_of", "spsa_moments", "tuned"]
 
 _RMS, _DISTANCE, _ARRIVAL, _AMPLITUDE_MAX = 0.2, 5.0, 0.45, 1.8  # of sqrt(noise_sd/abs(J''))
 _CYCLES = 50.0
@@ -46,15 +45,6 @@ def harmonics_of(inputs: int, *, least: int, per_harmonic: float = 0.0) -> tuple
 
     The fastest input is as slow as possible. No harmonic is twice another one, nor sum or difference of two, also not
     where sampling folds them back; so the curvatures of J echo beside the slopes.
-
-    Parameters
-    ----------
-    inputs : int
-        How many.
-    least : int
-        Cycles of the period at least.
-    per_harmonic : float
-        Cycles that the period must have for each oscillation of the fastest input.
     """
     period = least
     while True:
@@ -198,18 +188,11 @@ def _dither(
     linear = np.maximum(spec["arrival"], np.minimum(spec["distance"], rate * slowest))
     way = (spec["distance"] - linear) / rate + slowest * np.log(linear / spec["arrival"])
     out = {
-        "amplitude": amplitude,
-        "period": period,
-        "harmonics": np.array(harmonics),
-        "gain": 2.0 / (amplitude * tau * (1.0 if compensated else echo)),
-        "rate": rate,
-        "time_constant_cycles": slowest,
-        "cycles": float(period + way.max()),
-        "dither_cost": 0.25 * float(amplitude @ amplitude),
-        "sensor_gain": response[:, 0],
-        "sensor_phase_deg": response[:, 1],
-        "delay_uncertainty": doubt,
-    }
+        "amplitude": amplitude, "period": period, "harmonics": np.array(harmonics),
+        "gain": 2.0 / (amplitude * tau * (1.0 if compensated else echo)), "rate": rate, "time_constant_cycles": slowest,
+        "cycles": float(period + way.max()), "dither_cost": 0.25 * float(amplitude @ amplitude),
+        "sensor_gain": response[:, 0], "sensor_phase_deg": response[:, 1], "delay_uncertainty": doubt,
+    }  # fmt: skip
     return out, final
 
 
@@ -254,16 +237,91 @@ def _spsa(
     c = _amplitudes(spec["amplitude_max"], spec, scatter)
     time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, c))).max()))
     out = {
-        "amplitude": c,
-        "period": 2,
-        "harmonics": None,
-        "gain": np.full(count, q),
-        "rate": np.maximum(2.0 * c, 1.2 * q * float(c @ spec["distance"]) / c),
-        "time_constant_cycles": time_constant,
-        "cycles": time_constant * decades,
-        "dither_cost": 0.5 * float(c @ c),
-        "sensor_gain": np.ones(count),
-        "sensor_phase_deg": np.zeros(count),
-        "delay_uncertainty": 0.0,
-    }
+        "amplitude": c, "period": 2, "harmonics": None, "gain": np.full(count, q),
+        "rate": np.maximum(2.0 * c, 1.2 * q * float(c @ spec["distance"]) / c), "time_constant_cycles": time_constant,
+        "cycles": time_constant * decades, "dither_cost": 0.5 * float(c @ c), "sensor_gain": np.ones(count),
+        "sensor_phase_deg": np.zeros(count), "delay_uncertainty": 0.0,
+    }  # fmt: skip
     return out, scatter(c)
+
+
+def approach_gain(curvature: float, time_constant_cycles: float, *, amplitude: float = 1.0) -> float:
+    """Give the gain by which extremum seeking nears an optimum of this curvature with this time constant [cycles]."""
+    return 2.0 / (amplitude * abs(curvature) * time_constant_cycles)
+
+
+_METHODS = ("batch", "moving_average", "spsa")
+_MOST_INPUTS = 8
+_FLAT = 1e-6  # of the curvature along the inputs
+
+
+def hessian_of(curvature: Any, inputs: Sequence[str]) -> tuple[Any, tuple[str, ...]]:
+    """Read the curvature: a number for one input, a matrix for several, and the names of the inputs."""
+    names = tuple(inputs)
+    if isinstance(curvature, Mapping):
+        names = names or tuple(map(str, curvature))
+        curvature = named_values("curvature", curvature, names)
+    found = np.asarray(curvature, dtype=np.float64)
+    if found.size == 1:
+        found = found.reshape(())
+    count = len(found) if found.ndim else 1
+    if found.ndim > 2 or found.shape not in ((), (count,), (count, count)) or count > _MOST_INPUTS:
+        raise ShapeError(
+            f"curvature has shape {found.shape}: must be a number, one per input, or the matrix of at most "
+            f"{_MOST_INPUTS} inputs"
+        )
+    if names and len(names) != count:
+        raise ShapeError(f"inputs has {len(names)} entries: must have {count}, one per input of curvature")
+    for value in np.ravel(found if found.ndim < 2 else np.diag(found)):
+        if not (math.isfinite(value) and value != 0.0):
+            raise ParameterError.of("|curvature|", abs(value), "> 0; measure J at three points per input or more")
+    if not found.ndim:
+        return float(found), names
+    if found.ndim == 1:
+        return np.diag(-np.abs(found)), names
+    if not np.isfinite(found).all() or not np.allclose(found, found.T, rtol=1e-6, atol=0.0):
+        raise ParameterError("curvature: must be a symmetric matrix of finite numbers")
+    sizes = coupling_of(found)[0]
+    if (np.diag(found) > 0.0).any() != (np.diag(found) > 0.0).all() or not sizes[0] > _FLAT:
+        raise ParameterError(
+            "curvature: J must bend one way in every direction; its scaled matrix has the eigenvalues "
+            f"{', '.join(f'{size:.3g}' for size in sizes)}: measure again, or give one number per input"
+        )
+    return found, names
+
+
+def of_each(hessian: NDArray[np.float64], names: Sequence[str]) -> tuple[str, ...]:
+    """Write of which input a number is; nothing where there is one without a name."""
+    if len(hessian) == 1 and not names:
+        return ("",)
+    return tuple(f" of {name}" for name in names or (f"input {place}" for place in range(len(hessian))))
+
+
+def per_input(name: str, value: Any, of: Sequence[str]) -> NDArray[np.float64] | None:
+    """Read numbers of the specification, one per input."""
+    if value is None:
+        return None
+    numbers, count = np.asarray(value, dtype=np.float64), len(of)
+    if count == 1 and numbers.size != 1:
+        raise ShapeError(f"{name} has {numbers.size} entries: must be one number, as curvature")
+    if count > 1 and numbers.shape != (count,):
+        raise ShapeError(f"{name} has shape {numbers.shape}: must be ({count},), one number per input in its unit")
+    for which, number in zip(of, numbers.ravel(), strict=True):
+        if not (number > 0.0 and math.isfinite(number)):
+            raise ParameterError.of(f"{name}{which}", number, "> 0")
+    return numbers.ravel()
+
+
+def check_wish(noise_sd: float, method: str, delay_uncertainty: float | None, cycles: float | None) -> None:
+    """Refuse what is not per input."""
+    if method not in _METHODS:
+        raise ParameterError.of("method", method, f"one of {', '.join(_METHODS)}")
+    if not (noise_sd > 0.0 and math.isfinite(noise_sd)):
+        raise ParameterError.of(
+            "noise_sd", noise_sd,
+            "> 0; repeat one set-point some twenty times and take the standard deviation of J",
+        )  # fmt: skip
+    if cycles is not None and not (cycles > 0.0 and math.isfinite(cycles)):
+        raise ParameterError.of("cycles", cycles, "> 0")
+    if delay_uncertainty is not None and not (delay_uncertainty >= 0.0 and math.isfinite(delay_uncertainty)):
+        raise ParameterError.of("delay_uncertainty", delay_uncertainty, ">= 0 and finite; 0 for a delay known exactly")

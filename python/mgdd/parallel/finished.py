@@ -7,8 +7,6 @@ from typing import TypeVar
 
 from mgdd.errors import Interrupted, WorkerLostError
 
-__all__ = ["hand_over", "keep_finished", "or_partial"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -24,13 +22,7 @@ def or_partial(call: Callable[[], Result]) -> tuple[Result, Interrupted | None]:
 
 
 def keep_finished(call: Callable[[Item], Result], items: Iterable[Item], done: list[Result]) -> Interrupted | None:
-    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included.
-
-    Returns
-    -------
-    Interrupted or None
-        What ended it, for `hand_over`; raised at once where `done` is empty. `items` may look at `done` as it grows.
-    """
+    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included."""
     try:
         for item in items:
             done += [call(item)]

@@ -9,8 +9,6 @@ from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.finished import hand_over
 from mgdd.parallel.pool import MakesExecutor
 
-__all__ = ["map_items"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -80,15 +78,9 @@ def map_items(
         results.update(zip(range(start, stop), part, strict=True))
 
     stop = run_chunks(
-        _call_each,
-        lambda start, stop: (function, given[start:stop]),
-        keep,
-        len(given),
-        executor=executor,
-        workers=workers,
-        seconds_per_item=seconds_per_item,
-        progress=progress,
-    )
+        _call_each, lambda start, stop: (function, given[start:stop]), keep, len(given), executor=executor,
+        workers=workers, seconds_per_item=seconds_per_item, progress=progress,
+    )  # fmt: skip
     if stop is not None:
         hand_over(results, stop)
     return [results[number] for number in range(len(given))]

@@ -14,26 +14,11 @@ from typing import Any, Self
 
 from mgdd.errors import ParameterError
 
-__all__ = ["MakesExecutor", "Pool", "cores", "processes", "single_threaded", "threads_of"]
-
 _single: ContextVar[bool] = ContextVar("single", default=False)
 
 
 class Pool:
-    """An executor with the number of its workers; a broken one is made anew where a function makes it.
-
-    Parameters
-    ----------
-    executor : Executor or callable, optional
-        Anything with ``submit``, or a function that makes it; threads if left out.
-    workers : int, optional
-        Number of threads, or of workers where the executor does not say it; the cores of this process if left out.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Something else, or fewer than one worker.
-    """
+    """An executor with the number of its workers; a broken one is made anew where a function makes it."""
 
     def __init__(self, executor: MakesExecutor | Any, workers: int | None) -> None:
         self._wanted = _checked(workers)
@@ -95,13 +80,7 @@ def processes(workers: int) -> Callable[[], Executor]:
 
 
 def threads_of(workers: int | None) -> int:
-    """Give the number of threads of one call of the core: as many as wanted, or one per core.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than one.
-    """
+    """Give the number of threads of one call of the core: as many as wanted, or one per core."""
     return _checked(workers) or cores()
 
 

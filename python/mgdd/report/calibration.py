@@ -11,8 +11,7 @@ from mgdd.engine import analyze
 from mgdd.errors import Interrupted
 from mgdd.identify import best_timing, estimate_tdc, wall_heat_profile
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
-from mgdd.identify.engine.burn_laws import compare_laws, law_row
-from mgdd.identify.engine.calibration import TDC_SPAN_CAD
+from mgdd.identify.engine.calibration import TDC_SPAN_CAD, compare_laws, law_row
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import Member
 from mgdd.identify.engine.profile import WallHeatProfile

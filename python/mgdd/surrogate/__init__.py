@@ -11,11 +11,7 @@ from mgdd.surrogate.fit import fit_surrogate
 from mgdd.surrogate.response_fit import fit_response
 from mgdd.surrogate.response_model import ResponseModel
 
-__all__ = [
-    "ResponseModel",
-    "fit_response",
-    "fit_surrogate",
-]
+__all__ = ["ResponseModel", "fit_response", "fit_surrogate"]
 
 
 def __dir__() -> list[str]:

@@ -17,8 +17,6 @@ from mgdd.surrogate.signal_model import SensorLag, SignalModel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["read_response", "read_surrogate", "response_file", "surrogate_file"]
-
 _LARGEST_COUNT = 1_000_000
 _SIGNAL = "signal_"
 _LABELS = wanted(("name", "units", "long_name"), form="texts")

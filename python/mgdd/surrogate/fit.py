@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["fit_surrogate"]
-
 _FOLDS = 5
 _MAX_DELAY = 8  # cycles, of a slow signal
 _SETTLE = 40  # cycles of excitation that a slow signal needs before its first row counts
@@ -149,18 +147,12 @@ def _fit_signal(
     coefficients = least_squares_of(terms[use], values[use])
     residual = np.where(use, values - terms @ coefficients, np.nan)
     model = SignalModel(
-        name=name,
-        label=label,
-        coefficients=coefficients,
-        lag_cycles=lag,
-        lag_scores=scores,
-        lag_at_bound=sensor.at_bound if sensor is not None else lag == max_lag,
-        sensor=sensor,
+        name=name, label=label, coefficients=coefficients, lag_cycles=lag, lag_scores=scores,
+        lag_at_bound=sensor.at_bound if sensor is not None else lag == max_lag, sensor=sensor,
         r2=r_squared(values[use], (terms @ coefficients)[use]),
         r2_held_out=r_squared(values[use & ~early], (terms @ before)[use & ~early]),
-        residual_sd=float(np.nanstd(residual)),
-        cyclic_sd=_cyclic(residual, log, lag),
-    )
+        residual_sd=float(np.nanstd(residual)), cyclic_sd=_cyclic(residual, log, lag),
+    )  # fmt: skip
     return model, residual
 
 

@@ -15,17 +15,6 @@ from mgdd.signals.model import columns_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = [
-    "EDGE",
-    "MOST_FACTORS",
-    "PointHull",
-    "column_label",
-    "column_names",
-    "farthest_inside",
-    "hull_of",
-    "points_of",
-]
-
 MOST_FACTORS = 6  # of a hull: its facets grow beyond all memory with more
 EDGE = 1e-9  # of a range: a point so far outside of a boundary lies on it
 _HALVINGS = 40  # of the way to a boundary
@@ -86,13 +75,7 @@ class PointHull:
 
 
 def hull_of(points: NDArray[np.float64], names: Sequence[str]) -> PointHull:
-    """Find the convex hull of points, shape (n, m).
-
-    Raises
-    ------
-    DataError
-        Too many factors, a factor that does not vary, too few points, points in a plane.
-    """
+    """Find the convex hull of points, shape (n, m)."""
     n, m = points.shape
     if m > MOST_FACTORS:
         raise DataError(f"{m} factors: the hull of measured points takes at most {MOST_FACTORS}; hold some constant")

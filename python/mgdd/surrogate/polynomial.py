@@ -17,18 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = [
-    "MODELS",
-    "PolynomialBasis",
-    "PolynomialSurface",
-    "Support",
-    "choose_terms",
-    "least_squares_of",
-    "leverage_of",
-    "r_squared",
-    "support_of",
-]
-
 MODELS = ("linear", "interactions", "quadratic", "cubic")
 
 
@@ -84,16 +72,6 @@ class Support:
     root : ndarray, shape (p, p)
         W, whose product with the terms has the leverage as its sum of squares; over the n records in the box its
         mean is p/n.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.random_steps import random_step_records
-    >>> support = fit_surrogate(random_step_records(1500)).support
-    >>> support.inputs
-    ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')
-    >>> support.contains([[0.0, 0.37, 3.2, 1000.0], [-30.0, 0.37, 3.2, 1000.0]]).tolist()
-    [True, False]
     """
 
     inputs: tuple[str, ...]
@@ -108,33 +86,11 @@ class Support:
         object.__setattr__(self, "root", np.ascontiguousarray(self.root))
 
     def leverage(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Say how far points are from the middle of the records, in the metric of the fit.
-
-        Parameters
-        ----------
-        points : array_like, shape (n, m)
-            In the units of the inputs.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Diagonal of the hat matrix [-].
-        """
+        """Say how far points are from the middle of the records, in the metric of the fit."""
         return self._leverage_of(self.basis(np.asarray(points, dtype=np.float64)))
 
     def contains(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which points lie in the box and do not exceed the leverage limit.
-
-        Parameters
-        ----------
-        points : array_like, shape (n, m)
-            In the units of the inputs.
-
-        Returns
-        -------
-        ndarray of bool, shape (n,)
-            False outside, and for NaN.
-        """
+        """Return which points lie in the box and do not exceed the leverage limit."""
         at = np.asarray(points, dtype=np.float64)
         return self.contains_terms(at, self.basis(at))
 

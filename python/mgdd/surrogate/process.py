@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["ProcessSurface", "fit_process", "matern"]
-
 _NUGGET = 1e-10  # of the signal variance: keeps a noise-free covariance positive
 
 
@@ -130,15 +128,7 @@ class _Search:
 def fit_process(
     points: NDArray[np.float64], values: NDArray[np.float64], names: Sequence[str], *, n_starts: int, seed: int
 ) -> tuple[ProcessSurface, FitReport]:
-    """Fit signal, length scales and noise by maximum likelihood.
-
-    Raises
-    ------
-    ImportError
-        The extra ``gp`` is not installed.
-    DataError
-        Too many points.
-    """
+    """Fit signal, length scales and noise by maximum likelihood."""
     if len(values) > MOST_POINTS:
         raise DataError(
             f"{len(values)} points: a Gaussian process takes at most {MOST_POINTS}; thin them or use a polynomial"
@@ -205,29 +195,18 @@ def _report(
     size = float(np.linalg.norm(surface.values - surface.values.mean()))
     near = sum(float(found.fun) < float(best.fun) + 0.05 for found in search.results)
     return FitReport(
-        names=own,
-        values=values,
-        stderr=stderr,
-        lower=edges[:, 0],
-        upper=edges[:, 1],
-        bounds_active=at_bound,
-        covariance=covariance,
-        correlation=correlation,
+        names=own, values=values, stderr=stderr, lower=edges[:, 0], upper=edges[:, 1], bounds_active=at_bound,
+        covariance=covariance, correlation=correlation,
         unidentifiable=tuple(name for name, side in zip(own, at_bound, strict=True) if side),
         findings=tuple(_at_bound(name, int(side)) for name, side in zip(own, at_bound, strict=True) if side),
-        null_directions=np.zeros((logs.size, 0)),
-        rmse=float(np.sqrt(np.mean(residual**2))),
-        cost=0.5 * float(np.sum(residual**2)),
-        nrmse_fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / size),
-        residual=residual,
-        nfev=sum(int(found.nfev) for found in search.results),
-        njev=sum(int(found.nfev) for found in search.results),
-        nit=int(best.nit),
-        history={},
+        null_directions=np.zeros((logs.size, 0)), rmse=float(np.sqrt(np.mean(residual**2))),
+        cost=0.5 * float(np.sum(residual**2)), nrmse_fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / size),
+        residual=residual, nfev=sum(int(found.nfev) for found in search.results),
+        njev=sum(int(found.nfev) for found in search.results), nit=int(best.nit), history={},
         status="cost_converged" if best.success else "stalled",
         message=f"log marginal likelihood {-float(best.fun):.4g}, found by {near} of {len(search.results)} searches",
         success=bool(best.success),
-    )
+    )  # fmt: skip
 
 
 def _covariance(regressor: Any, logs: NDArray[np.float64], free: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -12,8 +12,6 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["random_step_records"]
-
 _BOX = {"soi_cad": (-8.0, 10.0), "doi_main_ms": (0.25, 0.5), "doi_h2_ms": (2.5, 4.0), "p2m_us": (700.0, 1400.0)}
 _LABELS = {
     "soi_cad": ("°CA aTDC", "start of injection"),
@@ -31,45 +29,7 @@ _LAG, _DELAY, _TAU = 1, 3, 6.0
 
 
 def random_step_records(cycles: int = 4000, *, seed: int = 0, noise: float = 1.0) -> xr.Dataset:
-    """Make records of a known quadratic engine whose injection is stepped at random.
-
-    With s = SOI [°CA aTDC], d = (main duration - 0.37 ms)/0.1 ms, h = (hydrogen duration - 3.2 ms)/0.4 ms and
-    g = (pilot-to-main gap - 1000 µs)/200 µs of the cycle one row before::
-
-        IMEP  = 7.0 + 0.5 d + 0.4 h - 0.005 (s + 4)²         [bar]
-        MFB50 = 10 + s - 0.4 h + 0.02 s²                     [°CA aTDC]
-        MPRR  = 4.5 - 0.2 s + 0.3 h d + 0.2 g                [bar/°CA]
-        NOx   = 650 - 45 s + 1.5 s² + 60 d + 40 h            [ppm]
-
-    The NOx reading comes three rows after its command, behind a first-order lag of 6 cycles. Commands hold for
-    1 to 30 cycles.
-
-    Parameters
-    ----------
-    cycles : int
-        Number of cycles, at least 10.
-    seed : int
-        Seed of steps and noise.
-    noise : float
-        Scale of the noise: 1 gives 0.1 bar, 0.8 °CA, 0.6 bar/°CA and 8 ppm, all mutually correlated by 0.6; 0
-        gives none [-].
-
-    Returns
-    -------
-    xarray.Dataset
-        Inputs and signals over ``cycle``, as `fit_surrogate` takes them.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Fewer than 10 cycles or negative noise.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate.random_steps import random_step_records
-    >>> random_step_records(100)["nox_ppm"].dims
-    ('cycle',)
-    """
+    """Make records of a known quadratic engine whose injection is stepped at random."""
     if cycles < 10:
         raise ParameterError.of("cycles", cycles, ">= 10")
     if not 0.0 <= noise < np.inf:

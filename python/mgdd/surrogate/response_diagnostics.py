@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from mgdd.surrogate.response_model import ResponseModel
 
-__all__ = ["diagnostics_of", "outlier_bound", "response_findings"]
-
 _OUTLIER = 0.05  # probability that clean data have any outlier
 _RARE = 0.01  # probability at which clean data show each of the other patterns
 _FEW_ORDERED = 10

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ResponseFit", "fit_response"]
-
 KINDS = ("polynomial", "gaussian_process")
 SELECTIONS = ("bic", "press", "all")
 _MOST_DEGREE = 4
@@ -48,14 +46,6 @@ class ResponseFit(Fit):
         ``residual`` (measured minus fitted), ``studentised``, ``leverage``, ``normal_score`` and ``outlier``; the
         number ``outlier_bound``; cuts through the medians of the points, ``cut``, ``cut_mean``, ``cut_lower`` and
         ``cut_upper`` over ``factor`` and ``step``.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_response
-    >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
-    >>> fit = fit_response(line, "imep_bar", degree=1)
-    >>> fit.diagnostics["left_out"].values.round(1).tolist()
-    [1.4, 2.7, 5.8, 9.1, 12.0]
     """
 
     diagnostics: xr.Dataset
@@ -166,18 +156,13 @@ def fit_response(
     parted = left_out if folds is None else _parted(x, y, fitter, int(folds), seed)
     known = np.isfinite(parted)
     return ResponseFit(
-        report=report,
-        model=model,
-        kind=kind,
-        train=_quality(y, surface.fitted()[0], label),
+        report=report, model=model, kind=kind, train=_quality(y, surface.fitted()[0], label),
         test=_quality(y[known], parted[known], label) if known.sum() > 1 else None,
         checked_by="leave-one-out" if folds is None else f"{folds}-fold",
         findings=(*report.findings, *response_findings(model, studentised, left_out)),
-        unidentifiable=report.unidentifiable,
-        source=name,
-        draw=_draw,
+        unidentifiable=report.unidentifiable, source=name, draw=_draw,
         diagnostics=diagnostics_of(model, left_out, studentised),
-    )
+    )  # fmt: skip
 
 
 def _draw(fit: ResponseFit, ax: Any) -> Any:

@@ -11,18 +11,19 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
+from mgdd.io.point_table import POINT
 from mgdd.results.describe import described
-from mgdd.results.labels import Label, labelled_dataset
+from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.surrogate.file import read_response, response_file
 from mgdd.surrogate.points import EDGE, PointHull, hull_of, points_of
 from mgdd.surrogate.polynomial import PolynomialSurface
 from mgdd.surrogate.process import ProcessSurface
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
     from numpy.typing import NDArray
-
-__all__ = ["RESERVED", "ResponseModel"]
 
 RESERVED = ("point", "mean", "mean_sd", "sd", "lower", "upper", "extrapolated")
 
@@ -127,15 +128,6 @@ class ResponseModel(Parameters):
             A level outside 0 to 1.
         mgdd.errors.DataError
             A factor is missing or not finite.
-
-        Examples
-        --------
-        >>> from mgdd.surrogate import fit_response
-        >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
-        >>> model = fit_response(line, "imep_bar", degree=1).model
-        >>> found = model.predict({"fuel_mg": [15.0]})
-        >>> found["lower"].item() < found["mean"].item() < found["upper"].item()
-        True
         """
         from scipy.stats import t
 
@@ -188,3 +180,41 @@ class ResponseModel(Parameters):
 
 
 described(ResponseModel, rows=_rows)
+
+
+# What stands behind the name of a response, and the part of a prediction that it is.
+_PARTS = {"": "mean", "_sd": "sd", "_lower": "lower", "_upper": "upper"}
+
+
+def prediction_table(
+    models: Sequence[ResponseModel],
+    axes: Mapping[str, NDArray[Any]],
+    columns: Mapping[str, NDArray[np.float64]],
+    *,
+    extrapolate: bool,
+    level: float,
+) -> tuple[xr.Dataset, dict[str, int]]:
+    """Predict every response over a grid, or over a list of points."""
+    labels = {name: label for model in models for name, label in model.factors.items()}
+    dims, shape = tuple(axes), tuple(len(values) for values in axes.values())
+    variables: dict[str, tuple[Any, ...]] = {
+        name: (name, values, *labels.get(name, ("-", "number of the point"))) for name, values in axes.items()
+    }
+    beside = [name for name in labels if name not in axes]
+    variables |= {name: (POINT, columns[name], *labels[name]) for name in beside}
+    outside: dict[str, int] = {}
+    for model in models:
+        found = model.predict({name: columns[name].ravel() for name in model.factors}, level=level)
+        beyond = found["extrapolated"].to_numpy()
+        outside[model.name] = int(beyond.sum())
+        keep = np.ones(beyond.shape, dtype=bool) if extrapolate else ~beyond
+        for ending, part in _PARTS.items():
+            values = np.where(keep, found[part].to_numpy(), np.nan).reshape(shape)
+            variables[f"{model.name}{ending}"] = (dims, values, *label_of(found[part]))
+        if extrapolate:
+            where = beyond.reshape(shape).astype(np.int8)
+            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
+    table = labelled_dataset(variables, attrs={"level": level}).set_coords(beside)
+    for model in models:
+        table[model.name].attrs["source"] = "predicted"
+    return table, outside

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["SensorLag", "SignalModel", "find_sensor_lag", "lagged"]
-
 # Trial time constants [cycles]; the best is refined by a parabola through its neighbours.
 _TAUS = np.r_[0.0, np.geomspace(0.5, 40.0, 36)]
 _BLOCK = 250  # cycles; longer than the memory of the residual
@@ -49,14 +47,6 @@ class SensorLag:
         Its standard error [cycles].
     at_bound : bool
         Whether delay or time constant lies on the edge of what was searched.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.random_steps import random_step_records
-    >>> sensor = fit_surrogate(random_step_records(3000)).signals["nox_ppm"].sensor
-    >>> sensor.delay_cycles, round(sensor.tau_cycles)
-    (3, 6)
     """
 
     delay_cycles: int
@@ -183,14 +173,6 @@ class SignalModel:
         Standard deviation of record minus model, in the unit of the signal.
     cyclic_sd : float
         The part of it from one cycle to the next while the command is held; the rest is what the surface misses.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.random_steps import random_step_records
-    >>> imep = fit_surrogate(random_step_records(1500)).signals["imep_bar"]
-    >>> imep.lag_cycles, round(imep.residual_sd, 1)
-    (1, 0.1)
     """
 
     name: str

@@ -8,15 +8,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from mgdd._core.optimize import Limit
-from mgdd.errors import ParameterError
+from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.optimize.optimum import Optimum, limits_of
 from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
 from mgdd.surrogate.file import read_surrogate, surrogate_file
-from mgdd.surrogate.optimum import best_along
 from mgdd.surrogate.polynomial import PolynomialBasis, Support
 from mgdd.surrogate.signal_model import SignalModel
 
@@ -24,7 +24,99 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["STEERED", "EngineSurrogate"]
+_TINY = 1e-9  # relative slack of a limit at its own crossing
+
+
+def best_along(
+    support: Support,
+    surfaces: Mapping[str, NDArray[np.float64]],
+    at: NDArray[np.float64],
+    *,
+    weights: Mapping[str, float],
+    kept: tuple[Limit, ...],
+    nonnegative: tuple[str, ...],
+) -> Optimum:
+    """Maximise the weighted sum of signals over SOI where supported and within the limits, the rest of a point held."""
+    limits = {limit.name: limit.upper - limit.margin for limit in kept}
+    column = support.inputs.index("soi_cad")
+    low, high = float(support.lower[column]), float(support.upper[column])
+    nodes = np.linspace(low, high, 5)
+    points = np.tile(at, (nodes.size, 1))
+    points[:, column] = nodes
+    terms = support.basis(points)
+
+    def along(values: NDArray[np.float64], degree: int) -> Polynomial:
+        return Polynomial.fit(nodes, values, degree)
+
+    curves = {name: along(terms @ coefficients, 2) for name, coefficients in surfaces.items()}
+    leverage = along(support.leverage(points), 4) - support.leverage_limit
+    goal = Polynomial([0.0], (low, high), (-1.0, 1.0))
+    for name, weight in weights.items():
+        goal = goal + weight * curves[name]
+    held = {name: curves[name] - limit for name, limit in limits.items()}
+    rules = [leverage, *(-curves[name] for name in nonnegative)]
+    edges = _inner_roots(rules, low, high)
+    others = np.delete(np.arange(len(support.inputs)), column)
+    inside = np.all((points[0, others] >= support.lower[others]) & (points[0, others] <= support.upper[others]))
+    candidates = np.unique(np.r_[edges, _inner_roots([*held.values(), goal.deriv()], low, high)])
+    supported = inside & _kept(rules, candidates)
+    feasible = supported & _kept(list(held.values()), candidates)
+    if not feasible.any():
+        if not supported.any():
+            raise ConvergenceError(f"no soi_cad in [{low:.4g}, {high:.4g}] is supported: change the other inputs")
+        near = ", ".join(
+            f"{n} >= {curves[n](candidates[supported]).min():.4g} (limit {v:g})" for n, v in limits.items()
+        )
+        raise ConvergenceError(
+            f"no supported soi_cad in [{low:.4g}, {high:.4g}] meets the limits together; each alone: {near}; "
+            "raise a limit"
+        )
+    best = float(candidates[int(np.argmax(np.where(feasible, goal(candidates), -np.inf)))])
+    start, end = _range_around(best, edges, inside & _kept(rules, 0.5 * (edges[1:] + edges[:-1])))
+    return Optimum(
+        inputs={"soi_cad": best},
+        objective=" + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items()),
+        value=float(goal(best)),
+        values={name: float(curve(best)) for name, curve in curves.items()},
+        limits=kept,
+        active_limits=tuple(n for n, curve in held.items() if abs(curve(best)) <= _TINY * max(1.0, abs(limits[n]))),
+        at_bound=min(best - start, end - best) <= _TINY * (high - low),
+        bounds={"soi_cad": (start, end)},
+        curvature=float(goal.deriv(2)(best)),
+    )
+
+
+def _inner_roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.float64]:
+    """Return the ends of the range and the real roots between them, sorted."""
+    found = [low, high]
+    for curve in curves:
+        slope = curve.deriv()
+        for root in curve.trim(_TINY**2 * np.abs(curve.coef).max()).roots():
+            at = float(np.real(root))
+            for _ in range(3):  # Newton: a nearly straight curve spoils the digits of its companion matrix
+                at = at - float(curve(at) / slope(at)) if slope(at) != 0.0 else at
+            if abs(np.imag(root)) < _TINY * (high - low) and low < at < high:
+                found.append(at)
+    return np.unique(found)
+
+
+def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the supported interval that holds the best SOI, joined across roots where nothing changes."""
+    first = int(np.searchsorted(edges, best, side="right")) - 1
+    last = int(np.searchsorted(edges, best, side="left"))
+    while first > 0 and supported[first - 1]:
+        first -= 1
+    while last < edges.size - 1 and supported[last]:
+        last += 1
+    return float(edges[first]), float(edges[last])
+
+
+def _kept(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
+    out = np.ones(at.size, dtype=np.bool_)
+    for curve in curves:
+        out &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())
+    return out
+
 
 STEERED = "soi_cad"
 
@@ -50,14 +142,6 @@ class EngineSurrogate(Parameters):
         Record minus model by row of the log, one column per signal, NaN where a record was not used.
     source : mapping of str to object
         Attributes of the records.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate
-    >>> from mgdd.surrogate.random_steps import random_step_records
-    >>> surrogate = fit_surrogate(random_step_records(1500))
-    >>> surrogate.inputs
-    ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')
     """
 
     signals: Mapping[str, SignalModel]
@@ -102,14 +186,6 @@ class EngineSurrogate(Parameters):
         ------
         mgdd.errors.ParameterError
             An unknown input, a value that is not finite, or a point outside the support with ``outside="raise"``.
-
-        Examples
-        --------
-        >>> from mgdd.surrogate import fit_surrogate
-        >>> from mgdd.surrogate.random_steps import random_step_records
-        >>> surrogate = fit_surrogate(random_step_records(1500))
-        >>> surrogate.predict([-4.0, 0.0, 40.0])["supported"].values.tolist()
-        [True, True, False]
         """
         if outside not in ("flag", "raise"):
             raise ParameterError.of("outside", outside, "'flag' or 'raise'")
@@ -166,14 +242,6 @@ class EngineSurrogate(Parameters):
             An unknown signal or input, a weight or limit that is not finite.
         mgdd.errors.ConvergenceError
             No supported SOI meets the limits.
-
-        Examples
-        --------
-        >>> from mgdd.surrogate import fit_surrogate
-        >>> from mgdd.surrogate.random_steps import random_step_records
-        >>> best = fit_surrogate(random_step_records(1500)).find_optimum("imep_bar", {"mprr": 5.0})
-        >>> best.active_limits, best.at_bound
-        (('mprr',), False)
         """
         weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         kept = limits_of(limits)
@@ -195,14 +263,7 @@ class EngineSurrogate(Parameters):
         )
 
     def quality(self) -> xr.Dataset:
-        """Tabulate how well each surface does.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``r2``, ``r2_held_out``, ``lag_cycles``, ``residual_sd`` and ``cyclic_sd`` over ``signal``; the last two
-            in the unit of each signal.
-        """
+        """Tabulate how well each surface does."""
         models = list(self.signals.values())
         own = "unit of the signal"
         return labelled_dataset(
@@ -226,23 +287,7 @@ class EngineSurrogate(Parameters):
         return cls(**read_surrogate(file))
 
     def operating_point(self, at: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Complete a choice of inputs with the medians of the rest, and check it.
-
-        Parameters
-        ----------
-        at : mapping of str to float, optional
-            Inputs other than ``soi_cad``, in their units.
-
-        Returns
-        -------
-        dict
-            A value for every input.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            An unknown input, ``soi_cad``, or a value that is not finite.
-        """
+        """Complete a choice of inputs with the medians of the rest, and check it."""
         for name, value in (at or {}).items():
             if name not in self.inputs or name == STEERED:
                 others = ", ".join(n for n in self.inputs if n != STEERED)

@@ -12,9 +12,7 @@ import numpy as np
 from mgdd._core import systems
 from mgdd.errors import ParameterError
 from mgdd.io.parameters import ModelParameters, wanted
-from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import fit_of, fit_run
-from mgdd.optimize.least_squares import LeastSquaresOptions
+from mgdd.optimize.least_squares import FitOptions, LeastSquaresOptions, fit_of, fit_options, fit_run
 from mgdd.parallel.finished import hand_over, keep_finished
 from mgdd.results import Fit
 from mgdd.results.describe import described

@@ -25,7 +25,7 @@ from mgdd.loop import (
 )
 from mgdd.loop.tune import draw_throttles
 from mgdd.optimize import ExtremumSeeking, FitOptions, GradientDescent, Limit, Spsa
-from mgdd.parallel.plan import Plan
+from mgdd.parallel.chunks import Plan
 from mgdd.results import Fit
 from mgdd.throttle import Throttle
 

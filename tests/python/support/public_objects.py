@@ -47,13 +47,14 @@ def bound_classes(room: ModuleType = _core) -> dict[str, type]:
 
 
 def public_classes() -> dict[str, type]:
-    """Give every class in the list of names of a module, by its full name."""
+    """Give every class that a module lists or, without a list, defines, by its full name."""
     found: dict[type, str] = {}
     for module in MODULES:
         room = importlib.import_module(module)
-        for name in getattr(room, "__all__", ()):
+        own = [name for name, member in vars(room).items() if getattr(member, "__module__", "") == module]
+        for name in getattr(room, "__all__", own):
             member = getattr(room, name)
-            if inspect.isclass(member) and not issubclass(member, BaseException):
+            if inspect.isclass(member) and not name.startswith("_") and not issubclass(member, BaseException):
                 found.setdefault(member, f"{module}.{name}")
     return {name: member for member, name in found.items()}
 

@@ -12,11 +12,10 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace import conditions
-from mgdd.identify.engine.findings import findings_of
-from mgdd.identify.engine.model_error import with_model_error
+from mgdd.identify.engine.findings import findings_of, with_model_error
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.identify.engine.request import Bounds, Request, closed, with_burn
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.presets.meant import CylinderLike, PointLike
 from mgdd.results.fit import FitQuality
@@ -25,8 +24,6 @@ from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["fit_cylinder", "fit_request"]
 
 
 def fit_cylinder(
@@ -112,20 +109,10 @@ def fit_cylinder(
     True
     """
     request = Request.of(
-        traces,
-        cylinder,
-        free=free,
-        fuel_heat_j=fuel_heat_j,
-        bounds=bounds,
-        point=point,
-        start_values=start_values,
-        step_cad=step_cad,
-        integrator=integrator,
-        options=options,
-        pegging=pegging,
-        pegging_exponent=pegging_exponent,
+        traces, cylinder, free=free, fuel_heat_j=fuel_heat_j, bounds=bounds, point=point, start_values=start_values,
+        step_cad=step_cad, integrator=integrator, options=options, pegging=pegging, pegging_exponent=pegging_exponent,
         inlet_pressure_kpa=inlet_pressure_kpa,
-    )
+    )  # fmt: skip
     return fit_request(request, model_error=True)
 
 
@@ -137,16 +124,10 @@ def fit_request(request: Request, *, model_error: bool = False) -> CylinderFit:
     chosen = fit_options(request.options, max_iterations=200)
     core, stop = or_partial(
         lambda: _core.identify.fit_cylinder(
-            measured,
-            cylinder,
-            burns,
-            list(request.free),
-            request.step_cad,
-            request.integrator,
-            chosen.max_iterations,
+            measured, cylinder, burns, list(request.free), request.step_cad, request.integrator, chosen.max_iterations,
             request.search_bounds(),
         )
-    )
+    )  # fmt: skip
     loads = tuple(
         _load(core.cylinder, fitted, trace, label, point)
         for fitted, trace, label in zip(core.loads, request.traces, labels, strict=True)
@@ -155,18 +136,11 @@ def fit_request(request: Request, *, model_error: bool = False) -> CylinderFit:
     if model_error and stop is None:
         report = with_model_error(report, request, core)
     fit = CylinderFit(
-        report=report,
-        model=core.cylinder,
-        kind=burn_law(core.cylinder),
+        report=report, model=core.cylinder, kind=burn_law(core.cylinder),
         train=FitQuality(nrmse_fit_percent=None, rmse=100.0 * report.rmse, unit="% of p_max", n=report.residual.size),
-        unidentifiable=report.unidentifiable,
-        source=", ".join(labels),
-        draw=_draw,
-        loads=loads,
-        table=load_table(loads),
-        correlation_if_free=np.asarray(core.correlation_if_free),
-        request=request,
-    )
+        unidentifiable=report.unidentifiable, source=", ".join(labels), draw=_draw, loads=loads,
+        table=load_table(loads), correlation_if_free=np.asarray(core.correlation_if_free), request=request,
+    )  # fmt: skip
     return hand_over(replace(fit, findings=findings_of(fit, request)), stop)
 
 
@@ -190,19 +164,14 @@ def _load(
     }
     overlay = labelled_dataset(
         {
-            ANGLE: (ANGLE, angle),
-            "measured_bar": (ANGLE, pressure),
-            "model_bar": (ANGLE, fitted.model_bar),
-            "residual_bar": (ANGLE, fitted.model_bar - pressure),
-            "rmse_bar": ((), fitted.rmse_bar),
+            ANGLE: (ANGLE, angle), "measured_bar": (ANGLE, pressure), "model_bar": (ANGLE, fitted.model_bar),
+            "residual_bar": (ANGLE, fitted.model_bar - pressure), "rmse_bar": ((), fitted.rmse_bar),
             "rmse_percent": ((), fitted.rmse_percent),
-            "imep_closed_error_percent": ((), fitted.imep_closed_error_percent),
-            "soc_cad": ((), burn.soc_cad),
-            "soi_cad": ((), soi),
-            "p_max_bar": ((), fitted.p_max_bar),
+            "imep_closed_error_percent": ((), fitted.imep_closed_error_percent), "soc_cad": ((), burn.soc_cad),
+            "soi_cad": ((), soi), "p_max_bar": ((), fitted.p_max_bar),
         },
         attrs={"file": label, "burn": cylinder.burn_shape},
-    )
+    )  # fmt: skip
     own = conditions(trace, point).replace(
         intake_pressure_kpa=burn.start_pressure_bar * 100.0,
         fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
@@ -210,14 +179,7 @@ def _load(
         trapped_mass_g=fitted.trapped_mass_g,
     )
     return Load(
-        file=label,
-        point=own,
-        cylinder=with_burn(cylinder, burn),
-        soc_cad=burn.soc_cad,
-        burn_duration_cad=burn.burn_duration_cad,
-        fuel_heat_j=burn.fuel_heat_j,
-        soi_cad=soi,
-        onset_against_soi_cad=burn.soc_cad - soi,
-        overlay=overlay,
-        **scalars,
-    )
+        file=label, point=own, cylinder=with_burn(cylinder, burn), soc_cad=burn.soc_cad,
+        burn_duration_cad=burn.burn_duration_cad, fuel_heat_j=burn.fuel_heat_j, soi_cad=soi,
+        onset_against_soi_cad=burn.soc_cad - soi, overlay=overlay, **scalars,
+    )  # fmt: skip

@@ -10,13 +10,11 @@ from dataclasses import dataclass, field, replace
 from mgdd._core.engine import Cylinder
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.identify.engine.cylinder import fit_request
-from mgdd.identify.engine.plausible import Plausibility
+from mgdd.identify.engine.findings import Plausibility
 from mgdd.identify.engine.records import CylinderFit, Load
 from mgdd.identify.engine.request import BURN_FIELDS, GAMMA_PARAMETER, SHAPE_FIELDS, Request
 from mgdd.parallel.finished import hand_over
 from mgdd.results.describe import described
-
-__all__ = ["Member", "ModelFamily", "fit_family"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,15 +152,6 @@ class Member:
         Per trace: RMSE with gamma and wall heat of the other traces [% of p_max]; its own where they are held.
     why_not : tuple of str
         Per trace: why it is not plausible there; empty if it is.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import ModelFamily, best_timing
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[0].best.member.law
-    'double_wiebe'
     """
 
     law: str
@@ -229,16 +218,10 @@ def _member(request: Request, fit: CylinderFit) -> Member:
     fitted = "wall heat" if "wall_heat_scale" in common else "gamma" if common else "nothing"
     law = request.cylinder.gamma_model
     return Member(
-        law=request.cylinder.burn_shape,
-        gamma_model=law,
-        wall_heat_model=request.cylinder.wall_heat_model,
-        gamma=float(getattr(fit.model, GAMMA_PARAMETER[law])),
-        wall_heat_scale=float(fit.model.wall_heat_scale),
-        fitted=fitted,
-        score=math.inf,
-        fit=fit,
-        left_out_percent=_left_out(request, fit),
-    )
+        law=request.cylinder.burn_shape, gamma_model=law, wall_heat_model=request.cylinder.wall_heat_model,
+        gamma=float(getattr(fit.model, GAMMA_PARAMETER[law])), wall_heat_scale=float(fit.model.wall_heat_scale),
+        fitted=fitted, score=math.inf, fit=fit, left_out_percent=_left_out(request, fit),
+    )  # fmt: skip
 
 
 def _left_out(request: Request, fit: CylinderFit) -> tuple[float, ...]:

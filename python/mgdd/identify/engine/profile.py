@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_request
-from mgdd.identify.engine.model_error import WIDTHS
+from mgdd.identify.engine.findings import WIDTHS
 from mgdd.identify.engine.records import CylinderFit, starts_of
 from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
 from mgdd.results.labels import labelled_dataset
@@ -20,8 +20,6 @@ from mgdd.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["WallHeatProfile", "wall_heat_profile"]
 
 NAME = "wall_heat_scale"
 UPPER = float(_core.identify.wall_heat_scale_upper)
@@ -57,14 +55,6 @@ class WallHeatProfile(Result):
         Why not, in words.
     dataset : xarray.Dataset
         ``rmse_percent`` of all traces together, and per trace, over ``wall_heat_scale``.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
-    >>> wall_heat_profile(fit_cylinder(traces, cylinder)).identifiable
-    False
     """
 
     value: float
@@ -86,13 +76,7 @@ class WallHeatProfile(Result):
         return draw(self.dataset, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give everything but the Dataset as a dict.
-
-        Returns
-        -------
-        dict
-            Field names to values.
-        """
+        """Give everything but the Dataset as a dict."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "dataset"}
 
 
@@ -178,19 +162,10 @@ def wall_heat_profile(
         *_reasons_of_moves(moved, used, best, value, possible),
     )
     return WallHeatProfile(
-        value=value,
-        stderr=float(fit.report.stderr[fit.report.names.index(NAME)]),
-        correlation=correlation,
-        correlated_with=partner,
-        range_low=low,
-        range_high=high,
-        moved=moved,
-        possible_low=possible[0],
-        possible_high=possible[1],
-        identifiable=not reasons,
-        reasons=reasons,
-        dataset=_dataset(fits),
-    )
+        value=value, stderr=float(fit.report.stderr[fit.report.names.index(NAME)]), correlation=correlation,
+        correlated_with=partner, range_low=low, range_high=high, moved=moved, possible_low=possible[0],
+        possible_high=possible[1], identifiable=not reasons, reasons=reasons, dataset=_dataset(fits),
+    )  # fmt: skip
 
 
 def _widths(given: Mapping[str, float] | None) -> dict[str, float]:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mgdd.identify.engine.request import Request
 
-__all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table", "starts_of"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Load(Result):
@@ -53,14 +51,6 @@ class Load(Result):
         Modelled wall heat over fuel heat [-].
     overlay : xarray.Dataset
         ``measured_bar``, ``model_bar``, ``residual_bar`` over ``crank_angle_cad``.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import fit_cylinder
-    >>> fit = fit_cylinder(datasets.read("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
-    >>> fit.loads[0].rmse_percent < 1.0
-    True
     """
 
     file: str
@@ -111,16 +101,6 @@ class CylinderFit(Fit):
         As the report's correlation, but with parameters at a bound taken as free there.
     request : object
         What was asked for, so that `wall_heat_profile` can ask again.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import fit_cylinder
-    >>> fit = fit_cylinder(datasets.read("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
-    >>> fit.loads[1].rmse_percent < 1.0
-    True
-    >>> "wall_heat_scale" in fit.unidentifiable
-    True
     """
 
     loads: tuple[Load, ...]

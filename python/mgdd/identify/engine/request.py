@@ -12,12 +12,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd._core.identify import LoadBurn, with_burn
 from mgdd.engine import analyze
 from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.pressure import one_cycle
-from mgdd.optimize.fit_options import FitOptions
+from mgdd.optimize.least_squares import FitOptions
 from mgdd.presets.meant import CylinderLike, PointLike, cylinder_of, point_of, stated
 from mgdd.results.labels import ANGLE
 
@@ -25,18 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = [
-    "BURN_FIELDS",
-    "GAMMA_PARAMETER",
-    "SHAPE_FIELDS",
-    "LoadBurn",
-    "Request",
-    "default_free",
-    "listed",
-    "pegged",
-    "with_burn",
-]
-
+LoadBurn = _core.identify.LoadBurn
+with_burn = _core.identify.with_burn
 SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
 BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
 _EARLIEST = ("soi_cad", "spark_cad")
@@ -96,18 +85,11 @@ class Request:
         if start_values is not None and len(start_values) != len(given):
             raise ParameterError(f"start_values has {len(start_values)} entries for {len(given)} traces")
         return cls(
-            traces=tuple(pegged(trace, cylinder, point, **pegging) for trace in given),
-            labels=_labels(given),
-            cylinder=cylinder,
-            free=names,
-            known_heat_j=heats,
-            bounds=dict(bounds or {}),
-            point=point,
-            start_values=None if start_values is None else tuple(start_values),
-            step_cad=step_cad,
-            integrator=integrator,
-            options=options,
-        )
+            traces=tuple(pegged(trace, cylinder, point, **pegging) for trace in given), labels=_labels(given),
+            cylinder=cylinder, free=names, known_heat_j=heats, bounds=dict(bounds or {}), point=point,
+            start_values=None if start_values is None else tuple(start_values), step_cad=step_cad,
+            integrator=integrator, options=options,
+        )  # fmt: skip
 
     def measured(self, *, late_cad: float = 0.0, more_bar: float = 0.0) -> list[_core.identify.MeasuredCycle]:
         """Give the closed parts as the core takes them, or as they would be that much later and higher."""
@@ -211,14 +193,9 @@ def pegged(
     if pegging == "none":
         return trace
     result = analyze(
-        trace,
-        cylinder,
-        point=point,
-        pegging=pegging,
-        pegging_exponent=pegging_exponent,
-        inlet_pressure_kpa=inlet_pressure_kpa,
-        quiet=True,
-    )
+        trace, cylinder, point=point, pegging=pegging, pegging_exponent=pegging_exponent,
+        inlet_pressure_kpa=inlet_pressure_kpa, quiet=True,
+    )  # fmt: skip
     moved = trace.assign(pressure_bar=trace["pressure_bar"] + float(result["pegging_bar"]))
     moved["pressure_bar"].attrs.update(trace["pressure_bar"].attrs)
     return moved

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["TdcEstimate", "estimate_tdc"]
-
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
 # Gamma of charge and burned gas, at 300 K and its slope; at 3500 K it stays above 1.
 _GAS = {"gamma_linear_300k": (1.36, 1.45), "gamma_linear_slope_per_k": (-1.1e-4, -2.0e-5)}
@@ -64,15 +62,6 @@ class TdcEstimate(Result):
         Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
         ``low_cad`` and ``high_cad``; fired also ``rmse_percent`` over ``tdc_offset_cad``.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import estimate_tdc
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> found = estimate_tdc(datasets.read("hd_diesel_128x144"), cylinder, span_cad=1.0)
-    >>> found.suspect
-    False
     """
 
     tdc_offset_cad: float
@@ -115,13 +104,7 @@ class TdcEstimate(Result):
         return not self.low_cad <= 0.0 <= self.high_cad
 
     def doubts(self) -> list[str]:
-        """Say in words that the angles are outside the range, and what no sound engine has.
-
-        Returns
-        -------
-        list of str
-            Empty where they are inside.
-        """
+        """Say in words that the angles are outside the range, and what no sound engine has."""
         if not self.suspect:
             return list(self.findings)
         edge = "tdc_offset_cad" in self.dataset and abs(self.tdc_offset_cad) >= abs(
@@ -229,17 +212,11 @@ def _of_motored(request: Request, cost: DegreeCost) -> TdcEstimate:
             raise error.reworded(f"{label}: {error}") from None
     found = MotoredTdc.of_many(strokes)
     return TdcEstimate(
-        tdc_offset_cad=found.offset_cad,
-        low_cad=found.offset_cad - found.offset_half_cad,
-        high_cad=found.offset_cad + found.offset_half_cad,
-        method="motored strokes",
-        imep_closed_bar=cost.imep_bar,
-        imep_error_bar=cost.error_bar,
-        loss_angle_cad=found.loss_angle_cad,
-        wall_heat_scale=found.wall_heat_scale,
-        findings=found.findings,
-        dataset=labelled_dataset({}),
-    )
+        tdc_offset_cad=found.offset_cad, low_cad=found.offset_cad - found.offset_half_cad,
+        high_cad=found.offset_cad + found.offset_half_cad, method="motored strokes", imep_closed_bar=cost.imep_bar,
+        imep_error_bar=cost.error_bar, loss_angle_cad=found.loss_angle_cad, wall_heat_scale=found.wall_heat_scale,
+        findings=found.findings, dataset=labelled_dataset({}),
+    )  # fmt: skip
 
 
 def _of_fired(

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["RANGED", "BestTiming", "MemberTiming", "undetermined"]
-
 RANGED = (
     "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
     "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",
@@ -100,13 +98,7 @@ class MemberTiming:
     at_bound: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Give law, gamma and wall heat of the member and its answer as plain values.
-
-        Returns
-        -------
-        dict
-            Names to values.
-        """
+        """Give law, gamma and wall heat of the member and its answer as plain values."""
         names = ("law", "gamma_model", "gamma", "wall_heat_model", "wall_heat_scale")
         model = {name: getattr(self.member, name) for name in names}
         own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
@@ -128,16 +120,6 @@ class BestTiming(Result):
         family on both sides, gains from 0 where the range of moves spans it. NaN without any.
     free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
         The same without the limit of the load's own p_max.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import ModelFamily, best_timing
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[0.5, 1.0])
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> rows = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)
-    >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
-    ([1, 9], 8)
     """
 
     file: str
@@ -190,13 +172,7 @@ class BestTiming(Result):
         return labelled_dataset({"member": members, **columns}, attrs=attrs)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give file, ranges, directions, best member and all members as plain values.
-
-        Returns
-        -------
-        dict
-            Names to values; ranges as lists.
-        """
+        """Give file, ranges, directions, best member and all members as plain values."""
         return {
             "file": self.file,
             **{name: list(getattr(self, name)) for name in RANGED},

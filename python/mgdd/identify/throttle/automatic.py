@@ -9,32 +9,28 @@ from typing import TYPE_CHECKING
 from mgdd import _core
 from mgdd.errors import Interrupted
 from mgdd.identify.starts import spread_starts
-from mgdd.identify.throttle.delay_report import delay_at_end, with_delay
 from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
-from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
-from mgdd.identify.throttle.hunt import (
+from mgdd.identify.throttle.free_run import below_ceiling, draw_free_run, free_run, noise_of, quality_of, source_of
+from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, delay_weights, independent_values, with_nuisances
+from mgdd.identify.throttle.whole_delay import (
     AT_NOISE,
     BRISTLES,
     FINE,
     FLOOR_DEG,
     MOVING,
+    RAMPS,
+    Delays,
     Hunt,
     best_of,
+    delay_at_end,
     independent_samples,
     missed,
     names_of,
+    whole_delay,
+    with_delay,
 )
-from mgdd.identify.throttle.noise_ceiling import below_ceiling, noise_of
-from mgdd.identify.throttle.nuisances import (
-    SHARE,
-    TYPICAL_SHARE,
-    delay_weights,
-    independent_values,
-    with_nuisances,
-)
-from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
@@ -42,8 +38,6 @@ from mgdd.results.fit_report import FitReport
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["fit_groups"]
 
 LAG, RAMP, DELAY = ("electrical_s",), ("ramp_deg",), ("delay_samples",)
 DROP = ("stribeck_drop", "stribeck_deg_per_s")
@@ -69,38 +63,11 @@ def fit_groups(
     stops_deg: tuple[float, float] = (0.0, 90.0),
     options: FitOptions | None = None,
 ) -> Fit:
-    """Fit the first-principle groups and keep of lag, delay, Stribeck drop, presliding and gap what the log supports.
+    """Fit the first-principle groups, and keep of lag, delay, drop, presliding and gap what the log supports.
 
     Coulomb friction with lag and delay comes first; then the others, each from several starts, with the delay free.
     The structure with the lowest n ln(cost) + k ln(n) is kept (Schwarz 1978), n counting independent samples of the
     residual. It is then fitted with fine steps at the delays about the one found, and every term is tried without.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], evenly sampled.
-    fixed : mapping of str to float, optional
-        Groups that are known.
-    delays : sequence of float
-        Delays that may be, in samples; long ones are looked at where the best of those before are the longest.
-    stops_deg : tuple of float
-        Mechanical stops [deg].
-    options : FitOptions, optional
-        4 starts of a Stribeck drop with seed 0, 40 trial steps per search, tolerance 1e-7 of the last.
-
-    Returns
-    -------
-    mgdd.results.Fit
-        ``kind`` is ``first_principle``; the finding ``structure_chosen`` says what was compared.
-
-    Raises
-    ------
-    DataError, ParameterError
-        As `fit_first_principle`.
-
-    References
-    ----------
-    Schwarz (1978) for the comparison of structures.
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=40, tolerance=1e-7)
     problem = groups_problem(log, fixed=fixed, stops_deg=stops_deg)
@@ -139,18 +106,12 @@ def fit_groups(
     run = free_run(model, log)
     train = quality_of([run])
     fit = Fit(
-        report=report,
-        model=model,
-        kind=model.kind,
-        train=train,
+        report=report, model=model, kind=model.kind, train=train,
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
-        findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)),
-        source=source_of(log),
+        findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)), source=source_of(log),
         start_rmse=tuple(sorted(one.rmse for one in hunt.done)),
-        n_best=sum(one.rmse <= 1.005 * found.rmse for one in hunt.done),
-        run=run,
-        draw=draw_free_run,
-    )
+        n_best=sum(one.rmse <= 1.005 * found.rmse for one in hunt.done), run=run, draw=draw_free_run,
+    )  # fmt: skip
     return hand_over(fit, interrupted)
 
 

@@ -20,8 +20,6 @@ from mgdd.signals.model import as_signal
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ExcitationCheck", "check_excitation"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ExcitationCheck(Result):
@@ -41,17 +39,6 @@ class ExcitationCheck(Result):
         Predicted motor current [A]; NaN if the prior model has none.
     prediction : xarray.Dataset
         ``duty``, ``angle_deg`` and, where the model has it, ``current_a`` over ``time_s``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify import check_excitation
-    >>> from mgdd.signals import chirp
-    >>> def lazy(time_s, duty, start_deg):
-    ...     return 30.0 + 100.0 * np.asarray(duty)
-    >>> check = check_excitation(chirp(offset=0.15, amplitude=0.2), lazy, angle_window_deg=(1.0, 60.0))
-    >>> check.passed, check.findings[0].text
-    (False, 'the plate opens to 65.0 deg, beyond 60')
     """
 
     passed: bool
@@ -73,13 +60,7 @@ class ExcitationCheck(Result):
         return throttle_run(self.prediction, ax=ax)
 
     def summary(self) -> str:
-        """Return a short summary.
-
-        Returns
-        -------
-        str
-            Verdict, predicted figures, limits passed, and what stays open.
-        """
+        """Return a short summary."""
         c = self.content
         lines = [
             "inside the limits" if self.passed else "outside the limits",
@@ -94,13 +75,7 @@ class ExcitationCheck(Result):
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the figures and sentences as a dict, without the prediction.
-
-        Returns
-        -------
-        dict
-            Names to values; those of `content` stand beside the others.
-        """
+        """Give the figures and sentences as a dict, without the prediction."""
         own = {name: getattr(self, name) for name in ("passed", "peak_current_a", "rms_current_a")}
         words = {name: [str(finding) for finding in getattr(self, name)] for name in ("findings", "unanswered")}
         return own | {name: getattr(self.content, name) for name in RecordContent.__dataclass_fields__} | words

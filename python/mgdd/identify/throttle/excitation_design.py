@@ -13,8 +13,6 @@ from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, pr
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EXCITATIONS", "design_excitation"]
-
 EXCITATIONS = ("chirp", "multisine", "prbs", "amplitude_random_steps", "staircase", "triangle")
 _LENGTHS = {"chirp": 12.0, "multisine": 20.0, "amplitude_random_steps": 10.0, "triangle": 40.0}
 _QUASI_STATIC = ("staircase", "triangle")
@@ -131,13 +129,7 @@ def design_excitation(
 
 
 def _rule(
-    groups: DutyGroups,
-    limp_home_deg: float,
-    window: tuple[float, float],
-    side: str,
-    factor: float,
-    *,
-    slow: bool,
+    groups: DutyGroups, limp_home_deg: float, window: tuple[float, float], side: str, factor: float, *, slow: bool
 ) -> tuple[float, float]:
     """Return offset and amplitude."""
     reach_up, reach_down = max(window[1] - limp_home_deg, 0.0), max(limp_home_deg - window[0], 0.0)

@@ -11,12 +11,10 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.identify.starts import rank, search_starts
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
-from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
-from mgdd.identify.throttle.first_principle_start import group_starts
-from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
-from mgdd.identify.throttle.noise_ceiling import below_ceiling
+from mgdd.identify.throttle.first_principle_problem import group_starts, groups_problem, log_columns
+from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.results import Fit
@@ -26,8 +24,6 @@ from mgdd.results.fit_report import FitReport
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-__all__ = ["fit_first_principle"]
 
 STATIC = (*GROUP_NAMES[2:7], "limp_home_deg")
 SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
@@ -102,19 +98,6 @@ def fit_first_principle(
     References
     ----------
     Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.first_principle import fit_first_principle
-    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-    >>> from mgdd.optimize import FitOptions
-    >>> time = 1e-3 * np.arange(4000)
-    >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))
-    >>> log = FirstPrincipleModel().simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 30.0})
-    >>> fit = fit_first_principle(log, options=FitOptions(n_starts=1))
-    >>> fit.train.nrmse_fit_percent > 99.0
-    True
     """
     log = as_log(log)
     test = None if test is None else as_log(test, "test")
@@ -187,19 +170,12 @@ def fit_first_principle(
     run = free_run(model, log)
     train = quality_of([run])
     fit = Fit(
-        report=report,
-        model=model,
-        kind=model.kind,
-        train=train,
+        report=report, model=model, kind=model.kind, train=train,
         test=None if test is None else quality_of([free_run(model, test)]),
-        unidentifiable=(*problem.unvisited, *report.unidentifiable),
-        findings=(*findings, *below_ceiling([log], train)),
-        source=source_of(log),
-        start_rmse=tuple(sorted(map(float, errors))),
-        n_best=n_reached,
-        run=run,
+        unidentifiable=(*problem.unvisited, *report.unidentifiable), findings=(*findings, *below_ceiling([log], train)),
+        source=source_of(log), start_rmse=tuple(sorted(map(float, errors))), n_best=n_reached, run=run,
         draw=draw_free_run,
-    )
+    )  # fmt: skip
     return hand_over(fit, stop)
 
 

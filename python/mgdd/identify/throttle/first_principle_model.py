@@ -12,7 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.io.parameters import FIT_NOTES, ModelParameters, ParameterFile, Wanted, wanted
+from mgdd.io.parameters import ModelParameters, Wanted, wanted
 from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -20,25 +20,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-__all__ = ["FirstPrincipleModel"]
-
 GROUP_NAMES = tuple(_core.identify.group_names)
 # What a throttle need not have: without a word its friction does not drop or bend, its gear has no gap, its
 # stops are rigid, its damping is back-EMF and its duty acts at once.
 REFINEMENTS = MappingProxyType(
     {
-        "stribeck_drop": 0.0,
-        "stribeck_deg_per_s": 15.0,
-        "ramp_deg": 0.25,
-        "delay_samples": 0.0,
-        "presliding_deg": 0.0,
-        "presliding_damping": 0.5,
-        "half_gap_deg": 0.0,
-        "viscous_share": 0.0,
-        "stop_duty_per_deg": 0.0,
+        "stribeck_drop": 0.0, "stribeck_deg_per_s": 15.0, "ramp_deg": 0.25, "delay_samples": 0.0, "presliding_deg": 0.0,
+        "presliding_damping": 0.5, "half_gap_deg": 0.0, "viscous_share": 0.0, "stop_duty_per_deg": 0.0,
         "stop_damping": 0.5,
     }
-)
+)  # fmt: skip
 _NEEDED = tuple(name for name in GROUP_NAMES if name not in REFINEMENTS)
 # Groups of a typical passenger-car throttle, the start of a fit.
 TYPICAL = MappingProxyType(
@@ -84,20 +75,12 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         Steps per sample.
     sample_s : float
         Sample time that the delay counts [s].
-
-    Examples
-    --------
-    >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-    >>> run = FirstPrincipleModel().simulate({"time_s": [0.0, 0.001, 0.002], "duty": [0.0, 0.0, 0.0]})
-    >>> run["angle_deg"].values.tolist()
-    [8.0, 8.0, 8.0]
     """
 
     kind = "first_principle"
     parameter_names = GROUP_NAMES
     settings = MappingProxyType(
-        wanted(("closed_deg", "open_deg"))
-        | {"substeps": Wanted(form="integer"), "sample_s": Wanted("s", required=False)}
+        wanted(("closed_deg", "open_deg")) | {"substeps": Wanted(form="integer"), "sample_s": Wanted("s")}
     )
     input_names = ("duty",)
     output_name = observed_state = "angle_deg"
@@ -148,33 +131,6 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             substeps=self.substeps,
         )
 
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
-        """Make the model of a file that `to_toml` or a fit wrote; older ones have fewer groups, the ramp as a setting.
-
-        Parameters
-        ----------
-        file : ParameterFile
-            The file.
-
-        Returns
-        -------
-        FirstPrincipleModel
-            What older files do not name is not there: no drop, no presliding, no delay.
-        """
-        file.expect(kinds=(cls.kind,), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
-        names = wanted(cls.parameter_names)
-        # A file with some of them and the ramp among them is not an older one: what it lacks was lost.
-        older = REFINEMENTS.keys().isdisjoint(file.tables["parameters"]) or "ramp_deg" in file.tables["settings"]
-        may_lack = {name: want._replace(required=not older) for name, want in names.items() if name in REFINEMENTS}
-        values = file.values("parameters", names | may_lack)
-        own = {name: want._replace(required=want.required or not older) for name, want in cls.settings.items()}
-        settings = file.values("settings", {**own, "ramp_deg": names["ramp_deg"]._replace(required=False)})
-        ramp = settings.pop("ramp_deg", None)
-        if ramp is not None:
-            values.setdefault("ramp_deg", ramp)
-        return cls(parameters=values, **settings)
-
     def physical_parameters(
         self,
         *,
@@ -202,13 +158,6 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         ------
         ParameterError
             A number that is not positive, or none or both of the two.
-
-        Examples
-        --------
-        >>> from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-        >>> found = FirstPrincipleModel().physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
-        >>> round(found["torque_constant_nm_per_a"], 4)
-        0.2291
         """
         known = {
             "resistance_ohm": resistance_ohm,

@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, argument
+from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.first_principle_model import (
     GROUP_NAMES,
     LONGEST_DELAY,
@@ -18,7 +19,6 @@ from mgdd.identify.throttle.first_principle_model import (
     shifted,
     whole_shift,
 )
-from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle
 from mgdd.identify.throttle.free_run import LOG_COLUMNS
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results.finding import Finding
@@ -29,21 +29,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["GroupsProblem", "Search", "groups_problem", "log_columns", "shows_limp_home"]
-
 ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
 BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
 SIDE_S = 0.1  # shorter visits cannot settle a side's two parameters
 # Where a group begins that is searched and was not there before.
 _FIRST = {
-    "electrical_s": 1e-3,
-    "stribeck_drop": 0.25,
-    "delay_samples": 1.0,
-    "presliding_deg": 0.1,
-    "half_gap_deg": 0.15,
-    "viscous_share": 0.3,
-    "stop_duty_per_deg": 30.0,
-}
+    "electrical_s": 1e-3, "stribeck_drop": 0.25, "delay_samples": 1.0, "presliding_deg": 0.1, "half_gap_deg": 0.15,
+    "viscous_share": 0.3, "stop_duty_per_deg": 30.0,
+}  # fmt: skip
 _DELAY, _ROOM = "delay_samples", 2.0
 _REST_S, _REST_DEG = 0.01, 0.5
 _FIRST_SAMPLES = 5
@@ -76,13 +69,9 @@ class GroupsProblem:
         return not self.unvisited
 
     def record(
-        self, share: float = 1.0, shift: int = 0
+        self, shift: int = 0
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], list[float], int, list[int]]:
-        """Return the first share of the log for the core, the duty `shift` samples later.
-
-        Where it does not begin at rest its speed is free, too.
-        """
-        n = round(share * self.angle.size)
+        """Return the log for the core, the duty `shift` samples later; not begun at rest its speed is free, too."""
         first = self.angle[: max(2, round(_REST_S / self.step_s))]
         start = float(self.angle[:_FIRST_SAMPLES].mean())
         moving = float(np.ptp(first)) > _REST_DEG
@@ -90,18 +79,11 @@ class GroupsProblem:
         # A moving plate has left the mean of its first samples behind.
         begin = float(self.angle[0]) if moving else start
         state = [begin, speed, float(np.clip(self.duty[0], -1.0, 1.0))]
-        duty = shifted(np.clip(self.duty[:n], -1.0, 1.0), shift, state[2])
-        return self.step_s, duty, self.angle[:n], state, 0, [0, 1] if moving else [0]
+        duty = shifted(np.clip(self.duty, -1.0, 1.0), shift, state[2])
+        return self.step_s, duty, self.angle, state, 0, [0, 1] if moving else [0]
 
     def search(
-        self,
-        values: Mapping[str, float],
-        free: Sequence[str],
-        *,
-        substeps: int,
-        tolerance: float,
-        max_iterations: int,
-        share: float = 1.0,
+        self, values: Mapping[str, float], free: Sequence[str], *, substeps: int, tolerance: float, max_iterations: int
     ) -> Search:
         """Search the groups `free` from `values`, all others kept; Interrupted carries what it had."""
         # A search needs room for a delay that is free; the rest of a long one is taken off the duty.
@@ -113,15 +95,10 @@ class GroupsProblem:
         )  # fmt: skip
         found, stop = or_partial(
             lambda: _core.identify.fit_throttle_groups(
-                [self.record(share, shift)],
-                stages=[stage],
-                starts=[[start[name] for name in GROUP_NAMES]],
-                closed_deg=self.stops_deg[0],
-                open_deg=self.stops_deg[1],
-                substeps=substeps,
-                n_threads=1,
+                [self.record(shift)], stages=[stage], starts=[[start[name] for name in GROUP_NAMES]],
+                closed_deg=self.stops_deg[0], open_deg=self.stops_deg[1], substeps=substeps, n_threads=1,
             )
-        )
+        )  # fmt: skip
         report = found["reports"][0]
         ended = dict(zip(GROUP_NAMES, found["values"], strict=True))
         return hand_over(
@@ -178,15 +155,9 @@ def groups_problem(
         if not (low <= value <= high or value == REFINEMENTS.get(name)):
             raise ParameterError.of(name, value, f"within [{low:g}, {high:g}]")
     return GroupsProblem(
-        step_s=step_s,
-        duty=duty,
-        angle=angle,
-        stops_deg=stops_deg,
-        values=within_bounds(values, searched),
-        free=tuple(searched),
-        unvisited=tuple(unvisited),
-        findings=tuple(findings),
-    )
+        step_s=step_s, duty=duty, angle=angle, stops_deg=stops_deg, values=within_bounds(values, searched),
+        free=tuple(searched), unvisited=tuple(unvisited), findings=tuple(findings),
+    )  # fmt: skip
 
 
 def shows_limp_home(log: xr.Dataset) -> bool:
@@ -215,3 +186,91 @@ def log_columns(log: xr.Dataset) -> list[NDArray[np.float64]]:
     if columns[0].size < 100:
         raise DataError(f"log has {columns[0].size} samples: at least 100 are needed")
     return columns
+
+
+IDLE_DUTY = 0.03  # less than any plate needs to move
+SIDE_DEG = 1.0  # beyond it a sample belongs to one side of limp-home
+
+
+def rest_angle(step_s: float, duty: NDArray[np.float64], angle: NDArray[np.float64], otherwise: float) -> float:
+    """Angle at the end of the longest rest without duty, if it lasts half a second.
+
+    Failing that, the first angle of a record that starts at rest and either without duty or never to cross it; failing
+    that, `otherwise`.
+    """
+    first = slice(0, max(2, round(0.01 / step_s)))
+    home = float(np.median(angle[first]))
+    idle = bool((np.abs(duty[first]) < IDLE_DUTY).all())
+    if np.ptp(angle[first]) < 0.5 and (idle or angle.min() > home - SIDE_DEG or angle.max() < home + SIDE_DEG):
+        otherwise = home
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.abs(duty) < 0.01).astype(int), [0]])))
+    begins, ends = edges[::2], edges[1::2]
+    if begins.size == 0:
+        return otherwise
+    longest = int(np.argmax(ends - begins))
+    tail = angle[max(begins[longest], ends[longest] - round(0.1 / step_s)) : ends[longest]]
+    at_rest = (ends[longest] - begins[longest]) * step_s >= 0.5 and np.ptp(tail) < 0.5
+    return float(np.median(tail)) if at_rest else otherwise
+
+
+def regression_start(
+    step_s: float,
+    duty: NDArray[np.float64],
+    angle: NDArray[np.float64],
+    values: Mapping[str, float],
+    free: list[str],
+    closed_deg: float,
+    open_deg: float,
+) -> dict[str, float]:
+    """Torque balance of the moving samples: u = +-beta + kappa x + delta sign(w) + w/(G tau) + dw/dt/G."""
+    from scipy.signal import savgol_filter
+
+    half = max(3, round(0.010 / step_s))
+    if angle.size < 10 * half:
+        return {}
+    smooth, speed, push = (
+        np.asarray(savgol_filter(angle, 2 * half + 1, 3, deriv=order, delta=step_s)[half:-half]) for order in range(3)
+    )
+    u = np.convolve(duty, np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid")
+    x = smooth - values["limp_home_deg"]
+    inside = (smooth > closed_deg + 1.0) & (smooth < open_deg - 1.0) & (np.abs(x) > SIDE_DEG)
+    # A window that holds a reversal, or starts from rest, has no single friction sign.
+    moving = np.minimum.reduce([np.abs(np.roll(speed, shift)) for shift in (-half, 0, half)]) > 5.0
+    steady = np.sign(np.roll(speed, -half)) == np.sign(np.roll(speed, half))
+    chosen = inside & moving & steady
+    if np.count_nonzero(chosen) < 50:
+        return {}
+    above = x > 0.0
+    columns = {
+        "beta_above_duty": above * 1.0, "kappa_above_duty_per_deg": above * x, "beta_below_duty": ~above * -1.0,
+        "kappa_below_duty_per_deg": ~above * x, "delta_duty": np.sign(speed), "damping": speed, "inertia": push,
+    }  # fmt: skip
+    names = [name for name in columns if name in free or name in ("damping", "inertia")]
+    matrix = np.column_stack([columns[name][chosen] for name in names])
+    target = u[chosen] - sum(
+        values[name] * columns[name][chosen] for name in columns if name in values and name not in names
+    )
+    solution = dict(zip(names, np.linalg.lstsq(matrix, target, rcond=None)[0].tolist(), strict=True))
+    inertia, damping = solution.pop("inertia"), solution.pop("damping")
+    found = {name: value for name, value in solution.items() if value > 0.0}
+    if inertia > 0.0 and "gain_deg_per_s2_per_duty" in free:
+        found["gain_deg_per_s2_per_duty"] = 1.0 / inertia
+        if damping > 0.0 and "tau_s" in free:
+            found["tau_s"] = inertia / damping
+    return found
+
+
+def group_starts(values: Mapping[str, float], free: list[str], n_starts: int, seed: int) -> list[list[float]]:
+    """Spread the free groups that are searched as logarithms from half to twice their first value."""
+    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
+    box = [
+        _core.optimize.Parameter(
+            name=name,
+            lower=max(bounds[name].lower, 0.5 * values[name]),
+            upper=min(bounds[name].upper, 2.0 * values[name]),
+            log_scaled=True,
+        )
+        for name in free
+        if bounds[name].log_scaled
+    ]
+    return [[start[name] for name in GROUP_NAMES] for start in spread_starts(values, box, n_starts, seed)]

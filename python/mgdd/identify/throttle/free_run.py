@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.results import Fit
+from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality
 from mgdd.results.labels import labelled_dataset
 from mgdd.results.model import Model
@@ -18,8 +19,7 @@ from mgdd.signals.model import as_signal, columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["LOG_COLUMNS", "as_log", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
+    from numpy.typing import NDArray
 
 # What the start of a free run still carries of the unknown speed and current.
 DISCARD_S = 0.05
@@ -75,3 +75,36 @@ def draw_free_run(fit: Fit, ax: Any) -> Any:
     from mgdd.plot.throttle import free_run as draw
 
     return draw(cast("xr.Dataset", fit.run), ax=ax)
+
+
+_MISSED_PERCENT = 3.0  # points of the fit below what noise alone would leave
+_LEAST_FOUR_FIFTHS = 0.4377  # mean square of the least four fifths of a normal variable, over its variance
+
+
+def noise_of(angle: NDArray[np.float64]) -> float:
+    """Return the standard deviation of white noise on an angle, from its second differences, which motion hardly has.
+
+    The mean square of the smaller four fifths, over what it is of a normal distribution: a median would be a whole
+    number of steps of the converter.
+    """
+    second = np.sort(np.abs(np.diff(angle, 2)))
+    least = second[: max(4 * second.size // 5, 1)]
+    return float(np.sqrt(np.mean(least**2) / (_LEAST_FOUR_FIFTHS * 6.0)))
+
+
+def below_ceiling(logs: Sequence[xr.Dataset], train: FitQuality | None) -> tuple[Finding, ...]:
+    """Report a fit that misses far more of its own logs than the noise of the angle."""
+    own = None if train is None else train.nrmse_fit_percent
+    if own is None:
+        return ()
+    angles = [log["angle_deg"].to_numpy() for log in logs]
+    noise = float(np.sqrt(np.average([noise_of(angle) ** 2 for angle in angles], weights=[a.size for a in angles])))
+    ceiling = 100.0 * (1.0 - noise / float(np.std(np.concatenate(angles))))
+    if ceiling - own <= _MISSED_PERCENT:
+        return ()
+    text = (
+        f"the fit meets its own log at {own:.1f} %, and the noise of the angle alone would leave {ceiling:.1f} %: the "
+        "plate does what the model does not have, and the intervals hold for the model only"
+    )
+    remedy = "compare with the other kinds of model, look at the residuals, and check the stops and the log"
+    return (Finding("below_ceiling", (), text, remedy),)

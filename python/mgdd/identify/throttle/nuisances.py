@@ -12,16 +12,14 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, LONGEST_DELAY, whole_shift
-from mgdd.identify.throttle.hunt import AT_NOISE, FLOOR_DEG
-from mgdd.identify.throttle.noise_ceiling import noise_of
+from mgdd.identify.throttle.free_run import noise_of
+from mgdd.identify.throttle.whole_delay import AT_NOISE, FLOOR_DEG
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.identify.throttle.first_principle_problem import GroupsProblem
     from mgdd.results.fit_report import FitReport
-
-__all__ = ["SHARE", "TYPICAL_SHARE", "delay_weights", "independent_values", "with_nuisances"]
 
 SHARE, _DELAY = "viscous_share", "delay_samples"
 # A shorted motor brakes more than its bearings: what is not back-EMF is anything from none to half of the damping.
@@ -51,27 +49,9 @@ def with_nuisances(
     Considered, not estimated (Schmidt 1966), each through the change of all estimates to first order: the share of the
     damping that is not back-EMF (evenly spread over 0 to 0.5; while the plate slides, lag, time constant and gain take
     up whatever it is), the steps of the simulation (what finer ones would give), and the whole delay (its rivals, with
-    their likelihood). A residual above the noise has a cause that the model lacks, which acts for longer than the
-    residual is correlated: errors are then also those of a jackknife over blocks of a second, where that is larger.
-
-    Parameters
-    ----------
-    problem : GroupsProblem
-        The log.
-    values : mapping of str to float
-        All groups, as fitted.
-    report : FitReport
-        Of the fit.
-    substeps : int
-        Steps per sample of the fit.
-    share_known : bool
-        Whether the share of the damping was given, or is an estimate.
-    delays : mapping of float to float, optional
-        Weight by delay, the fitted one included (`delay_weights`).
-
-    References
-    ----------
-    Schmidt (1966), Kuensch (1989); Buckland et al. (1997) for the weights of rivals.
+    their likelihood, Buckland et al. 1997). A residual above the noise has a cause that the model lacks, which acts for
+    longer than the residual is correlated: errors are then also those of a jackknife over blocks of a second
+    (Kuensch 1989), where that is larger.
     """
     known = np.flatnonzero(np.isfinite(report.stderr))
     if known.size == 0:

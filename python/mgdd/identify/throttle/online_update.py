@@ -14,8 +14,6 @@ from mgdd.throttle import PseudoWiener
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["OnlineUpdate"]
-
 _ALL = ("tau_s", "gain_deg_per_s2_per_duty", "preload_duty", "spring_duty_per_deg", "coulomb_duty")
 
 
@@ -134,16 +132,5 @@ class OnlineUpdate:
         return {name: list(values) for name, values in self._core.state().items()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from a saved state, bit for bit.
-
-        Parameters
-        ----------
-        state : mapping
-            What `state` gave, of the same method and settings.
-
-        Raises
-        ------
-        ParameterError
-            A state of another kind of object; nothing is changed then.
-        """
+        """Go on from a saved state, bit for bit."""
         self._core.restore({str(name): list(values) for name, values in state.items()})

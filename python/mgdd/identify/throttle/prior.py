@@ -16,8 +16,6 @@ from mgdd.throttle import Throttle, simulate_throttle
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["DutyGroups", "Prior", "prior_of"]
-
 _TRAVEL_DEG = (0.0, 90.0)
 _MARGIN_DEG = 1.0
 _PW_R = (

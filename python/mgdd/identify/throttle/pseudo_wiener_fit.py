@@ -10,10 +10,9 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.throttle.delay_report import delay_at_end
-from mgdd.identify.throttle.free_run import as_log, draw_free_run, free_run, quality_of, source_of
-from mgdd.identify.throttle.noise_ceiling import below_ceiling
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.whole_delay import delay_at_end
+from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
@@ -23,8 +22,6 @@ from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["fit_pseudo_wiener"]
 
 # Enough that the best of PW-W and PW-P is found more than once on the records of the study.
 _STARTS = MappingProxyType({"pw_r": 9, "pw_w": 16, "pw_p": 16})
@@ -74,36 +71,10 @@ def fit_pseudo_wiener(
         9 searches per delay of PW-R and 16 of the others (per delay and start rule of the lags), seed 1 of their Latin
         hypercube, and 150 trial steps per search by default.
 
-    Returns
-    -------
-    mgdd.results.Fit
-        The best of all searches; `n_best` counts those that ended there, `start_rmse` has the error of each [deg].
-
-    Raises
-    ------
-    DataError
-        Logs of different or uneven sample time, a duty beyond ±1.
-    ParameterError
-        A kind or name that does not exist.
-
     Notes
     -----
     Output error with exact forward sensitivities on Levenberg-Marquardt. Only groups of the physical parameters can be
     identified from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
-    >>> from mgdd.optimize import FitOptions
-    >>> from mgdd.throttle import PseudoWiener
-    >>> time = np.arange(4000) * 1e-3
-    >>> duty = 0.15 + 0.2 * np.sin(2.0 * np.pi * (0.5 * time + 0.6 * time**2))
-    >>> truth = PseudoWiener("pw_r", {"above_coulomb_duty": 0.08, "below_coulomb_duty": 0.08})
-    >>> log = truth.simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 8.0})
-    >>> fit = fit_pseudo_wiener(log, limp_home_deg=8.0, options=FitOptions(n_starts=2))
-    >>> round(fit.parameters["above_coulomb_duty"], 4)
-    0.08
     """
     chosen = fit_options(options, n_starts=_STARTS.get(kind, 1), seed=1, max_iterations=150)
     logs = [as_log(one) for one in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]
@@ -126,19 +97,11 @@ def fit_pseudo_wiener(
     delays = [delay_samples] if isinstance(delay_samples, int | float) else list(delay_samples)
     (parameters, report, errors, n_best), stop = or_partial(
         lambda: _core.identify.fit_pseudo_wiener(
-            kind=kind,
-            records=columns,
-            parameters=values,
-            sides=sides,
-            free=list(free),
-            delays=delays,
-            starts=chosen.n_starts,
-            seed=chosen.seed,
-            only_given_start=start_values is not None,
-            try_map_start=lag_start == "best",
-            max_iterations=chosen.max_iterations,
+            kind=kind, records=columns, parameters=values, sides=sides, free=list(free), delays=delays,
+            starts=chosen.n_starts, seed=chosen.seed, only_given_start=start_values is not None,
+            try_map_start=lag_start == "best", max_iterations=chosen.max_iterations,
         )
-    )
+    )  # fmt: skip
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
     runs = [free_run(model, one) for one in logs]
@@ -152,18 +115,10 @@ def fit_pseudo_wiener(
         found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
     train = quality_of(runs)
     fit = Fit(
-        report=wrapped,
-        model=model,
-        kind=kind,
-        train=train,
-        unidentifiable=wrapped.unidentifiable,
-        findings=(*found, *below_ceiling(logs, train)),
-        source=source_of(logs[0]),
-        start_rmse=tuple(errors.tolist()),
-        n_best=int(n_best),
-        run=runs[0],
-        draw=draw_free_run,
-    )
+        report=wrapped, model=model, kind=kind, train=train, unidentifiable=wrapped.unidentifiable,
+        findings=(*found, *below_ceiling(logs, train)), source=source_of(logs[0]), start_rmse=tuple(errors.tolist()),
+        n_best=int(n_best), run=runs[0], draw=draw_free_run,
+    )  # fmt: skip
     return hand_over(fit, stop)
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["RecordContent", "open_questions", "record_content"]
-
 # Speed and travel are taken over 20 ms, travel with a play of 0.1 deg: beyond the noise of a 12-bit sensor.
 _SPEED_WINDOW_S = 0.02
 _PLAY_DEG = 0.1
@@ -54,14 +52,6 @@ class RecordContent(NumbersResult):
         Length [s].
     limp_home_deg : float
         As given, or NaN [deg].
-
-    Examples
-    --------
-    >>> from mgdd.identify import check_excitation
-    >>> from mgdd.signals import triangle
-    >>> check = check_excitation(triangle(offset=0.0, amplitude=0.2), lambda time, duty, start: 30.0 + 100.0 * duty)
-    >>> round(check.content.angle_high_deg, 6)
-    50.0
     """
 
     angle_low_deg: float
@@ -101,18 +91,11 @@ def record_content(
     if stops_deg is not None:
         at_stops = float(((angle < stops_deg[0] + _STOP_DEG) | (angle > stops_deg[1] - _STOP_DEG)).sum()) * step
     return RecordContent(
-        angle_low_deg=float(angle.min()),
-        angle_high_deg=float(angle.max()),
-        peak_speed_deg_per_s=float(np.abs(speed).max()),
-        travel_open_deg=opened,
-        travel_closed_deg=closed,
-        time_above_s=above,
-        time_below_s=below,
-        limp_home_crossings=crossings,
-        time_at_stops_s=at_stops,
-        duration_s=float(time[-1] - time[0]) + step,
-        limp_home_deg=math.nan if limp_home_deg is None else limp_home_deg,
-    )
+        angle_low_deg=float(angle.min()), angle_high_deg=float(angle.max()),
+        peak_speed_deg_per_s=float(np.abs(speed).max()), travel_open_deg=opened, travel_closed_deg=closed,
+        time_above_s=above, time_below_s=below, limp_home_crossings=crossings, time_at_stops_s=at_stops,
+        duration_s=float(time[-1] - time[0]) + step, limp_home_deg=math.nan if limp_home_deg is None else limp_home_deg,
+    )  # fmt: skip
 
 
 def _travel(angle: NDArray[np.float64], window: int) -> tuple[float, float]:

@@ -15,8 +15,7 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.identify.starts import rank, search_starts
 from mgdd.io.parameters import ModelParameters, wanted
-from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import fit_of, fit_run
+from mgdd.optimize.least_squares import FitOptions, fit_of, fit_options, fit_run
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit
@@ -28,8 +27,6 @@ from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-__all__ = ["SmoothThrottle"]
 
 _EXAMPLE = MappingProxyType(dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True)))
 _START_RAD = 0.14
@@ -52,14 +49,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
     ------
     ParameterError
         A parameter that is missing or unknown.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify.throttle.smooth import SmoothThrottle
-    >>> run = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(5), "duty": np.zeros(5)})
-    >>> run["angle_deg"].values.round(3).tolist()
-    [8.021, 8.021, 8.021, 8.021, 8.021]
     """
 
     kind = "smooth"
@@ -158,18 +147,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
         References
         ----------
         Nielsen (1999) for the damping; Moré (1978) for the scaling; Griewank and Walther (2008) for the sensitivities.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from mgdd.identify.throttle.smooth import SmoothThrottle
-        >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
-        >>> time, truth = 1e-3 * np.arange(8000), np.array(list(SmoothThrottle().parameters.values()))
-        >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
-        >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
-        >>> fit = SmoothThrottle().fit(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
-        >>> bool(fit.report.rmse < 0.051)
-        True
         """
         chosen = fit_options(options, tolerance=1e-9)
         table = np.atleast_2d(np.asarray(start_values, dtype=np.float64))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import ParameterError
+from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.free_run import LOG_COLUMNS, as_log, discarded, free_run, quality_of, source_of
-from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io.throttle_checks import check_throttle_log
@@ -19,16 +18,62 @@ from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit import FitQuality
 from mgdd.results.fit_report import FitReport
+from mgdd.results.labels import labelled_dataset
 from mgdd.results.model import Model
 from mgdd.results.result import Result, drawn_by, merged
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
+from mgdd.signals.metrics import ResidualTests, residual_tests, rmse, vaf_percent
 from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import ArrayLike
 
-__all__ = ["ThrottleValidation", "entangled", "validate_throttle"]
+HORIZONS_S = (0.005, 0.020, 0.050)
+_WHOLE = 1e-6
+
+
+def n_step_rms(
+    model: Model, log: xr.Dataset, *, horizons_s: Sequence[float] | None = None, true_deg: ArrayLike | None = None
+) -> xr.Dataset:
+    """Give the error of predictions that start anew from the measurement at every sample."""
+    time, _, angle = columns_of(log, LOG_COLUMNS)
+    truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
+    step = even_step(time)
+    horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
+    skip = discarded(step, time.size)
+    table = np.empty((2, len(horizons_s)))
+    for at, horizon in enumerate(horizons_s):
+        n = samples_of(horizon, step, time.size)
+        ahead = model.predict(log, n)["angle_deg"].to_numpy()
+        if ahead.shape != (time.size - n,):
+            raise DataError(f"predict gave {ahead.shape} values {n} samples ahead: must be ({time.size - n},)")
+        target = truth[n:][skip:]
+        table[:, at] = rmse(target, ahead[skip:]), rmse(target, angle[: time.size - n][skip:])
+    return labelled_dataset(
+        {
+            "predictor": ("predictor", [str(model.kind), "persistence"], "-", "predictor"),
+            "horizon_s": ("horizon_s", np.asarray(horizons_s, dtype=np.float64), "s", "horizon"),
+            "n_step_rms_deg": (("predictor", "horizon_s"), table, "deg", "RMS error ahead"),
+        }
+    )
+
+
+def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:
+    """5, 20 and 50 ms in whole samples, at least one; what a log samples too coarsely or is too short for falls out."""
+    samples = sorted({max(1, round(horizon / step_s)) for horizon in HORIZONS_S})
+    return tuple(n * step_s for n in samples if n <= max(1, size // 2))
+
+
+def samples_of(horizon_s: float, step_s: float, size: int) -> int:
+    """Give how many whole samples a horizon is; ParameterError where it is none, or more than half of the log."""
+    n = round(horizon_s / step_s)
+    if n < 1 or abs(n * step_s - horizon_s) > _WHOLE * step_s * max(n, 1) + 1e-9:
+        raise ParameterError(f"horizons_s: {horizon_s:g} s is not a whole number of samples of {step_s:g} s")
+    if n > size // 2:
+        raise ParameterError(f"horizons_s: {horizon_s:g} s is more than half of the log, {size * step_s:g} s")
+    return n
+
 
 _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
@@ -56,12 +101,6 @@ class ThrottleValidation(Result):
         Limitations found, what the log does not identify, and which excitation would.
     source : str
         Name of the log.
-
-    Examples
-    --------
-    >>> from mgdd.identify.throttle.validation import ThrottleValidation
-    >>> "quality" in ThrottleValidation.__dataclass_fields__
-    True
     """
 
     kind: str
@@ -79,13 +118,7 @@ class ThrottleValidation(Result):
         return merged(self.free_run, self.n_step, self.tests.dataset)
 
     def summary(self) -> str:
-        """Return a short summary.
-
-        Returns
-        -------
-        str
-            Free run, n steps ahead, residual tests, findings.
-        """
+        """Return a short summary."""
         figures = f"free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF {self.vaf_percent:.2f} %"
         rows = [
             f"{self.kind} on {self.source}: {figures}",
@@ -132,13 +165,7 @@ class ThrottleValidation(Result):
         return drawn_by(engine, lambda place: parts[what](self, ax=place), ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Give figures and sentences as a dict, without the runs.
-
-        Returns
-        -------
-        dict
-            With ``n_step_rms`` by horizon in milliseconds.
-        """
+        """Give figures and sentences as a dict, without the runs."""
         figures = {
             "kind": self.kind,
             "source": self.source,
@@ -167,11 +194,7 @@ class ThrottleValidation(Result):
 
 
 def validate_throttle(
-    model: Model | Fit,
-    log: Any,
-    *,
-    horizons_s: Sequence[float] | None = None,
-    limp_home_deg: float | None = None,
+    model: Model | Fit, log: Any, *, horizons_s: Sequence[float] | None = None, limp_home_deg: float | None = None
 ) -> ThrottleValidation:
     """Validate a model, or a fit, on a log, best on one that it was not fitted to.
 
@@ -229,15 +252,10 @@ def validate_throttle(
     notes = _notes(quality, tests)
     pairs = entangled(fit.report) if fit is not None else ()
     return ThrottleValidation(
-        kind=own.kind,
-        quality=quality,
-        vaf_percent=vaf_percent(measured, modelled),
-        n_step=n_step_rms(own, log, horizons_s=horizons_s),
-        tests=tests,
-        free_run=run,
-        findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)),
-        source=source_of(log),
-    )
+        kind=own.kind, quality=quality, vaf_percent=vaf_percent(measured, modelled),
+        n_step=n_step_rms(own, log, horizons_s=horizons_s), tests=tests, free_run=run,
+        findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)), source=source_of(log),
+    )  # fmt: skip
 
 
 def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:

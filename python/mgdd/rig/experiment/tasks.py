@@ -16,16 +16,15 @@ from mgdd.errors import Error, Interrupted, ParameterError, arguments_written
 from mgdd.io import throttle_log
 from mgdd.io.point_table import read_points
 from mgdd.loop import Plant, Reference
+from mgdd.loop.closed_loop import stillness
 from mgdd.loop.controller_families import groups_of
 from mgdd.loop.engine_guide import EngineGuide
-from mgdd.loop.known import tell_known
 from mgdd.loop.lower_limits import both_sides
-from mgdd.loop.seek import require_cycles, searched, seek_inputs, started
+from mgdd.loop.seek import require_cycles, searched, seek_inputs, started, tell_known
 from mgdd.loop.seek_choice import Choice, Question, chosen
 from mgdd.loop.seek_result import SeekResult
 from mgdd.loop.track import FIGURES
 from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
-from mgdd.loop.until_still import stillness
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
