@@ -136,11 +136,17 @@ class FeedForward(Guided, _core.guide.FeedForward):
             raise ParameterError.of("keep_start", keep_start, "True or False")
         settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
-            "trust": trust, "calibration_rate": calibration_rate, "following_share": following_share,
+            "trust": trust,
+            "calibration_rate": calibration_rate,
+            "following_share": following_share,
             "probe_cycles": int(settling <= _LONGEST_SETTLING) if probe_cycles is None else probe_cycles,
-            "probe_settling": settling, "noise_sd": noise_sd, "trust_sd": trust_sd, "doubt": doubt,
-            "curvature_spread": curvature_spread, "significance": significance,
-        }  # fmt: skip
+            "probe_settling": settling,
+            "noise_sd": noise_sd,
+            "trust_sd": trust_sd,
+            "doubt": doubt,
+            "curvature_spread": curvature_spread,
+            "significance": significance,
+        }
         super().__init__(seeker, **self._options)
         self._options["keep_start"] = bool(keep_start)
         self._set_seeker_history(seeker._history_columns())

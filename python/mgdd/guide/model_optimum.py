@@ -83,10 +83,18 @@ class ModelOptimum(_core.guide.ModelOptimum):
         integrator: str = "trapezoid",
     ) -> None:
         super().__init__(
-            cylinder_of(cylinder), performance=performance or Performance(), nox=nox or NoxModel(), method=method,
-            bounds_cad=bounds_cad, step_size=step_size, difference_cad=difference_cad, tolerance_cad=tolerance_cad,
-            iterations=iterations, step_cad=step_cad, integrator=integrator,
-        )  # fmt: skip
+            cylinder_of(cylinder),
+            performance=performance or Performance(),
+            nox=nox or NoxModel(),
+            method=method,
+            bounds_cad=bounds_cad,
+            step_size=step_size,
+            difference_cad=difference_cad,
+            tolerance_cad=tolerance_cad,
+            iterations=iterations,
+            step_cad=step_cad,
+            integrator=integrator,
+        )
         self._known: dict[OperatingPoint, Optimum] = {}
 
     def __call__(self, point: OperatingPoint) -> Optimum | None:

@@ -141,11 +141,20 @@ class OnlineCalibration:
         if isinstance(parameters, str):
             raise ParameterError.of("parameters", parameters, "a sequence of names")
         self._core = _core.guide.OnlineCalibration(
-            cylinder=cylinder_of(engine, "engine"), method=method, parameters=list(parameters),
-            uncertainty=dict(uncertainty or {}), window_cycles=window_cycles, steady_cycles=steady_cycles,
-            cov_limit_percent=cov_limit_percent, forgetting=forgetting, soc_scatter_cad=soc_scatter_cad,
-            jump_factor=jump_factor, trials_per_update=trials_per_update, step_cad=step_cad, integrator=integrator,
-        )  # fmt: skip
+            cylinder=cylinder_of(engine, "engine"),
+            method=method,
+            parameters=list(parameters),
+            uncertainty=dict(uncertainty or {}),
+            window_cycles=window_cycles,
+            steady_cycles=steady_cycles,
+            cov_limit_percent=cov_limit_percent,
+            forgetting=forgetting,
+            soc_scatter_cad=soc_scatter_cad,
+            jump_factor=jump_factor,
+            trials_per_update=trials_per_update,
+            step_cad=step_cad,
+            integrator=integrator,
+        )
         self._size = len(self._core.angles_cad)
         self._history: list[tuple[str, list[float]]] = []
 

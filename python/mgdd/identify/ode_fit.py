@@ -172,10 +172,24 @@ def fit_ode(
     logs = [name in set(log_scaled) for name in unknowns]
     read = output_or_first_state(output)
     search = _Search(
-        derivative=derivative, output=read, time=time, inputs=inputs, measured=measured, substeps=substeps, skip=skip,
-        sigma=sigma, p0=p0.copy(), state=state.copy(), where=where, free_state=tuple(free_state), names=tuple(unknowns),
-        lower=lower, upper=upper, logs=logs, options=chosen_options,
-    )  # fmt: skip
+        derivative=derivative,
+        output=read,
+        time=time,
+        inputs=inputs,
+        measured=measured,
+        substeps=substeps,
+        skip=skip,
+        sigma=sigma,
+        p0=p0.copy(),
+        state=state.copy(),
+        where=where,
+        free_state=tuple(free_state),
+        names=tuple(unknowns),
+        lower=lower,
+        upper=upper,
+        logs=logs,
+        options=chosen_options,
+    )
     first = dict(zip(unknowns, [*p0[where].tolist(), *state[list(free_state)].tolist()], strict=True))
     box = [
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=log)
@@ -194,9 +208,14 @@ def fit_ode(
     p0[where] = best.values[: len(chosen)]
     state[list(free_state)] = best.values[len(chosen) :]
     model = OdeModel(
-        derivative=derivative, output=read, parameters=dict(zip(names, p0.tolist(), strict=True)),
-        initial_state=tuple(state.tolist()), substeps=substeps, input_names=tuple(input_names), output_name=output_name,
-    )  # fmt: skip
+        derivative=derivative,
+        output=read,
+        parameters=dict(zip(names, p0.tolist(), strict=True)),
+        initial_state=tuple(state.tolist()),
+        substeps=substeps,
+        input_names=tuple(input_names),
+        output_name=output_name,
+    )
     errors = [report.rmse if np.isfinite(report.rmse) else np.inf for report in reports]
     run, quality = None, None
     if np.isfinite(best.rmse):
@@ -234,10 +253,16 @@ class _Search:
 
     def one(self, start: Mapping[str, float]) -> FitReport:
         return least_squares(
-            self.residual, list(start.values()), names=self.names, lower=self.lower, upper=self.upper,
-            log_scaled=self.logs, data=self.measured[self.skip :] / self.sigma,
-            max_iterations=self.options.max_iterations, cost_tolerance=self.options.tolerance,
-        )  # fmt: skip
+            self.residual,
+            list(start.values()),
+            names=self.names,
+            lower=self.lower,
+            upper=self.upper,
+            log_scaled=self.logs,
+            data=self.measured[self.skip :] / self.sigma,
+            max_iterations=self.options.max_iterations,
+            cost_tolerance=self.options.tolerance,
+        )
 
     def residual(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         p, s, widths = self.stack(x)

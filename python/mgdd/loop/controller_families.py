@@ -65,12 +65,18 @@ def groups_of(model: Any) -> Groups:
 
 def _of_groups(model: Any, numbers: Mapping[str, float]) -> Groups:
     plate = Plate(
-        gain_deg_per_s2=numbers["gain_deg_per_s2_per_duty"], time_constant_s=numbers["tau_s"],
-        electrical_s=numbers["electrical_s"], friction=numbers["delta_duty"], limp_home_deg=numbers["limp_home_deg"],
-        preload_above=numbers["beta_above_duty"], preload_below=numbers["beta_below_duty"],
+        gain_deg_per_s2=numbers["gain_deg_per_s2_per_duty"],
+        time_constant_s=numbers["tau_s"],
+        electrical_s=numbers["electrical_s"],
+        friction=numbers["delta_duty"],
+        limp_home_deg=numbers["limp_home_deg"],
+        preload_above=numbers["beta_above_duty"],
+        preload_below=numbers["beta_below_duty"],
         spring_above_per_deg=numbers["kappa_above_duty_per_deg"],
-        spring_below_per_deg=numbers["kappa_below_duty_per_deg"], closed_deg=model.closed_deg, open_deg=model.open_deg,
-    )  # fmt: skip
+        spring_below_per_deg=numbers["kappa_below_duty_per_deg"],
+        closed_deg=model.closed_deg,
+        open_deg=model.open_deg,
+    )
     return Groups(plate, numbers["delay_samples"] * model.sample_s)
 
 
@@ -79,13 +85,18 @@ def _of_pw_r(numbers: Mapping[str, float]) -> Groups:
         return math.sqrt(numbers[f"above_{name}"] * numbers[f"below_{name}"])
 
     plate = Plate(
-        gain_deg_per_s2=mean("gain_deg_per_s2_per_duty"), time_constant_s=mean("tau_s"), electrical_s=0.0,
-        friction=mean("coulomb_duty"), limp_home_deg=numbers["limp_home_deg"],
-        preload_above=numbers["above_preload_duty"], preload_below=numbers["below_preload_duty"],
+        gain_deg_per_s2=mean("gain_deg_per_s2_per_duty"),
+        time_constant_s=mean("tau_s"),
+        electrical_s=0.0,
+        friction=mean("coulomb_duty"),
+        limp_home_deg=numbers["limp_home_deg"],
+        preload_above=numbers["above_preload_duty"],
+        preload_below=numbers["below_preload_duty"],
         spring_above_per_deg=numbers["above_spring_duty_per_deg"],
-        spring_below_per_deg=numbers["below_spring_duty_per_deg"], closed_deg=numbers["closed_deg"],
+        spring_below_per_deg=numbers["below_spring_duty_per_deg"],
+        closed_deg=numbers["closed_deg"],
         open_deg=numbers["open_deg"],
-    )  # fmt: skip
+    )
     return Groups(plate, numbers["delay_samples"] * numbers["sample_s"])
 
 
@@ -181,20 +192,32 @@ def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
         gains[f"integral_{side}_per_deg_s"] = x["integral_per_s"] / 90.0
         gains[f"derivative_{side}_s_per_deg"] = x["derivative_s"] / 90.0
     return Pid(
-        sample_s=setup.sample_s, kick=min(x["kick"] * groups.plate.friction, 1.0), kick_width_deg=x["kick_width_deg"],
-        integral_window_deg=x["integral_window_deg"], dead_band_deg=x["dead_band_deg"],
+        sample_s=setup.sample_s,
+        kick=min(x["kick"] * groups.plate.friction, 1.0),
+        kick_width_deg=x["kick_width_deg"],
+        integral_window_deg=x["integral_window_deg"],
+        dead_band_deg=x["dead_band_deg"],
         rate_s_per_deg=x["rate"] / (groups.plate.time_constant_s * groups.plate.gain_deg_per_s2),
-        friction=min(x["friction"] * groups.plate.friction, 1.0), **groups.spring, **gains,
-    )  # fmt: skip
+        friction=min(x["friction"] * groups.plate.friction, 1.0),
+        **groups.spring,
+        **gains,
+    )
 
 
 def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> SlidingMode:
     return SlidingMode(
-        sample_s=setup.sample_s, switching=x["switching"], layer_deg=x["layer_deg"], integral_per_s=x["integral_per_s"],
-        bandwidth_per_s=x["bandwidth_per_s"], reference_pole_per_s=x["reference_pole_per_s"],
-        friction=min(x["friction"] * groups.plate.friction, 1.0), integral_layers=x["integral_layers"],
-        reaching="implicit", **groups.spring, **groups.motion,
-    )  # fmt: skip
+        sample_s=setup.sample_s,
+        switching=x["switching"],
+        layer_deg=x["layer_deg"],
+        integral_per_s=x["integral_per_s"],
+        bandwidth_per_s=x["bandwidth_per_s"],
+        reference_pole_per_s=x["reference_pole_per_s"],
+        friction=min(x["friction"] * groups.plate.friction, 1.0),
+        integral_layers=x["integral_layers"],
+        reaching="implicit",
+        **groups.spring,
+        **groups.motion,
+    )
 
 
 _PREDICTIVE: dict[str, tuple[float, float, bool]] = {
@@ -235,9 +258,15 @@ FAMILIES: Mapping[str, Family] = {
     "pid": Family(
         "PID",
         {
-            "proportional": (2.0, 30.0, True), "integral_per_s": (1.0, 300.0, True), "derivative_s": (0.02, 0.4, True),
-            "kick": (0.0, 1.5, False), "kick_width_deg": (0.01, 1.0, True), "integral_window_deg": (0.3, 20.0, True),
-            "dead_band_deg": (0.0, 0.15, False), "rate": (0.0, 1.5, False), "friction": (0.0, 1.5, False),
+            "proportional": (2.0, 30.0, True),
+            "integral_per_s": (1.0, 300.0, True),
+            "derivative_s": (0.02, 0.4, True),
+            "kick": (0.0, 1.5, False),
+            "kick_width_deg": (0.01, 1.0, True),
+            "integral_window_deg": (0.3, 20.0, True),
+            "dead_band_deg": (0.0, 0.15, False),
+            "rate": (0.0, 1.5, False),
+            "friction": (0.0, 1.5, False),
         },
         _pid,
         knows_delay=False,
@@ -269,4 +298,4 @@ FAMILIES: Mapping[str, Family] = {
         _PLAIN,
         lambda groups, x, setup: _guided(groups, x, setup, friction_learning=False, gauss_newton_steps=10),
     ),
-}  # fmt: skip
+}

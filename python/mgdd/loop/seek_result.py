@@ -345,10 +345,18 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     doubts = doubts_about(seeker, run, readings, gain, kept, asked)
     return SeekResult(
         inputs=dict(zip([one.name for one in asked.inputs], seeker.settable.tolist(), strict=True)),
-        value=at_best.value, value_sd=at_best.sd, gain=gain.value, gain_sd=gain.sd, start=dict(start),
-        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]}, seeker=seeker,
-        reason=reason, findings=unique([*seeker.findings, *doubts]), run=run, asked=asked,
-    )  # fmt: skip
+        value=at_best.value,
+        value_sd=at_best.sd,
+        gain=gain.value,
+        gain_sd=gain.sd,
+        start=dict(start),
+        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]},
+        seeker=seeker,
+        reason=reason,
+        findings=unique([*seeker.findings, *doubts]),
+        run=run,
+        asked=asked,
+    )
 
 
 def _known(value: Any) -> float | None:

@@ -103,12 +103,17 @@ def find_optimum(
     edges = [min(x - low, high - x) / (1.0 if name == "soc_cad" else high - low)
              for x, (name, (low, high)) in zip(best, bounds.items(), strict=True)]  # fmt: skip
     return Optimum(
-        inputs=dict(zip(bounds, map(float, best), strict=True)), objective="j", value=float(at["j"]),
-        values={**numbers, **limited, **spread}, limits=kept,
+        inputs=dict(zip(bounds, map(float, best), strict=True)),
+        objective="j",
+        value=float(at["j"]),
+        values={**numbers, **limited, **spread},
+        limits=kept,
         active_limits=tuple(name for name, cap in caps.items() if sides[name] > cap - 1e-3 * max(1.0, abs(cap))),
-        at_bound=min(edges) < 1e-3, bounds=dict(bounds), curvature=curvature,
+        at_bound=min(edges) < 1e-3,
+        bounds=dict(bounds),
+        curvature=curvature,
         free_inputs=dict(zip(bounds, map(float, free), strict=True)),
-    )  # fmt: skip
+    )
 
 
 def _best_timing(

@@ -124,9 +124,15 @@ def track(
     inner = core_of(controller)
     if inner is not None:
         run = _core.loop.track_throttle(
-            inner, plant._core, delay_samples=delay_samples, reference_deg=wanted.angle_deg, airflow_torque_nm=airflow,
-            supply_v=supply, from_sample=wanted.from_sample, band_deg=wanted.band_deg,
-        )  # fmt: skip
+            inner,
+            plant._core,
+            delay_samples=delay_samples,
+            reference_deg=wanted.angle_deg,
+            airflow_torque_nm=airflow,
+            supply_v=supply,
+            from_sample=wanted.from_sample,
+            band_deg=wanted.band_deg,
+        )
         figures = {name: float(column[0]) for name, column in run.pop("figures").items()}
     elif callable(getattr(controller, "step", None)):
         run = _run_in_python(controller, plant, wanted.angle_deg, delay_samples, airflow, supply)

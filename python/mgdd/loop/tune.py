@@ -184,9 +184,15 @@ def tune_controller(
         inside = np.clip(np.asarray(shares, float), 0.0, 1.0)
         controller = family.build(groups, _numbers(family.space, inside), setup)
         runs = track_many(
-            {kind: controller}, references, throttles, delay_samples=delay_samples, noise_deg=noise_deg,
-            first_seed=seed, executor=pool, workers=workers,
-        )  # fmt: skip
+            {kind: controller},
+            references,
+            throttles,
+            delay_samples=delay_samples,
+            noise_deg=noise_deg,
+            first_seed=seed,
+            executor=pool,
+            workers=workers,
+        )
         outside = float(np.abs(np.asarray(shares, float) - inside).sum())
         cost = tracking_cost(runs.isel(controller=0)) + 10.0 * outside
         seen.append((cost, tuple(map(float, inside))))

@@ -78,16 +78,27 @@ class VirtualThrottle:
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._given: dict[str, Any] = {
-            "throttle": self.throttle, "inputs": self._inputs, "sensors": sensors or SensorPair(),
-            "faults": tuple(faults), "start_deg": self.start_deg, "sample_s": sample_s, "step_s": step_s,
-            "bridge": bridge, "seed": seed,
-        }  # fmt: skip
+            "throttle": self.throttle,
+            "inputs": self._inputs,
+            "sensors": sensors or SensorPair(),
+            "faults": tuple(faults),
+            "start_deg": self.start_deg,
+            "sample_s": sample_s,
+            "step_s": step_s,
+            "bridge": bridge,
+            "seed": seed,
+        }
         self._core = _core.loop.VirtualThrottle(
-            throttle=self.throttle, sensors=self._given["sensors"],
+            throttle=self.throttle,
+            sensors=self._given["sensors"],
             faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
-            plant_faults=[fault.to_core() for fault in faults if fault.sensor is None], sample_s=sample_s,
-            step_s=step_s, start_deg=self.start_deg, bridge=bridge, seed=seed,
-        )  # fmt: skip
+            plant_faults=[fault.to_core() for fault in faults if fault.sensor is None],
+            sample_s=sample_s,
+            step_s=step_s,
+            start_deg=self.start_deg,
+            bridge=bridge,
+            seed=seed,
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self._given, self.state, self._applied)

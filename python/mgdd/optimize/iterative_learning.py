@@ -181,14 +181,23 @@ class IterativeLearning:
         guard: bool = True,
     ) -> None:
         self._settings: dict[str, Any] = {
-            "initial": _column(initial, "initial"), "law": law,
+            "initial": _column(initial, "initial"),
+            "law": law,
             "impulse_response": _column([] if impulse_response is None else impulse_response, "impulse_response"),
-            "relative_degree": relative_degree, "k_p": k_p, "k_d": k_d,
+            "relative_degree": relative_degree,
+            "k_p": k_p,
+            "k_d": k_d,
             "learning_function": _column([] if learning_function is None else learning_function, "learning_function"),
-            "lead": lead, "cutoff": cutoff, "error_weight": error_weight, "input_weight": input_weight,
-            "change_weight": change_weight, "lower": -np.inf if lower is None else lower,
-            "upper": np.inf if upper is None else upper, "rate": np.inf if rate is None else rate, "guard": guard,
-        }  # fmt: skip
+            "lead": lead,
+            "cutoff": cutoff,
+            "error_weight": error_weight,
+            "input_weight": input_weight,
+            "change_weight": change_weight,
+            "lower": -np.inf if lower is None else lower,
+            "upper": np.inf if upper is None else upper,
+            "rate": np.inf if rate is None else rate,
+            "guard": guard,
+        }
         self._core = _core.optimize.IterativeLearning(**self._settings)
         self._report: ConvergenceReport | None = None
         if self._settings["impulse_response"].size and not self.convergence().asymptotic:

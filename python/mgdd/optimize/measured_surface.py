@@ -85,10 +85,15 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
     lever = np.asarray(-np.linalg.solve(bend, lever))
     area = np.outer(half, half)
     return Surface(
-        variance=variance, freedom=freedom, curvature=bend / area, curvature_variance=bend_variance / area**2,
-        optimum=middle + half * best, optimum_variance=(lever @ spread @ lever.T) * area, bends=bends,
+        variance=variance,
+        freedom=freedom,
+        curvature=bend / area,
+        curvature_variance=bend_variance / area**2,
+        optimum=middle + half * best,
+        optimum_variance=(lever @ spread @ lever.T) * area,
+        bends=bends,
         directions=directions * half,
-    )  # fmt: skip
+    )
 
 
 def _numbered(x: Array) -> tuple[str, ...]:

@@ -199,10 +199,17 @@ class Tuning(InputNumbers):
         one = not np.ndim(self.curvature)
         if self.method == "spsa":
             return Spsa(
-                **space, schedule="constant", gain=each(self.gain), perturbation=each(self.amplitude),
-                step_max=each(self.rate), noise_sd=self.noise_sd, seed=seed, maximize=maximize,
-                limits=list(limits_of(limits)), curvature=self.curvature if one else None,
-            )  # fmt: skip
+                **space,
+                schedule="constant",
+                gain=each(self.gain),
+                perturbation=each(self.amplitude),
+                step_max=each(self.rate),
+                noise_sd=self.noise_sd,
+                seed=seed,
+                maximize=maximize,
+                limits=list(limits_of(limits)),
+                curvature=self.curvature if one else None,
+            )
         lag = _core.optimize.ComponentLag()
         seen = self.curvature if one else None
         if self.compensated:
@@ -210,11 +217,19 @@ class Tuning(InputNumbers):
         elif one:  # the demodulation sees what the sensor leaves in phase
             seen *= self.sensor_gain * math.cos(math.radians(self.sensor_phase_deg))
         return ExtremumSeeking(
-            **space, form=self.method, amplitude=each(self.amplitude), period=self.period, gain=each(self.gain),
-            rate=each(self.rate), components=[lag], hold_cycles=hold_cycles, maximize=maximize,
-            limits=list(limits_of(limits)), curvature=seen,
+            **space,
+            form=self.method,
+            amplitude=each(self.amplitude),
+            period=self.period,
+            gain=each(self.gain),
+            rate=each(self.rate),
+            components=[lag],
+            hold_cycles=hold_cycles,
+            maximize=maximize,
+            limits=list(limits_of(limits)),
+            curvature=seen,
             **({} if self.harmonics is None else {"harmonics": each(self.harmonics)}),
-        )  # fmt: skip
+        )
 
 
 def _joined(numbers: Any, digits: int = 4) -> str:
@@ -325,6 +340,11 @@ def tune(
         del values["harmonics"]
         values = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in values.items()}
     return Tuning(
-        **values, noise_sd=noise_sd, curvature=hessian, delay_cycles=delay_cycles, lag_cycles=lag_cycles,
-        compensated=compensated, inputs=names,
-    )  # fmt: skip
+        **values,
+        noise_sd=noise_sd,
+        curvature=hessian,
+        delay_cycles=delay_cycles,
+        lag_cycles=lag_cycles,
+        compensated=compensated,
+        inputs=names,
+    )

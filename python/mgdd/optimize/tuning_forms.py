@@ -188,11 +188,18 @@ def _dither(
     linear = np.maximum(spec["arrival"], np.minimum(spec["distance"], rate * slowest))
     way = (spec["distance"] - linear) / rate + slowest * np.log(linear / spec["arrival"])
     out = {
-        "amplitude": amplitude, "period": period, "harmonics": np.array(harmonics),
-        "gain": 2.0 / (amplitude * tau * (1.0 if compensated else echo)), "rate": rate, "time_constant_cycles": slowest,
-        "cycles": float(period + way.max()), "dither_cost": 0.25 * float(amplitude @ amplitude),
-        "sensor_gain": response[:, 0], "sensor_phase_deg": response[:, 1], "delay_uncertainty": doubt,
-    }  # fmt: skip
+        "amplitude": amplitude,
+        "period": period,
+        "harmonics": np.array(harmonics),
+        "gain": 2.0 / (amplitude * tau * (1.0 if compensated else echo)),
+        "rate": rate,
+        "time_constant_cycles": slowest,
+        "cycles": float(period + way.max()),
+        "dither_cost": 0.25 * float(amplitude @ amplitude),
+        "sensor_gain": response[:, 0],
+        "sensor_phase_deg": response[:, 1],
+        "delay_uncertainty": doubt,
+    }
     return out, final
 
 
@@ -237,11 +244,18 @@ def _spsa(
     c = _amplitudes(spec["amplitude_max"], spec, scatter)
     time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, c))).max()))
     out = {
-        "amplitude": c, "period": 2, "harmonics": None, "gain": np.full(count, q),
-        "rate": np.maximum(2.0 * c, 1.2 * q * float(c @ spec["distance"]) / c), "time_constant_cycles": time_constant,
-        "cycles": time_constant * decades, "dither_cost": 0.5 * float(c @ c), "sensor_gain": np.ones(count),
-        "sensor_phase_deg": np.zeros(count), "delay_uncertainty": 0.0,
-    }  # fmt: skip
+        "amplitude": c,
+        "period": 2,
+        "harmonics": None,
+        "gain": np.full(count, q),
+        "rate": np.maximum(2.0 * c, 1.2 * q * float(c @ spec["distance"]) / c),
+        "time_constant_cycles": time_constant,
+        "cycles": time_constant * decades,
+        "dither_cost": 0.5 * float(c @ c),
+        "sensor_gain": np.ones(count),
+        "sensor_phase_deg": np.zeros(count),
+        "delay_uncertainty": 0.0,
+    }
     return out, scatter(c)
 
 

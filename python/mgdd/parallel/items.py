@@ -78,9 +78,15 @@ def map_items(
         results.update(zip(range(start, stop), part, strict=True))
 
     stop = run_chunks(
-        _call_each, lambda start, stop: (function, given[start:stop]), keep, len(given), executor=executor,
-        workers=workers, seconds_per_item=seconds_per_item, progress=progress,
-    )  # fmt: skip
+        _call_each,
+        lambda start, stop: (function, given[start:stop]),
+        keep,
+        len(given),
+        executor=executor,
+        workers=workers,
+        seconds_per_item=seconds_per_item,
+        progress=progress,
+    )
     if stop is not None:
         hand_over(results, stop)
     return [results[number] for number in range(len(given))]

@@ -147,12 +147,18 @@ def _fit_signal(
     coefficients = least_squares_of(terms[use], values[use])
     residual = np.where(use, values - terms @ coefficients, np.nan)
     model = SignalModel(
-        name=name, label=label, coefficients=coefficients, lag_cycles=lag, lag_scores=scores,
-        lag_at_bound=sensor.at_bound if sensor is not None else lag == max_lag, sensor=sensor,
+        name=name,
+        label=label,
+        coefficients=coefficients,
+        lag_cycles=lag,
+        lag_scores=scores,
+        lag_at_bound=sensor.at_bound if sensor is not None else lag == max_lag,
+        sensor=sensor,
         r2=r_squared(values[use], (terms @ coefficients)[use]),
         r2_held_out=r_squared(values[use & ~early], (terms @ before)[use & ~early]),
-        residual_sd=float(np.nanstd(residual)), cyclic_sd=_cyclic(residual, log, lag),
-    )  # fmt: skip
+        residual_sd=float(np.nanstd(residual)),
+        cyclic_sd=_cyclic(residual, log, lag),
+    )
     return model, residual
 
 

@@ -195,18 +195,29 @@ def _report(
     size = float(np.linalg.norm(surface.values - surface.values.mean()))
     near = sum(float(found.fun) < float(best.fun) + 0.05 for found in search.results)
     return FitReport(
-        names=own, values=values, stderr=stderr, lower=edges[:, 0], upper=edges[:, 1], bounds_active=at_bound,
-        covariance=covariance, correlation=correlation,
+        names=own,
+        values=values,
+        stderr=stderr,
+        lower=edges[:, 0],
+        upper=edges[:, 1],
+        bounds_active=at_bound,
+        covariance=covariance,
+        correlation=correlation,
         unidentifiable=tuple(name for name, side in zip(own, at_bound, strict=True) if side),
         findings=tuple(_at_bound(name, int(side)) for name, side in zip(own, at_bound, strict=True) if side),
-        null_directions=np.zeros((logs.size, 0)), rmse=float(np.sqrt(np.mean(residual**2))),
-        cost=0.5 * float(np.sum(residual**2)), nrmse_fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / size),
-        residual=residual, nfev=sum(int(found.nfev) for found in search.results),
-        njev=sum(int(found.nfev) for found in search.results), nit=int(best.nit), history={},
+        null_directions=np.zeros((logs.size, 0)),
+        rmse=float(np.sqrt(np.mean(residual**2))),
+        cost=0.5 * float(np.sum(residual**2)),
+        nrmse_fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / size),
+        residual=residual,
+        nfev=sum(int(found.nfev) for found in search.results),
+        njev=sum(int(found.nfev) for found in search.results),
+        nit=int(best.nit),
+        history={},
         status="cost_converged" if best.success else "stalled",
         message=f"log marginal likelihood {-float(best.fun):.4g}, found by {near} of {len(search.results)} searches",
         success=bool(best.success),
-    )  # fmt: skip
+    )
 
 
 def _covariance(regressor: Any, logs: NDArray[np.float64], free: NDArray[np.intp]) -> NDArray[np.float64]:

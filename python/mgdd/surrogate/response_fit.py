@@ -156,13 +156,18 @@ def fit_response(
     parted = left_out if folds is None else _parted(x, y, fitter, int(folds), seed)
     known = np.isfinite(parted)
     return ResponseFit(
-        report=report, model=model, kind=kind, train=_quality(y, surface.fitted()[0], label),
+        report=report,
+        model=model,
+        kind=kind,
+        train=_quality(y, surface.fitted()[0], label),
         test=_quality(y[known], parted[known], label) if known.sum() > 1 else None,
         checked_by="leave-one-out" if folds is None else f"{folds}-fold",
         findings=(*report.findings, *response_findings(model, studentised, left_out)),
-        unidentifiable=report.unidentifiable, source=name, draw=_draw,
+        unidentifiable=report.unidentifiable,
+        source=name,
+        draw=_draw,
         diagnostics=diagnostics_of(model, left_out, studentised),
-    )  # fmt: skip
+    )
 
 
 def _draw(fit: ResponseFit, ax: Any) -> Any:

@@ -196,11 +196,16 @@ def sweep(
     cylinder, point = engine_of(cylinder, point)
     cases = cases_of(over, points=points)
     request = Request(
-        cylinder=cylinder, point=point, soc_cad=soc_cad, names=tuple(cases.names),
+        cylinder=cylinder,
+        point=point,
+        soc_cad=soc_cad,
+        names=tuple(cases.names),
         outputs=_chosen("outputs", outputs, [*_core.engine.indicator_units(), *NOX]),
         traces=_chosen("traces", None if traces is True else () if traces is False else traces, TRACES),
-        step_cad=step_cad, integrator=integrator, nox=NoxProxy() if nox is None else nox,
-    )  # fmt: skip
+        step_cad=step_cad,
+        integrator=integrator,
+        nox=NoxProxy() if nox is None else nox,
+    )
     angles = _angles(request)
     width = 8 * (len(request.outputs) + len(request.traces) * len(angles))
     _require_memory(cases, width)
@@ -218,9 +223,15 @@ def sweep(
         finished[start:stop] = True
 
     stop = run_chunks(
-        simulate_cases, lambda start, stop: (request, cases.columns(start, stop)), keep, cases.n, executor=executor,
-        workers=workers, largest=max(1, _CHUNK_BYTES // (width + 8 * len(cases.names))), progress=progress,
-    )  # fmt: skip
+        simulate_cases,
+        lambda start, stop: (request, cases.columns(start, stop)),
+        keep,
+        cases.n,
+        executor=executor,
+        workers=workers,
+        largest=max(1, _CHUNK_BYTES // (width + 8 * len(cases.names))),
+        progress=progress,
+    )
     for array in arrays.values() if stop else ():
         array[~finished] = np.nan
     return hand_over(_dataset(request, cases, arrays, angles, void, finished if stop else None), stop)

@@ -142,15 +142,23 @@ def _answer(
         free = kept = None  # an implausible member has no say, so it must not stop the others
     base = float(now[objective])
     return MemberTiming(
-        member=member, plausible=not member.why_not[at], why_not=member.why_not[at], rmse_percent=load.rmse_percent,
-        left_out_percent=member.left_out_percent[at], imep_closed_error_percent=load.imep_closed_error_percent,
-        fitted_soc_cad=load.soc_cad, fitted_ca50_cad=load.ca50_cad, soc_minus_soi_cad=load.onset_against_soi_cad,
-        efficiency_gross=float(now["efficiency_gross"]), **_best_of(kept, base, load.soc_cad, ""),
+        member=member,
+        plausible=not member.why_not[at],
+        why_not=member.why_not[at],
+        rmse_percent=load.rmse_percent,
+        left_out_percent=member.left_out_percent[at],
+        imep_closed_error_percent=load.imep_closed_error_percent,
+        fitted_soc_cad=load.soc_cad,
+        fitted_ca50_cad=load.ca50_cad,
+        soc_minus_soi_cad=load.onset_against_soi_cad,
+        efficiency_gross=float(now["efficiency_gross"]),
+        **_best_of(kept, base, load.soc_cad, ""),
         **_best_of(free, base, load.soc_cad, "free_"),
         free_p_max_bar=math.nan if free is None else float(free["p_max_bar"]),
-        p_max_model_error_bar=float(now["p_max_bar"]) - load.p_max_bar, p_max_limit_bar=ceiling,
+        p_max_model_error_bar=float(now["p_max_bar"]) - load.p_max_bar,
+        p_max_limit_bar=ceiling,
         at_bound=any(found is not None and found.at_bound for found in (free, kept)),
-    )  # fmt: skip
+    )
 
 
 def _search(load: Load) -> tuple[float, float]:

@@ -56,10 +56,15 @@ def compare_laws(
             progress(f"calibrate {shape}, {gamma} gamma")
         fits.append(
             fit_cylinder(
-                traces, law, fuel_heat_j=fuel_heat_j, bounds={"soc_cad": (None, None)}, point=point, step_cad=step_cad,
+                traces,
+                law,
+                fuel_heat_j=fuel_heat_j,
+                bounds={"soc_cad": (None, None)},
+                point=point,
+                step_cad=step_cad,
                 integrator=integrator,
             )
-        )  # fmt: skip
+        )
     return fits
 
 
@@ -120,11 +125,17 @@ class Calibration:
     def to_dict(self) -> dict[str, Any]:
         """Give everything as plain values."""
         return {
-            "law": self.fit.kind, "status": self.fit.report.status, "traces": self._trace_rows(),
-            "common": self._common(), "unidentifiable": self.unidentifiable(),
-            "laws": [law_row(law) for law in self.laws], "tdc": self.tdc.figures, "warnings": self.doubts(),
-            "cylinder": self.fit.model.to_dict(), "report": self.summary(),
-        }  # fmt: skip
+            "law": self.fit.kind,
+            "status": self.fit.report.status,
+            "traces": self._trace_rows(),
+            "common": self._common(),
+            "unidentifiable": self.unidentifiable(),
+            "laws": [law_row(law) for law in self.laws],
+            "tdc": self.tdc.figures,
+            "warnings": self.doubts(),
+            "cylinder": self.fit.model.to_dict(),
+            "report": self.summary(),
+        }
 
     def _trace_rows(self) -> list[dict[str, Any]]:
         names = list(_PER_TRACE)

@@ -109,10 +109,20 @@ def fit_cylinder(
     True
     """
     request = Request.of(
-        traces, cylinder, free=free, fuel_heat_j=fuel_heat_j, bounds=bounds, point=point, start_values=start_values,
-        step_cad=step_cad, integrator=integrator, options=options, pegging=pegging, pegging_exponent=pegging_exponent,
+        traces,
+        cylinder,
+        free=free,
+        fuel_heat_j=fuel_heat_j,
+        bounds=bounds,
+        point=point,
+        start_values=start_values,
+        step_cad=step_cad,
+        integrator=integrator,
+        options=options,
+        pegging=pegging,
+        pegging_exponent=pegging_exponent,
         inlet_pressure_kpa=inlet_pressure_kpa,
-    )  # fmt: skip
+    )
     return fit_request(request, model_error=True)
 
 
@@ -124,10 +134,16 @@ def fit_request(request: Request, *, model_error: bool = False) -> CylinderFit:
     chosen = fit_options(request.options, max_iterations=200)
     core, stop = or_partial(
         lambda: _core.identify.fit_cylinder(
-            measured, cylinder, burns, list(request.free), request.step_cad, request.integrator, chosen.max_iterations,
+            measured,
+            cylinder,
+            burns,
+            list(request.free),
+            request.step_cad,
+            request.integrator,
+            chosen.max_iterations,
             request.search_bounds(),
         )
-    )  # fmt: skip
+    )
     loads = tuple(
         _load(core.cylinder, fitted, trace, label, point)
         for fitted, trace, label in zip(core.loads, request.traces, labels, strict=True)
@@ -136,11 +152,18 @@ def fit_request(request: Request, *, model_error: bool = False) -> CylinderFit:
     if model_error and stop is None:
         report = with_model_error(report, request, core)
     fit = CylinderFit(
-        report=report, model=core.cylinder, kind=burn_law(core.cylinder),
+        report=report,
+        model=core.cylinder,
+        kind=burn_law(core.cylinder),
         train=FitQuality(nrmse_fit_percent=None, rmse=100.0 * report.rmse, unit="% of p_max", n=report.residual.size),
-        unidentifiable=report.unidentifiable, source=", ".join(labels), draw=_draw, loads=loads,
-        table=load_table(loads), correlation_if_free=np.asarray(core.correlation_if_free), request=request,
-    )  # fmt: skip
+        unidentifiable=report.unidentifiable,
+        source=", ".join(labels),
+        draw=_draw,
+        loads=loads,
+        table=load_table(loads),
+        correlation_if_free=np.asarray(core.correlation_if_free),
+        request=request,
+    )
     return hand_over(replace(fit, findings=findings_of(fit, request)), stop)
 
 
@@ -164,14 +187,19 @@ def _load(
     }
     overlay = labelled_dataset(
         {
-            ANGLE: (ANGLE, angle), "measured_bar": (ANGLE, pressure), "model_bar": (ANGLE, fitted.model_bar),
-            "residual_bar": (ANGLE, fitted.model_bar - pressure), "rmse_bar": ((), fitted.rmse_bar),
+            ANGLE: (ANGLE, angle),
+            "measured_bar": (ANGLE, pressure),
+            "model_bar": (ANGLE, fitted.model_bar),
+            "residual_bar": (ANGLE, fitted.model_bar - pressure),
+            "rmse_bar": ((), fitted.rmse_bar),
             "rmse_percent": ((), fitted.rmse_percent),
-            "imep_closed_error_percent": ((), fitted.imep_closed_error_percent), "soc_cad": ((), burn.soc_cad),
-            "soi_cad": ((), soi), "p_max_bar": ((), fitted.p_max_bar),
+            "imep_closed_error_percent": ((), fitted.imep_closed_error_percent),
+            "soc_cad": ((), burn.soc_cad),
+            "soi_cad": ((), soi),
+            "p_max_bar": ((), fitted.p_max_bar),
         },
         attrs={"file": label, "burn": cylinder.burn_shape},
-    )  # fmt: skip
+    )
     own = conditions(trace, point).replace(
         intake_pressure_kpa=burn.start_pressure_bar * 100.0,
         fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
@@ -179,7 +207,14 @@ def _load(
         trapped_mass_g=fitted.trapped_mass_g,
     )
     return Load(
-        file=label, point=own, cylinder=with_burn(cylinder, burn), soc_cad=burn.soc_cad,
-        burn_duration_cad=burn.burn_duration_cad, fuel_heat_j=burn.fuel_heat_j, soi_cad=soi,
-        onset_against_soi_cad=burn.soc_cad - soi, overlay=overlay, **scalars,
-    )  # fmt: skip
+        file=label,
+        point=own,
+        cylinder=with_burn(cylinder, burn),
+        soc_cad=burn.soc_cad,
+        burn_duration_cad=burn.burn_duration_cad,
+        fuel_heat_j=burn.fuel_heat_j,
+        soi_cad=soi,
+        onset_against_soi_cad=burn.soc_cad - soi,
+        overlay=overlay,
+        **scalars,
+    )

@@ -218,10 +218,16 @@ def _member(request: Request, fit: CylinderFit) -> Member:
     fitted = "wall heat" if "wall_heat_scale" in common else "gamma" if common else "nothing"
     law = request.cylinder.gamma_model
     return Member(
-        law=request.cylinder.burn_shape, gamma_model=law, wall_heat_model=request.cylinder.wall_heat_model,
-        gamma=float(getattr(fit.model, GAMMA_PARAMETER[law])), wall_heat_scale=float(fit.model.wall_heat_scale),
-        fitted=fitted, score=math.inf, fit=fit, left_out_percent=_left_out(request, fit),
-    )  # fmt: skip
+        law=request.cylinder.burn_shape,
+        gamma_model=law,
+        wall_heat_model=request.cylinder.wall_heat_model,
+        gamma=float(getattr(fit.model, GAMMA_PARAMETER[law])),
+        wall_heat_scale=float(fit.model.wall_heat_scale),
+        fitted=fitted,
+        score=math.inf,
+        fit=fit,
+        left_out_percent=_left_out(request, fit),
+    )
 
 
 def _left_out(request: Request, fit: CylinderFit) -> tuple[float, ...]:

@@ -162,10 +162,19 @@ def wall_heat_profile(
         *_reasons_of_moves(moved, used, best, value, possible),
     )
     return WallHeatProfile(
-        value=value, stderr=float(fit.report.stderr[fit.report.names.index(NAME)]), correlation=correlation,
-        correlated_with=partner, range_low=low, range_high=high, moved=moved, possible_low=possible[0],
-        possible_high=possible[1], identifiable=not reasons, reasons=reasons, dataset=_dataset(fits),
-    )  # fmt: skip
+        value=value,
+        stderr=float(fit.report.stderr[fit.report.names.index(NAME)]),
+        correlation=correlation,
+        correlated_with=partner,
+        range_low=low,
+        range_high=high,
+        moved=moved,
+        possible_low=possible[0],
+        possible_high=possible[1],
+        identifiable=not reasons,
+        reasons=reasons,
+        dataset=_dataset(fits),
+    )
 
 
 def _widths(given: Mapping[str, float] | None) -> dict[str, float]:

@@ -85,11 +85,18 @@ class Request:
         if start_values is not None and len(start_values) != len(given):
             raise ParameterError(f"start_values has {len(start_values)} entries for {len(given)} traces")
         return cls(
-            traces=tuple(pegged(trace, cylinder, point, **pegging) for trace in given), labels=_labels(given),
-            cylinder=cylinder, free=names, known_heat_j=heats, bounds=dict(bounds or {}), point=point,
-            start_values=None if start_values is None else tuple(start_values), step_cad=step_cad,
-            integrator=integrator, options=options,
-        )  # fmt: skip
+            traces=tuple(pegged(trace, cylinder, point, **pegging) for trace in given),
+            labels=_labels(given),
+            cylinder=cylinder,
+            free=names,
+            known_heat_j=heats,
+            bounds=dict(bounds or {}),
+            point=point,
+            start_values=None if start_values is None else tuple(start_values),
+            step_cad=step_cad,
+            integrator=integrator,
+            options=options,
+        )
 
     def measured(self, *, late_cad: float = 0.0, more_bar: float = 0.0) -> list[_core.identify.MeasuredCycle]:
         """Give the closed parts as the core takes them, or as they would be that much later and higher."""
@@ -193,9 +200,14 @@ def pegged(
     if pegging == "none":
         return trace
     result = analyze(
-        trace, cylinder, point=point, pegging=pegging, pegging_exponent=pegging_exponent,
-        inlet_pressure_kpa=inlet_pressure_kpa, quiet=True,
-    )  # fmt: skip
+        trace,
+        cylinder,
+        point=point,
+        pegging=pegging,
+        pegging_exponent=pegging_exponent,
+        inlet_pressure_kpa=inlet_pressure_kpa,
+        quiet=True,
+    )
     moved = trace.assign(pressure_bar=trace["pressure_bar"] + float(result["pegging_bar"]))
     moved["pressure_bar"].attrs.update(trace["pressure_bar"].attrs)
     return moved

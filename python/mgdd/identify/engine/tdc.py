@@ -212,11 +212,17 @@ def _of_motored(request: Request, cost: DegreeCost) -> TdcEstimate:
             raise error.reworded(f"{label}: {error}") from None
     found = MotoredTdc.of_many(strokes)
     return TdcEstimate(
-        tdc_offset_cad=found.offset_cad, low_cad=found.offset_cad - found.offset_half_cad,
-        high_cad=found.offset_cad + found.offset_half_cad, method="motored strokes", imep_closed_bar=cost.imep_bar,
-        imep_error_bar=cost.error_bar, loss_angle_cad=found.loss_angle_cad, wall_heat_scale=found.wall_heat_scale,
-        findings=found.findings, dataset=labelled_dataset({}),
-    )  # fmt: skip
+        tdc_offset_cad=found.offset_cad,
+        low_cad=found.offset_cad - found.offset_half_cad,
+        high_cad=found.offset_cad + found.offset_half_cad,
+        method="motored strokes",
+        imep_closed_bar=cost.imep_bar,
+        imep_error_bar=cost.error_bar,
+        loss_angle_cad=found.loss_angle_cad,
+        wall_heat_scale=found.wall_heat_scale,
+        findings=found.findings,
+        dataset=labelled_dataset({}),
+    )
 
 
 def _of_fired(

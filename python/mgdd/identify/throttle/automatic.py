@@ -106,12 +106,18 @@ def fit_groups(
     run = free_run(model, log)
     train = quality_of([run])
     fit = Fit(
-        report=report, model=model, kind=model.kind, train=train,
+        report=report,
+        model=model,
+        kind=model.kind,
+        train=train,
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
-        findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)), source=source_of(log),
+        findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)),
+        source=source_of(log),
         start_rmse=tuple(sorted(one.rmse for one in hunt.done)),
-        n_best=sum(one.rmse <= 1.005 * found.rmse for one in hunt.done), run=run, draw=draw_free_run,
-    )  # fmt: skip
+        n_best=sum(one.rmse <= 1.005 * found.rmse for one in hunt.done),
+        run=run,
+        draw=draw_free_run,
+    )
     return hand_over(fit, interrupted)
 
 

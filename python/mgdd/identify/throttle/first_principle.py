@@ -170,12 +170,19 @@ def fit_first_principle(
     run = free_run(model, log)
     train = quality_of([run])
     fit = Fit(
-        report=report, model=model, kind=model.kind, train=train,
+        report=report,
+        model=model,
+        kind=model.kind,
+        train=train,
         test=None if test is None else quality_of([free_run(model, test)]),
-        unidentifiable=(*problem.unvisited, *report.unidentifiable), findings=(*findings, *below_ceiling([log], train)),
-        source=source_of(log), start_rmse=tuple(sorted(map(float, errors))), n_best=n_reached, run=run,
+        unidentifiable=(*problem.unvisited, *report.unidentifiable),
+        findings=(*findings, *below_ceiling([log], train)),
+        source=source_of(log),
+        start_rmse=tuple(sorted(map(float, errors))),
+        n_best=n_reached,
+        run=run,
         draw=draw_free_run,
-    )  # fmt: skip
+    )
     return hand_over(fit, stop)
 
 

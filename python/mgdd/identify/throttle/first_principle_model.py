@@ -25,11 +25,18 @@ GROUP_NAMES = tuple(_core.identify.group_names)
 # stops are rigid, its damping is back-EMF and its duty acts at once.
 REFINEMENTS = MappingProxyType(
     {
-        "stribeck_drop": 0.0, "stribeck_deg_per_s": 15.0, "ramp_deg": 0.25, "delay_samples": 0.0, "presliding_deg": 0.0,
-        "presliding_damping": 0.5, "half_gap_deg": 0.0, "viscous_share": 0.0, "stop_duty_per_deg": 0.0,
+        "stribeck_drop": 0.0,
+        "stribeck_deg_per_s": 15.0,
+        "ramp_deg": 0.25,
+        "delay_samples": 0.0,
+        "presliding_deg": 0.0,
+        "presliding_damping": 0.5,
+        "half_gap_deg": 0.0,
+        "viscous_share": 0.0,
+        "stop_duty_per_deg": 0.0,
         "stop_damping": 0.5,
     }
-)  # fmt: skip
+)
 _NEEDED = tuple(name for name in GROUP_NAMES if name not in REFINEMENTS)
 # Groups of a typical passenger-car throttle, the start of a fit.
 TYPICAL = MappingProxyType(

@@ -34,9 +34,14 @@ BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
 SIDE_S = 0.1  # shorter visits cannot settle a side's two parameters
 # Where a group begins that is searched and was not there before.
 _FIRST = {
-    "electrical_s": 1e-3, "stribeck_drop": 0.25, "delay_samples": 1.0, "presliding_deg": 0.1, "half_gap_deg": 0.15,
-    "viscous_share": 0.3, "stop_duty_per_deg": 30.0,
-}  # fmt: skip
+    "electrical_s": 1e-3,
+    "stribeck_drop": 0.25,
+    "delay_samples": 1.0,
+    "presliding_deg": 0.1,
+    "half_gap_deg": 0.15,
+    "viscous_share": 0.3,
+    "stop_duty_per_deg": 30.0,
+}
 _DELAY, _ROOM = "delay_samples", 2.0
 _REST_S, _REST_DEG = 0.01, 0.5
 _FIRST_SAMPLES = 5
@@ -95,10 +100,15 @@ class GroupsProblem:
         )  # fmt: skip
         found, stop = or_partial(
             lambda: _core.identify.fit_throttle_groups(
-                [self.record(shift)], stages=[stage], starts=[[start[name] for name in GROUP_NAMES]],
-                closed_deg=self.stops_deg[0], open_deg=self.stops_deg[1], substeps=substeps, n_threads=1,
+                [self.record(shift)],
+                stages=[stage],
+                starts=[[start[name] for name in GROUP_NAMES]],
+                closed_deg=self.stops_deg[0],
+                open_deg=self.stops_deg[1],
+                substeps=substeps,
+                n_threads=1,
             )
-        )  # fmt: skip
+        )
         report = found["reports"][0]
         ended = dict(zip(GROUP_NAMES, found["values"], strict=True))
         return hand_over(
@@ -155,9 +165,15 @@ def groups_problem(
         if not (low <= value <= high or value == REFINEMENTS.get(name)):
             raise ParameterError.of(name, value, f"within [{low:g}, {high:g}]")
     return GroupsProblem(
-        step_s=step_s, duty=duty, angle=angle, stops_deg=stops_deg, values=within_bounds(values, searched),
-        free=tuple(searched), unvisited=tuple(unvisited), findings=tuple(findings),
-    )  # fmt: skip
+        step_s=step_s,
+        duty=duty,
+        angle=angle,
+        stops_deg=stops_deg,
+        values=within_bounds(values, searched),
+        free=tuple(searched),
+        unvisited=tuple(unvisited),
+        findings=tuple(findings),
+    )
 
 
 def shows_limp_home(log: xr.Dataset) -> bool:
@@ -242,9 +258,14 @@ def regression_start(
         return {}
     above = x > 0.0
     columns = {
-        "beta_above_duty": above * 1.0, "kappa_above_duty_per_deg": above * x, "beta_below_duty": ~above * -1.0,
-        "kappa_below_duty_per_deg": ~above * x, "delta_duty": np.sign(speed), "damping": speed, "inertia": push,
-    }  # fmt: skip
+        "beta_above_duty": above * 1.0,
+        "kappa_above_duty_per_deg": above * x,
+        "beta_below_duty": ~above * -1.0,
+        "kappa_below_duty_per_deg": ~above * x,
+        "delta_duty": np.sign(speed),
+        "damping": speed,
+        "inertia": push,
+    }
     names = [name for name in columns if name in free or name in ("damping", "inertia")]
     matrix = np.column_stack([columns[name][chosen] for name in names])
     target = u[chosen] - sum(

@@ -97,11 +97,19 @@ def fit_pseudo_wiener(
     delays = [delay_samples] if isinstance(delay_samples, int | float) else list(delay_samples)
     (parameters, report, errors, n_best), stop = or_partial(
         lambda: _core.identify.fit_pseudo_wiener(
-            kind=kind, records=columns, parameters=values, sides=sides, free=list(free), delays=delays,
-            starts=chosen.n_starts, seed=chosen.seed, only_given_start=start_values is not None,
-            try_map_start=lag_start == "best", max_iterations=chosen.max_iterations,
+            kind=kind,
+            records=columns,
+            parameters=values,
+            sides=sides,
+            free=list(free),
+            delays=delays,
+            starts=chosen.n_starts,
+            seed=chosen.seed,
+            only_given_start=start_values is not None,
+            try_map_start=lag_start == "best",
+            max_iterations=chosen.max_iterations,
         )
-    )  # fmt: skip
+    )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
     runs = [free_run(model, one) for one in logs]
@@ -115,10 +123,18 @@ def fit_pseudo_wiener(
         found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
     train = quality_of(runs)
     fit = Fit(
-        report=wrapped, model=model, kind=kind, train=train, unidentifiable=wrapped.unidentifiable,
-        findings=(*found, *below_ceiling(logs, train)), source=source_of(logs[0]), start_rmse=tuple(errors.tolist()),
-        n_best=int(n_best), run=runs[0], draw=draw_free_run,
-    )  # fmt: skip
+        report=wrapped,
+        model=model,
+        kind=kind,
+        train=train,
+        unidentifiable=wrapped.unidentifiable,
+        findings=(*found, *below_ceiling(logs, train)),
+        source=source_of(logs[0]),
+        start_rmse=tuple(errors.tolist()),
+        n_best=int(n_best),
+        run=runs[0],
+        draw=draw_free_run,
+    )
     return hand_over(fit, stop)
 
 

@@ -91,11 +91,18 @@ def record_content(
     if stops_deg is not None:
         at_stops = float(((angle < stops_deg[0] + _STOP_DEG) | (angle > stops_deg[1] - _STOP_DEG)).sum()) * step
     return RecordContent(
-        angle_low_deg=float(angle.min()), angle_high_deg=float(angle.max()),
-        peak_speed_deg_per_s=float(np.abs(speed).max()), travel_open_deg=opened, travel_closed_deg=closed,
-        time_above_s=above, time_below_s=below, limp_home_crossings=crossings, time_at_stops_s=at_stops,
-        duration_s=float(time[-1] - time[0]) + step, limp_home_deg=math.nan if limp_home_deg is None else limp_home_deg,
-    )  # fmt: skip
+        angle_low_deg=float(angle.min()),
+        angle_high_deg=float(angle.max()),
+        peak_speed_deg_per_s=float(np.abs(speed).max()),
+        travel_open_deg=opened,
+        travel_closed_deg=closed,
+        time_above_s=above,
+        time_below_s=below,
+        limp_home_crossings=crossings,
+        time_at_stops_s=at_stops,
+        duration_s=float(time[-1] - time[0]) + step,
+        limp_home_deg=math.nan if limp_home_deg is None else limp_home_deg,
+    )
 
 
 def _travel(angle: NDArray[np.float64], window: int) -> tuple[float, float]:

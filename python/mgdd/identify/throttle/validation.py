@@ -252,10 +252,15 @@ def validate_throttle(
     notes = _notes(quality, tests)
     pairs = entangled(fit.report) if fit is not None else ()
     return ThrottleValidation(
-        kind=own.kind, quality=quality, vaf_percent=vaf_percent(measured, modelled),
-        n_step=n_step_rms(own, log, horizons_s=horizons_s), tests=tests, free_run=run,
-        findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)), source=source_of(log),
-    )  # fmt: skip
+        kind=own.kind,
+        quality=quality,
+        vaf_percent=vaf_percent(measured, modelled),
+        n_step=n_step_rms(own, log, horizons_s=horizons_s),
+        tests=tests,
+        free_run=run,
+        findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)),
+        source=source_of(log),
+    )
 
 
 def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:

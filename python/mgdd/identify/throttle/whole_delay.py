@@ -252,11 +252,17 @@ def with_delay(
     null = np.vstack([report.null_directions, np.zeros((1, report.null_directions.shape[1]))])
     null.flags.writeable = False
     return dataclasses.replace(
-        report, names=(*report.names, _NAME), values=_longer(report.values, delay), stderr=_longer(stderr, error),
-        lower=_longer(report.lower, low), upper=_longer(report.upper, high),
-        bounds_active=_longer(report.bounds_active, side), covariance=_wider(covariance, error**2),
-        correlation=_wider(report.correlation, 1.0), null_directions=null,
-    )  # fmt: skip
+        report,
+        names=(*report.names, _NAME),
+        values=_longer(report.values, delay),
+        stderr=_longer(stderr, error),
+        lower=_longer(report.lower, low),
+        upper=_longer(report.upper, high),
+        bounds_active=_longer(report.bounds_active, side),
+        covariance=_wider(covariance, error**2),
+        correlation=_wider(report.correlation, 1.0),
+        null_directions=null,
+    )
 
 
 def delay_at_end(kept: float, tried: Sequence[float], longest_known: float) -> list[Finding]:
