@@ -174,9 +174,9 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         Cycles by which a delay may be shorter or longer than told, at most 20; ``delay_cycles`` says which one the
         readings show. A delay of 0, and one beside a lag, is taken as told.
     guide : callable, fitted response or DataArray, optional
-        What a model says of J over one to five inputs: a callable of what `ask` gives or of plain numbers, asked on
-        a grid between the bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates per input. A
-        sequence gives one per component.
+        What a model says of J over one to five inputs: a callable of what `ask` gives or of plain numbers, asked on a
+        grid between the bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates
+        per input. A sequence gives one per component.
     limit_guides : mapping of str to guides, or sequence, optional
         The same of limits. With those of all limits the readings to the side are left out there too; nothing is asked
         farther beyond what was read than a first step, or 0.4 of its width.
