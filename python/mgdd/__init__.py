@@ -13,9 +13,11 @@ Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA 
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import Any
 
 from mgdd._core import __version__
+from mgdd._rooms import missing as _missing
 
 __all__ = [
     "__version__",
@@ -46,9 +48,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in __all__:
         return importlib.import_module(f"mgdd.{name}")
-    if name in ("BoundedSeeking", "NewtonSeeking"):
-        return getattr(importlib.import_module("mgdd.optimize"), name)  # which says what to take
-    raise AttributeError(f"module 'mgdd' has no attribute {name!r}")
+    raise _missing(sys.modules[__name__], name)
 
 
 def __dir__() -> list[str]:

@@ -129,7 +129,7 @@ def test_names_of_before_say_what_to_take(name: str, capsys: pytest.CaptureFixtu
 def test_classes_and_files_of_before_say_what_to_take(kind: str, tmp_path: Path) -> None:
     with pytest.raises(ImportError, match="A seeker of your own"):
         exec(f"from mgdd.optimize import {kind}")  # noqa: S102
-    with pytest.raises(ImportError, match="A seeker of your own"):
+    with pytest.raises(AttributeError, match="A seeker of your own"):
         getattr(mgdd, kind)
     file = tmp_path / "seeker.json"
     Spsa(start=0.0, limits=[Limit("p", 1.0)]).save(file)

@@ -7,6 +7,7 @@ Engine: `fit_cylinder`, `wall_heat_profile`, `best_timing`. Throttle: `identify_
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.identify.engine.best_timing import best_timing
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.family import ModelFamily
@@ -37,6 +38,4 @@ __all__ = [
     "wall_heat_profile",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -10,6 +10,7 @@ along a `Reference`, `simulate_drive` runs a throttle between the pedal and the 
 from __future__ import annotations
 
 from mgdd._core.loop import SensorDynamics
+from mgdd._rooms import furnish as _furnish
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.criteria import LoopCriteria
@@ -52,6 +53,4 @@ __all__ = [
     "tuned_controller",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -32,7 +32,7 @@ np.True_
 from __future__ import annotations
 
 from mgdd._core.optimize import ComponentLag, Input, Limit
-from mgdd.errors import former_seeker as _former_seeker
+from mgdd._rooms import furnish as _furnish
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import ExtremumSeeking
 from mgdd.optimize.fit_options import FitOptions
@@ -60,12 +60,4 @@ __all__ = [
     "tune",
 ]
 
-
-def __getattr__(name: str) -> object:
-    if instead := _former_seeker(name):
-        raise ImportError(f"{name}: {instead}")  # of an AttributeError `from ... import` would drop the text
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)
