@@ -32,7 +32,7 @@ _NAMED = {
     "Callable": "a function",
     "Buffer": "bytes",
 }
-_LONGEST_HOW = 240  # letters of what a missing argument is
+_LONGEST_HOW = 240  # letters of what a missing argument is, and of the names that are known
 _BOUND = "plain, without a unit"
 _PLAIN = "give the magnitude in the unit of the name, as in soc.to('degree').magnitude"
 _MAKE = {
@@ -183,7 +183,7 @@ def _bound(
     known = [argument.name for argument in arguments]
     for keyword, value in keywords.items():
         if keyword not in known:
-            hint = did_you_mean(keyword, known) or f"known are {', '.join(known)}"
+            hint = did_you_mean(keyword, known) or f"known are {shortened(', '.join(known), _LONGEST_HOW)}"
             return TypeError(f"{name}() has no argument {keyword!r}: {hint}")
         if keyword in bound:
             return TypeError(f"{name}() got {keyword!r} twice, by place and by name")

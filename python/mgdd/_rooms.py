@@ -166,8 +166,8 @@ def _said(doc: str) -> dict[str, str]:
     """Kind and first sentence of each parameter of a numpydoc text."""
     from inspect import cleandoc
 
-    said = {}
-    for names, kind, text in re.findall(r"^([\w, ]+) : (.+)\n((?: {4}.*\n)*)", cleandoc(doc), re.MULTILINE):
+    said: dict[str, str] = {}
+    for names, kind, text in re.findall(r"^([\w, ]+?)( : .+)?\n((?: {4}.*\n)+)", cleandoc(doc), re.MULTILINE):
         first = " ".join(text.split()).partition(". ")[0].rstrip(".")
-        said |= dict.fromkeys(names.split(", "), f"{kind}: {first}")
+        said |= dict.fromkeys(names.split(", "), f"{kind.removeprefix(' : ')}: {first}".removeprefix(": "))
     return said
