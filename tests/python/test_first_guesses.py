@@ -86,7 +86,7 @@ GUESSES: dict[str, tuple[Callable[[], Any], str]] = {
     "input beside": (lambda: sweep_module.sweep(ENGINE, soc_cad=[1.0]), r"as \{'soc_cad': \["),  # type: ignore[arg-type]
     # A method that a result has not.
     "method": (lambda: engine.find_optimum(ENGINE).summarize(), "did you mean 'summary'"),  # type: ignore[attr-defined]
-    "form of a file": (lambda: engine.simulate(ENGINE).save("run.csv"), r"path = 'run.csv': .*\.nc"),  # type: ignore
+    "form of a file": (lambda: engine.simulate(ENGINE).save("run.csv"), r"path = 'run.csv': .*\.nc"),
     "no model file": (lambda: engine.find_optimum(ENGINE).save("best.toml"), r"path = 'best.toml': .*\.nc"),
 }
 
@@ -176,7 +176,7 @@ def test_an_error_from_inside_is_left_alone() -> None:
     def broken(_: float) -> float:
         raise TypeError("own trouble")
 
-    with pytest.raises(TypeError, match="^own trouble$"):
+    with pytest.raises(TypeError, match=r"^own trouble$"):
         parallel.map_items(broken, [1.0])
 
 

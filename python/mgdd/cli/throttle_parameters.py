@@ -22,7 +22,7 @@ __all__ = ["LOG", "add_preset", "add_throttle", "changes_of", "known_only", "log
 
 LOG = Options(
     read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
-    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal", "sheet",
+    "travel_deg", "start_s", "stop_s", "sample_s", "delimiter", "decimal", "sheet",
 )  # fmt: skip
 
 _DEFAULT_PRESET = "P1"

@@ -12,8 +12,9 @@ from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
     import numpy as np
-    import xarray as xr
     from numpy.typing import NDArray
+
+    from mgdd.results.dataset import Dataset
 
 __all__ = ["FLAGS", "OWN_LABELS", "cycles_to_dataset"]
 
@@ -33,7 +34,7 @@ def cycles_to_dataset(
     *,
     noise_free_limits: NDArray[np.float64] | None = None,
     more: Mapping[str, tuple[Any, ...]] = {},
-) -> xr.Dataset:
+) -> Dataset:
     """Label the columns of a run, with further ones that are labelled already."""
     settings = bench.settings
     terms = _unique([term.signal for term in settings["performance"].terms])

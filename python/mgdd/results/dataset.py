@@ -21,7 +21,7 @@ class _Plot(DatasetPlotAccessor):
 
     __slots__ = ()
 
-    def __call__(self, *, ax: Axes | None = None, engine: str = "matplotlib") -> Any:  # type: ignore[override]
+    def __call__(self, *, ax: Axes | None = None, engine: str = "matplotlib") -> Any:
         """Draw as `mgdd.results.result.Result.plot` does."""
         # By name: texts and figures stand above the data that they show.
         drawn_by = import_module("mgdd.results.result").drawn_by
@@ -33,7 +33,7 @@ class _PlotOf:
         return _Plot if data is None else _Plot(data)
 
 
-class Dataset(xr.Dataset):
+class Dataset(xr.Dataset):  # type: ignore[no-untyped-call]
     """The data of a function or a result: an `xarray.Dataset` that has a summary and a figure of its own.
 
     A selection, a mean and a pickle of it are one again; ``plot()`` takes ``ax`` and ``engine`` as that of a `Fit`.
@@ -50,7 +50,7 @@ class Dataset(xr.Dataset):
     """
 
     __slots__ = ()
-    plot = _PlotOf()  # type: ignore[assignment]
+    plot = _PlotOf()
 
     def summary(self) -> str:
         """Return a human-readable summary.

@@ -302,8 +302,8 @@ def _shown(value: Any) -> str:
     if hasattr(value, "sizes") and hasattr(value, "dims"):
         return "Dataset (" + ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items()) + ")"
     if isinstance(value, Mapping | Sequence | set | frozenset):
-        named = isinstance(value, Mapping)
-        entries = [f"{name} {_shown(own)}" for name, own in value.items()] if named else [*map(_shown, value)]
+        named = value.items() if isinstance(value, Mapping) else [("", own) for own in value]
+        entries = [f"{name} {_shown(own)}".lstrip() for name, own in named]
         joined = ", ".join(entries) or "none"
         short = textwrap.shorten(joined, _LONG, placeholder=" …")
         return short if short == joined else f"{len(value)}: {short}"
