@@ -17,7 +17,6 @@ import sys
 from typing import Any
 
 from mgdd._core import __version__
-from mgdd._rooms import missing as _missing
 
 __all__ = [
     "__version__",
@@ -48,7 +47,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in __all__:
         return importlib.import_module(f"mgdd.{name}")
-    raise _missing(sys.modules[__name__], name)
+    from mgdd._rooms import missing
+
+    raise missing(sys.modules[__name__], name)
 
 
 def __dir__() -> list[str]:

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from types import FunctionType, ModuleType
 from typing import Any
 
-from mgdd._arguments import unbound
 from mgdd._guesses import former_seeker, near_names
 from mgdd.errors import Error, did_you_mean
 
@@ -126,6 +125,8 @@ def _look(
 ) -> Exception | None:
     """Return a better error for arguments that do not fit the signature, or stand in another order."""
     import inspect
+
+    from mgdd._arguments import unbound
 
     parameters = list(inspect.signature(function).parameters.values())
     if parameters and parameters[0].name == "self":
