@@ -13,6 +13,7 @@ Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA 
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import Any
 
 from mgdd._core import __version__
@@ -46,7 +47,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in __all__:
         return importlib.import_module(f"mgdd.{name}")
-    raise AttributeError(f"module 'mgdd' has no attribute {name!r}")
+    from mgdd._rooms import missing
+
+    raise missing(sys.modules[__name__], name)
 
 
 def __dir__() -> list[str]:

@@ -9,11 +9,14 @@ import ast
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import Error, ParameterError, did_you_mean
+from mgdd.errors import Error, ParameterError, did_you_mean, shortened
 
-__all__ = ["refusal", "require_plain", "shown", "unit_refusal"]
+if TYPE_CHECKING:
+    import inspect
+
+__all__ = ["refusal", "require_plain", "shown", "unbound", "unit_refusal"]
 
 _NUMBERS, _NUMBER, _WHOLE = "ArrayLike", "SupportsFloat", "SupportsInt"
 _NAMED = {
@@ -29,6 +32,7 @@ _NAMED = {
     "Callable": "a function",
     "Buffer": "bytes",
 }
+_LONGEST_HOW = 240  # letters of what a missing argument is, and of the names that are known
 _BOUND = "plain, without a unit"
 _PLAIN = "give the magnitude in the unit of the name, as in soc.to('degree').magnitude"
 _MAKE = {
@@ -44,6 +48,30 @@ class _Argument:
     kind: ast.expr
     required: bool
     keyword_only: bool
+    how: str = ""  # kind and meaning, for one that is missing
+
+
+def unbound(
+    name: str,
+    parameters: Sequence[inspect.Parameter],
+    given: Sequence[Any],
+    keywords: Mapping[str, Any],
+    how: Mapping[str, str],
+) -> TypeError | None:
+    """Say why a call does not fit the signature of a Python function; `how` has kind and meaning of its parameters."""
+    places = [each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
+    arguments = [
+        _Argument(
+            each.name,
+            ast.Constant(None),
+            each.default is each.empty,
+            each.kind is each.KEYWORD_ONLY,
+            how.get(each.name, ""),
+        )
+        for each in places
+    ]
+    bound = _bound(name, arguments, given, keywords)
+    return bound if isinstance(bound, TypeError) else None
 
 
 def refusal(
@@ -155,14 +183,15 @@ def _bound(
     known = [argument.name for argument in arguments]
     for keyword, value in keywords.items():
         if keyword not in known:
-            hint = did_you_mean(keyword, known) or f"known are {', '.join(known)}"
+            hint = did_you_mean(keyword, known) or f"known are {shortened(', '.join(known), _LONGEST_HOW)}"
             return TypeError(f"{name}() has no argument {keyword!r}: {hint}")
         if keyword in bound:
             return TypeError(f"{name}() got {keyword!r} twice, by place and by name")
         bound[keyword] = value
     missing = [argument.name for argument in arguments if argument.required and argument.name not in bound]
     if missing:
-        return TypeError(f"{name}() lacks {', '.join(missing)}")
+        how = shortened(next(argument.how for argument in arguments if argument.name == missing[0]), _LONGEST_HOW)
+        return TypeError(f"{name}() lacks {', '.join(missing)}{how and f' ({how})'}")
     return bound
 
 

@@ -12,12 +12,13 @@ Examples
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Self
+
+from mgdd._guesses import near_names
 
 __all__ = [
     "ConvergenceError",
@@ -39,9 +40,6 @@ def __dir__() -> list[str]:
 # Letters: of a value that a message quotes, and of a whole message. What a file carries may be of any length.
 _LONGEST_VALUE, _LONGEST_MESSAGE = 120, 399
 _NOTE = 32  # letters of what says how many are left out
-_LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length
-# Letters that are more than chance, and names that are an answer rather than a list.
-_SHORTEST_STEM, _MOST_NAMES = 3, 4
 _LONG_WORD = re.compile(rf"\S{{{_LONGEST_VALUE + 1},}}")
 _LONG_QUOTE = re.compile(rf"'[^'\n]{{{_LONGEST_VALUE + 1},}}'|\"[^\"\n]{{{_LONGEST_VALUE + 1},}}\"")
 
@@ -285,23 +283,9 @@ class Interrupted(KeyboardInterrupt):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Ask for the known names that begin alike, else for the nearest one, or say nothing where none is near.
-
-    Names that differ in their unit are different quantities, so all of them are named: ``pmax`` begins ``p_max_bar``
-    and ``p_max_cad``, of which the nearest by its letters would be a guess.
-    """
-    if len(name) > _LONGEST_NAME:
-        return ""
-    near = [other for other in known if len(other) <= _LONGEST_NAME]
-    stem = _letters(name)
-    close = [other for other in near if len(stem) >= _SHORTEST_STEM and _letters(other).startswith(stem)]
-    if not 0 < len(close) <= _MOST_NAMES:
-        close = difflib.get_close_matches(name, near, 1)
+    """Ask for the known names that are near, or say nothing where none is."""
+    close = near_names(name, list(known))
     return f"did you mean {' or '.join(map(repr, close))}?" if close else ""
-
-
-def _letters(name: str) -> str:
-    return name.lower().replace("_", "").replace("-", "")
 
 
 def hinted(message: str, name: str, known: Iterable[str]) -> str:

@@ -105,9 +105,9 @@ RECORDS = ("train", "chirp", "steps")
 def noisy_records(throttle: Throttle, noise: list[np.random.Generator]) -> dict[str, xr.Dataset]:
     """Simulate training chirp, test chirp and steps of 150 ms from rest at limp-home, through a noisy 12-bit sensor."""
     duties = (
-        chirp(DURATION_S, offset=0.15, amplitude=0.20, low_hz=0.2, high_hz=6.0, step_s=SAMPLE_S),
-        chirp(DURATION_S, offset=0.15, amplitude=0.18, low_hz=0.3, high_hz=5.0, step_s=SAMPLE_S),
-        amplitude_random_steps(DURATION_S, offset=0.15, amplitude=0.20, hold_s=0.15, step_s=SAMPLE_S),
+        chirp(DURATION_S, offset=0.15, amplitude=0.20, low_hz=0.2, high_hz=6.0, sample_s=SAMPLE_S),
+        chirp(DURATION_S, offset=0.15, amplitude=0.18, low_hz=0.3, high_hz=5.0, sample_s=SAMPLE_S),
+        amplitude_random_steps(DURATION_S, offset=0.15, amplitude=0.20, hold_s=0.15, sample_s=SAMPLE_S),
     )
     out = {}
     for name, signal, rng in zip(RECORDS, duties, noise, strict=True):

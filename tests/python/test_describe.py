@@ -208,7 +208,7 @@ def test_rows_know_units_arrays_and_what_is_missing() -> None:
     )  # fmt: skip
     assert rows == [
         Row("tau_s", "0.123457", "s"), Row("p_max_bar", "95", "bar"), Row("on", "yes"), Row("none_deg", "–"),
-        Row("gone_mm", "–"), Row("grid", "array 3 × 4"), Row("pair", "1, 2.5"), Row("words", "a"),
+        Row("gone_mm", "–"), Row("grid", "0 (3 × 4)"), Row("pair", "1, 2.5"), Row("words", "a"),
         Row("nothing", "none"), Row("map.a_s", "1", "s"), Row("map.b_m", "2", "m"), Row("mass_kg", "95", "kg"),
         Row("gain_percent.x.csv", "1.5", "%"), Row("own", "3", "furlong"),
     ]  # fmt: skip

@@ -34,7 +34,7 @@ def duty(signal: Any) -> np.ndarray:
 @given(offset=st.floats(-0.9, 0.9), share=st.floats(0.05, 1.0))
 def test_every_signal_keeps_its_swing_and_its_clock(name: str, offset: float, share: float) -> None:
     amplitude = share * (1.0 - abs(offset))
-    signal = SIGNALS[name](offset=offset, amplitude=amplitude, step_s=2e-3)
+    signal = SIGNALS[name](offset=offset, amplitude=amplitude, sample_s=2e-3)
     values = duty(signal)
     assert np.abs(values - offset).max() <= amplitude * (1.0 + 1e-12) + 1e-12
     assert np.abs(values - offset).max() >= 0.85 * amplitude
@@ -51,8 +51,8 @@ def test_a_duty_beyond_one_is_refused_with_the_largest_amplitude(name: str) -> N
     for bad in (float("nan"), -0.1):
         with pytest.raises(ParameterError, match="amplitude"):
             SIGNALS[name](offset=0.0, amplitude=bad)
-    with pytest.raises(ParameterError, match="step_s"):
-        SIGNALS[name](offset=0.0, amplitude=0.1, step_s=-1e-3)
+    with pytest.raises(ParameterError, match="sample_s"):
+        SIGNALS[name](offset=0.0, amplitude=0.1, sample_s=-1e-3)
 
 
 def test_the_chirp_sweeps_between_its_frequencies() -> None:
@@ -65,10 +65,10 @@ def test_the_chirp_sweeps_between_its_frequencies() -> None:
 
 def test_frequencies_above_half_the_sampling_rate_are_refused() -> None:
     with pytest.raises(ParameterError, match=r"high_hz = 6: must be below half the sampling rate, 5 Hz"):
-        signals.chirp(offset=0.0, amplitude=0.1, step_s=0.1)
-    signals.chirp(offset=0.0, amplitude=0.1, step_s=0.05)
+        signals.chirp(offset=0.0, amplitude=0.1, sample_s=0.1)
+    signals.chirp(offset=0.0, amplitude=0.1, sample_s=0.05)
     with pytest.raises(ParameterError, match="half the sampling rate"):
-        signals.multisine(offset=0.0, amplitude=0.1, step_s=0.1)
+        signals.multisine(offset=0.0, amplitude=0.1, sample_s=0.1)
     with pytest.raises(ParameterError, match="low <= high"):
         signals.chirp(offset=0.0, amplitude=0.1, low_hz=7.0)
     with pytest.raises(ParameterError, match="hold_s"):

@@ -341,17 +341,17 @@ def test_uneven_sampling_is_resampled() -> None:
     rng = np.random.default_rng(3)
     uneven = TIME + np.r_[0.0, rng.uniform(-0.2e-3, 0.2e-3, 1198), 0.0]
     angle = np.interp(uneven, TIME, ANGLE)
-    with pytest.raises(DataError, match=r"column 'time_s': uneven sampling: .*pass step_s=0.001 to resample"):
+    with pytest.raises(DataError, match=r"column 'time_s': uneven sampling: .*pass sample_s=0.001 to resample"):
         log(uneven, angle=angle)
-    made = log(uneven, angle=angle, step_s=1e-3)
+    made = log(uneven, angle=angle, sample_s=1e-3)
     np.testing.assert_allclose(made["time_s"], TIME, atol=1e-12)
     np.testing.assert_allclose(made["angle_deg"], ANGLE, atol=0.05)
     assert set(made["duty"].to_numpy()) <= set(DUTY), "the duty holds"
     drifting = np.cumsum(np.r_[0.0, np.where(np.arange(1199) < 600, 1.0e-3, 1.08e-3)])
     with pytest.raises(DataError, match="uneven sampling"):
         log(drifting)
-    with pytest.raises(ParameterError, match="step_s"):
-        log(uneven, step_s=-1.0)
+    with pytest.raises(ParameterError, match="sample_s"):
+        log(uneven, sample_s=-1.0)
 
 
 def test_jitter_is_no_gap() -> None:
@@ -359,24 +359,24 @@ def test_jitter_is_no_gap() -> None:
         time = np.arange(4000) * 1e-3
         jittered = time + 0.1e-3 * np.random.default_rng(seed).standard_normal(4000)
         duty, angle = np.interp(time % 1.0, TIME, DUTY), np.interp(time % 1.0, TIME, ANGLE)
-        with pytest.raises(DataError, match=r"uneven sampling: .*pass step_s=0.001 to resample"):
+        with pytest.raises(DataError, match=r"uneven sampling: .*pass sample_s=0.001 to resample"):
             log(jittered, duty, angle)
-        assert log(jittered, duty, angle, step_s=1e-3).sizes["time_s"] >= 3999
+        assert log(jittered, duty, angle, sample_s=1e-3).sizes["time_s"] >= 3999
         for at in (2000, 3990):  # one sample that is missing is still seen, by its own row
             keep = np.delete(np.arange(4000), at)
-            kept = log(jittered[keep], duty[keep], angle[keep], step_s=1e-3)
+            kept = log(jittered[keep], duty[keep], angle[keep], sample_s=1e-3)
             assert kept.attrs["warnings"].startswith("1 gap(s) in the time")
             assert kept["time_s"][-1] == pytest.approx(time[at - 1], abs=2e-3)
 
 
-@pytest.mark.parametrize("step_s", [None, 5e-4])
-def test_a_gap_is_left_out_and_said_and_found_by_the_fit(step_s: float | None) -> None:
+@pytest.mark.parametrize("sample_s", [None, 5e-4])
+def test_a_gap_is_left_out_and_said_and_found_by_the_fit(sample_s: float | None) -> None:
     keep = np.delete(np.arange(6000), 4500)
     time = np.arange(6000) * 1e-3
     whole = (time, 0.25 * np.sin(4.0 * np.pi * time), 20.0 + 16.0 * np.sin(4.0 * np.pi * time - 0.8))
-    cut = throttle_log(*(each[keep] for each in whole), step_s=step_s)
+    cut = throttle_log(*(each[keep] for each in whole), sample_s=sample_s)
     assert cut["time_s"].values[[0, -1]].tolist() == [0.0, pytest.approx(4.499)]
-    assert cut["angle_deg"].values[:: 2 if step_s else 1] == pytest.approx(whole[2][:4500])
+    assert cut["angle_deg"].values[:: 2 if sample_s else 1] == pytest.approx(whole[2][:4500])
     assert "kept are the 4500 samples from 0 to 4.499 s" in cut.attrs["warnings"]
     assert throttle_log(*whole).attrs["warnings"] == ""
 

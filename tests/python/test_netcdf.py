@@ -213,6 +213,9 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "design.design_points": lambda _: [
         planned(n=16), planned(method="factorial"), planned(n=12, method="d_optimal", existing=planned(n=4)),
     ],
+    "results.Fit.predict": lambda _: surrogate.fit_response(planned(n=16), "fuel_mg", degree=1).predict(
+        planned(n=8)
+    ),
     "surrogate.ResponseModel.predict": lambda _: [model.predict(planned(n=8)) for model in responses()],
     "surrogate.fit_response.diagnostics": lambda _: surrogate.fit_response(
         {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}, "imep_bar", degree=1

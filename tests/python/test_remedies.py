@@ -127,5 +127,5 @@ def test_a_remedy_for_arrays_is_done_to_the_arrays() -> None:
         pressure_trace(*TRACES["radians"])
     with pytest.raises(Error, match=r"pass duty / 100"):
         throttle_log(*LOGS["percent"])
-    with pytest.raises(Error, match=r"mgdd\.io\.throttle_log\(\.\.\., step_s=0\.001\)"):
+    with pytest.raises(Error, match=r"mgdd\.io\.throttle_log\(\.\.\., sample_s=0\.001\)"):
         _identified(Path(), LOGS["uneven"])

@@ -162,7 +162,7 @@ def test_a_result_can_do_what_every_result_can(name: str, tmp_path: Path) -> Non
     assert made._repr_html_().startswith("<div>")
     made.to_netcdf(tmp_path / "made.nc")
     back = xr.load_dataset(tmp_path / "made.nc")
-    xr.testing.assert_equal(back, data)
+    assert data.equals(back)
     assert set(back.attrs) == set(data.attrs)
     table = made.to_dataframe()
     assert len(table) >= 1

@@ -13,8 +13,8 @@ import pytest
 CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop > rig"
 # parallel knows errors alone: whatever is long enough to leave the machine may use it.
 PYTHON = (
-    "errors > _arguments _settings > _core > parallel results > signals > io plot > presets > optimize"
-    " > control > engine throttle > identify > surrogate > guide"
+    "_guesses > errors > _arguments _settings > _core > _rooms > parallel results > signals > io plot > presets"
+    " > optimize > control > engine throttle > identify > surrogate > guide"
     " > loop sweep design datasets > maps > rig > report > cli > __main__ > mgdd_studies"
 )
 

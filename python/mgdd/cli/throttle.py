@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 LOG = Options(
     read_throttle_log, "time", "duty", "angle", "current", "supply", "time_unit", "duty_unit", "angle_unit",
-    "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal", "sheet",
+    "travel_deg", "start_s", "stop_s", "sample_s", "delimiter", "decimal", "sheet",
 )  # fmt: skip
 
 _DEFAULT_PRESET = "P1"

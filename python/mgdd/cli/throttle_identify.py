@@ -98,11 +98,11 @@ def _drawn(validation: ThrottleValidation, correlation: xr.Dataset | None) -> Fi
     return figure
 
 
-_DESIGN = Options(identify.design_excitation, "side", "duration_s", "step_s")
+_DESIGN = Options(identify.design_excitation, "side", "duration_s", "sample_s")
 _CHECK = Options(
     identify.check_excitation, "angle_window_deg", "max_rate_deg_per_s", "max_current_a", "start_deg"
 )  # fmt: skip
-_COMMON = ("offset", "amplitude", "step_s")
+_COMMON = ("offset", "amplitude", "sample_s")
 # Options that only some of the signals have, as the arguments of their functions.
 _OF_KIND = {
     kind: tuple(name for name in inspect.signature(getattr(signals, kind)).parameters if name not in _COMMON)
@@ -140,7 +140,7 @@ def _excite(args: argparse.Namespace) -> None:
     throttle, preset = throttle_of(args)
     limits = _CHECK.given(args)
     designed = _DESIGN.given(args)
-    step_s = _DESIGN.of(args)["step_s"]
+    sample_s = _DESIGN.of(args)["sample_s"]
     given = {name: getattr(args, name) for name in ("duration_s", *_OWN) if getattr(args, name) is not None}
     for name in given:
         if name not in _OF_KIND[args.kind]:
@@ -157,12 +157,12 @@ def _excite(args: argparse.Namespace) -> None:
         signal, check = identify.design_excitation(args.kind, throttle, **designed, **limits)
     else:
         make = getattr(signals, args.kind)
-        signal = make(offset=args.offset, amplitude=args.amplitude, step_s=step_s, **given)
+        signal = make(offset=args.offset, amplitude=args.amplitude, sample_s=sample_s, **given)
         check = identify.check_excitation(signal, throttle, **limits)
         if not check.passed:
             raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
-    payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": step_s}
+    payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "sample_s": sample_s}
     payload |= attrs | check.to_dict()
     emit(args, payload, text=_text(args.kind, attrs, check), traces=check.prediction)
 

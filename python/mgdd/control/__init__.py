@@ -9,6 +9,7 @@ bridge where it must.
 from __future__ import annotations
 
 from mgdd._core.control import GuidedPredictive, Pid, SlidingMode, ThrottleSupervisor
+from mgdd._rooms import furnish as _furnish
 from mgdd.control.mgdd1 import Mgdd1
 from mgdd.control.supervised import SupervisedController
 
@@ -21,6 +22,4 @@ __all__ = [
     "ThrottleSupervisor",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

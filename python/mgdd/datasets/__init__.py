@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.datasets.files import names
 from mgdd.datasets.readers import read
 
 __all__ = ["names", "read"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -6,11 +6,10 @@ between points that were measured. `mgdd.surrogate.fit_response` fits a model to
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.design.points import design_points
 from mgdd.design.region import FeasibleRegion
 
 __all__ = ["FeasibleRegion", "design_points"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

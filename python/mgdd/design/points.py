@@ -161,7 +161,7 @@ def _filled(
             f"n = {n}: the means of a Sobol design are balanced for powers of two only; the nearest are "
             f"{1 << (n.bit_length() - 1)} and {1 << n.bit_length()}",
             UserWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     sample = sampler_of("sobol" if method == "maximin" else method, m, generator)
     points, found, drawn = draw_inside(

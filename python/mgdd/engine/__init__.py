@@ -6,6 +6,7 @@ Crank angles are °CA aTDC (firing TDC = 0, compression negative) throughout.
 from __future__ import annotations
 
 from mgdd._core.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
+from mgdd._rooms import furnish as _furnish
 from mgdd.engine.cycle import sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import ignition_delay
 from mgdd.engine.indicating import Indicating
@@ -38,6 +39,4 @@ __all__ = [
     "trust",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

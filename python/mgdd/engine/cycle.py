@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from mgdd.presets.meant import CylinderLike, PointLike
+    from mgdd.results.dataset import Dataset
 
 __all__ = ["convergence", "sensitivities", "simulate", "timing_sweep", "volume_l"]
 
@@ -42,7 +43,7 @@ def simulate(
     soc_cad: float = -6.0,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
-) -> xr.Dataset:
+) -> Dataset:
     """Simulate one closed cycle, from intake valve closing to exhaust valve opening.
 
     Parameters
@@ -142,7 +143,7 @@ def timing_sweep(
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
     nox: NoxProxy | None = None,
-) -> xr.Dataset:
+) -> Dataset:
     """Simulate one operating point over many starts of combustion.
 
     Parameters
@@ -192,7 +193,7 @@ def sensitivities(
     soc_cad: float = -6.0,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
-) -> xr.Dataset:
+) -> Dataset:
     """Differentiate every indicator and the pressure trace exactly, by forward mode.
 
     Parameters

@@ -129,6 +129,7 @@ def find_optimum(
         findings=idle_limits(
             caps, {name: float(columns[name].max()) for name in caps}, f"for soc_cad in [{low:g}, {high:g}]"
         ),
+        scan={"soc_cad": grid, **{name: columns[name] for name in (objective, *caps)}},
     )
 
 

@@ -21,6 +21,8 @@ from mgdd.results.labels import ANGLE, labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
+    from mgdd.results.dataset import Dataset
+
 __all__ = ["analyze", "conditions"]
 
 _CONDITIONS = ("speed_rpm", "trapped_mass_g", "intake_temperature_k", "ivc_temperature_k")
@@ -53,7 +55,7 @@ def analyze(
     fuel_mg: float | None = None,
     traces: bool = True,
     quiet: bool = False,
-) -> xr.Dataset:
+) -> Dataset:
     """Analyse pressure: pegging, heat release, burn angles, work, polytropic exponents, of one cycle or of many.
 
     Parameters
@@ -275,7 +277,7 @@ def _one(
     options: dict[str, Any],
     attrs: dict[str, Any],
     given: str | None,
-) -> xr.Dataset:
+) -> Dataset:
     made = _core.engine.TraceOptions(**options)
     angle, bar = trace[ANGLE].values, trace["pressure_bar"].values
     raw = _core.engine.analyze(angle, bar, cylinder, point, made)

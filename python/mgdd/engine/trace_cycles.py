@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from mgdd.results.dataset import Dataset
+
 __all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "expansion_of", "is_of_cycles", "of_cycles", "scatter"]
 
 CYCLE = "cycle"
@@ -57,7 +59,7 @@ def of_cycles(
     knock_threshold_bar: float | None,
     *,
     traces: bool = True,
-) -> xr.Dataset:
+) -> Dataset:
     """Analyse every cycle, and the cycle of their mean pressure; what varies has a mean, a deviation and a COV.
 
     A record in several parts has the same figures as in one; its traces are of one part.

@@ -25,6 +25,7 @@ Examples
 from __future__ import annotations
 
 from mgdd._core.guide import Curve
+from mgdd._rooms import furnish as _furnish
 from mgdd.guide.curve_seeking import CurveSeeking
 from mgdd.guide.feed_forward import FeedForward
 from mgdd.guide.guided_engine import GuidedEngine
@@ -34,6 +35,4 @@ from mgdd.guide.timing_map import TimingMap
 
 __all__ = ["Curve", "CurveSeeking", "FeedForward", "GuidedEngine", "ModelOptimum", "OnlineCalibration", "TimingMap"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -7,6 +7,7 @@ Engine: `fit_cylinder`, `wall_heat_profile`, `best_timing`. Throttle: `identify_
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.identify.engine.best_timing import best_timing
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.family import ModelFamily
@@ -26,6 +27,4 @@ __all__ = [
     "fit_cylinder", "fit_ode", "identify_throttle", "load_throttle_model", "validate_throttle", "wall_heat_profile",
 ]  # fmt: skip
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

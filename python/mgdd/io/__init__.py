@@ -5,6 +5,7 @@ Angles are degrees of crank angle with firing TDC = 0 and compression negative (
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.io.bench_file import read
 from mgdd.io.chunks import pressure_chunks
 from mgdd.io.encoder import Encoder
@@ -23,6 +24,4 @@ __all__ = [
     "write_csv",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
-from mgdd.io.files import parsed, read_plain_text
+from mgdd.io.files import parsed, read_plain_text, write_whole_text
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
@@ -326,6 +326,15 @@ class Parameters:
             An unknown key, another unit, a wrong type, a value outside its domain.
         """
         return cls.of_file(ParameterFile.from_toml(text, origin=origin))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write `to_toml` to a file that `load` reads; it is replaced in one step."""
+        write_whole_text(path, self.to_toml())
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a file that `save` wrote, or a fit; the errors of `from_toml` name the file."""
+        return cls.of_file(ParameterFile.read(path))
 
     @classmethod
     def of_file(cls, file: ParameterFile) -> Self:

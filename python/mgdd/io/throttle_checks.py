@@ -85,8 +85,8 @@ def in_arrays(name: str, text: str | None) -> str:
     ends = {"start_s": "the samples from", "stop_s": "the samples up to"}
     if name in ends:
         return f"{ends[name]} {value or 'a time'}{' s' if value else ''}"
-    if name == "step_s":
-        return f"mgdd.io.throttle_log(..., step_s={value})"
+    if name == "sample_s":
+        return f"mgdd.io.throttle_log(..., sample_s={value})"
     return units.get((name, value)) or columns.get(name) or f"mgdd.io.read_throttle_log(..., {name}={text or '...'})"
 
 
@@ -216,7 +216,7 @@ def _check_time_exchanged(columns: Mapping[str, NDArray[np.float64]], place: Pla
 
 def check_even(time: NDArray[np.float64], place: Place) -> None:
     """Refuse uneven sampling: the models step evenly."""
-    remedy = f"pass {argument('step_s', '{step:g}')} to resample"
+    remedy = f"pass {argument('sample_s', '{step:g}')} to resample"
     even_step(time, where=lambda at: place.cell(at, "time_s"), remedy=remedy)
 
 

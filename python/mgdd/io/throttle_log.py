@@ -40,7 +40,7 @@ def throttle_log(
     *,
     current_a: ArrayLike | None = None,
     supply_v: ArrayLike | None = None,
-    step_s: float | None = None,
+    sample_s: float | None = None,
     name: str = "log",
 ) -> xr.Dataset:
     """Check arrays and make the Dataset of a throttle log from copies of them.
@@ -55,7 +55,7 @@ def throttle_log(
         Plate angle from closed [deg], opening positive.
     current_a, supply_v : array_like, optional
         Motor current [A] and supply voltage [V].
-    step_s : float, optional
+    sample_s : float, optional
         Resample to this even step [s]: the duty holds, the others are interpolated.
     name : str
         What messages and figures call the log; stored as ``attrs["file"]``.
@@ -85,8 +85,8 @@ def throttle_log(
     """
     given = {"time_s": time_s, "duty": duty, "angle_deg": angle_deg, "current_a": current_a, "supply_v": supply_v}
     columns = {key: _column(key, values, name) for key, values in given.items() if values is not None}
-    with taken(("step_s",), in_arrays):
-        return _checked(columns, Place(name), step_s=step_s, name=name)
+    with taken(("sample_s",), in_arrays):
+        return _checked(columns, Place(name), sample_s=sample_s, name=name)
 
 
 def read_throttle_log(
@@ -103,7 +103,7 @@ def read_throttle_log(
     travel_deg: float = 90.0,
     start_s: float | None = None,
     stop_s: float | None = None,
-    step_s: float | None = None,
+    sample_s: float | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
     sheet: str | None = None,
@@ -132,7 +132,7 @@ def read_throttle_log(
         Angle at 100 percent [deg].
     start_s, stop_s : float, optional
         Keep the rows from `start_s` to `stop_s` [s]; both ends count.
-    step_s : float, optional
+    sample_s : float, optional
         Resample to this even step [s]: the duty holds, the others are interpolated.
     delimiter : str, optional
         Column separator of a text file; None detects it.
@@ -186,7 +186,7 @@ def read_throttle_log(
     return _checked(
         columns,
         place,
-        step_s=step_s,
+        sample_s=sample_s,
         name=Path(path).name,
         duty_unit=units["duty"],
         angle_unit=units["angle_deg"],
@@ -266,7 +266,7 @@ def _checked(
     columns: dict[str, NDArray[np.float64]],
     place: Place,
     *,
-    step_s: float | None,
+    sample_s: float | None,
     name: str,
     duty_unit: str = "-",
     angle_unit: str = "deg",
@@ -280,10 +280,10 @@ def _checked(
             )
     columns, place, note = without_gaps(columns, place)
     check_samples(columns, place)
-    if step_s is None:
+    if sample_s is None:
         check_even(columns["time_s"], place)
     else:
-        columns, place = _resampled(columns, step_s, place)
+        columns, place = _resampled(columns, sample_s, place)
     check_signals(
         columns["duty"],
         columns["angle_deg"],
@@ -297,13 +297,13 @@ def _checked(
 
 
 def _resampled(
-    columns: dict[str, NDArray[np.float64]], step_s: float, place: Place
+    columns: dict[str, NDArray[np.float64]], sample_s: float, place: Place
 ) -> tuple[dict[str, NDArray[np.float64]], Place]:
     time = columns["time_s"]
-    if not 0.0 < step_s <= 0.1:
-        raise ParameterError.of("step_s", step_s, "in (0, 0.1] s")
-    even = time[0] + step_s * np.arange(math.floor((time[-1] - time[0]) / step_s * (1.0 + 1e-12)) + 1)
-    held = np.clip(np.searchsorted(time, even + 1e-9 * step_s, side="right") - 1, 0, time.size - 1)
+    if not 0.0 < sample_s <= 0.1:
+        raise ParameterError.of("sample_s", sample_s, "in (0, 0.1] s")
+    even = time[0] + sample_s * np.arange(math.floor((time[-1] - time[0]) / sample_s * (1.0 + 1e-12)) + 1)
+    held = np.clip(np.searchsorted(time, even + 1e-9 * sample_s, side="right") - 1, 0, time.size - 1)
     out = {key: np.interp(even, time, values) for key, values in columns.items()}
     out["duty"] = columns["duty"][held]
     out["time_s"] = even

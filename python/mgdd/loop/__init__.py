@@ -10,6 +10,7 @@ along a `Reference`, `simulate_drive` runs a throttle between the pedal and the 
 from __future__ import annotations
 
 from mgdd._core.loop import SensorDynamics
+from mgdd._rooms import furnish as _furnish
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.drive import simulate_drive
@@ -35,6 +36,4 @@ __all__ = [
     "seek_front", "simulate_drive", "track", "track_many", "tune_controller", "tuned_controller",
 ]  # fmt: skip
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from mgdd.results.dataset import Dataset
+
 _SEARCHED_CAD = (-30.0, 10.0)  # where nobody says, as `mgdd engine seek` does
 _RANDOM = (
     "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
@@ -216,7 +218,7 @@ class EngineBench(_core.loop.EngineBench):
             raise RigError("pressure() before the first cycle: step the bench first")
         return angle, pressure
 
-    def run(self, soc_cad: ArrayLike | Mapping[str, ArrayLike]) -> xr.Dataset:
+    def run(self, soc_cad: ArrayLike | Mapping[str, ArrayLike]) -> Dataset:
         """Run one cycle per requested start of combustion, without the GIL.
 
         Parameters

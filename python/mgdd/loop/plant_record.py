@@ -16,10 +16,10 @@ from mgdd.loop.summary import noise_free_variable
 from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
-    import xarray as xr
     from numpy.typing import NDArray
 
     from mgdd.optimize import Seeker
+    from mgdd.results.dataset import Dataset
 
 FLAGS = {
     "misfire": "nothing burned",
@@ -37,7 +37,7 @@ def cycles_to_dataset(
     *,
     noise_free_limits: NDArray[np.float64] | None = None,
     more: Mapping[str, tuple[Any, ...]] = {},
-) -> xr.Dataset:
+) -> Dataset:
     """Label the columns of a run, with further ones that are labelled already."""
     settings = bench.settings
     terms = _unique([term.signal for term in settings["performance"].terms])
@@ -157,9 +157,7 @@ def steered(
     }
 
 
-def dataset_of(
-    cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapping[str, tuple[Any, ...]]
-) -> xr.Dataset:
+def dataset_of(cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapping[str, tuple[Any, ...]]) -> Dataset:
     """Label what was measured; a plant that counts its cycles numbers them, others from the first."""
     columns = dict(cycles.values)
     count = columns.pop("cycle", None)

@@ -202,7 +202,9 @@ def plant_of(plant: Any, inputs: Sequence[Input], limits: Sequence[Limit], value
         return plant
     if callable(plant):
         return FunctionPlant(plant, names, held, values=tuple(values))
-    raise ParameterError(f"plant = {plant!r}: must be a Plant, or a function of the inputs by name")
+    raise ParameterError(
+        f"plant = {plant!r}: must be a Plant, as EngineBench('puma_single'), or a function of the inputs by name"
+    )
 
 
 def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any) -> Question:

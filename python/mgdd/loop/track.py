@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from mgdd.results.dataset import Dataset
+
 FIGURES = (
     "settling_ms",
     "mse_deg2",
@@ -67,7 +69,7 @@ def track(
     noise_deg: float = 0.03,
     sensors: SensorPair | None = None,
     seed: int = 0,
-) -> xr.Dataset:
+) -> Dataset:
     """Run a controller on the virtual throttle along a reference, and say how well it followed.
 
     Parameters

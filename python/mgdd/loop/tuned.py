@@ -69,7 +69,7 @@ def tuned_controller(
         kind, model, numbers=numbers, sample_s=sample_s, delay_samples=delay_samples, noise_deg=noise_deg
     )
     for doubt in doubts:
-        warnings.warn(doubt, UserWarning, stacklevel=2)
+        warnings.warn(doubt, UserWarning, stacklevel=3)
     return controller
 
 

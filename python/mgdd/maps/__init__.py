@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.compare import apply_map, compare_maps
 from mgdd.maps.dcm_files import read_dcm
@@ -20,6 +21,4 @@ __all__ = [
     "write_map",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

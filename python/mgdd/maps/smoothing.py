@@ -150,7 +150,7 @@ def smooth_map(
             warnings.warn(
                 f"{printable(str(optimum.name))}: extrapolated {notes['extrapolated']}: check them",
                 UserWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
     return optimum.replaced(
         np.where(missing, np.nan, solved).reshape(optimum.values.shape),

@@ -32,6 +32,7 @@ np.True_
 from __future__ import annotations
 
 from mgdd._core.optimize import ComponentLag, Input, Limit
+from mgdd._rooms import furnish as _furnish
 from mgdd.optimize.direct_seekers import ExtremumSeeking, GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import FitOptions, least_squares
@@ -45,6 +46,4 @@ __all__ = [
     "Input", "IterativeLearning", "Limit", "Seeker", "Spsa", "least_squares", "measure_map", "tune",
 ]  # fmt: skip
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

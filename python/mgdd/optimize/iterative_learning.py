@@ -201,7 +201,7 @@ class IterativeLearning:
         self._core = _core.optimize.IterativeLearning(**self._settings)
         self._report: ConvergenceReport | None = None
         if self._settings["impulse_response"].size and not self.convergence().asymptotic:
-            warnings.warn(f"law {law!r} {self.convergence().sentence}", UserWarning, stacklevel=2)
+            warnings.warn(f"law {law!r} {self.convergence().sentence}", UserWarning, stacklevel=3)
 
     def ask(self) -> NDArray[np.float64]:
         """Return the input of this trial.

@@ -7,13 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError, argument
 from mgdd.results.finding import Finding
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, named_label, to_jsonable
 from mgdd.results.result import NumbersResult
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -47,6 +51,8 @@ class Optimum(NumbersResult):
         The best point without limits, where it was sought.
     findings : tuple of Finding
         ``idle_limit``: a limit that nothing in the searched range reaches.
+    scan : mapping of str to array
+        The input, the objective and the limited quantities over the searched range, for `plot`; empty if not scanned.
     """
 
     inputs: Mapping[str, float]
@@ -60,9 +66,10 @@ class Optimum(NumbersResult):
     curvature: float = math.nan
     free_inputs: Mapping[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    scan: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("inputs", "values", "bounds", "free_inputs"):
+        for name in ("inputs", "values", "bounds", "free_inputs", "scan"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def __getitem__(self, name: str) -> float:
@@ -83,9 +90,19 @@ class Optimum(NumbersResult):
         edge = ", at the edge of the range" if self.at_bound else ""
         return f"<Optimum {self.objective} {self.value:.4g} at {at}{held}{edge}>"
 
+    def _draw(self, ax: Any) -> Any:
+        if not self.scan:
+            return super()._draw(ax)
+        from mgdd.plot.timing import scanned
+
+        over = next(iter(self.scan))
+        data = labelled_dataset({name: (over, values, *named_label(name)) for name, values in self.scan.items()})
+        caps = {limit.name: limit.upper for limit in self.limits}
+        return scanned(data, self.objective, self.inputs[over], self.value, caps, ax=ax)
+
     def to_dict(self) -> dict[str, Any]:
-        """Give everything as plain Python values."""
-        out = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        """Give everything but the scan as plain Python values."""
+        out = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "scan"}
         out["limits"] = {limit.name: limit.upper for limit in self.limits}
         out["findings"] = [vars(finding) for finding in self.findings]
         plain: dict[str, Any] = to_jsonable({k: dict(v) if isinstance(v, Mapping) else v for k, v in out.items()})

@@ -6,10 +6,9 @@ and Ctrl-C keeps what is finished.
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.parallel.items import map_items
 
 __all__ = ["map_items"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -7,6 +7,7 @@ title use the figure's `suptitle`.
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.plot.cycle import pressure
 from mgdd.plot.cycles import cycles
 from mgdd.plot.identification import correlation_matrix
@@ -32,6 +33,4 @@ __all__ = [
     "trade_off",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -7,10 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, ORANGE, finished, minus, new_axes, require
+from mgdd.plot.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    axis_label,
+    divide,
+    finished,
+    legend,
+    minus,
+    new_axes,
+    require,
+)
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
@@ -18,7 +32,7 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["timing"]
+__all__ = ["scanned", "timing"]
 
 _NOX = {"nox_affine_log_ppm": ("--", BLUE), "nox_arrhenius_ppm": ("-.", ORANGE)}
 
@@ -73,6 +87,57 @@ def timing(sweep: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     twin.set_ylabel("NOx proxy [ppm]")
     twin.set_ylim(bottom=0.0)
     return finished(ax, sweep, "soc_cad", "efficiency_gross", lines, grid=False)
+
+
+def scanned(
+    scan: xr.Dataset, objective: str, best: float, value: float, caps: Mapping[str, float], *, ax: Axes | None = None
+) -> Axes:
+    """Draw an objective over the only input, with its optimum, and each limited quantity with its limit below.
+
+    Parameters
+    ----------
+    scan : xarray.Dataset
+        Objective and limited quantities over the input.
+    objective : str
+        Name of the objective.
+    best, value : float
+        The optimum and the objective there.
+    caps : mapping of str to float
+        Limits by name.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; it is divided into the panels. None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes of the objective.
+    """
+    over = str(scan[objective].dims[0])
+    x, kept = scan[over].to_numpy(), np.ones(scan.sizes[over], bool)
+    for name, cap in caps.items():
+        kept &= scan[name].to_numpy() <= cap
+    ax = new_axes(ax, height=3.0 + 1.5 * len(caps))
+    panels = divide(ax, [1.6] + [1.0] * len(caps))
+    handles: list[Line2D] = ax.plot(x, scan[objective], "-", color=GREY, linewidth=1.2, label="all timings")
+    if not kept.all():
+        allowed = np.where(kept, scan[objective], np.nan)
+        handles += ax.plot(x, allowed, "-", color=BLACK, linewidth=2.2, label="within the limits")
+    text = minus(f"optimum {value:.4g} at {best:.2f} {label_of(scan[over]).units}")
+    handles += ax.plot(best, value, "o", color=BLUE, markersize=7, label=text)
+    ax.set_ylabel(axis_label(scan, objective))
+    for panel, (name, cap) in zip(panels[1:], caps.items(), strict=True):
+        panel.plot(x, scan[name], "-", color=BLACK, linewidth=1.2)
+        text = minus(f"limit {name} {cap:g} {label_of(scan[name]).units}")
+        handles.append(panel.axhline(cap, color=ORANGE, linestyle="--", linewidth=1.4, label=text))
+        panel.set_ylabel(f"{name}\n[{label_of(scan[name]).units}]")
+    for panel in panels:
+        panel.axvline(best, color=BLUE, linewidth=0.8, linestyle=":")
+        panel.grid(alpha=0.3)
+    panels[-1].set_xlabel(axis_label(scan, over))
+    ax.set_xlim(float(x[0]), float(x[-1]))
+    ax.figure.align_ylabels(panels)
+    legend(ax, handles)
+    return ax
 
 
 def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, bool]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.presets.preset import available, load
 
 __all__ = ["available", "load"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -257,12 +258,19 @@ def _load(text: str, kind: str | None) -> Preset:
             raise FileNotFoundError(
                 error.errno, f"no preset file {text!r}: {hint}; shipped are {', '.join(available(kind))}"
             ) from None
-    if text not in available():
+    if (shipped := _shipped(text)) is None:
         longer = next((f"did you mean {name!r}?" for name in available(kind) if text and text in name), "")
         hint = did_you_mean(text, available(kind)) or longer or "or pass a path that ends in .toml"
         raise ParameterError(f"no preset {text!r}: shipped are {', '.join(available(kind))}; {hint}")
-    file = resources.files("mgdd.presets").joinpath(f"{text}.toml")
-    return Preset.from_toml(file.read_text(encoding="utf-8"), origin=f"preset {text}")
+    return shipped
+
+
+@lru_cache(maxsize=64)  # a preset cannot be changed, so that all who ask share one
+def _shipped(name: str) -> Preset | None:
+    if name not in available():
+        return None
+    file = resources.files("mgdd.presets").joinpath(f"{name}.toml")
+    return Preset.from_toml(file.read_text(encoding="utf-8"), origin=f"preset {name}")
 
 
 def _check_kind(kind: str | None) -> None:

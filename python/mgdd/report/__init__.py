@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.report.calibration import calibration_report
 from mgdd.report.explore import explore
 from mgdd.report.page import write_report
@@ -10,6 +11,4 @@ from mgdd.report.sections import Section, Table
 
 __all__ = ["Report", "Section", "Table", "calibration_report", "explore", "write_report"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

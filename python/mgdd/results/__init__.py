@@ -5,12 +5,11 @@ Nothing stands here without a unit: a Dataset refuses a variable that does not s
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.results.fit import Fit
 
 __all__ = [
     "Fit",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

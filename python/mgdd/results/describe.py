@@ -14,18 +14,20 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import printable
-from mgdd.results.labels import VARIABLES
+from mgdd.results.labels import VARIABLES, label_of
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
+    "PLAIN",
     "Row",
     "as_figure",
     "as_html",
     "as_text",
     "core_rows",
+    "dataset_text",
     "described",
     "fields_of",
     "picture_of",
@@ -38,7 +40,8 @@ _LONG = 60  # of a text in a table
 _LEAD, _MANY = 8, 60  # rows in HTML: that are seen at once, and behind a fold
 _CELLS = 25  # along an axis of a map in a small picture
 _DIGITS = 6
-_PLAIN = ("parameters", "summary")  # mappings whose keys need no owner in front
+_FEW = 4  # numbers that are shown rather than their range
+PLAIN = ("inputs", "values", "numbers", "parameters", "summary")  # mappings whose keys need no owner in front
 T = TypeVar("T")
 
 
@@ -205,7 +208,7 @@ def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -
     out = []
     for name, value in values.items():
         if isinstance(value, Mapping) and value and all(_is_scalar(item) for item in value.values()):
-            owner, shared = "" if name in _PLAIN else f"{name}.", unit_of(name)
+            owner, shared = "" if name in PLAIN else f"{name}.", unit_of(name)
             for key, item in value.items():
                 (row,) = rows_of({str(key): item}, units)
                 unit = row.unit if shared == "-" or row.value == "–" else shared
@@ -215,6 +218,18 @@ def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -
             shown = _shown(value)
             out.append(Row(name, shown, unit if shown != "–" else "-"))
     return out
+
+
+def dataset_text(data: Any) -> str:
+    """Lay out a Dataset as text: its size, and the value or the range of every variable."""
+    over = " × ".join(f"{size} {dim}" for dim, size in data.sizes.items())
+    shown: dict[str, Any] = {}
+    for name, own in sorted(data.data_vars.items(), key=lambda item: item[1].ndim):  # numbers before ranges
+        values = own.to_numpy()
+        few = values.size <= _FEW and values.ndim == 1
+        shown[str(name)] = own.item() if not own.ndim else values if few else _range(values, "")
+    units = {str(name): label_of(own).units for name, own in data.data_vars.items() if "units" in own.attrs}
+    return as_text(f"Dataset over {over}" if over else "Dataset", rows_of(shown, units))
 
 
 def described(
@@ -261,8 +276,9 @@ def title_of(obj: Any) -> str:
 
 
 def fields_of(obj: Any) -> dict[str, Any]:
-    """Give the fields of a dataclass but name and kind."""
-    return {item.name: getattr(obj, item.name) for item in dataclasses.fields(obj) if item.name not in ("name", "kind")}
+    """Give the fields of a dataclass but name, kind and those that its text leaves out."""
+    shown = (item.name for item in dataclasses.fields(obj) if item.repr and item.name not in ("name", "kind"))
+    return {name: getattr(obj, name) for name in shown}
 
 
 def _is_scalar(value: Any) -> bool:
@@ -281,23 +297,33 @@ def _shown(value: Any) -> str:
     if isinstance(value, str):
         return textwrap.shorten(value, _LONG, placeholder=" …") or "–"
     if isinstance(value, np.ndarray):
-        return f"array {' × '.join(map(str, value.shape))}" if value.size > 4 else _shown(value.tolist())
+        few = value.size <= _FEW and value.ndim <= 1
+        return _shown(value.tolist()) if few else _range(value, f" ({' × '.join(map(str, value.shape))})")
     if hasattr(value, "sizes") and hasattr(value, "dims"):
         return "Dataset (" + ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items()) + ")"
-    if isinstance(value, Sequence | set | frozenset) and value and all(_is_scalar(item) for item in value):
-        joined = ", ".join(item if isinstance(item, str) else _shown(item) for item in value)
+    if isinstance(value, Mapping | Sequence | set | frozenset):
+        named = value.items() if isinstance(value, Mapping) else [("", own) for own in value]
+        entries = [f"{name} {_shown(own)}".lstrip() for name, own in named]
+        joined = ", ".join(entries) or "none"
         short = textwrap.shorten(joined, _LONG, placeholder=" …")
         return short if short == joined else f"{len(value)}: {short}"
-    if isinstance(value, Mapping | Sequence | set | frozenset) and not value:
-        return "none"
-    if isinstance(value, Mapping):
-        return textwrap.shorten(f"{len(value)}: {', '.join(map(str, value))}", _LONG, placeholder=" …")
-    if isinstance(value, Sequence | set | frozenset):
-        return f"{len(value)} of {type(next(iter(value))).__name__}"
+    if isinstance(value, _core.optimize.Limit):
+        return f"{value.name} <= {value.upper:g}"
     if callable(value):
         return getattr(value, "__qualname__", type(value).__qualname__)
     own = repr(value)
     return own if len(own) <= _LONG and "\n" not in own and " object at " not in own else title_of(value)
+
+
+def _range(values: np.ndarray[Any, Any], shape: str) -> str:
+    """Show an array by its least and its largest number."""
+    if values.dtype.kind == "b":
+        return f"{int(values.sum())} of {values.size} yes"
+    known = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
+    if not known.size:
+        return f"array{shape or ' without numbers'}"
+    low, high = _shown(known.min()), _shown(known.max())
+    return f"{low if low == high else f'{low} to {high}'}{shape}"
 
 
 def core_rows(record: Any) -> list[Row]:

@@ -192,6 +192,30 @@ class Fit(Result):
             raise DataError(f"a fit of {self.kind} keeps no run to draw: simulate its model")
         return self.draw(self, ax)
 
+    def predict(self, *given: Any, **options: Any) -> xr.Dataset:
+        """Predict with the model.
+
+        Parameters
+        ----------
+        *given, **options
+            As ``predict`` of `model` takes them: points of a response, or a record and the samples ahead of a throttle.
+
+        Returns
+        -------
+        xarray.Dataset
+            As ``predict`` of `model` gives it.
+
+        Raises
+        ------
+        DataError
+            A model that does not predict, as a cylinder: `mgdd.engine.simulate` takes it.
+        """
+        own = getattr(self.model, "predict", None)
+        if own is None:
+            raise DataError(f"{type(self.model).__name__} has no predict: simulate it, with the model of this fit")
+        made: xr.Dataset = own(*given, **options)
+        return made
+
     def to_dict(self) -> dict[str, Any]:
         """Give everything but residual, model and run as plain values that `json.dumps` takes.
 
@@ -234,9 +258,12 @@ class Fit(Result):
         give = getattr(self.model, "to_parameters", None)
         if give is None:
             raise DataError(f"{type(self.model).__name__} has no parameter file: keep the parameters of to_dict()")
+        own = give()
+        if "parameters" not in own.tables:  # a response, whose file has its points: they say what the fit would
+            return str(own.to_toml())
         units = dict.fromkeys(("fit_percent_train", "fit_percent_test"), "%")
         units["rmse_test"] = "-" if self.test is None else self.test.unit
-        file = give().with_fit(
+        file = own.with_fit(
             stderr=self.stderr,
             figures={name: (value, units[name]) for name, value in figures_of(self).items() if value is not None},
             source=f"fitted to {self.source}",

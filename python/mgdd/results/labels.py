@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
+    from mgdd.results.dataset import Dataset
+
 __all__ = [
     "ANGLE",
     "VARIABLES",
@@ -202,7 +204,7 @@ def labelled_dataset(
     *,
     attrs: Mapping[str, Any] | None = None,
     copy: bool = True,
-) -> xr.Dataset:
+) -> Dataset:
     """Build a Dataset in which nothing lacks a unit; the values are copied.
 
     Parameters
@@ -219,7 +221,7 @@ def labelled_dataset(
 
     Returns
     -------
-    xarray.Dataset
+    mgdd.results.Dataset
         With ``attrs["units"]`` and ``attrs["long_name"]`` on every variable and coordinate. The units are expressions
         that pint parses (``degree``, ``percent``, ``N*m``, ``1``); a convention that they cannot hold ends the long
         name: ``crank angle, °CA aTDC``.
@@ -243,7 +245,7 @@ def labelled_dataset(
     >>> ds["pressure_bar"].attrs["units"], ds["crank_angle_cad"].attrs["long_name"]
     ('bar', 'crank angle, °CA aTDC')
     """
-    import xarray as xr
+    from mgdd.results.dataset import Dataset
 
     _check_attributes("the Dataset", attrs or {})
     arrays: dict[str, tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, str]]] = {}
@@ -263,7 +265,7 @@ def labelled_dataset(
         if dim not in coords:
             raise DataError(f"dimension {dim} of {name} has no coordinate: add a variable {dim!r}")
     data = {name: item for name, item in arrays.items() if name not in coords}
-    return xr.Dataset(data_vars=data, coords=coords, attrs=dict(attrs or {}))
+    return Dataset(data_vars=data, coords=coords, attrs=dict(attrs or {}))
 
 
 def label_of(variable: xr.DataArray | xr.Variable) -> Label:

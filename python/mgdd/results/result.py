@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable, Mapping
 from numbers import Real
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
-from mgdd.results.describe import Row, as_figure, as_html, as_text, fields_of, picture_of, rows_of, title_of
+from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.results.describe import PLAIN, Row, as_figure, as_html, as_text, fields_of, picture_of, rows_of, title_of
 from mgdd.results.labels import Label, labelled_dataset, named_label
 
 if TYPE_CHECKING:
-    import os
-
     import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Figures", "NumbersResult", "Result", "drawn_by", "merged"]
-
-_PLAIN = ("inputs", "values", "numbers")  # mappings whose keys need no owner in front
+__all__ = ["Figures", "NumbersResult", "Result", "drawn_by", "merged", "saved"]
 
 
 class Figures(dict[str, Any]):
@@ -66,6 +64,13 @@ class Result:
         @property
         def dataset(self) -> xr.Dataset:
             """All its data."""
+
+    else:
+
+        def __getattr__(self, name: str) -> Any:
+            kind, known = type(self).__name__, [each for each in dir(self) if not each.startswith("_")]
+            hint = "" if name.startswith("_") else did_you_mean(name, known) or f"it has {', '.join(known)}"
+            raise AttributeError(f"{kind!r} object has no attribute {name!r}: {hint}", name=name, obj=self)
 
     def _title(self) -> str:
         return title_of(self)
@@ -123,6 +128,22 @@ class Result:
     def _draw(self, ax: Axes | None) -> Axes:
         return as_figure(self._title(), self._rows(), ax)
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result to a file: its data to ``.nc``, the parameters of its model to ``.toml``.
+
+        Parameters
+        ----------
+        path : path-like
+            The file, by whose ending the form is chosen; one that is there is overwritten. `xarray.load_dataset` reads
+            the first form, ``load`` of the class of the model the second.
+
+        Raises
+        ------
+        ParameterError
+            Another ending, or ``.toml`` for a result without a model that has a parameter file.
+        """
+        saved(self, path)
+
     def to_netcdf(self, path: str | os.PathLike[str]) -> None:
         """Write `dataset` to a classic netCDF file; `xarray.load_dataset` reads it, and `mgdd.plot` draws what it read.
 
@@ -165,6 +186,18 @@ class Result:
         return pd.DataFrame(columns, index=index)
 
 
+def saved(what: Any, path: str | os.PathLike[str]) -> None:
+    """Write a result or a Dataset in the form of the ending of the file."""
+    give, ending = getattr(what, "to_toml", None), Path(path).suffix
+    if ending == ".nc":
+        getattr(what, "dataset", what).to_netcdf(path, engine="scipy")
+    elif ending == ".toml" and give is not None:
+        Path(path).write_text(give(), encoding="utf-8")
+    else:
+        bound = "a file that ends in .nc, for the data" + (", or in .toml, for the parameters" if give else "")
+        raise ParameterError.of("path", os.fspath(path), bound)
+
+
 class NumbersResult(Result):
     """A result that is a record of numbers and texts: its `dataset` has them as variables without a dimension."""
 
@@ -195,7 +228,7 @@ def _sorted(name: str, value: Any, numbers: dict[str, Any], texts: dict[str, Any
         numbers[name] = value
     elif isinstance(value, Mapping):
         for key, own in value.items():
-            _sorted(str(key) if name in _PLAIN else f"{name}_{key}", own, numbers, texts)
+            _sorted(str(key) if name in PLAIN else f"{name}_{key}", own, numbers, texts)
     elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(own, Real) for own in value):
         for key, own in zip(("low", "high"), value, strict=True):
             numbers[f"{name}_{key}"] = own
@@ -236,6 +269,7 @@ def merged(*datasets: xr.Dataset, attrs: Mapping[str, Any] | None = None) -> xr.
     """
     import xarray as xr
 
+    from mgdd.results.dataset import Dataset
+
     whole = xr.merge(datasets, combine_attrs="override", join="outer", compat="no_conflicts")
-    whole.attrs = dict(attrs or {})
-    return whole
+    return Dataset(whole.data_vars, whole.coords, dict(attrs or {}))

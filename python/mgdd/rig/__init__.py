@@ -7,6 +7,7 @@ core, with its frames, messages and transports, is in `mgdd.rig.realtime`.
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
@@ -41,6 +42,4 @@ __all__ = [
     "watch",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -5,6 +5,7 @@ Numbers in, numbers out; units are those of the caller.
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
 from mgdd.signals.metrics import nrmse_fit_percent
 
@@ -18,6 +19,4 @@ __all__ = [
     "triangle",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

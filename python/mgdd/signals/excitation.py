@@ -32,7 +32,7 @@ def chirp(
     amplitude: float,
     low_hz: float = 0.2,
     high_hz: float = 6.0,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
 ) -> xr.Dataset:
     """Sweep a sine linearly from `low_hz` to `high_hz`.
 
@@ -46,7 +46,7 @@ def chirp(
         First frequency [Hz].
     high_hz : float
         Last frequency [Hz].
-    step_s : float
+    sample_s : float
         Sample time [s].
 
     Returns
@@ -66,8 +66,8 @@ def chirp(
     >>> sweep.sizes["time_s"], float(sweep["duty"][0])
     (12000, 0.15)
     """
-    time = _time(duration_s, step_s)
-    _check_band(low_hz, high_hz, step_s)
+    time = _time(duration_s, sample_s)
+    _check_band(low_hz, high_hz, sample_s)
     phase = 2.0 * math.pi * (low_hz * time + (high_hz - low_hz) * time**2 / (2.0 * duration_s))
     return _signal("chirp", time, np.sin(phase), offset, amplitude, low_hz=low_hz, high_hz=high_hz)
 
@@ -80,7 +80,7 @@ def multisine(
     fundamental_hz: float = 0.1,
     high_hz: float = 8.0,
     harmonics: int = 20,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
 ) -> xr.Dataset:
     """Add odd harmonics of equal size with Schroeder's phases, which keep the peak low.
 
@@ -99,7 +99,7 @@ def multisine(
         Upper end of the band, of a chirp its last frequency [Hz].
     harmonics : int
         How many.
-    step_s : float
+    sample_s : float
         Sample time [s].
 
     Returns
@@ -122,8 +122,8 @@ def multisine(
     >>> multisine(offset=0.0, amplitude=0.2).attrs["crest_factor"] < 2.0
     True
     """
-    time = _time(duration_s, step_s)
-    _check_band(fundamental_hz, high_hz, step_s)
+    time = _time(duration_s, sample_s)
+    _check_band(fundamental_hz, high_hz, sample_s)
     odd = np.arange(1, math.floor(high_hz / fundamental_hz * (1.0 + 1e-12)) + 1, 2)
     if not 1 <= harmonics <= odd.size:
         raise ParameterError.of(
@@ -139,7 +139,7 @@ def multisine(
     phases = -math.pi * k * (k - 1) / harmonics
     wave = np.cos(2.0 * math.pi * fundamental_hz * lines * time[:, None] + phases).sum(axis=1)
     # The peak between two samples is the amplifier's too, but what is sent is samples.
-    period = _time(1.0 / fundamental_hz, min(step_s, 0.02 / high_hz))
+    period = _time(1.0 / fundamental_hz, min(sample_s, 0.02 / high_hz))
     whole = np.cos(2.0 * math.pi * fundamental_hz * lines * period[:, None] + phases).sum(axis=1)
     peak = max(float(np.abs(whole).max()), float(np.abs(wave).max()))
     crest = peak / float(np.sqrt(np.mean(whole**2)))
@@ -156,7 +156,7 @@ def prbs(
     amplitude: float,
     hold_s: float = 0.1,
     register: int = 7,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
 ) -> xr.Dataset:
     """Switch between two levels by a shift register of maximum length.
 
@@ -170,7 +170,7 @@ def prbs(
         Shortest time at a level [s]: the spectrum is flat to about 0.44 over it.
     register : int
         Length of the register, 3 to 16.
-    step_s : float
+    sample_s : float
         Sample time [s].
 
     Returns
@@ -192,13 +192,13 @@ def prbs(
     """
     if register not in _TAPS:
         raise ParameterError.of("register", register, "in [3, 16]")
-    held = _hold(hold_s, step_s)
+    held = _hold(hold_s, sample_s)
     bits = maximum_length_sequence(register)
-    time = _time(bits.size * held * step_s if duration_s is None else duration_s, step_s)
+    time = _time(bits.size * held * sample_s if duration_s is None else duration_s, sample_s)
     wave = 2.0 * bits[(np.arange(time.size) // held) % bits.size].astype(np.float64) - 1.0
     return _signal(
         "prbs", time, wave, offset, amplitude,
-        low_hz=1.0 / (bits.size * held * step_s), high_hz=0.44 / (held * step_s), hold_s=held * step_s,
+        low_hz=1.0 / (bits.size * held * sample_s), high_hz=0.44 / (held * sample_s), hold_s=held * sample_s,
         register=register,
     )  # fmt: skip
 
@@ -210,7 +210,7 @@ def amplitude_random_steps(
     amplitude: float,
     hold_s: float | tuple[float, float] = 0.15,
     seed: int | None = None,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
 ) -> xr.Dataset:
     """Step to levels spread over the whole swing (an amplitude-modulated pseudo-random sequence).
 
@@ -225,7 +225,7 @@ def amplitude_random_steps(
     seed : int, optional
         Of levels and holds. None takes the golden-ratio sequence, level k at ``2 frac(0.618 k) - 1``, which fills
         the swing evenly.
-    step_s : float
+    sample_s : float
         Sample time [s].
 
     Returns
@@ -245,9 +245,9 @@ def amplitude_random_steps(
     >>> [round(float(u), 4) for u in steps["duty"][[0, 150, 300]]]
     [-0.05, 0.1972, 0.0444]
     """
-    time = _time(duration_s, step_s)
+    time = _time(duration_s, sample_s)
     shortest, longest = (hold_s, hold_s) if isinstance(hold_s, int | float) else hold_s
-    least, most = _hold(shortest, step_s), _hold(longest, step_s)
+    least, most = _hold(shortest, sample_s), _hold(longest, sample_s)
     if most < least:
         raise ParameterError(f"hold_s = ({shortest:g}, {longest:g}): the first must not exceed the second")
     count = time.size // least + 1
@@ -262,7 +262,13 @@ def amplitude_random_steps(
         levels, holds = rng.uniform(-1.0, 1.0, count), rng.integers(least, most + 1, count)
     wave = np.repeat(levels, holds)[: time.size]
     return _signal(
-        "amplitude_random_steps", time, wave, offset, amplitude, high_hz=0.44 / (least * step_s), hold_s=least * step_s
+        "amplitude_random_steps",
+        time,
+        wave,
+        offset,
+        amplitude,
+        high_hz=0.44 / (least * sample_s),
+        hold_s=least * sample_s,
     )
 
 
@@ -273,7 +279,7 @@ def staircase(
     rise: float = 0.01,
     hold_s: float = 0.25,
     cycles: int = 1,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
 ) -> xr.Dataset:
     """Climb from the lowest duty to the highest and back in small steps: hysteresis, breakaway, springs.
 
@@ -287,7 +293,7 @@ def staircase(
         Time on a step [s].
     cycles : int
         How often up and down.
-    step_s : float
+    sample_s : float
         Sample time [s].
 
     Returns
@@ -308,7 +314,7 @@ def staircase(
     (30.249, 0.3)
     """
     _check_swing(offset, amplitude)
-    held = _hold(hold_s, step_s)
+    held = _hold(hold_s, sample_s)
     if not (math.isfinite(rise) and rise > 0.0):
         raise ParameterError.of("rise", rise, "> 0")
     if cycles < 1:
@@ -316,8 +322,8 @@ def staircase(
     count = max(math.ceil(2.0 * amplitude / rise * (1.0 - 1e-9)), 1)
     up = np.linspace(-1.0, 1.0, count + 1)
     levels = np.r_[up, np.tile(np.r_[up[-2::-1], up[1:]], cycles - 1), up[-2::-1]]
-    time = _time(levels.size * held * step_s, step_s)
-    return _signal("staircase", time, np.repeat(levels, held), offset, amplitude, hold_s=held * step_s, rise=rise)
+    time = _time(levels.size * held * sample_s, sample_s)
+    return _signal("staircase", time, np.repeat(levels, held), offset, amplitude, hold_s=held * sample_s, rise=rise)
 
 
 def triangle(
@@ -326,7 +332,7 @@ def triangle(
     offset: float,
     amplitude: float,
     frequency_hz: float = 0.05,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
 ) -> xr.Dataset:
     """Ramp slowly up and down: friction by the hysteresis, preload by the jump at limp-home, springs by the slope.
 
@@ -338,7 +344,7 @@ def triangle(
         Mean duty and half the swing [-]; starts at `offset`, upwards.
     frequency_hz : float
         Ramps up and down per second [Hz].
-    step_s : float
+    sample_s : float
         Sample time [s].
 
     Returns
@@ -358,8 +364,8 @@ def triangle(
     >>> round(float(ramp["duty"].max()), 6), round(float(ramp["duty"][10000]), 6)
     (0.3, 0.0)
     """
-    time = _time(duration_s, step_s)
-    _check_band(0.0, frequency_hz, step_s)
+    time = _time(duration_s, sample_s)
+    _check_band(0.0, frequency_hz, sample_s)
     wave = 1.0 - np.abs(np.mod(4.0 * frequency_hz * time + 3.0, 4.0) - 2.0)
     return _signal("triangle", time, -wave, offset, amplitude, low_hz=frequency_hz, high_hz=frequency_hz)
 
@@ -373,29 +379,29 @@ def maximum_length_sequence(register: int) -> NDArray[np.int_]:
     return np.asarray(bits, dtype=np.int_)
 
 
-def _time(duration_s: float, step_s: float) -> NDArray[np.float64]:
-    if not (math.isfinite(step_s) and step_s > 0.0):
-        raise ParameterError.of("step_s", step_s, "finite and > 0")
-    if not (math.isfinite(duration_s) and duration_s >= 2.0 * step_s):
-        raise ParameterError.of("duration_s", duration_s, f"finite and at least two samples of {step_s:g} s")
-    if duration_s / step_s > _MOST_SAMPLES:
-        raise ParameterError(f"duration_s = {duration_s:g}: {_MOST_SAMPLES} samples of {step_s:g} s are the most")
-    return np.arange(round(duration_s / step_s), dtype=np.float64) * step_s
+def _time(duration_s: float, sample_s: float) -> NDArray[np.float64]:
+    if not (math.isfinite(sample_s) and sample_s > 0.0):
+        raise ParameterError.of("sample_s", sample_s, "finite and > 0")
+    if not (math.isfinite(duration_s) and duration_s >= 2.0 * sample_s):
+        raise ParameterError.of("duration_s", duration_s, f"finite and at least two samples of {sample_s:g} s")
+    if duration_s / sample_s > _MOST_SAMPLES:
+        raise ParameterError(f"duration_s = {duration_s:g}: {_MOST_SAMPLES} samples of {sample_s:g} s are the most")
+    return np.arange(round(duration_s / sample_s), dtype=np.float64) * sample_s
 
 
-def _hold(hold_s: float, step_s: float) -> int:
-    if not (step_s > 0.0 and math.isfinite(hold_s) and hold_s >= step_s * (1.0 - 1e-9)):
-        raise ParameterError.of("hold_s", hold_s, f"at least one sample, step_s = {step_s:g}")
-    return max(round(hold_s / step_s), 1)
+def _hold(hold_s: float, sample_s: float) -> int:
+    if not (sample_s > 0.0 and math.isfinite(hold_s) and hold_s >= sample_s * (1.0 - 1e-9)):
+        raise ParameterError.of("hold_s", hold_s, f"at least one sample, sample_s = {sample_s:g}")
+    return max(round(hold_s / sample_s), 1)
 
 
-def _check_band(low_hz: float, high_hz: float, step_s: float) -> None:
-    nyquist = 0.5 / step_s
+def _check_band(low_hz: float, high_hz: float, sample_s: float) -> None:
+    nyquist = 0.5 / sample_s
     if not 0.0 <= low_hz <= high_hz or not high_hz > 0.0:
         raise ParameterError(f"low_hz = {low_hz:g}, high_hz = {high_hz:g}: must be 0 <= low <= high, high > 0")
     if high_hz >= nyquist:
         raise ParameterError.of(
-            "high_hz", high_hz, f"below half the sampling rate, {nyquist:g} Hz; lower it or step_s = {step_s:g}"
+            "high_hz", high_hz, f"below half the sampling rate, {nyquist:g} Hz; lower it or sample_s = {sample_s:g}"
         )
 
 

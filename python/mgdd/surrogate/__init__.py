@@ -7,12 +7,11 @@ of an experiment, as `mgdd.design.design_points` plans one.
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.surrogate.fit import fit_surrogate
 from mgdd.surrogate.response_fit import fit_response
 from mgdd.surrogate.response_model import ResponseModel
 
 __all__ = ["ResponseModel", "fit_response", "fit_surrogate"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

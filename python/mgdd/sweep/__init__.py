@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from mgdd._rooms import furnish as _furnish
 from mgdd.sweep.cycles import sweep
 
 __all__ = ["sweep"]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

@@ -146,7 +146,11 @@ def cases_of(over: Any, *, points: bool) -> Cases:
         numbers = np.asarray(over[POINT].to_numpy()) if POINT in over.coords else None
         points, over = True, over.data_vars
     if not hasattr(over, "keys") or not len(list(over.keys())):
-        raise ParameterError.of("over", shown(over), "a mapping of at least one input to its values, or a design")
+        raise ParameterError.of(
+            "over",
+            shown(over),
+            "a mapping of at least one input to its values, as {'soc_cad': [-10.0, -5.0]}, or a design",
+        )
     inputs = {str(name): _values(str(name), over[name]) for name in over.keys()}  # noqa: SIM118 - a DataFrame too
     if not points:
         for name, values in inputs.items():

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from mgdd.results.dataset import Dataset
+
 NOX = ("nox_affine_log_ppm", "nox_arrhenius_ppm")
 VOID = "void"  # numbers of the cases whose pressure leaves the physical range
 _ALWAYS = "p_max_bar"  # finite for every cycle that is one
@@ -134,7 +136,7 @@ def sweep(
     executor: MakesExecutor | None = None,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> xr.Dataset:
+) -> Dataset:
     """Simulate a cycle for every point of a grid, or for every point of a list.
 
     The numbers are those of `mgdd.engine.simulate` for each point, to rounding; to one part in a million where thirty
@@ -256,7 +258,7 @@ def _dataset(
     angles: NDArray[np.float64],
     void: _Void,
     finished: NDArray[np.bool_] | None,
-) -> xr.Dataset:
+) -> Dataset:
     variables = cases.coordinates()
     if request.traces:
         variables[ANGLE] = (ANGLE, angles)

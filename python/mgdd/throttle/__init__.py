@@ -7,6 +7,7 @@ reconstruction from public sources, not the code behind the dissertation: see th
 from __future__ import annotations
 
 from mgdd._core.throttle import PedalMap, Throttle
+from mgdd._rooms import furnish as _furnish
 from mgdd.throttle.characteristics import characteristics
 from mgdd.throttle.demand import DemandChain
 from mgdd.throttle.interop import to_iosystem
@@ -25,6 +26,4 @@ __all__ = [
     "to_iosystem",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
+_furnish(__name__)

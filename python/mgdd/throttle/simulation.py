@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from mgdd.results.dataset import Dataset
+
 __all__ = ["simulate_throttle", "step_summary"]
 
 _DEFAULT_DURATION_S = 1.0
@@ -39,7 +41,7 @@ def simulate_throttle(
     supply_v: ArrayLike | None = None,
     airflow_torque_nm: ArrayLike = 0.0,
     step_s: float = 1e-4,
-) -> xr.Dataset:
+) -> Dataset:
     """Simulate a throttle from rest, without current, under a duty signal; or many cases at once in vector lanes.
 
     Parameters

@@ -29,7 +29,7 @@ def design_excitation(
     *,
     side: str = "above",
     duration_s: float | None = None,
-    step_s: float = 1e-3,
+    sample_s: float = 1e-3,
     angle_window_deg: tuple[float, float] | None = None,
     max_rate_deg_per_s: float | None = None,
     max_current_a: float | None = None,
@@ -52,7 +52,7 @@ def design_excitation(
         Side of limp-home to be identified.
     duration_s : float, optional
         Length [s]; None takes the default of the signal.
-    step_s : float
+    sample_s : float
         Sample time [s].
     angle_window_deg : (float, float), optional
         Where the plate may go [deg]. None keeps it 1 deg off its stops above limp-home; below it, across it, and for
@@ -99,7 +99,7 @@ def design_excitation(
             window = (low - _STOP_DEG, window[1])
         if kind in _QUASI_STATIC:
             window = (window[0], high + _STOP_DEG)
-    make = _maker(kind, side, duration_s, step_s)
+    make = _maker(kind, side, duration_s, sample_s)
     check: ExcitationCheck | None = None
     for factor in _OVER_FRICTION:
         offset, amplitude = _rule(known.groups, known.limp_home_deg, window, side, factor, slow=kind in _QUASI_STATIC)
@@ -148,22 +148,22 @@ def _rule(
     return sign * hold, friction
 
 
-def _maker(kind: str, side: str, duration_s: float | None, step_s: float) -> Callable[[float, float], xr.Dataset]:
+def _maker(kind: str, side: str, duration_s: float | None, sample_s: float) -> Callable[[float, float], xr.Dataset]:
     def make(offset: float, amplitude: float) -> xr.Dataset:
         if kind == "staircase":
             if duration_s is not None:
                 raise ParameterError("duration_s: a staircase lasts as long as its steps; leave it out")
-            return staircase(offset=offset, amplitude=amplitude, step_s=step_s)
+            return staircase(offset=offset, amplitude=amplitude, sample_s=sample_s)
         if kind == "prbs":
-            return prbs(duration_s, offset=offset, amplitude=amplitude, step_s=step_s)
+            return prbs(duration_s, offset=offset, amplitude=amplitude, sample_s=sample_s)
         length = _LENGTHS[kind] if duration_s is None else duration_s
         if kind == "chirp":
             low, high = (0.5, 8.0) if side == "below" else (0.2, 6.0)
-            return chirp(length, offset=offset, amplitude=amplitude, low_hz=low, high_hz=high, step_s=step_s)
+            return chirp(length, offset=offset, amplitude=amplitude, low_hz=low, high_hz=high, sample_s=sample_s)
         if kind == "multisine":
-            return multisine(length, offset=offset, amplitude=amplitude, step_s=step_s)
+            return multisine(length, offset=offset, amplitude=amplitude, sample_s=sample_s)
         if kind == "triangle":
-            return triangle(length, offset=offset, amplitude=amplitude, step_s=step_s)
-        return amplitude_random_steps(length, offset=offset, amplitude=amplitude, step_s=step_s)
+            return triangle(length, offset=offset, amplitude=amplitude, sample_s=sample_s)
+        return amplitude_random_steps(length, offset=offset, amplitude=amplitude, sample_s=sample_s)
 
     return make

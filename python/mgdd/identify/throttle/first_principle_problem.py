@@ -126,7 +126,7 @@ def groups_problem(
 ) -> GroupsProblem:
     """Read a log, check names and values, and start from the torque balance of its moving samples."""
     time, duty, angle = log_columns(log)
-    step_s = even_step(time, remedy=f"read_throttle_log(..., {argument('step_s', '{step:g}')}) resamples")
+    step_s = even_step(time, remedy=f"read_throttle_log(..., {argument('sample_s', '{step:g}')}) resamples")
     given = {name: float(value) for name, value in {**(start_values or {}), **(fixed or {})}.items()}
     for name in [*given, *free]:
         if name not in GROUP_NAMES:

@@ -152,7 +152,7 @@ class IdentifyPlan:
         self.task, self.sample_s, self.seed = task, sample_s, seed
         self.prior = throttle_named(task.prior, folder)
         signal, _ = identify.design_excitation(
-            task.excitation, self.prior, side=task.side, duration_s=task.duration_s, step_s=sample_s
+            task.excitation, self.prior, side=task.side, duration_s=task.duration_s, sample_s=sample_s
         )
         settle = round(_SETTLE_S / sample_s)
         self.duty = np.r_[np.zeros(settle), signal["duty"].to_numpy()]
