@@ -107,11 +107,15 @@ def test_a_limit_is_the_same_after_every_journey(tmp_path: Path) -> None:
         ({"delay_cycles": -1.0}, r"limit p: delay_cycles = -1: must lie in \[0, 1e6\]"),
         ({"lag_cycles": math.nan}, r"limit p: lag_cycles = nan: must lie in \[0, 1e6\]"),
         ({"margin_sd": -0.5}, r"limit p: margin_sd = -0.5: must lie in \[0, 100\]"),
+        ({"upper": math.inf}, "limit p: upper = inf"),
+        ({"margin": -1.0}, "margin = -1"),
+        ({"method": "penalty", "weight": 0.0}, "weight = 0"),
+        ({"method": "penalty", "scale": math.nan}, "scale = nan"),
     ],
 )
-def test_what_cannot_be_is_named(wrong: dict[str, float], text: str) -> None:
+def test_what_cannot_be_is_named(wrong: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
-        Limit("p", 1.0, **wrong)
+        Limit("p", **{"upper": 1.0, **wrong})
 
 
 def test_history_and_states_tell_of_the_limits() -> None:

@@ -113,6 +113,8 @@ def test_a_misfire_is_counted_and_not_read(make: Any) -> None:
     assert np.isnan(seeker.history["objective"].values[-1]).all()
     if "delay" not in str(before):  # what comes late goes on
         np.testing.assert_array_equal(seeker.ask(), x)
+        counted = {name: before[name] for name in before if name.startswith("failing_")}
+        assert seeker.state | counted == before | {"cycle": [15.0], "misfires": [1.0]}
 
 
 @every
@@ -316,6 +318,8 @@ def test_a_state_that_is_not_its_own_is_refused_and_changes_nothing(make: Any) -
     before = seeker.state
     wrong = [{k: v for k, v in before.items() if k != "cycle"}, before | {"unheard_of": [1.0]}]
     wrong += [before | {"cycle": [value]} for value in (1.5, np.inf)]
+    if min(before.get("first_bend", [0.0])) > 0.0:  # the first readings are done
+        wrong += [before | {"first_bend": [value] * len(before["first_bend"])} for value in (0.0, -1.0, np.nan, np.inf)]
     wrong += [
         before | {name: [value]} for name in ("phase", "stage", "turn") if name in before for value in (-1.0, 1e6)
     ]
