@@ -218,11 +218,7 @@ def test_a_state_that_does_not_fit_changes_nothing() -> None:
     ("change", "field"),
     [
         ({"trust": 1.2}, "initial|trust"),
-        ({"probe_cycles": -1}, "probe_cycles"),
-        ({"doubt": 1.0}, "doubt"),
         ({"noise_sd": 0.0}, "noise_sd"),
-        ({"calibration_rate": 0.0}, "calibration_rate"),
-        ({"following_share": 0.0}, "following_share"),
         ({"calibration_rate": [1.0, 2.0]}, "calibration_rate"),
         ({"guide": 3.0}, "guide"),
         ({"seeker": "esc"}, "seeker"),
