@@ -90,6 +90,7 @@ def raising(_: Any) -> float:
         (raising, "ZeroDivisionError: map has no cell"),
         (lambda _: math.nan, "nan"),
         (lambda _: 10.5, "10.5"),
+        (lambda _: -30.5, "-30.5"),
         (lambda _: [1.0, 2.0], "2.0"),
         (lambda _: "late", "late"),
         (lambda _: curved(math.inf), "inf"),

@@ -65,9 +65,11 @@ def test_bound_of_monotone_trials(n, bound):
 def test_norm_optimal_factor_of_each_singular_direction():
     left, s, _ = np.linalg.svd(lifted([1.0, 0.5], 7))
     for direction, sigma in zip(left.T, s, strict=True):
-        learner = IterativeLearning(np.zeros(7), law="norm_optimal", impulse_response=[1.0, 0.5], change_weight=0.4)
-        errors = run(learner, [1.0, 0.5], direction, 3)
-        np.testing.assert_allclose(errors[1], 0.4 / (sigma**2 + 0.4) * direction, atol=1e-14)
+        for error, own in ((3.0, 0.2), (1.0, 0.0)):
+            weights = {"change_weight": 0.4, "error_weight": error, "input_weight": own}
+            learner = IterativeLearning(np.zeros(7), law="norm_optimal", impulse_response=[1.0, 0.5], **weights)
+            errors = run(learner, [1.0, 0.5], direction, 3)
+            np.testing.assert_allclose(errors[1], (own + 0.4) / (error * sigma**2 + own + 0.4) * direction, atol=1e-14)
     report = learner.convergence()
     assert report.spectral_radius == pytest.approx(0.4 / (s[-1] ** 2 + 0.4), abs=1e-10)
     assert report.monotone
@@ -84,7 +86,7 @@ LAWS = {
     "norm_optimal": {"law": "norm_optimal"},
     "weighted": {"law": "norm_optimal", "input_weight": 0.1, "error_weight": 2.0},
 }
-RESPONSE = np.array([0.0, 0.8, 0.3, -0.1])
+RESPONSE = np.array([1e-17, 0.8, 0.3, -0.1])  # the first acts on nothing
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -188,6 +188,8 @@ def test_steady_map_is_quiet_and_labelled() -> None:
         ),
         (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),
         (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
+        (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [], cycles=5), "seeds is empty"),
+        (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [1], cycles=0), "cycles = 0: must be >= 1"),
         (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "seeker = 3: must be a seeker, as"),
         (lambda: EngineBench().find_optimum({"nonsense": 1.0}), "'nonsense' is not an indicator"),
         (lambda: EngineBench().find_optimum(bounds={"soc_cad": (5.0, -5.0)}), "must increase"),

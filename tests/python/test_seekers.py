@@ -19,6 +19,7 @@ from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,
+    GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Limit,
@@ -174,9 +175,18 @@ def test_each_setting_refuses_by_name_or_bears_its_value(name: str) -> None:
         (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: ExtremumSeeking(start=0.0, form="median"), "form = .median.*batch"),
         (lambda: ExtremumSeeking(start=[0.0] * 9), "at most 8"),
+        (lambda: ExtremumSeeking(start=0.0, washout_pole=1.0), "washout_pole = 1: must lie between 0 and 1"),
+        (lambda: ExtremumSeeking(start=0.0, hold_cycles=-1), "hold_cycles = -1: must be >= 0"),
         (lambda: Spsa(start=0.0, gain=0.0), "gain = 0.*: must be > 0"),
+        (lambda: Spsa(start=0.0, gain_exponent=0.55), "gain_exponent = 0.55: must exceed"),
+        (lambda: Spsa(start=0.0, form="second_order", initial_hessian=0.0), "initial_hessian = 0: must be < 0"),
         (lambda: GoldenSection(start=0.0, lower=-np.inf, upper=1.0), "lower = -inf: must be finite"),
         (lambda: ComponentLag(delay_cycles=-1.0), "delay_cycles = -1"),
+        (lambda: ExtremumSeeking(start=0.0, components=[]), "components is empty"),
+        (
+            lambda: GaussianProcessSeeking(start=0.0, **BOX, delay_cycles=2.0, components=[ComponentLag()]),
+            "delay_cycles = 2: must be left out",
+        ),
     ],
 )
 def test_settings_are_refused_by_name(make: Any, message: str) -> None:

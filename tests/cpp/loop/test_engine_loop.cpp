@@ -74,7 +74,8 @@ LoopCycle cycle_at(double estimate_cad, double limit_value = 0.0, bool misfire =
 }
 
 TEST(LoopStatistics, CountsAsItsDefinitionsSay) {
-  LoopStatistics statistics({.optimum_cad = 0.0, .tail_cycles = 2, .exceed_from = 4, .exceed_above = {10.0}}, 8);
+  LoopStatistics statistics(
+      {.optimum_cad = 0.0, .tail_cycles = 2, .exceed_from = 4, .exceed_above = {10.0}, .limits = {10.0}}, 8);
   const std::vector<double> estimates{4.0, 1.0, 2.0, 1.0, 0.5, -0.5, 0.5, 0.1};
   const std::vector<double> values{99.0, 99.0, 99.0, 99.0, 10.0, 10.1, 9.0, 11.0};
   for (std::size_t k = 0; k < estimates.size(); ++k)
@@ -90,6 +91,10 @@ TEST(LoopStatistics, CountsAsItsDefinitionsSay) {
   EXPECT_EQ(s.misfires, 1);
   EXPECT_DOUBLE_EQ(s.lowest_cad, -0.5);
   EXPECT_DOUBLE_EQ(s.highest_cad, 4.0);
+  EXPECT_EQ(s.limits[0].worst_cycle, 0.0);
+  EXPECT_EQ(s.limits[0].above_cycles, 6);  // at the limit is not above it
+  EXPECT_EQ(s.limits[0].judged_above_cycles, 2);
+  EXPECT_EQ(s.limits[0].judged_read_cycles, 4);
 }
 
 TEST(LoopStatistics, SaysNothingOfWhatWasNotAskedOrDidNotHappen) {
