@@ -37,12 +37,6 @@ TEST(TransportLag, PhaseIsThatOfTheDiscreteFilter) {
   }
 }
 
-TEST(TransportLag, WithoutDelayAndLagItIsTheSignalItself) {
-  TransportLag lag;
-  for (const double x : {0.1, 0.7, -3.3})
-    EXPECT_EQ(lag.step(x, 0, 1.0), x);
-}
-
 TEST(TransportLag, ADelayThatChangesReadsAnotherPlaceOfTheLine) {
   TransportLag lag(10);
   for (int k = 0; k < 20; ++k)
