@@ -130,19 +130,13 @@ MADE: dict[str, Callable[..., Any]] = {
 
 @pytest.mark.parametrize("name", MADE)
 def test_each_number_is_refused_by_its_name_outside_of_its_domain(name: str) -> None:
-    numbers = [field for field, value in MADE[name]().settings.items() if type(value) in (float, int)]
+    numbers = {field: value for field, value in MADE[name]().settings.items() if type(value) in (float, int)}
     assert len(numbers) >= 3
-    for field in numbers:
-        refused, said = list[float](), list[str]()
-        for value in (math.nan, -math.inf, math.inf, -1e12, 1e12, -1.0, 0.0, 0.5):
-            try:
+    for field, own in numbers.items():
+        for value in (-(10**9), -1) if type(own) is int else (math.nan, -math.inf, -1e12):
+            said = "initial" if field == "trust" else field.removeprefix("trust_")
+            with pytest.raises((ParameterError, TypeError), match=f"{said}|no argument '{field}'"):
                 MADE[name](**{field: value})
-            except (ParameterError, TypeError) as refusal:
-                refused.append(value)
-                said.append(str(refusal))
-        assert {-math.inf, -1e12} < {*refused}, field
-        assert any(map(math.isnan, refused)), field
-        assert all(field.removeprefix("trust_") in each or field == "trust" for each in said), (field, said)
 
 
 def test_tell_needs_a_measurement_or_a_misfire() -> None:

@@ -181,6 +181,7 @@ def test_each_setting_refuses_by_name_or_bears_its_value(name: str) -> None:
         (lambda: Spsa(start=0.0, gain_exponent=0.55), "gain_exponent = 0.55: must exceed"),
         (lambda: Spsa(start=0.0, form="second_order", initial_hessian=0.0), "initial_hessian = 0: must be < 0"),
         (lambda: GoldenSection(start=0.0, lower=-np.inf, upper=1.0), "lower = -inf: must be finite"),
+        (lambda: GoldenSection(start=0.0, **BOX, samples_max=0), "samples_max = 0: must be >= 1"),
         (lambda: ComponentLag(delay_cycles=-1.0), "delay_cycles = -1"),
         (lambda: ExtremumSeeking(start=0.0, components=[]), "components is empty"),
         (

@@ -38,6 +38,8 @@ TEST(GuidedEngine, SmallStepsOfThePointAreNoNewPoint) {
   drifted.fuel_mg *= 1.04 * 1.04;
   guided.at(drifted);
   EXPECT_NE(save_state(guided), before) << "from where the model was asked last, not from the cycle before";
+  drifted.speed_rpm = std::nan("");
+  EXPECT_EQ(guided.at(drifted), GuideStatus::refused);
 }
 
 TEST(GuidedEngine, TakesNoMemoryAndNeverThrows) {

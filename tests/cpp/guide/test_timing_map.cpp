@@ -137,6 +137,9 @@ TEST(TimingMap, RefusesWhatIsNoConfirmedOptimumAndChangesNothing) {
                                            {1500.0, 20.0, -5.0, nan}}) {
     EXPECT_FALSE(map.learn(std::array{speed, fuel}, y, sd));
   }
+  StateColumns bad = before;
+  bad["variance"][3] = 0.0;
+  EXPECT_THROW(restore_state(map, bad), ParameterError);
   EXPECT_EQ(save_state(map), before);
 }
 
