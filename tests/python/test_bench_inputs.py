@@ -18,7 +18,6 @@ from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.loop import seek as seek_on
 from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Spsa
 from mgdd.results.labels import check_labels
-from mgdd.rig import SimulatedRig
 
 THREE = ["soc_cad", "egr", "intake_pressure_kpa"]
 QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
@@ -156,12 +155,6 @@ def test_whole_loops_are_those_of_one_at_a_time() -> None:
     with pytest.raises(ParameterError, match="in the order of the bench, soc_cad, egr, intake_pressure_kpa"):
         monte_carlo(bench, turned, range(3), cycles=15)
     assert bench.cycle == 0
-
-
-def test_a_rig_of_several_inputs() -> None:
-    with SimulatedRig(EngineBench(inputs=THREE, limits=["nox_true_ppm"])) as rig:
-        rig.apply({"soc_cad": -6.0, "egr": 0.3, "intake_pressure_kpa": 160.0})
-        assert rig.measure().limits["nox_true_ppm"] < 1200.0
 
 
 ALONE = ExtremumSeeking(start=-6.0, lower=-25.0, upper=10.0)

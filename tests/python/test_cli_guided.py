@@ -100,25 +100,6 @@ def test_the_start_is_that_of_the_user(kind: str, capsys: Capsys, table: Path, t
     assert first_timing(file) == pytest.approx(-18.0, abs=1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("seeker", ["gradient_descent", "spsa"])
-def test_a_seeker_of_any_kind_begins_there(seeker: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
-    for kind in ("feed_forward", "map"):
-        file = tmp_path / f"{kind}.csv"
-        seek(
-            capsys,
-            *options(kind, table),
-            "--seeker",
-            seeker,
-            "--start",
-            "soc_cad=-18",
-            "--cycles",
-            "50",
-            "-o",
-            str(file),
-        )
-        assert first_timing(file) == pytest.approx(-18.0, abs=2.0)
-
-
 @pytest.mark.parametrize(
     ("argv", "said"),
     [

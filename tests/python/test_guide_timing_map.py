@@ -67,6 +67,9 @@ def test_every_file_form_gives_the_map_back() -> None:
 
 
 def test_broken_files_are_refused() -> None:
+    for field, value in (("forgetting", 1.01), ("prior_sd_cad", 0.0)):
+        with pytest.raises(ParameterError, match=f"{field} = {value:g}"):
+            TimingMap(AXES, 0.0, **{field: value})
     text = learnt().to_toml()
     with pytest.raises(Error, match="kind"):
         TimingMap.from_toml(text.replace("timing_map", "engine"))

@@ -90,15 +90,8 @@ def test_a_limit_is_the_same_after_every_journey(tmp_path: Path) -> None:
     assert limit != Limit("p_max_bar", 95.0, margin=1.5, scale=7.0, delay_cycles=10.5, lag_cycles=2.0, margin_sd=0.5)
     assert eval(repr(limit)) == limit
     assert pickle.loads(pickle.dumps(limit)) == copy.copy(limit) == limit
-    seeker = seekers(limit, 1)["ExtremumSeeking batch"]()
-    seeker.run(lambda x: (-((x[0] - 3.0) ** 2), [100.0 - x[0]]), 123)
-    seeker.save(tmp_path / "seeker.json")
-    loaded, twin = Seeker.load(tmp_path / "seeker.json"), pickle.loads(pickle.dumps(seeker))
-    assert loaded.settings["limits"] == [limit]
-    for one in (loaded, twin, seeker):
-        one.run(lambda x: (-((x[0] - 3.0) ** 2), [100.0 - x[0]]), 100)
-    assert loaded.state == twin.state == seeker.state
-    np.testing.assert_array_equal(twin.history["limit_states"], seeker.history["limit_states"])
+    seekers(limit, 1)["ExtremumSeeking batch"]().save(tmp_path / "seeker.json")
+    assert Seeker.load(tmp_path / "seeker.json").settings["limits"] == [limit]
 
 
 @pytest.mark.parametrize(
@@ -107,11 +100,15 @@ def test_a_limit_is_the_same_after_every_journey(tmp_path: Path) -> None:
         ({"delay_cycles": -1.0}, r"limit p: delay_cycles = -1: must lie in \[0, 1e6\]"),
         ({"lag_cycles": math.nan}, r"limit p: lag_cycles = nan: must lie in \[0, 1e6\]"),
         ({"margin_sd": -0.5}, r"limit p: margin_sd = -0.5: must lie in \[0, 100\]"),
+        ({"upper": math.inf}, "limit p: upper = inf"),
+        ({"margin": -1.0}, "margin = -1"),
+        ({"method": "penalty", "weight": 0.0}, "weight = 0"),
+        ({"method": "penalty", "scale": math.nan}, "scale = nan"),
     ],
 )
-def test_what_cannot_be_is_named(wrong: dict[str, float], text: str) -> None:
+def test_what_cannot_be_is_named(wrong: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
-        Limit("p", 1.0, **wrong)
+        Limit("p", **{"upper": 1.0, **wrong})
 
 
 def test_history_and_states_tell_of_the_limits() -> None:

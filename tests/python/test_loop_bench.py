@@ -5,13 +5,12 @@ from __future__ import annotations
 import copy
 import math
 import pickle
-import threading
 
 import numpy as np
 import pytest
 
 from mgdd import _core, presets
-from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor, simulate
+from mgdd.engine import Cylinder, OperatingPoint, Performance, PerformanceTerm, simulate
 from mgdd.errors import ParameterError, RigError, ShapeError
 from mgdd.loop import EngineBench, Measurement, SensorDynamics
 from mgdd.results.labels import check_labels
@@ -135,43 +134,6 @@ def test_settings_build_the_same_bench_again() -> None:
     )
 
 
-def test_a_run_leaves_the_interpreter_free() -> None:
-    done = threading.Event()
-    soc = np.full(200_000, -6.0)
-    seen = []
-
-    def work() -> None:
-        EngineBench().run_columns(soc)
-        done.set()
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    while not done.is_set():
-        seen.append(done.wait(0.002))
-    thread.join()
-    assert len(seen) > 5
-
-
-def test_analyser_and_schedule() -> None:
-    points = [(0, OperatingPoint()), (30, OperatingPoint(speed_rpm=3000.0))]
-    bench = EngineBench(schedule=points, analyser=SILENT, **QUIET)
-    assert bench.analyser_delay_cycles == 38
-    out = bench.run(np.full(40, -6.0))
-    assert list(np.flatnonzero(out["operating_point_changed"])) == [30]
-    assert bench.analyser_delay_cycles == 75
-    assert bench.point == points[1][1]
-    assert bench.point_at(0) == points[0][1]
-    np.testing.assert_array_equal(out["nox_analyser_ppm"][:30], out["nox_true_ppm"][0])
-
-
-def test_the_corrected_soft_sensor_finds_a_biased_analyser() -> None:
-    soft = SoftSensor(model=NoxModel(proxy=NoxProxy(reference_nox_ppm=1000.0), map="arrhenius"))
-    out = EngineBench(soft_sensor=soft, seed=1).run(np.full(1500, -6.0))
-    ratio = (out["nox_soft_corrected_ppm"] / out["nox_true_ppm"]).values
-    assert ratio[0] == pytest.approx(1000.0 / 1200.0)
-    assert ratio[800:].mean() == pytest.approx(1.0, abs=0.005)
-
-
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
@@ -180,6 +142,10 @@ def test_the_corrected_soft_sensor_finds_a_biased_analyser() -> None:
         ({"schedule": [(2, OperatingPoint())]}, r"schedule\[0\].cycle = 2: must be 0"),
         ({"limits": "p_max_bar"}, "limits = 'p_max_bar': must be a sequence"),
         ({"limits": ["torque"]}, "limits: 'torque' is not measured"),
+        ({"limits": ["p_max_bar"] * 9}, "limits has 9 entries: must be at most 8"),
+        ({"schedule": [(k, OperatingPoint()) for k in (0, 5, 5)]}, r"schedule\[2\].cycle = 5: must be > 5"),
+        ({"inputs": ["soc_cad", "egr", "egr"]}, "egr stands there twice"),
+        ({"inputs": ["soc_cad", "second_fraction"]}, "second_fraction needs burn_shape"),
         ({"seed": -1}, r"seed = -1: must be in \[0, 2\*\*64\)"),
         ({"nox_sensor": "nose"}, "nox_sensor = 'nose': must be one of none, analyser"),
         ({"nox_sensor": "none", "performance": Performance.efficiency_and_nox()}, "nox_sensor = 'none'"),

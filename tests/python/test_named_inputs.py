@@ -12,7 +12,7 @@ import pytest
 from tests.python.support.stepped import stepped
 
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.guide import Curve, CurveSeeking, FeedForward
+from mgdd.guide import FeedForward
 from mgdd.loop import EngineBench, Measurement, monte_carlo, run_seeker
 from mgdd.optimize import (
     ExtremumSeeking,
@@ -56,22 +56,6 @@ def test_other_units_of_inputs_and_j_lead_along_the_same_path(name: str, limited
     other = path(stepped(start=start, inputs=wide, limits=limits)[name](), [50.0, 1e-3], 1e-3)
     np.testing.assert_allclose(other * [1.0, 100.0], plain * [1.0, 100.0], rtol=0.0, atol=1e-5)
     assert np.ptp(plain[:, 0]) > 1.5, "it has not moved"
-
-
-@pytest.mark.parametrize(
-    ("make", "start"),
-    [
-        (GoldenSection, 6.0),
-        (lambda **own: CurveSeeking(curve=Curve.parabola(curvature=-0.05, best=1.0, reach=80), **own), 6.0),
-    ],
-    ids=["golden section", "curve"],
-)
-def test_seekers_of_one_input_take_its_name(make: Make, start: float) -> None:
-    seeker = make(start={"soc_cad": start}, inputs={"soc_cad": (-20.0, 10.0)})
-    seeker.run(lambda x: -0.03 * (x["soc_cad"] + 3.0) ** 2, 120)
-    assert float(seeker.estimate[0]) == pytest.approx(-3.0, abs=0.5)
-    assert seeker.settings["lower"] == [-20.0]
-    assert seeker.settings["upper"] == [10.0]
 
 
 def test_steps_count_in_scales_and_stay_within_rates() -> None:

@@ -11,7 +11,7 @@ import pytest
 from tests.python.support.stepped import stepped
 
 from mgdd.engine import OperatingPoint, Performance
-from mgdd.errors import DataError, Interrupted, ParameterError, RigError
+from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import EngineBench, LoopCriteria, Measurement, run_seeker
 from mgdd.loop.plant import AnnouncingPlant
 from mgdd.loop.summary import summarize_cycles
@@ -162,29 +162,6 @@ def test_a_plain_rig_gives_what_it_measures() -> None:
     assert "limits" not in run.dataset
 
 
-def test_ctrl_c_leaves_a_usable_result() -> None:
-    pressed = []
-
-    def answer(cycle: int, soc: float) -> Measurement:
-        if cycle == 120 and not pressed:
-            pressed.append(cycle)
-            raise KeyboardInterrupt
-        return hill(cycle, soc)
-
-    rig, own, whole = ScriptedRig(answer), seeker(), seeker()
-    with pytest.raises(Interrupted, match="after 120 of 400 cycles") as stop:
-        run_seeker(rig, own, 400, criteria=LoopCriteria(optimum=-5.6))
-    run = stop.value.partial
-    assert (run.interrupted, run.dataset.attrs["interrupted"]) == (True, 1)
-    assert run.dataset.sizes["cycle"] == own.cycle == 120
-    assert np.isfinite(run.summary["final_soc_cad"])
-    rest = run_seeker(rig, own, 280)
-    straight = run_seeker(ScriptedRig(hill), whole, 400)
-    joined = np.concatenate([run.dataset["estimate"][:, 0], rest.dataset["estimate"][:, 0]])
-    np.testing.assert_array_equal(joined, straight.dataset["estimate"][:, 0])
-    np.testing.assert_array_equal(rest.dataset["cycle"], np.arange(120, 400))
-
-
 def test_errors_name_the_remedy_and_change_nothing() -> None:
     own = seeker()
     before = copy.deepcopy(own.state)
@@ -223,29 +200,6 @@ def test_summary_of_half_a_run() -> None:
     assert np.isnan(part["exceeded_fraction"])
 
 
-class ClampingRig(ScriptedRig):
-    """Takes timings of -4 °CA aTDC and later only, where the best would be -5.6, and says so."""
-
-    def measure(self) -> Measurement:
-        applied = max(self.applied[-1], -4.0)
-        return Measurement(components=hill(0, applied).components, applied={"soc_cad": applied})
-
-
-@pytest.mark.parametrize("name", sorted(SEEKERS.keys() - {"component-wise", "CurveSeeking", "GaussianProcessSeeking"}))
-def test_a_rig_that_clamps_inside_the_bounds_holds_the_estimate_there(name: str) -> None:
-    free = SEEKERS[name]()
-    chosen = type(free)(**{**free.settings, "limits": [], "start": [6.0]})
-    run = run_seeker(ClampingRig(hill), chosen, 1500)
-    check_labels(run.dataset)
-    estimate = run.dataset["estimate"][:, 0].to_numpy()
-    assert estimate[300:].min() > -4.0 - 0.2
-    assert abs(estimate[-500:].mean() + 4.0) < 1.2
-    asked, applied = (run.dataset[key].to_numpy()[:, 0] for key in ("asked", "applied"))
-    np.testing.assert_array_equal(applied, np.maximum(asked, -4.0))
-    np.testing.assert_array_equal(chosen.history["applied"].to_numpy()[:, 0], applied)
-    assert run.summary["mean_applied_soc_cad"] == pytest.approx(applied[750:].mean(), abs=1e-12)
-
-
 def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
     """Bounds wider than the window of the bench: the loop of the core and the one from Python stay one."""
     wide = {"start": -20.0, "lower": -80.0, "upper": 60.0}
@@ -272,21 +226,3 @@ def test_an_applied_input_that_the_plant_does_not_have_is_named() -> None:
     rig = ScriptedRig(lambda *_: Measurement(components=(1.0,), applied={"rail_bar": 900.0}))
     with pytest.raises(ParameterError, match=r"applied = rail_bar: must be among the inputs soc_cad"):
         run_seeker(rig, seeker(), 3)
-
-
-def test_tell_takes_what_was_applied_and_refuses_what_cannot_be() -> None:
-    from mgdd.errors import ShapeError
-
-    one = Spsa(start=[1.0, 2.0])
-    one.ask()
-    before = one.state
-    for wrong, error, text in [
-        ([1.0], ShapeError, "applied has 1 entries: must have 2"),
-        ([], ShapeError, "applied is empty"),
-        ([1.0, np.nan], DataError, r"applied\[1\] = nan: must be finite"),
-    ]:
-        with pytest.raises(error, match=text):
-            one.tell(1.0, applied=wrong)
-        assert one.state == before
-    one.tell(1.0, applied=[0.25, 0.5])
-    assert one.history["applied"].to_numpy().tolist() == [[0.25, 0.5]]

@@ -190,17 +190,18 @@ def test_a_seeker_goes_on_bit_for_bit_from_its_state(name: str) -> None:
     assert codes(one) == codes(other)
 
 
-def path(make: Callable[[], Any], scale: float = 1.0, missing: int = 0) -> list[float]:
+def path(make: Callable[[], Any], scale: float = 1.0, missing: int = 0, *, says: bool = False) -> list[float]:
     """What is asked over eighty cycles; every so many, where given, nothing is read."""
     seeker, rng, asked = make(), np.random.default_rng(7), []
     for cycle in range(80):
         asked.append(float(np.ravel(seeker.ask())[0]))
         assert float(np.ravel(seeker.ask())[0]) == asked[-1]
         j = scale * j_at(asked[-1], rng)
+        applied = {"applied": asked[-1]} if says else {}
         if missing and cycle % missing == missing - 1:
-            seeker.tell(misfire=True)
+            seeker.tell(misfire=True, **applied)
         else:
-            seeker.tell(j)
+            seeker.tell(j, **applied)
         with pytest.raises(ParameterError, match="tell without ask"):
             seeker.tell(j)
         assert min(asked) >= -20.0
@@ -211,7 +212,7 @@ def path(make: Callable[[], Any], scale: float = 1.0, missing: int = 0) -> list[
 @every
 def test_what_is_asked_is_the_same_again_and_within_bounds(name: str) -> None:
     assert path(SEEKERS[name]) == path(SEEKERS[name])
-    assert np.isfinite(path(SEEKERS[name], missing=5)).all()
+    assert path(SEEKERS[name], missing=5, says=True) == path(SEEKERS[name], missing=5)
     assert np.isfinite(path(SEEKERS[name], missing=1)).all()
 
 

@@ -19,6 +19,7 @@ from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import (
     ComponentLag,
     ExtremumSeeking,
+    GaussianProcessSeeking,
     GoldenSection,
     GradientDescent,
     Limit,
@@ -113,6 +114,8 @@ def test_a_misfire_is_counted_and_not_read(make: Any) -> None:
     assert np.isnan(seeker.history["objective"].values[-1]).all()
     if "delay" not in str(before):  # what comes late goes on
         np.testing.assert_array_equal(seeker.ask(), x)
+        counted = {name: before[name] for name in before if name.startswith("failing_")}
+        assert seeker.state | counted == before | {"cycle": [15.0], "misfires": [1.0]}
 
 
 @every
@@ -172,9 +175,19 @@ def test_each_setting_refuses_by_name_or_bears_its_value(name: str) -> None:
         (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: ExtremumSeeking(start=0.0, form="median"), "form = .median.*batch"),
         (lambda: ExtremumSeeking(start=[0.0] * 9), "at most 8"),
+        (lambda: ExtremumSeeking(start=0.0, washout_pole=1.0), "washout_pole = 1: must lie between 0 and 1"),
+        (lambda: ExtremumSeeking(start=0.0, hold_cycles=-1), "hold_cycles = -1: must be >= 0"),
         (lambda: Spsa(start=0.0, gain=0.0), "gain = 0.*: must be > 0"),
+        (lambda: Spsa(start=0.0, gain_exponent=0.55), "gain_exponent = 0.55: must exceed"),
+        (lambda: Spsa(start=0.0, form="second_order", initial_hessian=0.0), "initial_hessian = 0: must be < 0"),
         (lambda: GoldenSection(start=0.0, lower=-np.inf, upper=1.0), "lower = -inf: must be finite"),
+        (lambda: GoldenSection(start=0.0, **BOX, samples_max=0), "samples_max = 0: must be >= 1"),
         (lambda: ComponentLag(delay_cycles=-1.0), "delay_cycles = -1"),
+        (lambda: ExtremumSeeking(start=0.0, components=[]), "components is empty"),
+        (
+            lambda: GaussianProcessSeeking(start=0.0, **BOX, delay_cycles=2.0, components=[ComponentLag()]),
+            "delay_cycles = 2: must be left out",
+        ),
     ],
 )
 def test_settings_are_refused_by_name(make: Any, message: str) -> None:
@@ -316,6 +329,8 @@ def test_a_state_that_is_not_its_own_is_refused_and_changes_nothing(make: Any) -
     before = seeker.state
     wrong = [{k: v for k, v in before.items() if k != "cycle"}, before | {"unheard_of": [1.0]}]
     wrong += [before | {"cycle": [value]} for value in (1.5, np.inf)]
+    if min(before.get("first_bend", [0.0])) > 0.0:  # the first readings are done
+        wrong += [before | {"first_bend": [value] * len(before["first_bend"])} for value in (0.0, -1.0, np.nan, np.inf)]
     wrong += [
         before | {name: [value]} for name in ("phase", "stage", "turn") if name in before for value in (-1.0, 1e6)
     ]

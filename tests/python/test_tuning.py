@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ShapeError
 from mgdd.optimize import ExtremumSeeking, Limit, Spsa, measure_map, tune
 
 if TYPE_CHECKING:
@@ -134,44 +133,6 @@ def test_a_peak_off_which_no_parabola_can_be_read_is_refused() -> None:
 
 
 # --- the tuner ----------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("error", [-2, 2])
-@pytest.mark.parametrize("delay", [5, 20])
-def test_a_delay_that_is_wrong_by_two_cycles_is_survived(delay: int, error: int) -> None:
-    tuning = tune(SIGMA, BEND, delay_cycles=delay)
-    assert "may be wrong by" in tuning.summary()
-    bold = tune(SIGMA, BEND, delay_cycles=delay, delay_uncertainty=0.0)
-    assert (bold.period, bold.delay_uncertainty) == (6, 0.0)
-    assert "may be wrong by" not in bold.summary()
-    late = {}
-    for name, made in (("safe", tuning), ("bold", bold)):
-        rng = np.random.default_rng(delay)
-        values = [0.5 * BEND * 12.0**2] * (delay + error)
-
-        def j(x: Any, values: list[float] = values, rng: np.random.Generator = rng) -> float:
-            values.append(0.5 * BEND * x[0] ** 2)
-            return values.pop(0) + rng.normal(0.0, SIGMA)
-
-        path = made.seeker(start=12.0).run(j, int(5 * made.cycles))["estimate"].values[:, 0]
-        late[name] = np.abs(path[-len(path) // 4 :]).max()
-    assert late["safe"] < 6.0
-    assert late["bold"] > 15.0  # 120 deg: the wrong way
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_tuned_seeker_arrives_as_predicted(method: str) -> None:
-    tuning = tune(SIGMA, BEND, method=method, distance=12.0, arrival=1.0, cycles=100.0)
-    assert tuning.met
-    counts, squares = [], []
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        seeker = tuning.seeker(start=12.0 if seed % 2 else -12.0, seed=seed)
-        history = seeker.run(lambda x, rng=rng: 0.5 * BEND * x[0] ** 2 + rng.normal(0.0, SIGMA), 1200)
-        path = history["estimate"].values[:, 0]
-        counts.append(int(np.argmax(np.abs(path) <= 1.0)))
-        squares.append(float(np.mean(path[400:] ** 2)))
-    assert np.sqrt(np.mean(squares)) == pytest.approx(tuning.rms, rel=0.15)
-    assert np.mean(counts) == pytest.approx(tuning.cycles, rel=0.25)
-    assert np.mean(counts) < 100.0
 
 
 def test_the_seeker_carries_what_was_tuned() -> None:
@@ -211,31 +172,6 @@ def test_summary_says_plainly_whether_the_wish_is_met() -> None:
     assert "turned back" in tune(SIGMA, BEND, delay_cycles=5.0).summary()
     assert "not compensated" in tune(SIGMA, BEND, delay_cycles=5.0, compensated=False).summary()
     assert "measurements per iteration" in tune(SIGMA, BEND, method="spsa").summary()
-
-
-def test_tuning_is_a_value() -> None:
-    tuning = tune(SIGMA, BEND)
-    assert pickle.loads(pickle.dumps(tuning)) == tuning == tune(SIGMA, BEND)
-    assert tune(SIGMA, -BEND).gain == tuning.gain
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"noise_sd": 0.0}, "noise_sd = 0: must be > 0; repeat one set-point"),
-        ({"curvature": 0.0}, "curvature. = 0: must be > 0; measure J"),
-        ({"curvature": np.nan}, "curvature. = nan"),
-        ({"method": "annealing"}, "method = .annealing."),
-        ({"rms": -1.0}, "rms = -1"),
-        ({"arrival": 30.0, "distance": 20.0}, "arrival = 30: must be below distance = 20"),
-        ({"method": "spsa", "lag_cycles": 3.0}, "without delay and lag"),
-        ({"delay_cycles": -1.0}, "delay_cycles = -1"),
-        ({"delay_uncertainty": -1.0}, "delay_uncertainty = -1: must be >= 0 and finite; 0 for"),
-    ],
-)
-def test_wishes_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        tune(**({"noise_sd": SIGMA, "curvature": BEND} | arguments))
 
 
 @given(

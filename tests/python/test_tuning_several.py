@@ -238,6 +238,19 @@ def test_harmonics_do_not_mix_on_the_shortest_period(inputs: int, period: int) -
 
 
 @pytest.mark.parametrize("inputs", [1, 2, 3])
+def test_a_dither_whose_harmonics_mix_is_refused(inputs: int) -> None:
+    taken = 0
+    for period, own in product(range(4, 17 if inputs < 3 else 13), product(range(9), repeat=inputs)):
+        if 0 in own or 2 * max(own) >= period or len({*own}) < inputs or mixes(own, 97):  # beyond aliases
+            with pytest.raises(ParameterError, match="harmonics"):
+                ExtremumSeeking(start=[0.0] * inputs, period=period, harmonics=list(own))
+        else:
+            taken += 1
+            ExtremumSeeking(start=[0.0] * inputs, period=period, harmonics=list(own))
+    assert taken >= 6
+
+
+@pytest.mark.parametrize("inputs", [1, 2, 3])
 def test_harmonics_do_not_mix_on_any_period(inputs: int) -> None:
     for least in range(6, 31):
         period, harmonics = harmonics_of(inputs, least=least)
@@ -308,6 +321,7 @@ def test_tuning_of_several_inputs_is_a_value() -> None:
 
 
 PAIR = {"soc_cad": -0.06, "egr": -600.0}
+OPEN = ("rms", "cycles", "distance", "arrival", "amplitude_max", "delay_uncertainty")
 
 
 def test_a_specification_per_input_is_kept_or_told_by_name() -> None:
@@ -344,6 +358,8 @@ def test_a_specification_per_input_is_kept_or_told_by_name() -> None:
         ({"cycles": -1.0}, ParameterError, "cycles = -1"),
         ({"delay_cycles": -1.0}, ParameterError, "delay_cycles = -1"),
         ({"delay_uncertainty": -1.0}, ParameterError, "delay_uncertainty = -1: must be >= 0"),
+        ({"curvature": np.nan}, ParameterError, "curvature. = nan"),
+        *(({"curvature": -0.05, name: np.nan}, ParameterError, f"{name} = nan") for name in OPEN),
     ],
 )
 def test_wishes_are_refused_by_name(arguments: dict[str, Any], error: type[Exception], message: str) -> None:

@@ -82,9 +82,7 @@ TEST(CurveRobustness, ADriftOfTheLevelOfJCostsNothing) {
   EXPECT_LT(still.late_loss, 0.03);
   EXPECT_GE(still.inside, 0.85);
   for (const double slope : {-0.005, 0.005, 0.02}) {
-    Plant plant;
-    plant.level_per_cycle = slope;
-    const Figures drifting = figures_of(plant);
+    const Figures drifting = figures_of({.level_per_cycle = slope});
     EXPECT_LE(drifting.late_loss, 1.5 * still.late_loss) << slope;
     EXPECT_GE(drifting.inside, 0.85) << slope;
   }
@@ -92,10 +90,7 @@ TEST(CurveRobustness, ADriftOfTheLevelOfJCostsNothing) {
 
 TEST(CurveRobustness, ALevelThatSwingsIsNoDelay) {
   for (const auto& [swing, period] : {std::pair{3.0, 300.0}, std::pair{3.0, 100.0}, std::pair{1.5, 50.0}}) {
-    Plant plant;
-    plant.swing = swing;
-    plant.period = period;
-    const Figures found = figures_of(plant);
+    const Figures found = figures_of({.swing = swing, .period = period});
     EXPECT_LE(found.late_loss, 0.04) << period;
     EXPECT_LE(found.off, 0.03) << period;
     EXPECT_LE(found.wrong_delay, 0.2) << period;
@@ -104,10 +99,7 @@ TEST(CurveRobustness, ALevelThatSwingsIsNoDelay) {
 }
 
 TEST(CurveRobustness, ReadingsFarOffAreNoDelay) {
-  Plant plant;
-  plant.outliers = 0.02;
-  plant.seeds = 30;
-  const Figures found = figures_of(plant);
+  const Figures found = figures_of({.outliers = 0.02, .seeds = 30});
   EXPECT_LE(found.late_loss, 0.035);
   EXPECT_LE(found.off, 0.06);
   EXPECT_LE(found.wrong_delay, 0.1);
@@ -183,10 +175,7 @@ TEST(CurveRobustness, BehindALateSensorTheFirstMoveIsMadeBeforeTheFirstReading) 
 
 TEST(CurveRobustness, ADelayToldWrongIsFound) {
   for (const int delay : {0, 3, 10}) {
-    Plant plant;
-    plant.delay = plant.told_delay = delay;
-    plant.cycles = 120;
-    plant.seeds = 4;
+    Plant plant{.delay = delay, .told_delay = delay, .cycles = 120, .seeds = 4};
     const double right = figures_of(plant).early_loss;
     for (const int error : {-4, -3, -1, 1, 2, 3}) {
       plant.told_delay = delay + error;
@@ -202,15 +191,14 @@ TEST(CurveRobustness, ADelayToldWrongIsFound) {
 
 TEST(CurveRobustness, NeitherDoesADelayLeadAwayAfterAHandOver) {
   for (const int error : {-3, -1, 1, 3}) {
-    Plant plant;
-    plant.delay = 4;
-    plant.told_delay = plant.delay + error;
-    plant.guide_best = 12.0;
-    plant.noise_sd = 0.05;
-    plant.cycles = 700;
-    plant.seeds = 2;
-    plant.drop = [](double away) { return -2.0 * std::abs(std::tanh(3.0 * away)) - 0.3 * std::abs(away); };
-    const Figures found = figures_of(plant);
+    const auto drop = [](double away) { return -2.0 * std::abs(std::tanh(3.0 * away)) - 0.3 * std::abs(away); };
+    const Figures found = figures_of({.drop = drop,
+                                      .guide_best = 12.0,
+                                      .noise_sd = 0.05,
+                                      .delay = 4,
+                                      .told_delay = 4 + error,
+                                      .cycles = 700,
+                                      .seeds = 2});
     EXPECT_EQ(found.at_bound, 0.0) << error;
     EXPECT_LT(found.late_loss, 2.6) << error << ": 2 is a peak narrower than the dither";
   }
@@ -218,54 +206,35 @@ TEST(CurveRobustness, NeitherDoesADelayLeadAwayAfterAHandOver) {
 
 TEST(CurveRobustness, AnIntervalHoldsWhereTheGuideIsInAnotherUnitOrFarTooSteepOrFlat) {
   for (const double unit : {0.01, 0.1, 100.0}) {
-    Plant plant;
-    plant.unit = unit;
-    const Figures found = figures_of(plant);
+    const Figures found = figures_of({.unit = unit});
     EXPECT_GE(found.inside, 0.85) << unit;
     EXPECT_LE(found.early_loss, 25.0) << unit << ": six times that of the right unit at most";
   }
   for (const double curvature : {0.003, 0.3}) {
-    Plant plant;
-    plant.drop = [curvature](double away) { return -curvature * away * away; };
-    plant.noise_sd = curvature < 0.03 ? 0.03 : 0.3;
-    EXPECT_GE(figures_of(plant).inside, 0.85) << curvature;
+    const auto drop = [curvature](double away) { return -curvature * away * away; };
+    EXPECT_GE(figures_of({.drop = drop, .noise_sd = curvature < 0.03 ? 0.03 : 0.3}).inside, 0.85) << curvature;
   }
 }
 
 TEST(CurveRobustness, AnIntervalHoldsWhereTheOptimumMoves) {
-  for (const double drift : {0.01, -0.01}) {
-    Plant plant;
-    plant.optimum_per_cycle = drift;
-    plant.seeds = 12;
-    EXPECT_GE(figures_of(plant).inside, 0.85) << drift;
-  }
-  Plant plant;
-  plant.step = 3.0;
-  EXPECT_GE(figures_of(plant).inside, 0.75) << "a fifth of the cycles follow a step that nobody can have seen yet";
+  for (const double drift : {0.01, -0.01})
+    EXPECT_GE(figures_of({.optimum_per_cycle = drift, .seeds = 12}).inside, 0.85) << drift;
+  EXPECT_GE(figures_of({.step = 3.0}).inside, 0.75)
+      << "a fifth of the cycles follow a step that nobody can have seen yet";
 }
 
 // A third of the range in 180 cycles: without a velocity of the place .10 is lost late and 27 % of cycles are off.
 TEST(CurveRobustness, AnOptimumThatMovesSteadilyIsFollowed) {
   for (const double velocity : {0.08, -0.08}) {
-    Plant plant;
-    plant.optimum_per_cycle = velocity;
-    plant.noise_sd = 0.1;
-    plant.cycles = 180;
-    plant.seeds = 8;
-    const Figures seen = figures_of(plant);
+    const Figures seen = figures_of({.noise_sd = 0.1, .optimum_per_cycle = velocity, .cycles = 180, .seeds = 8});
     EXPECT_LE(seen.late_loss, 0.05) << velocity;
     EXPECT_LE(seen.off, 0.18) << velocity;
   }
 }
 
 TEST(CurveRobustness, JThatDoesNotAnswerIsSaidAloud) {
-  Plant plant;
-  plant.seeds = 12;
-  plant.stuck_from = 2;
-  EXPECT_GE(figures_of(plant).unanswered, 0.75);
-  plant.stuck_from = 1 << 30;
-  plant.noise_sd = 0.1;
-  EXPECT_LE(figures_of(plant).unanswered, 0.25);
+  EXPECT_GE(figures_of({.stuck_from = 2, .seeds = 12}).unanswered, 0.75);
+  EXPECT_LE(figures_of({.noise_sd = 0.1, .seeds = 12}).unanswered, 0.25);
 }
 
 }  // namespace

@@ -15,43 +15,6 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(FeedForward, StartsAtTheOptimumOfTheGuide) {
-  FeedForward<ExtremumSeeking> seeker = guided();
-  EXPECT_EQ(seeker.offer(at(-4.2), GuideCause::new_point), GuideStatus::followed);
-  EXPECT_NEAR(seeker.estimate()[0], -4.2, 1e-12);
-  EXPECT_NEAR(seeker.path().feed_forward()[0], -4.2, 1e-12);
-  EXPECT_NEAR(seeker.trim()[0], 0.0, 1e-12);
-}
-
-// Where the start is to be kept, what is applied stays that of the seeker, which begins anew as with any first value.
-TEST(FeedForward, AFirstValueThatIsACalibrationKeepsTheStart) {
-  for (auto& [name, any] : every_seeker(space_at(scalar_input(8.0), 40.0), 0.25, 3)) {
-    SCOPED_TRACE(name);
-    VariantSeeker plain(any);
-    FeedForward<VariantSeeker> kept{VariantSeeker(any)};
-    EXPECT_EQ(kept.offer(at(-4.2), GuideCause::calibration), GuideStatus::followed);
-    EXPECT_EQ(kept.estimate(), plain.estimate());
-    plain.restart();
-    EXPECT_EQ(kept.path().guide()[0], -4.2);
-    EXPECT_NEAR(kept.path().feed_forward()[0], -4.2, 1e-12);
-    EXPECT_NEAR(kept.trim()[0], plain.estimate()[0] + 4.2, 1e-12);
-    EXPECT_EQ(run(kept, -5.6, 90, 0.25), run(plain, -5.6, 90, 0.25));
-    EXPECT_EQ(save_state(kept.seeker()), save_state(plain));
-  }
-}
-
-TEST(FeedForward, AKeptStartLeavesTheGuidesMovesAsTheyAre) {
-  FeedForward<ExtremumSeeking> seeker = guided(-12.0);
-  seeker.offer(at(-2.7), GuideCause::calibration);
-  EXPECT_NEAR(seeker.trim()[0], -9.3, 1e-12);
-  run(seeker, -4.2, 600);
-  EXPECT_NEAR(seeker.trim()[0], -1.5, 0.02);
-  seeker.offer(at(-9.2), GuideCause::new_point);
-  run(seeker, -10.7, 2);
-  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::confirmed);
-  EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.05);
-}
-
 TEST(FeedForward, ALittleTrustedGuideIsInForceInPart) {
   FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.initial = 0.25, .noise_sd = 0.25});
   seeker.offer(at(-4.0), GuideCause::calibration);
@@ -73,23 +36,6 @@ TEST(FeedForward, ANewPointMovesTheEstimateAndKeepsTheTrim) {
   EXPECT_EQ(seeker.path().trust().verdict(), Verdict::confirmed);
   EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.05);
   EXPECT_NEAR(seeker.trim()[0], trim, 1e-12);
-}
-
-TEST(FeedForward, ACalibrationMovesNothingThatIsApplied) {
-  FeedForward<ExtremumSeeking> plain = guided(), calibrated = guided();
-  for (FeedForward<ExtremumSeeking>* one : {&plain, &calibrated})
-    one->offer(at(-1.0), GuideCause::new_point);
-  EXPECT_EQ(run(calibrated, -5.6, 50, 0.25), run(plain, -5.6, 50, 0.25));
-  EXPECT_EQ(calibrated.offer(at(-4.75), GuideCause::calibration), GuideStatus::followed);
-  double before = calibrated.path().feed_forward()[0];
-  for (const double expected : {-2.0, -3.0, -4.0, -4.75, -4.75}) {
-    EXPECT_EQ(run(calibrated, -5.6, 1, 0.25), run(plain, -5.6, 1, 0.25));
-    EXPECT_NEAR(calibrated.path().feed_forward()[0], expected, 1e-12);
-    EXPECT_LE(std::abs(calibrated.path().feed_forward()[0] - before), 1.0 + 1e-12);
-    EXPECT_NEAR(calibrated.trim()[0] - plain.trim()[0], plain.path().feed_forward()[0] - expected, 1e-12);
-    before = calibrated.path().feed_forward()[0];
-  }
-  EXPECT_EQ(save_state(calibrated.seeker()), save_state(plain.seeker()));
 }
 
 TEST(FeedForward, WhatIsLeftOfACalibrationBelongsToTheOldPoint) {
@@ -131,52 +77,6 @@ TEST(FeedForward, FollowsAPointThatDriftsThroughAFilterWithoutATestOrARestart) {
   const double before = drifting.estimate()[0];
   run(drifting, before - 4.64, 2);
   EXPECT_NEAR(drifting.estimate()[0] - before, -(9.0 - 4.36), 0.1);
-}
-
-TEST(FeedForward, HoldsTheLastValidValueOfAGuideThatCannotBeUsed) {
-  for (const GuideValue& bad :
-       {at(nan), at(-30.5), at(10.5), at(std::numeric_limits<double>::infinity()), GuideValue{inputs({-4.0, 2.0})},
-        GuideValue{scalar_input(-4.0), inputs({-0.1, -0.2})}}) {
-    FeedForward<ExtremumSeeking> seeker = guided();
-    seeker.offer(at(-4.0), GuideCause::new_point);
-    run(seeker, -4.0, 45);
-    const double estimate = seeker.estimate()[0], trust = seeker.path().trust().value();
-    EXPECT_EQ(seeker.offer(bad, GuideCause::new_point), GuideStatus::refused);
-    EXPECT_EQ(seeker.estimate()[0], estimate);
-    EXPECT_EQ(seeker.path().feed_forward()[0], -4.0);
-    EXPECT_LT(seeker.path().trust().value(), trust);
-    EXPECT_FALSE(seeker.path().testing());
-    EXPECT_EQ(seeker.offer(at(-10.0), GuideCause::following), GuideStatus::followed);  // late, but the whole move
-    EXPECT_TRUE(seeker.path().testing());
-    run(seeker, -10.0, 2);
-    EXPECT_NEAR(seeker.estimate()[0], -10.0, 0.5);
-  }
-}
-
-TEST(FeedForward, TakesNoAdviceBetweenAskAndTell) {
-  FeedForward<ExtremumSeeking> seeker = guided();
-  seeker.offer(at(-4.0), GuideCause::new_point);
-  seeker.ask();
-  const StateColumns before = save_state(seeker);
-  EXPECT_EQ(seeker.offer(at(-9.0), GuideCause::new_point), GuideStatus::busy);
-  EXPECT_EQ(save_state(seeker), before);
-}
-
-// Back at the first point before the guide was judged: nothing has been moved, so nothing is left over.
-TEST(FeedForward, HoldsAtAPointThatTheGuideDoesNotKnow) {
-  FeedForward<ExtremumSeeking> seeker = guided();
-  seeker.offer(at(-4.2), GuideCause::new_point);
-  run(seeker, -4.2, 47);
-  const double estimate = seeker.estimate()[0];
-  seeker.hold();
-  EXPECT_EQ(seeker.estimate()[0], estimate);
-  EXPECT_EQ(seeker.path().trust().value(), 1.0);
-  EXPECT_EQ(save_state(seeker.seeker()).at("seen")[0], 0.0);
-  run(seeker, -7.0, 30);
-  const double learnt = seeker.estimate()[0];
-  seeker.offer(at(-10.7), GuideCause::calibration);  // known again: a step from the last point that it knew
-  EXPECT_TRUE(seeker.path().testing());
-  EXPECT_NEAR(seeker.estimate()[0], learnt, 1e-12);
 }
 
 // A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.

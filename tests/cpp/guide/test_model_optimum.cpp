@@ -59,26 +59,6 @@ TEST(ModelOptimum, ConvergesBelowTheBoundOfTheStepAndFallsBackAboveIt) {
   }
 }
 
-TEST(ModelOptimum, TheAscentAloneTakesFourIterationsFromMinusTwenty) {
-  const EngineCase c;
-  for (const double step_size : {18.0, 45.0}) {
-    optimize::GradientDescentSettings g;
-    g.space.start = optimize::scalar_input(-20.0);
-    g.step_size = optimize::scalar_input(step_size);
-    optimize::GradientDescent ascent(g);
-    double widest = 0.0;
-    while (ascent.converged_at() < 0 && ascent.iteration() < 60) {
-      EngineCase at = c;
-      at.soc_cad = ascent.ask()[0];
-      widest = std::max(widest, std::abs(at.soc_cad));
-      const double j[] = {100.0 * test_support::run(at).indicators.efficiency_gross};
-      ascent.tell({j, {}, false});
-    }
-    EXPECT_EQ(ascent.converged_at(), step_size < 39.0 ? 4 : -1);
-    EXPECT_LT(widest, 22.0);  // bounded, even where it does not converge
-  }
-}
-
 TEST(ModelOptimum, EndsAtAnEdgeThatHoldsItBack) {
   const EngineCase c;
   ModelOptimumSettings s = settings_of(c);
@@ -92,16 +72,6 @@ TEST(ModelOptimum, EndsAtAnEdgeThatHoldsItBack) {
   const ModelOptimumResult early = ModelOptimum(s).find(c.point);
   EXPECT_TRUE(early.at_bound);
   EXPECT_EQ(early.soc_cad, 0.0);
-}
-
-TEST(ModelOptimum, WeighsNoxAsThePerformanceSays) {
-  const EngineCase c;
-  ModelOptimumSettings s = settings_of(c);
-  const double without = ModelOptimum(s).find(c.point).soc_cad;
-  s.performance = engine::efficiency_and_nox();
-  s.nox.map = engine::NoxMap::arrhenius;
-  const double with = ModelOptimum(s).find(c.point).soc_cad;
-  EXPECT_GT(with, without + 1.0);  // cooler, so later
 }
 
 TEST(ModelOptimum, SaysWhereThereIsNoOptimum) {
@@ -121,16 +91,6 @@ TEST(ModelOptimum, SaysWhereThereIsNoOptimum) {
   EXPECT_EQ(guide_value(optimum.find(point)).optimum[0], optimum.find(point).soc_cad);
 }
 
-TEST(ModelOptimum, FollowsACalibrationOfTheSameCylinder) {
-  const EngineCase calibrated("wall_heat_scale=1.1");
-  ModelOptimum optimum(settings_of(EngineCase()));
-  optimum.set_cylinder(calibrated.cylinder);
-  EXPECT_EQ(optimum.find(calibrated.point).soc_cad,
-            ModelOptimum(settings_of(calibrated)).find(calibrated.point).soc_cad);
-  EXPECT_THROW(optimum.set_cylinder(EngineCase("bore_mm=90").cylinder), ParameterError);
-  EXPECT_EQ(optimum.settings().cylinder, calibrated.cylinder);
-}
-
 TEST(ModelOptimum, FindsWithoutAllocating) {
   ModelOptimum optimum(settings_of(EngineCase()));
   static_assert(noexcept(optimum.find(engine::OperatingPoint{})));
@@ -141,26 +101,6 @@ TEST(ModelOptimum, FindsWithoutAllocating) {
     optimum.find(point);
   }
   EXPECT_EQ(counter.count(), 0u);
-}
-
-TEST(ModelOptimum, RefusesSettingsThatMakeNoSense) {
-  const auto field_of = [](auto change) {
-    ModelOptimumSettings s;
-    change(s);
-    try {
-      const ModelOptimum optimum(s);
-    } catch (const ParameterError& e) {
-      return std::string(e.field);
-    }
-    return std::string();
-  };
-  EXPECT_EQ(field_of([](auto& s) { s.step_size = 0.0; }), "step_size");
-  EXPECT_EQ(field_of([](auto& s) { s.difference_cad = -1.0; }), "difference_cad");
-  EXPECT_EQ(field_of([](auto& s) { s.tolerance_cad = 0.0; }), "tolerance_cad");
-  EXPECT_EQ(field_of([](auto& s) { s.iterations = 0; }), "iterations");
-  EXPECT_EQ(field_of([](auto& s) { s.lower_cad = -61.0; }), "lower_cad");
-  EXPECT_EQ(field_of([](auto& s) { s.upper_cad = -29.0; }), "upper_cad");
-  EXPECT_EQ(field_of([](auto& s) { s.cylinder.geometry.bore_mm = -1.0; }), "bore_mm");
 }
 
 }  // namespace

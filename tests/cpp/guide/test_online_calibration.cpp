@@ -190,75 +190,15 @@ Coverage coverage_of(CalibrationMethod method, double noise_bar, double correlat
   return out;
 }
 
-TEST(OnlineCalibration, StandardErrorsHoldForWhiteNoise) {
+TEST(OnlineCalibration, StandardErrorsHoldForWhiteAndForCorrelatedNoise) {
   for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
-    for (const double noise : {0.1, 0.5}) {
-      const Coverage c = coverage_of(method, noise, 0.0, 40);
-      EXPECT_GT(c.within_95, 0.88) << name_of(method) << " " << noise;  // 0.95 less three of 0.022
-      EXPECT_LT(c.spread, 1.2) << name_of(method) << " " << noise;
-      EXPECT_GT(c.spread, 0.7) << name_of(method) << " " << noise;
+    for (const auto& [noise, correlation] : {std::pair{0.1, 0.0}, {0.5, 0.0}, {0.3, 0.5}, {0.3, 0.9}}) {
+      const Coverage c = coverage_of(method, noise, correlation, 40);
+      EXPECT_GT(c.within_95, 0.88) << name_of(method) << noise << correlation;  // 0.95 less three of 0.022
+      EXPECT_LT(c.spread, correlation == 0.0 ? 1.2 : 1.25) << name_of(method) << noise << correlation;
+      EXPECT_TRUE(correlation > 0.0 || c.spread > 0.7) << name_of(method) << noise;
     }
   }
-}
-
-TEST(OnlineCalibration, StandardErrorsHoldForCorrelatedNoise) {
-  for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
-    for (const double correlation : {0.5, 0.9}) {
-      const Coverage c = coverage_of(method, 0.3, correlation, 40);
-      EXPECT_GT(c.within_95, 0.88) << name_of(method) << " " << correlation;
-      EXPECT_LT(c.spread, 1.25) << name_of(method) << " " << correlation;
-    }
-  }
-}
-
-// The commanded timing is told, the true one scatters about it: no window's mean error is that of the next.
-TEST(OnlineCalibration, StandardErrorsHoldWhereTheTimingScatters) {
-  for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
-    for (const double noise : {0.02, 0.2}) {
-      constexpr int seeds = 100;
-      double within = 0.0, spread = 0.0;
-      for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-        loop::BenchSettings s = steady_bench(noise, seed);
-        s.soc_scatter_cad = 0.3;
-        loop::EngineBench bench(s);
-        OnlineCalibrationSettings g = wrong_guide(method, 0.7);
-        g.soc_scatter_cad = 0.3;
-        OnlineCalibration calibration(g);
-        for (int k = 0; k < 65; ++k) {
-          bench.step(-8.0);
-          calibration.offer(bench.pressure().pressure_bar, {}, -8.0);
-          calibration.update();
-        }
-        const double z = (calibration.parameters()[wall] - 0.5) / calibration.standard_errors()[wall];
-        within += std::abs(z) < 1.96 ? 1.0 / seeds : 0.0;
-        spread += z * z / seeds;
-      }
-      EXPECT_GT(within, 0.88) << name_of(method) << " " << noise;
-      EXPECT_LT(std::sqrt(spread), 1.2) << name_of(method) << " " << noise;
-    }
-  }
-}
-
-TEST(OnlineCalibration, SeveralParametersTogether) {
-  loop::BenchSettings s = steady_bench(0.05);
-  s.pressure.tdc_error_cad = 0.8;
-  s.schedule[0].point.burn_duration_cad = 33.0;
-  loop::EngineBench bench(s);
-  OnlineCalibrationSettings g = wrong_guide(CalibrationMethod::recursive);
-  g.wanted[Calibrated::soc_offset] = g.wanted[Calibrated::burn_duration] = g.wanted[Calibrated::tdc] = true;
-  OnlineCalibration calibration(g);
-  engine::OperatingPoint told;
-  told.burn_duration_cad = 30.0;
-  for (int k = 0; k < 200; ++k) {
-    bench.step(-6.0);
-    calibration.offer(bench.pressure().pressure_bar, told, -5.5);
-    calibration.update();
-  }
-  EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.0125);
-  EXPECT_NEAR(calibration.parameters()[Calibrated::soc_offset], -0.5, 0.1);
-  EXPECT_NEAR(calibration.parameters()[Calibrated::burn_duration], 1.1, 0.01);
-  EXPECT_NEAR(calibration.parameters()[Calibrated::tdc], 0.8, 0.1);
-  EXPECT_NEAR(calibration.cylinder().burn.burn_duration_ref_cad, 33.0, 0.3);
 }
 
 // Fuel and burn of each point are off by another share; what belongs to the sensor is learnt over both.

@@ -2,8 +2,6 @@
 // on bit for bit, refusals that change nothing.
 #include <cmath>
 #include <functional>
-#include <limits>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -11,7 +9,6 @@
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/online_calibration.hpp"
-#include "mgdd/optimize/laws/extremum_seeking.hpp"
 #include "support/calibration_case.hpp"
 #include "support/no_alloc.hpp"
 
@@ -35,36 +32,6 @@ std::vector<double> trace_of(loop::EngineBench& bench, double soc_cad = -6.0) {
   bench.step(soc_cad);
   const auto shown = bench.pressure().pressure_bar;
   return {shown.begin(), shown.end()};
-}
-
-// Twice the wall heat of the engine, while extremum seeking moves the timing of every cycle.
-TEST(OnlineCalibrationLoop, FollowsAnEngineThatSeeks) {
-  for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
-    for (const double scatter : {0.0, 0.3}) {
-      loop::BenchSettings s = steady_bench(0.0, 3);
-      s.soc_scatter_cad = scatter;
-      loop::EngineBench bench(s);
-      OnlineCalibrationSettings g = wrong_guide(method);
-      g.soc_scatter_cad = scatter;
-      OnlineCalibration calibration(g);
-      optimize::ExtremumSeekingSettings seeking;
-      seeking.space = {optimize::scalar_input(-15.0), optimize::scalar_input(-30.0), optimize::scalar_input(10.0)};
-      seeking.curvature = -0.051;
-      optimize::ExtremumSeeking seeker(seeking);
-      int late = 0;
-      for (int k = 0; k < 300; ++k) {
-        const double soc = seeker.ask()[0];
-        const loop::BenchCycle c = bench.step(soc);
-        seeker.tell({.components = c.component_values().first(1), .limits = {}, .misfire = false});
-        calibration.offer(bench.pressure().pressure_bar, {}, soc);  // the commanded timing
-        calibration.update();
-        late += k >= 40 && std::abs(calibration.parameters()[wall] - 0.5) > 0.015 ? 1 : 0;
-      }
-      EXPECT_GT(std::abs(seeker.estimate()[0] + 15.0), 3.0);  // it did move
-      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.015) << name_of(method) << " " << scatter;
-      EXPECT_EQ(late, 0) << name_of(method) << " " << scatter;
-    }
-  }
 }
 
 TEST(OnlineCalibrationLoop, BadCyclesNeverReachIt) {
@@ -248,47 +215,6 @@ TEST(OnlineCalibrationLoop, ARefusedStateChangesNothing) {
   bad["covariance"][n_calibrated + 1] = -1.0;  // a diagonal place
   EXPECT_THROW(restore_state(calibration, bad), ParameterError);
   EXPECT_EQ(save_state(calibration), good);
-}
-
-TEST(OnlineCalibrationLoop, RefusesByName) {
-  const auto message = [](auto change) -> std::string {
-    OnlineCalibrationSettings s;
-    change(s);
-    try {
-      const OnlineCalibration calibration(s);
-    } catch (const ParameterError& e) {
-      return e.what();
-    }
-    return "";
-  };
-  const auto holds = [&](auto change, const std::string& part) {
-    EXPECT_NE(message(change).find(part), std::string::npos) << message(change);
-  };
-  holds([](auto& s) { s.wanted.fill(false); }, "parameters is empty");
-  holds([](auto& s) { s.uncertainty[Calibrated::tdc] = -1.0; }, "uncertainty of tdc_offset_cad = -1");
-  holds([](auto& s) { s.window.window_cycles = 1; }, "window_cycles = 1");
-  holds([](auto& s) { s.window.cov_limit_percent = 0.0; }, "cov_limit_percent = 0");
-  holds([](auto& s) { s.forgetting = 1.1; }, "forgetting = 1.1");
-  holds([](auto& s) { s.soc_scatter_cad = -0.1; }, "soc_scatter_cad = -0.1");
-  holds([](auto& s) { s.jump_factor = 1.0; }, "jump_factor = 1");
-  holds([](auto& s) { s.trials_per_update = 0; }, "trials_per_update = 0");
-  holds([](auto& s) { s.cylinder.geometry.bore_mm = -1.0; }, "bore_mm = -1");
-  holds([](auto& s) { s.cylinder.geometry.compression_ratio = 1.5; }, "compression_ratio = 1.5");
-  holds([](auto& s) { s.cylinder.wall_heat.wall_temperature_k = 200.0; }, "wall_temperature_k = 200");
-  holds(
-      [](auto& s) {
-        s.wanted[Calibrated::soc_variance] = true;
-        s.soc_scatter_cad = 0.0;
-      },
-      "soc_scatter_cad = 0: must be above 0 where soc_variance_scale is adapted");
-  holds(
-      [](auto& s) {
-        s.method = CalibrationMethod::extremum_seeking;
-        s.wanted[Calibrated::gamma] = true;
-      },
-      "extremum seeking adapts wall_heat_scale alone, not gamma_offset");
-  EXPECT_THROW(parse_calibrated("parameters", "c1"), ParameterError);
-  EXPECT_EQ(parse_calibrated("parameters", "tdc_offset_cad"), Calibrated::tdc);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include "mgdd/engine/recirculation.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 #include "mgdd/loop/engine_bench_lanes.hpp"
-#include "mgdd/loop/monte_carlo.hpp"
+#include "mgdd/loop/engine_loop.hpp"
 #include "support/bench_case.hpp"
 
 namespace mgdd::loop {
@@ -133,58 +133,6 @@ TEST(BenchInputs, EachIsTheSameAsInThePointOrTheCylinder) {
   same(split, {-9.0, 0.25}, s);
 }
 
-TEST(BenchInputs, BoostRaisesPressureAndCoolsTheBurn) {
-  EngineBench bench(steering({soc_cad, intake_pressure_kpa}));
-  BenchCycle before = step(bench, {-6.0, 120.0});
-  for (const double kpa : {150.0, 185.0, 230.0}) {
-    const BenchCycle now = step(bench, {-6.0, kpa});
-    EXPECT_GT(now.indicators.p_max_bar, before.indicators.p_max_bar + 10.0);
-    EXPECT_LT(now.indicators.t_max_k, before.indicators.t_max_k);
-    EXPECT_LT(now.nox_true_ppm, before.nox_true_ppm);
-    before = now;
-  }
-}
-
-TEST(BenchInputs, RequestsAreClampedRepeatedAndReported) {
-  EngineBench bench(steering({soc_cad, egr, intake_pressure_kpa}));
-  const BenchCycle first = step(bench, {-6.0, nan, nan});  // as the point has them
-  EXPECT_EQ((std::vector{first.applied[0], first.applied[1], first.applied[2]}), (std::vector{-6.0, 0.0, 150.0}));
-  const BenchCycle wide = step(bench, {-6.0, 0.7, 30.0});
-  EXPECT_TRUE(wide.clamped);
-  EXPECT_EQ(wide.applied[1], 0.5);
-  EXPECT_EQ(wide.applied[2], 50.0);
-  const BenchCycle kept = bench.step(-5.0);
-  EXPECT_FALSE(kept.clamped);
-  EXPECT_EQ(kept.applied[1], 0.5);
-  EXPECT_EQ(step(bench, {nan, 0.2}).applied[0], -5.0);
-  bench.reset();
-  EXPECT_EQ(bench.step(-5.0).applied[2], 150.0);
-}
-
-TEST(BenchInputs, SensorsStartSettledAtTheFirstRequest) {
-  EngineBench bench(steering({soc_cad, egr}));
-  const BenchCycle c = step(bench, {-6.0, 0.3});
-  EXPECT_EQ(c.nox_analyser_ppm, c.nox_true_ppm);
-  EXPECT_EQ(c.nox_fast_ppm, c.nox_true_ppm);
-  const double before = c.nox_true_ppm;
-  EXPECT_EQ(step(bench, {-6.0, 0.0}).nox_analyser_ppm, before);  // 38 cycles late
-}
-
-TEST(BenchInputs, AStateGoesOnBitForBit) {
-  BenchSettings s = steering({soc_cad, egr, intake_pressure_kpa}, BenchSettings{});
-  s.limits = {"nox_analyser_ppm", "t_evo_k"};
-  EngineBench whole(s);
-  for (int k = 0; k < 25; ++k)
-    step(whole, {test_support::wandering_soc_cad(k), 0.01 * k, 150.0 + k});
-  EngineBench twin(s);
-  restore_state(twin, save_state(whole));
-  EXPECT_EQ(twin.pressure().pressure_bar[70], whole.pressure().pressure_bar[70]);
-  for (int k = 0; k < 25; ++k)
-    ASSERT_EQ(bits_of(twin.step(-4.0)), bits_of(whole.step(-4.0)));
-  EngineBench plain{BenchSettings{}};
-  EXPECT_THROW(restore_state(plain, save_state(whole)), ParameterError);
-}
-
 TEST(BenchInputs, NoxAndExhaustTemperatureAreLimits) {
   BenchSettings s = steering({soc_cad, egr}, BenchSettings{});
   s.limits = {"nox_soft_ppm", "t_evo_k", "nox_fast_ppm", "dp_max_bar_per_cad", "nox_true_ppm"};
@@ -232,61 +180,15 @@ TEST(BenchInputs, ALoopOfTheCoreSteersThemAll) {
   const optimize::Spsa begun(o);
   EngineBench bench(s), twin(s);
   optimize::Spsa seeker = begun, other = begun;
-  LoopStatistics alone({}, 80);
   for (int k = 0; k < 80; ++k) {
     const LoopCycle cycle = loop_step(bench, seeker);
-    alone.add(cycle);
     const optimize::Inputs asked = other.ask();
     const BenchCycle c = twin.step({asked.data(), 3});
     other.tell({c.component_values(), {}, false, {c.applied.data(), 3}});
     ASSERT_EQ(bits_of(c), bits_of(cycle.bench));
   }
-  MonteCarloPlan plan;
-  plan.benches.emplace_back(s);
-  plan.criteria.resize(1);
-  plan.seekers.emplace_back(begun);
-  for (std::uint64_t seed = 0; seed < 16; ++seed)
-    plan.seeds.push_back(seed);
-  plan.cycles = 80;
-  const MonteCarloResult result = monte_carlo(plan, [] { return false; });
-  EXPECT_EQ(result.loops[0].mean_j, alone.summary().mean_j);
   EXPECT_FALSE(side_by_side(bench, bench));
   EXPECT_THROW(EngineBenchLanes({bench}), ParameterError);
-
-  const auto refusal = [](const EngineBench& on, const optimize::Spsa& with) -> std::string {
-    try {
-      require_match(on, with);
-    } catch (const ParameterError& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_NE(refusal(EngineBench{BenchSettings{}}, begun).find("takes one input, soc_cad"), std::string::npos);
-  o.space.upper[1] = 0.9;
-  o.space.start[1] = 0.7;
-  EXPECT_NE(refusal(bench, optimize::Spsa(o)).find("egr of the seeker = 0.7"), std::string::npos);
-}
-
-TEST(BenchInputs, RefusalsNameTheInput) {
-  const auto refusal = [](const BenchSettings& s) -> std::string {
-    try {
-      EngineBench{s};
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, "inputs");
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_NE(refusal(steering({})).find("must begin with soc_cad"), std::string::npos);
-  EXPECT_NE(refusal(steering({egr, soc_cad})).find("must begin with soc_cad"), std::string::npos);
-  EXPECT_NE(refusal(steering({soc_cad, egr, egr})).find("egr stands there twice"), std::string::npos);
-  EXPECT_NE(refusal(steering({soc_cad, second_fraction})).find("second_fraction needs burn_shape"), std::string::npos);
-  BenchSettings s = steering({soc_cad, egr});
-  s.soft_sensor.model.intake_o2_fraction = 0.18;
-  EXPECT_NE(refusal(s).find("intake_o2_fraction of soft_sensor"), std::string::npos);
-  s = steering({soc_cad, intake_pressure_kpa});
-  s.cylinder.gas.ivc_pressure_rise_kpa = -60.0;
-  EXPECT_NE(refusal(s).find("intake_pressure_kpa reaches down to 50 kPa"), std::string::npos);
 }
 
 }  // namespace

@@ -39,34 +39,6 @@ TEST(EngineBench, WithoutChanceItIsTheCycleModel) {
   EXPECT_EQ(bench.cycle(), 3);
 }
 
-TEST(EngineBench, TrueNoxOfTheDefaultEngine) {
-  EngineBench bench(quiet_bench());
-  const double soc[] = {-20.0, -10.0, -5.0, 0.0, 5.0}, nox[] = {4257.0, 2026.0, 1451.0, 1100.0, 887.0};
-  for (int i = 0; i < 5; ++i)
-    EXPECT_NEAR(bench.step(soc[i]).nox_true_ppm, nox[i], 0.005 * nox[i]);
-}
-
-TEST(EngineBench, TheOptimumMovesLaterWithTheWeightOfNox) {
-  const double weight[] = {0.0, 0.002, 0.004, 0.008, 0.016}, soc[] = {-5.63, -2.72, -0.65, 2.36, 6.49},
-               efficiency[] = {0.5619, 0.5598, 0.5559, 0.5473, 0.5307}, nox[] = {1509.0, 1269.0, 1137.0, 988.0, 843.0};
-  for (int i = 0; i < 5; ++i) {
-    EngineBench bench(quiet_bench(weight[i]));
-    double low = -15.0, high = 10.0;
-    while (high - low > 0.01) {
-      const double third = (high - low) / 3.0;
-      if (bench.step(low + third).j < bench.step(high - third).j) {
-        low += third;
-      } else {
-        high -= third;
-      }
-    }
-    const BenchCycle best = bench.step(0.5 * (low + high));
-    EXPECT_NEAR(best.soc_cad, soc[i], 0.15) << weight[i];
-    EXPECT_NEAR(best.indicators.efficiency_gross, efficiency[i], 2e-4) << weight[i];
-    EXPECT_NEAR(best.nox_true_ppm, nox[i], 0.01 * nox[i]) << weight[i];
-  }
-}
-
 TEST(EngineBench, SensorsStartSteadyAndAnswerAStepInClosedForm) {
   EngineBench bench(quiet_bench());
   const BenchCycle first = bench.step(-10.0);

@@ -128,14 +128,6 @@ TEST(MonteCarlo, AFewLoopsHaveTheBitsOfSingleOnes) {
   EXPECT_THROW(static_cast<void>(form_of_loops(16, LoopForm::shared)), ParameterError);
 }
 
-TEST(MonteCarlo, SeedsDiffer) {
-  const MonteCarloResult r = monte_carlo(small_plan(), {});
-  for (std::size_t group = 0; group < 12; group += 3) {
-    EXPECT_NE(r.loops[group].mean_cad, r.loops[group + 1].mean_cad);
-    EXPECT_NE(r.loops[group + 1].mean_cad, r.loops[group + 2].mean_cad);
-  }
-}
-
 TEST(MonteCarlo, StopsEarlyAndKeepsWhatIsFinished) {
   MonteCarloPlan plan = small_plan();
   plan.seeds.assign(5000, 1);
@@ -159,26 +151,6 @@ TEST(MonteCarlo, AnExceptionOfTheStopCallbackEndsTheLoops) {
   MonteCarloPlan plan = small_plan();
   plan.cycles = 1'000'000'000;  // would take hours
   EXPECT_THROW(monte_carlo(plan, []() -> bool { throw std::runtime_error("signal"); }), std::runtime_error);
-}
-
-TEST(MonteCarlo, AnEmptyOrUnfittingPlanIsRefused) {
-  MonteCarloPlan plan = small_plan();
-  plan.seeds.clear();
-  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
-  plan = small_plan();
-  plan.cycles = 0;
-  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
-  plan = small_plan();
-  plan.criteria.pop_back();
-  EXPECT_THROW(monte_carlo(plan, {}), ShapeError);
-  plan = small_plan();
-  plan.criteria[0].exceed_from = plan.cycles;
-  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
-  plan = small_plan();
-  optimize::GoldenSectionSettings golden;
-  golden.space = {scalar_input(0.0), scalar_input(-20.0), scalar_input(5.0)};
-  plan.seekers.emplace_back(optimize::GoldenSection(golden));  // knows no limits
-  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
 }
 
 }  // namespace

@@ -4,17 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 #include "support/bench_case.hpp"
-#include "support/no_alloc.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -55,26 +51,17 @@ TEST(PressureSensor, ExactItShowsTheCycleOnTheCrankGrid) {
   EXPECT_TRUE(bench.pressure().angle_cad.empty());
 }
 
-TEST(PressureSensor, GainAndOffsetAreThoseOfALine) {
+TEST(PressureSensor, GainAndADriftingOffsetAreThoseOfALine) {
   BenchSettings s = quiet_bench();
   s.pressure.gain_error = 0.02;
-  s.pressure.offset_bar = -0.3;
-  EngineBench bench(s);
-  const std::vector<double> shown = trace_of(bench, -6.0), real = true_trace(-6.0);
-  for (std::size_t k = 0; k < real.size(); ++k)
-    EXPECT_NEAR(shown[k], 1.02 * real[k] - 0.3, 1e-12);
-}
-
-TEST(PressureSensor, TheOffsetDriftsFromCycleToCycle) {
-  BenchSettings s = quiet_bench();
   s.pressure.offset_bar = -0.3;
   s.pressure.drift_bar_per_kcycle = 40.0;
   EngineBench bench(s);
   const std::vector<double> real = true_trace(-6.0);
   for (int cycle = 0; cycle < 3; ++cycle) {
     const std::vector<double> shown = trace_of(bench, -6.0);
-    for (std::size_t k = 0; k < real.size(); k += 29)
-      EXPECT_NEAR(shown[k], real[k] - 0.3 + 0.04 * cycle, 1e-12) << cycle;
+    for (std::size_t k = 0; k < real.size(); ++k)
+      EXPECT_NEAR(shown[k], 1.02 * real[k] - 0.3 + 0.04 * cycle, 1e-12) << cycle;
   }
 }
 
@@ -98,28 +85,6 @@ TEST(PressureSensor, ALateTdcShowsEachPressureLater) {
     EXPECT_NEAR(trace.pressure_bar.front(), 1.5, 0.02);
     EXPECT_NEAR(trace.pressure_bar.back(), 3.845, 0.15);
   }
-}
-
-// Pressure on volumes that are 1 CAD off: closed IMEP changes by 9.1 % (acceptance fact 36); one degree of work at EVO,
-// 0.3 %, falls off the window.
-TEST(PressureSensor, OneDegreeOfTdcIsNinePercentOfWork) {
-  const engine::Geometry<double> geometry{engine::GeometryParameters<double>{}};
-  const auto imep = [&](double error) {
-    BenchSettings s = quiet_bench();
-    s.pressure.tdc_error_cad = error;
-    EngineBench bench(s);
-    bench.step(-6.0);
-    const PressureTrace trace = bench.pressure();
-    double work = 0.0;
-    for (std::size_t k = 0; k + 1 < trace.angle_cad.size(); ++k) {
-      work += 0.5 * (trace.pressure_bar[k] + trace.pressure_bar[k + 1]) *
-              (geometry.volume_m3(trace.angle_cad[k + 1]) - geometry.volume_m3(trace.angle_cad[k]));
-    }
-    return work / geometry.swept_m3;
-  };
-  EXPECT_NEAR(imep(0.0), 9.392, 0.005);
-  EXPECT_NEAR(100.0 * (imep(1.0) / imep(0.0) - 1.0), 9.09, 0.35);
-  EXPECT_NEAR(100.0 * (imep(-1.0) / imep(0.0) - 1.0), -9.14, 0.35);
 }
 
 TEST(PressureSensor, NoiseIsWhiteAndNothingElseHearsOfIt) {
@@ -169,46 +134,6 @@ TEST(PressureSensor, ShowsTheBurnOfTheCycleWithItsScatterDriftAndMisfires) {
     EXPECT_EQ(std::vector<double>(shown.begin(), shown.end()), real) << k;
   }
   EXPECT_GT(misfires, 2);
-}
-
-TEST(PressureSensor, ReadingMovesNothingAndSurvivesARestart) {
-  BenchSettings s;
-  s.pressure.noise_bar = 0.2;
-  s.wall_heat_drift_per_kcycle = 3.0;
-  EngineBench watched(s), alone(s);
-  for (int k = 0; k < 30; ++k) {
-    const BenchCycle c = watched.step(wandering_soc_cad(k));
-    const test_support::AllocationCounter counter;
-    const auto first = watched.pressure().pressure_bar;
-    EXPECT_EQ(counter.count(), 0u);
-    const std::vector<double> once(first.begin(), first.end());
-    const auto again = watched.pressure().pressure_bar;
-    EXPECT_TRUE(std::equal(again.begin(), again.end(), once.begin(), once.end()));
-    EXPECT_EQ(bits_of(c), bits_of(alone.step(wandering_soc_cad(k))));
-  }
-  EngineBench other(s);
-  restore_state(other, save_state(watched));
-  const auto a = watched.pressure().pressure_bar, b = other.pressure().pressure_bar;
-  EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end()));
-}
-
-TEST(PressureSensor, RefusesByName) {
-  const auto message = [](auto change) -> std::string {
-    BenchSettings s;
-    change(s);
-    try {
-      const EngineBench bench(s);
-    } catch (const ParameterError& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_NE(message([](auto& s) { s.pressure.noise_bar = -1.0; }).find("pressure_noise_bar = -1 bar"),
-            std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.pressure.tdc_error_cad = 6.0; }).find("tdc_error_cad = 6"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.pressure.gain_error = std::nan(""); }).find("pressure_gain_error"),
-            std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.pressure.offset_bar = 9.0; }).find("pressure_offset_bar = 9"), std::string::npos);
 }
 
 }  // namespace

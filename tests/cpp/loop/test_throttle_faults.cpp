@@ -174,11 +174,12 @@ TEST(ThrottleFaults, AnOpenBridgePassesNoCurrentWhateverTheDuty) {
 }
 
 TEST(ThrottleFaults, EveryOneGoesOnBitForBitAfterARestore) {
-  const VirtualThrottleSettings settings = with({{Kind::jammed_at, 0.02, 18.0, 0.12},
-                                                 {Kind::supply_sag, 0.06, 9.0},
-                                                 {Kind::spring_above, 0.03, 0.4},
-                                                 {Kind::stale_sample, 0.08, 0.0, 0.2},
-                                                 {Kind::missing_sample, 0.15, 0.0, 0.16}});
+  VirtualThrottleSettings settings = with({{Kind::jammed_at, 0.02, 18.0, 0.12},
+                                           {Kind::supply_sag, 0.06, 9.0},
+                                           {Kind::spring_above, 0.03, 0.4},
+                                           {Kind::stale_sample, 0.08, 0.0, 0.2},
+                                           {Kind::missing_sample, 0.15, 0.0, 0.16}});
+  settings.faults[1] = {throttle::SensorFaultKind::stuck, 0.05, 0.0};
   VirtualThrottle first(settings);
   for (int k = 0; k < 300; ++k) {
     VirtualThrottle second(settings);
@@ -187,6 +188,7 @@ TEST(ThrottleFaults, EveryOneGoesOnBitForBitAfterARestore) {
     const auto a = first.step(in), b = second.step(in);
     ASSERT_EQ(a.angle_deg, b.angle_deg) << k;
     ASSERT_EQ(a.age_s, b.age_s);
+    ASSERT_EQ(a.sensed.fault, b.sensed.fault);
     if (!std::isnan(a.sensed.angle_deg)) {
       ASSERT_EQ(a.sensed.volts, b.sensed.volts);
     }

@@ -1,15 +1,11 @@
-// Figures of a run on tracks made by hand, the loop's delay and disturbances, refusals, and many loops at once.
+// Figures of a run on tracks made by hand, the loop's delay and disturbances.
 #include "mgdd/loop/throttle_loop.hpp"
 
 #include <cmath>
 #include <cstddef>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include "mgdd/control/pid.hpp"
-#include "mgdd/loop/throttle_controllers.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -102,61 +98,6 @@ TEST(ThrottleLoop, ADutyActsBehindItsDelayAndDisturbancesActAtOnce) {
   EXPECT_EQ(blown.angle_deg[19], now.angle_deg[19]);
   EXPECT_LT(blown.angle_deg[20], now.angle_deg[20]);
   EXPECT_LT(sagged.current_a[0], 0.6 * now.current_a[0]);
-}
-
-TEST(ThrottleLoop, RefusesByName) {
-  const auto refused = [](auto change, int delay = 1) {
-    ThrottleScenario s = step_scenario(20.0, 30.0, 10, 10);
-    change(s);
-    control::Pid pid{control::PidSettings{}};
-    try {
-      run_throttle_loop(pid, {}, delay, s);
-    } catch (const Error& e) {
-      return e.field;
-    }
-    return std::string("nothing");
-  };
-  EXPECT_EQ(refused([](auto& s) { s.reference_deg.clear(); }), "reference_deg");
-  EXPECT_EQ(refused([](auto& s) { s.reference_deg[3] = std::nan(""); }), "reference_deg");
-  EXPECT_EQ(refused([](auto& s) { s.airflow_torque_nm = {1.0}; }), "airflow_torque_nm");
-  EXPECT_EQ(refused([](auto& s) { s.supply_v.assign(20, INFINITY); }), "supply_v");
-  EXPECT_EQ(refused([](auto& s) { s.from = 20; }), "from");
-  EXPECT_EQ(refused([](auto&) {}, 21), "delay_samples");
-  EXPECT_EQ(refused([](auto&) {}), "nothing");
-}
-
-TEST(ThrottleMonteCarlo, IsTheSameOnAnyNumberOfThreadsAndLeavesItsControllersAlone) {
-  ThrottleMonteCarlo plan;
-  for (int i = 0; i < 3; ++i) {
-    VirtualThrottleSettings plant;
-    plant.throttle.coulomb_nm = plant.throttle.stiction_nm = 0.25 + 0.03 * i;
-    plant.seed = static_cast<std::uint64_t>(i);
-    plan.plants.push_back(plant);
-  }
-  plan.controllers = {control::GuidedPredictive{control::GuidedPredictiveSettings{}},
-                      control::Pid{control::PidSettings{}}};
-  plan.scenarios = {step_scenario(20.0, 60.0, 200, 400), step_scenario(40.0, 42.0, 200, 400)};
-  plan.band_deg = {0.8, 0.2};
-  plan.threads = 1;
-  const auto alone = monte_carlo(plan, {});
-  plan.threads = 3;
-  const auto together = monte_carlo(plan, {});
-  ASSERT_EQ(alone.figures.size(), 12u);
-  for (std::size_t i = 0; i < alone.figures.size(); ++i) {
-    EXPECT_TRUE(alone.finished[i] && together.finished[i]);
-    EXPECT_EQ(alone.figures[i].mse_deg2, together.figures[i].mse_deg2);
-  }
-  // [plant][controller][scenario]: a step of 2 deg costs less than one of 40.
-  EXPECT_LT(alone.figures[1].mse_deg2, 0.1 * alone.figures[0].mse_deg2);
-  control::Pid pid{control::PidSettings{}};
-  VirtualThrottleSettings last = plan.plants[2];
-  last.start_deg = 40.0;
-  const ThrottleTrack track = run_throttle_loop(pid, last, 1, plan.scenarios[1]);
-  EXPECT_EQ(alone.figures[11].mse_deg2, tracking_figures(plan.scenarios[1], track, 1e-3, 0.2).mse_deg2);
-  plan.band_deg.pop_back();
-  EXPECT_THROW(monte_carlo(plan, {}), ShapeError);
-  plan.plants.clear();
-  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
 }
 
 }  // namespace

@@ -1,11 +1,7 @@
 #include "support/fit_cases.hpp"
 
-#include <algorithm>
-
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
-#include "support/no_alloc.hpp"
 #include "support/reference_algebra.hpp"
 
 namespace mgdd::optimize {
@@ -90,32 +86,6 @@ TEST(LeastSquares, EveryEvaluationStaysInTheBox) {
   const FitReport fit = LeastSquares(parameters, 2).solve(watched, vector({-1.2, 1.0}));
   EXPECT_TRUE(fit.success()) << fit.brief();
   EXPECT_NEAR(fit.values[1], 0.25, 1e-9);
-}
-
-// The same search, once with bounds and once with a model that refuses every point outside them.
-TEST(LeastSquares, ClippingConvergesWhereRejectingDoesNot) {
-  const MatrixXd a = random_matrix(7, 20, 4);
-  const VectorXd b = a * vector({2.0, -2.0, 2.0, 0.1});
-  std::vector<Parameter> boxed = named(4);
-  for (Parameter& p : boxed) {
-    p.lower = -1.0;
-    p.upper = 1.0;
-  }
-  const Linear model{a, b};
-  const auto fenced = [&](const VectorXd& x, VectorXd& r, MatrixXd* j) {
-    return x.cwiseAbs().maxCoeff() <= 1.0 && model(x, r, j);
-  };
-  LeastSquares clipping(boxed, 20), rejecting(named(4), 20);
-  int clipping_found = 0, rejecting_found = 0;
-  const double best = clipping.solve(model, VectorXd::Zero(4)).cost;
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    const VectorXd start = random_matrix(100 + seed, 4, 1).array().tanh();
-    const FitReport clipped = clipping.solve(model, start);
-    clipping_found += clipped.success() && clipped.cost < best * (1 + 1e-9) ? 1 : 0;
-    rejecting_found += rejecting.solve(fenced, start).cost < best * (1 + 1e-3) ? 1 : 0;
-  }
-  EXPECT_EQ(clipping_found, 10);
-  EXPECT_LT(rejecting_found, 10);
 }
 
 }  // namespace

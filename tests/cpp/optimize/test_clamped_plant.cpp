@@ -106,68 +106,6 @@ TEST(ClampedPlant, AnOffsetOrAResolutionIsNotAClamp) {
   }
 }
 
-// Actuators that are told truthfully and do not clamp: slow ones, late ones, and such with steps above the dither.
-TEST(ClampedPlant, ALagOrCoarseStepsDoNotStopASeeker) {
-  struct Actuator {
-    const char* name;
-    double lag, step;
-    int delay;
-  };
-  constexpr double best = 4.0;
-  for (const Actuator& a :
-       {Actuator{"lag 1", 1.0, 0.0, 0}, Actuator{"lag 3", 3.0, 0.0, 0}, Actuator{"lag 6", 6.0, 0.0, 0},
-        Actuator{"steps", 0.0, 4.0, 0}, Actuator{"late", 0.0, 0.0, 1}, Actuator{"lag 3 and steps", 3.0, 2.5, 0}}) {
-    for (const double side : {1.0, -1.0}) {
-      for (auto& [name, any] : every_seeker(space_at(scalar_input(-8.0 * side), 20.0), 0.25, 1)) {
-        SCOPED_TRACE(name + ", " + a.name + ", side " + std::to_string(side));
-        std::visit(
-            [&](auto& seeker) {
-              double slow = -8.0 * side;
-              std::vector<double> asked(3, slow);
-              double mean = 0.0;  // of late
-              for (int k = 0; k < 900; ++k) {
-                asked.push_back(seeker.ask()[0]);
-                const double late = asked[asked.size() - 1 - static_cast<std::size_t>(a.delay)];
-                slow += (a.lag > 0.0 ? 1.0 - std::exp(-1.0 / a.lag) : 1.0) * (late - slow);
-                const double applied = a.step > 0.0 ? a.step * std::round(slow / a.step) : slow;
-                const double j[] = {quadratic(applied - best * side) +
-                                    0.25 * random::normal(11, 1, static_cast<std::uint64_t>(k))};
-                ASSERT_EQ(seeker.tell({j, {}, false, {&applied, 1}}), TellStatus::accepted);
-                if (k >= 700) mean += seeker.estimate()[0] / 200.0;
-              }
-              const double few =
-                  name == "spsa_second_order" ? 2.0 : 0.0;  // four measurements an iteration, each waited for
-              EXPECT_NEAR(mean, best * side, 2.5 + few + 0.5 * a.step);  // of 12 at the start
-            },
-            any);
-      }
-    }
-  }
-}
-
-TEST(ClampedPlant, AppliedAsAskedIsTheSameToTheLastBit) {
-  const std::vector<Limit> limits{{"p_max_bar", 104.0, 0.5}};
-  for (const SearchSpace& space : {space_at(scalar_input(-6.0), 30.0), space_at(inputs({-6.0, 4.0, 3.0}), 30.0)}) {
-    auto said = every_seeker(space, 0.25, 2, limits), silent = every_seeker(space, 0.25, 2, limits);
-    for (std::size_t i = 0; i < said.size(); ++i) {
-      SCOPED_TRACE(said[i].first);
-      const auto path = [&](bool says) {
-        return [says](auto& seeker) {
-          for (int k = 0; k < 500; ++k) {
-            const Inputs x = seeker.ask();
-            const double j[] = {peak_at(x, 3.0) + 0.2 * random::normal(5, 1, static_cast<std::uint64_t>(k))};
-            const double values[] = {100.0 + 2.0 * x[0]};
-            const std::span<const double> applied(x.data(), static_cast<std::size_t>(x.size()));
-            seeker.tell({j, values, k % 60 == 9, says ? applied : std::span<const double>()});
-          }
-          return save_state(seeker);
-        };
-      };
-      EXPECT_EQ(std::visit(path(true), said[i].second), std::visit(path(false), silent[i].second));
-    }
-  }
-}
-
 // Both halves of a difference are clamped differently: the slope is that of the applied inputs, exactly.
 TEST(ClampedPlant, SlopesOfAStraightLineAreExact) {
   const auto line = [](const Inputs& x) { return 5.0 + 0.75 * x[0]; };

@@ -186,21 +186,5 @@ TEST(ConstraintFilter, BarrierIsTheLogarithmOfTheRoomAndGoesOnAsItsTangent) {
   EXPECT_NEAR(shaping(limit, 120.0), 2.0 * (std::log(0.01) - 2.01 / 0.01), 1e-9);
 }
 
-TEST(ConstraintFilter, RefusesLimitsByName) {
-  const auto message = [](Limit limit) -> std::string {
-    try {
-      validate({std::move(limit)});
-    } catch (const ParameterError& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_TRUE(message({"p", 1.0}).empty());
-  EXPECT_NE(message({"p", unlimited}).find("limit p: upper = inf"), std::string::npos);
-  EXPECT_NE(message({"p", 1.0, -1.0}).find("margin = -1"), std::string::npos);
-  EXPECT_NE(message({"p", 1.0, 0.0, LimitMethod::penalty, 0.0}).find("weight = 0"), std::string::npos);
-  EXPECT_NE(message({"p", 1.0, 0.0, LimitMethod::penalty, 1.0, std::nan("")}).find("scale = nan"), std::string::npos);
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

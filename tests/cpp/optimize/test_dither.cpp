@@ -116,60 +116,7 @@ TEST(Dither, EachComponentIsTurnedBackByItsOwnPhase) {
   }
 }
 
-// The table of the analyser behind all of J: tau 4P, no clip, counted until it stays within 1.5 CAD.
-TEST(Dither, CompensatedAnalyserArrives) {
-  for (const auto& [period, expected] : {std::pair{120, 698.0}, std::pair{60, 268.0}}) {
-    const double j2 = -0.0637;
-    ExtremumSeekingSettings s = plain_seeking(-8.0);
-    s.dither.period = period;
-    s.gain = scalar_input(gain_for(4.0 * period, 1.0, j2));
-    s.components = {{38.0, 25.0}};
-    ExtremumSeeking seeker(s);
-    LaggedSensor sensor(38, 25.0, 0.5 * j2 * 64.0);
-    const std::vector<double> path =
-        search(seeker, [&](double x) { return sensor.show(0.5 * j2 * x * x); }, 20 * period);
-    std::size_t stays = path.size();
-    while (stays > 0 && std::abs(path[stays - 1]) <= 1.5)
-      --stays;
-    EXPECT_LT(std::abs(path.back()), 0.5);
-    EXPECT_NEAR(static_cast<double>(stays), expected, 0.35 * expected) << "period " << period;
-  }
-}
-
 // --- refusals -----------------------------------------------------------------------------------------------
-
-TEST(Dither, RefusesHarmonicsThatMix) {
-  const auto refused = [](int period, std::vector<int> n) {
-    const DitherSettings s = window(period, std::move(n));
-    EXPECT_THROW(validate(s, s.amplitude.size()), ParameterError);
-  };
-  refused(3, {1});
-  refused(0, {1});
-  refused(10, {5});
-  refused(10, {0});
-  refused(40, {4, 4});
-  refused(40, {4, 8});
-  refused(40, {8, 4});
-  refused(40, {3, 4, 7});
-  refused(40, {7, 4, 3});
-  refused(40, {5, 10, 17});  // twice
-  EXPECT_NO_THROW(validate(window(40, {4, 5, 7}), 3));
-  EXPECT_NO_THROW(validate(window(4, {1}), 1));
-  EXPECT_THROW(validate(window(40, {4, 5}), 3), ShapeError);
-  DitherSettings s = window(10, {1});
-  for (const double amplitude : {0.0, -1.0, std::nan(""), unlimited}) {
-    s.amplitude = scalar_input(amplitude);
-    EXPECT_THROW(validate(s, 1), ParameterError) << amplitude;
-  }
-}
-
-TEST(Dither, RefusesComponentsByName) {
-  EXPECT_THROW(validate(std::vector<ComponentLag>{}), ShapeError);
-  for (const double bad : {-1.0, std::nan(""), unlimited}) {
-    EXPECT_THROW(validate(std::vector<ComponentLag>{{bad, 0.0}}), ParameterError);
-    EXPECT_THROW(validate(std::vector<ComponentLag>{{0.0, 0.0}, {0.0, bad}}), ParameterError);
-  }
-}
 
 }  // namespace
 }  // namespace mgdd::optimize

@@ -79,70 +79,7 @@ TEST(ExtremumSeeking, AConstantAddedToJChangesNothing) {
   }
 }
 
-// The gain decides how fast, not where: mean of the estimate over cycles 1000 to 8000.
-TEST(ExtremumSeeking, FinalMeanDoesNotDependOnTheGain) {
-  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average}) {
-    std::vector<double> means;
-    for (const double tau : {40.0, 80.0}) {
-      double mean = 0.0;
-      for (std::uint64_t seed = 0; seed < 60; ++seed) {
-        ExtremumSeekingSettings s = plain_seeking(5.0, tau);
-        s.form = form;
-        ExtremumSeeking seeker(s);
-        mean += mean_of(search(seeker, quadratic, 8000, 0.1, seed), 1000, 8000) / 60.0;
-      }
-      means.push_back(mean);
-    }
-    EXPECT_NEAR(means[0], means[1], 0.05);
-    EXPECT_NEAR(means[0], 0.0, 0.05);
-  }
-}
-
 // --- figures of the default engine --------------------------------------------------------------------------
-
-TEST(ExtremumSeeking, CyclesFromTwelveToOne) {
-  for (const double side : {12.0, -12.0}) {
-    double mean = 0.0;
-    for (std::uint64_t seed = 0; seed < 200; ++seed) {
-      ExtremumSeeking seeker(plain_seeking(side));
-      const int count = first_within(search(seeker, quadratic, 600, 0.25, seed), 1.0);
-      ASSERT_GE(count, 0);
-      mean += count / 200.0;
-    }
-    EXPECT_NEAR(mean, 109.0, 12.0) << "from " << side;
-  }
-}
-
-TEST(ExtremumSeeking, CyclesAndErrorWithTheDefaultClip) {
-  ExtremumSeekingSettings s = plain_seeking(12.0);
-  s.rate = Inputs{};
-  ExtremumSeeking exact(s);
-  EXPECT_DOUBLE_EQ(exact.settings().rate[0], 0.3);
-  EXPECT_NEAR(first_within(search(exact, quadratic, 900), 1.0), 128.0, 5.0);
-  double square = 0.0;
-  for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    ExtremumSeeking seeker(s);
-    square += std::pow(rms_of(search(seeker, quadratic, 2400, 0.25, seed), 400, 2400), 2) / 100.0;
-  }
-  EXPECT_NEAR(std::sqrt(square), 0.75, 0.04);
-}
-
-TEST(ExtremumSeeking, BatchOfAmplitudeTwo) {
-  double mean = 0.0, square = 0.0;
-  for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    ExtremumSeekingSettings s = plain_seeking(12.0);
-    s.form = MeanRemoval::batch;
-    s.dither.amplitude = scalar_input(2.0);
-    s.gain = scalar_input(gain_for(20.0, 2.0));
-    s.rate = Inputs{};
-    ExtremumSeeking seeker(s);
-    const std::vector<double> path = search(seeker, quadratic, 2400, 0.25, seed);
-    mean += first_within(path, 1.0) / 100.0;
-    square += std::pow(rms_of(path, 400, 2400), 2) / 100.0;
-  }
-  EXPECT_NEAR(mean, 69.0, 5.0);
-  EXPECT_NEAR(std::sqrt(square), 0.63, 0.03);
-}
 
 TEST(ExtremumSeeking, NoiseMakesTheErrorThatAveragingPredicts) {
   for (const double sigma : {0.25, 0.5}) {
@@ -250,74 +187,7 @@ TEST(ExtremumSeeking, ARestartHoldsTheEstimateAsTheStartDoes) {
   }
 }
 
-TEST(ExtremumSeeking, ThreeInputsOnOneWindowFindTheirGradientAndOptimum) {
-  InputMatrix h(3, 3);
-  h << -0.06, 0.02, 0.0, 0.02, -0.05, -0.01, 0.0, -0.01, -0.08;
-  const Inputs best = inputs({2.0, -3.0, 1.0});
-  const auto j = [&](const Inputs& x) { return 0.5 * (x - best).dot(h * (x - best)); };
-  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average}) {
-    ExtremumSeekingSettings s;
-    s.space = space_at(inputs({8.0, 2.0, -5.0}));
-    s.dither = {.amplitude = inputs({1.0, 1.5, 0.5}), .period = 40, .harmonics = {4, 5, 7}};
-    s.form = form;
-    s.gain = inputs({0.25, 0.2, 0.4});
-    s.hold_cycles = 81;
-    ExtremumSeeking seeker(s);
-    Inputs mean = Inputs::Zero(3);  // over the second window, where the estimate is held and the first has filled
-    for (int k = 0; k < 80; ++k) {
-      cycle_of(seeker, j);
-      if (k >= 40) mean += seeker.gradient() / 40.0;
-    }
-    const Inputs truth = h * (seeker.estimate() - best);
-    EXPECT_LT(((form == MeanRemoval::batch ? seeker.gradient() : mean) - truth).norm(), 1e-12);
-    for (int k = 0; k < 6000; ++k)
-      cycle_of(seeker, j);
-    EXPECT_LT((seeker.estimate() - best).norm(), 0.05) << name_of(form);
-  }
-}
-
 // --- settings -----------------------------------------------------------------------------------------------
-
-TEST(ExtremumSeeking, AdviceNamesTheBoundOfAveraging) {
-  ExtremumSeekingSettings s = plain_seeking(0.0);
-  s.gain = scalar_input(5.0);
-  EXPECT_TRUE(s.advice().empty()) << "without a curvature there is nothing to say";
-  s.curvature = bend;
-  const std::string bound = "1.96";  // 2/(A |J''| 2 P) = 1/0.51
-  ASSERT_EQ(s.advice().size(), 1u);
-  EXPECT_NE(s.advice()[0].find(bound), std::string::npos) << s.advice()[0];
-  s.gain = scalar_input(1.9);
-  EXPECT_TRUE(s.advice().empty());
-  s.form = MeanRemoval::batch;
-  s.gain = scalar_input(3.9);
-  EXPECT_TRUE(s.advice().empty()) << "a batch may step straight to the optimum";
-}
-
-TEST(ExtremumSeeking, RefusesSettingsByName) {
-  const auto message = [](auto change) -> std::string {
-    ExtremumSeekingSettings s;
-    change(s);
-    try {
-      const ExtremumSeeking seeker(s);
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_TRUE(message([](auto&) {}).empty());
-  EXPECT_NE(message([](auto& s) { s.gain = scalar_input(0.0); }).find("gain = 0"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.gain = inputs({1.0, 1.0}); }).find("gain has 2"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.rate = scalar_input(-1.0); }).find("rate = -1"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.washout_pole = 1.0; }).find("washout_pole = 1"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.low_pass = 0.0; }).find("low_pass = 0"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.amplitude_floor = 0.5; }).find("full_gradient = 0"), std::string::npos);
-  for (const int cycles : {-1, -2}) {
-    EXPECT_NE(message([&](auto& s) { s.hold_cycles = cycles; }).find("hold_cycles = " + std::to_string(cycles)),
-              std::string::npos);
-  }
-  EXPECT_NE(message([](auto& s) { s.curvature = std::nan(""); }).find("curvature = nan"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.limit_amplitude = std::nan(""); }).find("limit_amplitude"), std::string::npos);
-}
 
 }  // namespace
 }  // namespace mgdd::optimize

@@ -92,27 +92,6 @@ TEST(FailureWatch, TheMoreFailByChanceTheMoreFailuresSetAnEdge) {
   }
 }
 
-// Three cycles in ten fail anywhere: runs of an extremum seeker behind a delay, whose dither goes on over failed
-// cycles.
-TEST(FailureWatch, ThreeFailuresInTenByChanceSeldomSetAnEdge) {
-  ExtremumSeekingSettings settings = plain_seeking(10.0);
-  settings.components[0].delay_cycles = 7.0;
-  int with_edge = 0;
-  const int runs = 40, cycles = 600;
-  for (std::uint64_t run = 0; run < runs; ++run) {
-    ExtremumSeeking seeker(settings);
-    std::vector<double> on_their_way(7, quadratic(10.0));
-    for (std::uint64_t k = 0; k < cycles; ++k) {
-      on_their_way.push_back(quadratic(seeker.ask()[0]) + 0.25 * random::normal(run, 1, k));
-      const double value[] = {on_their_way[k]};
-      seeker.tell({value, {}, random::bernoulli(0.3, run, 3, k)});
-      const FailureWatch& failures = seeker.protocol().failures;
-      with_edge += failures.failing_above()[0] < unlimited || failures.failing_below()[0] > -unlimited ? 1 : 0;
-    }
-  }
-  EXPECT_LT(with_edge, runs * cycles / 8);  // four failures, whatever fails by chance: 0.7 of the cycles
-}
-
 // From 3 on it fails: the edge is closed in on from both sides, and fewer and fewer cycles are spent on it.
 TEST(FailureWatch, TheEdgeIsFoundByHalvesAndLookedAtEverLessOften) {
   FailureWatch watch(1);
@@ -125,17 +104,6 @@ TEST(FailureWatch, TheEdgeIsFoundByHalvesAndLookedAtEverLessOften) {
   EXPECT_NEAR(watch.keep(scalar_input(8.0))[0], 3.0, 0.3);
   EXPECT_LE(early, 14);
   EXPECT_LE(late, 20);
-}
-
-TEST(FailureWatch, ARegionThatIsGoneIsForgotten) {
-  FailureWatch watch(1);
-  cycle_at(watch, 0.0, 3.0);
-  for (int k = 0; k < 200; ++k)
-    cycle_at(watch, 8.0, 3.0);
-  for (int k = 0; k < 1000; ++k)
-    cycle_at(watch, 8.0, 99.0);
-  EXPECT_EQ(cycle_at(watch, 8.0, 99.0), 8.0);
-  EXPECT_EQ(watch.failing_above()[0], unlimited);
 }
 
 TEST(FailureWatch, FailuresOfEverythingLeaveNoEdgeAndAreLookedForElsewhere) {

@@ -162,39 +162,5 @@ TEST(FirstReadings, APlantThatDoesNotFollowBendsNothing) {
   EXPECT_NEAR(first.bend()[1], 1e-3 / 4.0, 1e-12);
 }
 
-TEST(FirstReadings, UnequalStepsAndARestartBendTheSame) {
-  FirstReadings first(scalar_input(1.0), 0.4, true);
-  const auto told = [&](int cycles) {
-    for (int k = 0; first.open() && k < cycles; ++k) {
-      const Inputs x = first.ask(scalar_input(3.0)).cwiseMin(3.6);
-      first.learn(x, 0.2 * x[0] - 0.35 * (x[0] - 3.0) * (x[0] - 3.0));
-    }
-  };
-  told(7);
-  first.restart();
-  told(23);
-  EXPECT_TRUE(first.open());
-  told(1);
-  EXPECT_FALSE(first.open());
-  EXPECT_NEAR(first.bend().maxCoeff(), 0.7, 1e-12);
-}
-
-TEST(FirstReadings, AStateThatMakesNoGainIsRefused) {
-  for (auto& [name, any] : own_gains(from(-12.0), 5)) {
-    SCOPED_TRACE(name);
-    std::visit(
-        [](auto& seeker) {
-          for (int k = 0; k < 30; ++k)
-            cycle_of(seeker, [](const Inputs& x) { return quadratic(x[0]); });
-          for (const double bad : {0.0, -1.0, std::nan(""), unlimited}) {
-            StateColumns state = save_state(seeker);
-            state["first_bend"] = {bad};
-            EXPECT_THROW(restore_state(seeker, state), ParameterError) << bad;
-          }
-        },
-        any);
-  }
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

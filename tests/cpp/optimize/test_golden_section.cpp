@@ -95,21 +95,5 @@ TEST(GoldenSection, ABrokenLimitDecidesBeforeJ) {
   EXPECT_NEAR(seeker.estimate()[0], -4.0, 0.05);
 }
 
-TEST(GoldenSection, RefusesSettingsByName) {
-  const auto refused = [](auto change) {
-    GoldenSectionSettings s = between(-10.0, 10.0);
-    change(s);
-    EXPECT_THROW(GoldenSection{s}, ParameterError);
-  };
-  refused([](auto& s) { s.space.lower[0] = -unlimited; });
-  refused([](auto& s) { s.noise_sd = -1.0; });
-  refused([](auto& s) { s.significance = 0.0; });
-  refused([](auto& s) { s.samples_max = 0; });
-  refused([](auto& s) { s.tolerance = std::nan(""); });
-  GoldenSectionSettings s;
-  s.space = space_at(inputs({0.0, 0.0}), 10.0);
-  EXPECT_THROW(GoldenSection{s}, ShapeError);
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

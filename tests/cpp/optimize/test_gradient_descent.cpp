@@ -71,25 +71,5 @@ TEST(GradientDescent, RateClipsEveryStep) {
   EXPECT_NEAR(search(seeker, quadratic, 10).back(), 20.0, 1e-12);
 }
 
-TEST(GradientDescent, RefusesAndAdvises) {
-  const auto refused = [](auto change) {
-    GradientDescentSettings s;
-    change(s);
-    EXPECT_THROW(GradientDescent{s}, ParameterError);
-  };
-  refused([](auto& s) { s.step_size = scalar_input(0.0); });
-  refused([](auto& s) { s.difference = scalar_input(std::nan("")); });
-  refused([](auto& s) { s.rate = scalar_input(0.0); });
-  refused([](auto& s) { s.tolerance = scalar_input(-1.0); });
-  refused([](auto& s) { s.iterations = 0; });
-  GradientDescentSettings s = from(0.0, 40.0);
-  EXPECT_TRUE(s.advice().empty());
-  s.curvature = bend;
-  ASSERT_EQ(s.advice().size(), 1u);
-  EXPECT_NE(s.advice()[0].find("39.2"), std::string::npos) << s.advice()[0];
-  s.step_size = scalar_input(39.0);
-  EXPECT_TRUE(s.advice().empty());
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

@@ -7,9 +7,7 @@
 #include <vector>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/laws/gaussian_process_seeking.hpp"
-#include "support/no_alloc.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -204,79 +202,6 @@ TEST(GuidedProcess, AGuideOfALimitIsNotFollowedFartherThanItWasRead) {
       seeker.tell({j, limits});
     }
   }
-}
-
-// Efficiency at once, NOx behind an analyser that is told three cycles short: each by its own guide and its own delay.
-TEST(GuidedProcess, ComponentsHaveTheirOwnGuidesAndDelays) {
-  const auto efficiency = [](double soc, double egr) {
-    return 45.0 - 0.03 * (soc + 9.0) * (soc + 9.0) - 60.0 * (egr - 0.1) * (egr - 0.1);
-  };
-  const auto nox = [](double soc, double egr) { return -6.0 * std::exp(-0.04 * (soc + 9.0) - 4.0 * egr); };
-  double best = -1e9, late = 0.0;
-  for (double soc = -25.0; soc <= 15.0; soc += 0.25) {
-    for (double egr = 0.0; egr <= 0.4; egr += 0.005)
-      best = std::max(best, efficiency(soc, egr) + nox(soc, egr));
-  }
-  constexpr int seeds = 10, cycles = 120;
-  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-    auto s = settings_of(seed, nullptr);
-    s.components = {{}, {12.0, 0.0}};
-    s.guide = {table([&](double soc, double egr) { return 0.8 * efficiency(soc - 3.0, egr); }),
-               table([&](double soc, double egr) { return 1.5 * nox(soc, egr + 0.05); })};
-    GaussianProcessSeeking seeker(s);
-    std::vector<double> on_the_way(15, nox(4.0, 0.31));
-    for (int k = 0; k < cycles; ++k) {
-      const Inputs x = seeker.ask();
-      const auto at = static_cast<std::uint64_t>(k);
-      on_the_way.push_back(nox(x[0], x[1]));
-      const double j[] = {efficiency(x[0], x[1]) + 0.2 * random::normal(seed, 9, at),
-                          on_the_way[at] + 0.05 * random::normal(seed, 8, at)};
-      ASSERT_EQ(seeker.tell({j, {}}), TellStatus::accepted);
-    }
-    late += (best - efficiency(seeker.estimate()[0], seeker.estimate()[1]) -
-             nox(seeker.estimate()[0], seeker.estimate()[1])) /
-            seeds;
-  }
-  EXPECT_LT(late, 0.1);
-}
-
-TEST(GuidedProcess, GoesOnBitForBitInASeekerThatHasRunAndAllocatesNothing) {
-  auto s = settings_of(5, off_by_a_fifth);
-  s.kept = 12;
-  GaussianProcessSeeking seeker(s), again(s);
-  const auto cycle = [](GaussianProcessSeeking& one, int k) {
-    const double j[] = {-lost(one.ask()) + random::normal(5, 9, static_cast<std::uint64_t>(k))};
-    one.tell({j, {}});
-  };
-  const test_support::AllocationCounter counter;
-  for (int k = 0; k < 30; ++k)
-    cycle(seeker, k);
-  EXPECT_EQ(counter.count(), 0u);
-  for (int k = 100; k < 120; ++k)
-    cycle(again, k);
-  restore_state(again, save_state(seeker));
-  for (int k = 30; k < 45; ++k) {
-    cycle(seeker, k);
-    cycle(again, k);
-    ASSERT_EQ(save_state(seeker), save_state(again)) << k;
-  }
-}
-
-TEST(GuidedProcess, RefusesByName) {
-  const auto refused = [](auto change, const std::string& field) {
-    auto s = settings_of(0, off_by_a_fifth);
-    change(s);
-    try {
-      const GaussianProcessSeeking made(s);
-      ADD_FAILURE() << field;
-    } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
-    }
-  };
-  refused([](auto& s) { s.guide = {Surface({{0.0, 1.0}}, {1.0, 2.0})}; }, "guide is over 1");
-  refused([](auto& s) { s.guide = {table([](double, double) { return 3.0; })}; }, "guide");
-  refused([](auto& s) { s.guide.push_back(s.guide[0]); }, "guide has 2");
-  refused([](auto& s) { s.limit_guides = s.guide; }, "limit_guides");
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <vector>
 
 #include "mgdd/common/random.hpp"
 
@@ -86,14 +85,6 @@ TEST(LagWindow, WhatWasNotReadSaysNothing) {
       EXPECT_NEAR(value, plant.quantity, 1e-5) << k;
     }
   }
-}
-
-TEST(LagWindow, WithoutALagEveryReadingIsItself) {
-  LagWindow window(0.0, 1);
-  double value = 7.5;
-  Inputs z = scalar_input(1.0);
-  EXPECT_TRUE(window.take(value, z, 5));
-  EXPECT_EQ(value, 7.5);
 }
 
 }  // namespace

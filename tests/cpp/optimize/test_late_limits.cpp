@@ -2,7 +2,6 @@
 // limits that contradict each other, and what a seeker says of them.
 #include <deque>
 
-#include "mgdd/optimize/ask_tell/seeker_history.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
@@ -77,31 +76,6 @@ Outcome late_run(S& seeker, ComponentLag truth, double noise_sd, std::uint64_t s
   }
   out.state = limit_state_of(seeker, 0);
   return out;
-}
-
-TEST(LateLimits, EverySeekerKeepsALimitThatComesTenCyclesLate) {
-  const ComponentLag late{10.0, 0.0};
-  Limit limit{"p_max_bar", 104.0};
-  limit.lag = late;
-  for (const double noise : {0.0, 0.25}) {
-    std::vector<Outcome> sum(10);
-    const std::uint64_t seeds = noise > 0.0 ? 10 : 1;
-    for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-      auto all = every_seeker(space_at(scalar_input(-8.0), 20.0), noise, seed, {limit});
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        const Outcome one =
-            std::visit([&](auto& seeker) { return late_run(seeker, late, noise, seed); }, all[i].second);
-        sum[i].above += one.above / static_cast<double>(seeds);
-        sum[i].mean += one.mean / static_cast<double>(seeds);
-        EXPECT_EQ(one.state, noise > 0.0 ? one.state : LimitState::active) << all[i].first;
-      }
-    }
-    const auto names = every_seeker(space_at(scalar_input(-8.0), 20.0), noise, 0, {limit});
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      EXPECT_LE(sum[i].above, 0.01) << names[i].first << ", noise " << noise;
-      EXPECT_GT(sum[i].mean, noise > 0.0 ? 0.3 : 0.9) << names[i].first << ", noise " << noise;
-    }
-  }
 }
 
 TEST(LateLimits, StayWithTheirInputsWhereReadingsAreMissing) {
@@ -230,49 +204,6 @@ TEST(LateLimits, ALimitOutOfReachIsFreeAndOneBeyondTheBoundsInfeasible) {
         },
         any);
   }
-}
-
-TEST(LateLimits, TheHistoryHoldsLimitsAndStates) {
-  SpsaSettings settings;
-  settings.space = space_at(scalar_input(-3.0), 20.0);
-  settings.limits = {{"a", 100.0}, {"b", 0.0}};
-  RecordedSeeker<Spsa> seeker{Spsa(settings)};
-  for (int k = 0; k < 300; ++k) {
-    const double x = seeker.ask()[0];
-    const double j[] = {quadratic(x - 8.0)}, values[] = {10.0 + x, x};
-    seeker.tell({j, values, k == 100});
-  }
-  const StateColumns columns = seeker.history().save();
-  ASSERT_EQ(columns.at("limits").size(), 600u);
-  EXPECT_TRUE(std::isnan(columns.at("limits")[200]));
-  EXPECT_EQ(columns.at("limits")[599], columns.at("applied")[299]);
-  EXPECT_EQ(columns.at("limits")[598], 10.0 + columns.at("applied")[299]);
-  EXPECT_EQ(columns.at("limit_states")[598], 0.0);
-  EXPECT_EQ(columns.at("limit_states")[599], 1.0);
-  RecordedSeeker<Spsa> other{Spsa(settings)};
-  other.history().restore(columns);
-  EXPECT_EQ(other.history().save().at("limit_states"), columns.at("limit_states"));
-  StateColumns bad = columns;
-  bad["limit_states"][3] = 3.0;
-  EXPECT_THROW(other.history().restore(bad), ParameterError);
-}
-
-TEST(LateLimits, RefusesByName) {
-  const auto message = [](double delay, double lag, double margin_sd) -> std::string {
-    Limit limit{"p", 1.0};
-    limit.lag = {delay, lag};
-    limit.margin_sd = margin_sd;
-    try {
-      validate(std::vector<Limit>{limit});
-    } catch (const ParameterError& e) {
-      return e.what();
-    }
-    return "";
-  };
-  EXPECT_EQ(message(10.0, 25.0, 0.0), "");
-  EXPECT_EQ(message(-1.0, 0.0, 1.0), "limit p: delay_cycles = -1: must lie in [0, 1e6]");
-  EXPECT_EQ(message(0.0, std::nan(""), 1.0), "limit p: lag_cycles = nan: must lie in [0, 1e6]");
-  EXPECT_EQ(message(0.0, 0.0, -0.5), "limit p: margin_sd = -0.5: must lie in [0, 100]");
 }
 
 }  // namespace

@@ -9,19 +9,6 @@
 namespace mgdd::optimize {
 namespace {
 
-TEST(LateReadings, OfTheProcessGoToTheirInputs) {
-  auto s = two_inputs(3);
-  s.sensor = {12.0, 0.0};
-  GaussianProcessSeeking seeker(s);
-  std::vector<double> on_their_way(12, -lost(s.space.start));
-  for (int k = 0; k < 160; ++k) {
-    on_their_way.push_back(-lost(seeker.ask()) + noise(3, k));
-    const double j[] = {on_their_way[static_cast<std::size_t>(k)]};
-    seeker.tell({j, {}});
-  }
-  EXPECT_LT(lost(seeker.estimate()), 0.1);
-}
-
 // Told three cycles short or long, the delay is read off the readings; told right, it stays.
 TEST(LateReadings, TellADelayThatIsToldWrong) {
   constexpr int seeds = 8;

@@ -29,15 +29,6 @@ TEST(SpreadStarts, HasOnePointPerCellOfEveryAxis) {
   EXPECT_THROW((void)spread_starts({{"a"}}, 4, 1), ParameterError);
 }
 
-TEST(SpreadStarts, StayInsideTheirBounds) {
-  for (const Eigen::VectorXd& point : spread_starts({{"a", -2.0, -1.5}, {"b", 3.0, 3.5, true}}, 40, 9)) {
-    EXPECT_GE(point[0], -2.0);
-    EXPECT_LE(point[0], -1.5);
-    EXPECT_GE(point[1], 3.0);
-    EXPECT_LE(point[1], 3.5);
-  }
-}
-
 FitReport with_cost(double cost, double rmse) {
   FitReport report;
   report.cost = cost;

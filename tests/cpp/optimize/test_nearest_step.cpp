@@ -97,14 +97,5 @@ TEST(NearestStep, ALimitThatSaysNothingIsNoLimit) {
   EXPECT_EQ(nearest.step(), wish);
 }
 
-TEST(NearestStep, AllocatesNothing) {
-  const Problem problem(7, 8, 8);
-  NearestStep nearest(8);
-  const test_support::AllocationCounter counter;
-  problem.begin(nearest);
-  nearest.solve(1.0);
-  EXPECT_EQ(counter.count(), 0u);
-}
-
 }  // namespace
 }  // namespace mgdd::optimize

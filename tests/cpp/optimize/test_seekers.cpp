@@ -103,27 +103,6 @@ TEST(EverySeeker, AskAndTellAreNoexceptAndDoNotAllocate) {
   });
 }
 
-TEST(EverySeeker, AMisfireOnlyCounts) {
-  on_every_seeker([](auto& seeker, const Scene& scene) {
-    run(seeker, scene, 57);
-    auto other = seeker;
-    const Inputs x = seeker.ask();
-    const double nothing[] = {std::nan("")};
-    EXPECT_EQ(seeker.tell({nothing, {}, true}), TellStatus::misfire);
-    EXPECT_EQ(seeker.protocol().cycle, 58);
-    EXPECT_EQ(seeker.protocol().misfires, 1);
-    EXPECT_EQ(seeker.ask(), x);
-    StateColumns after = save_state(seeker);
-    other.ask();
-    StateColumns before = save_state(other);
-    for (StateColumns* const state : {&before, &after})  // where it failed is counted as well
-      std::erase_if(*state, [](const auto& column) { return column.first.starts_with("failing_"); });
-    before["cycle"] = {58.0};
-    before["misfires"] = {1.0};
-    EXPECT_EQ(before, after);
-  });
-}
-
 TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
   on_every_seeker([](auto& seeker, const Scene& scene) {
     const StateColumns fresh = save_state(seeker);

@@ -136,16 +136,6 @@ TEST(Spsa, FirstOrderFiguresOfTheDefaultEngine) {
   EXPECT_NEAR(std::sqrt(square), 0.42, 0.07);
 }
 
-TEST(Spsa, ConstantGainsGoOnTracking) {
-  SpsaSettings s;
-  s.space = space_at(scalar_input(0.0));
-  s.schedule = GainSchedule::constant;
-  s.gain = scalar_input(2.0);
-  Spsa seeker(s);
-  search(seeker, quadratic, 3000);
-  EXPECT_NEAR(search(seeker, [](double x) { return quadratic(x - 8.0); }, 300).back(), 8.0, 0.1);
-}
-
 TEST(Spsa, BlockingRefusesAStepThatMakesJWorse) {
   SpsaSettings s;
   s.space = space_at(scalar_input(5.0));
@@ -160,51 +150,6 @@ TEST(Spsa, BlockingRefusesAStepThatMakesJWorse) {
   for (const double x : search(guarded, quadratic, 300))
     EXPECT_LE(std::abs(x), 7.5 + 1e-9);  // the first step has nothing to be compared with
   EXPECT_GT(guarded.blocked(), 90);
-}
-
-TEST(Spsa, ASeedRepeatsARunAndAnotherDoesNot) {
-  const auto path = [](std::uint64_t seed) {
-    SpsaSettings s;
-    s.space = space_at(inputs({3.0, 4.0}));
-    s.seed = seed;
-    Spsa seeker(s);
-    for (int k = 0; k < 100; ++k)
-      cycle_of(seeker, [](const Inputs& x) { return -0.02 * x.squaredNorm(); });
-    return seeker.estimate();
-  };
-  EXPECT_EQ(path(1), path(1));
-  EXPECT_NE(path(1), path(2));
-}
-
-TEST(Spsa, RefusesAndAdvises) {
-  const auto refused = [](auto change) {
-    SpsaSettings s;
-    change(s);
-    EXPECT_THROW(Spsa{s}, ParameterError);
-  };
-  refused([](auto& s) { s.gain = scalar_input(-1.0); });
-  refused([](auto& s) { s.perturbation = scalar_input(0.0); });
-  refused([](auto& s) { s.stability = -1.0; });
-  refused([](auto& s) { s.gain_exponent = 0.55; });
-  refused([](auto& s) { s.averaging = 0; });
-  refused([](auto& s) { s.noise_sd = -0.1; });
-  refused([](auto& s) { s.initial_hessian = scalar_input(0.0); });
-  refused([](auto& s) { s.hessian_prior = 0.0; });
-  refused([](auto& s) { s.step_max = scalar_input(-1.0); });
-  refused([](auto& s) { s.step_max = scalar_input(0.0); });
-  refused([](auto& s) { s.gain = scalar_input(0.0); });
-  SpsaSettings s;
-  s.schedule = GainSchedule::constant;
-  s.gain = scalar_input(30.0);
-  EXPECT_TRUE(s.advice().empty());
-  s.curvature = bend;
-  ASSERT_EQ(s.advice().size(), 1u);
-  EXPECT_NE(s.advice()[0].find("19.6"), std::string::npos) << s.advice()[0];
-  s.gain = scalar_input(19.0);
-  EXPECT_TRUE(s.advice().empty());
-  s.gain.resize(0);  // made of the curvature
-  EXPECT_TRUE(s.advice().empty());
-  EXPECT_DOUBLE_EQ(Spsa(s).gain()[0], 1.0 / std::abs(bend));
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // Small problems with known answers for the tests of least squares.
 #pragma once
 
-#include <cmath>
 #include <initializer_list>
 #include <limits>
 #include <random>
@@ -52,23 +51,6 @@ struct Linear {
     r -= b;
     if (j != nullptr) {
       *j = a;
-    }
-    return true;
-  }
-};
-
-// y = p0 exp(-p1 t) on t = 0, 0.1, ...
-struct Decay {
-  VectorXd y;
-  bool operator()(const VectorXd& p, VectorXd& r, MatrixXd* j) const {
-    for (Index i = 0; i < y.size(); ++i) {
-      const double t = 0.1 * static_cast<double>(i);
-      const double e = std::exp(-p[1] * t);
-      r[i] = p[0] * e - y[i];
-      if (j != nullptr) {
-        (*j)(i, 0) = e;
-        (*j)(i, 1) = -p[0] * t * e;
-      }
     }
     return true;
   }
