@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 
 import mgdd
-from mgdd.results.labels import VARIABLES
 from public_objects import ROOMS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,12 +102,6 @@ def test_readme_numbers_hold() -> None:
             assert name in docs_tables.NUMBERS, f"{page.name}: no function computes {name!r}"
             (number, last), value = printed_numbers(text)[0], docs_tables.NUMBERS[name]()
             assert abs(number - value) <= 1.0001 * last, f"{page.name}: {name} = {number} is {value}"
-
-
-def test_variables_table_is_complete() -> None:
-    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| (.+?) \|$", _page("formats").split("<!-- checked")[-1], re.MULTILINE)
-    table = {name: (units, long_name) for name, units, long_name in rows}
-    assert {name: (v.units, v.long_name) for name, v in VARIABLES.items()} == table
 
 
 # --- the way from the landing page --------------------------------------------------------------------------
