@@ -239,7 +239,7 @@ def test_commands_of_getting_started_run(tmp_path: Path, monkeypatch: pytest.Mon
     lines = [
         line
         for block in re.findall(r"^```shell\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-        for line in block.splitlines()
+        for line in block.replace("\\\n", "").splitlines()
     ]
     commands = [shlex.split(line)[1:] for line in lines if line.startswith("mgdd engine")]
     assert len(commands) >= 5
@@ -258,7 +258,7 @@ def test_commands_of_maps_run(
     (section,) = re.findall(r"^## From the command line\n(.*?)^## ", _page("maps"), re.MULTILINE | re.DOTALL)
     (block,) = re.findall(r"^```shell\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
     (shown,) = re.findall(r"^```text\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
-    commands = [shlex.split(line)[1:] for line in block.splitlines()]
+    commands = [shlex.split(line)[1:] for line in block.replace("\\\n", "").splitlines()]
     assert {command[1] for command in commands if command[0] == "map"} == {
         "design", "fit", "predict", "optimize", "smooth", "show", "diff", "trade-off", "export",
     }  # fmt: skip
