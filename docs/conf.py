@@ -93,7 +93,7 @@ html_theme_options = {
     "footer_end": [],
 }
 html_show_sourcelink = False
-html_search_scorer = "_static/search_scorer.js"
+html_search_scorer = str(HERE / "_static" / "search_scorer.js")
 
 
 def help_of(command: str) -> str:
