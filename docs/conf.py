@@ -135,5 +135,13 @@ def setup(app: Any) -> None:
     app.connect("build-finished", list_versions)
 
 
+# The side bar of the API: its modules, and the names of the one that is open.
+html_context = {
+    "api": {
+        section.splitlines()[0]: re.findall(r"^   (\w+)$", section, re.MULTILINE)
+        for section in re.split(r"^## (?=mgdd)", (HERE / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    }
+}
+html_sidebars = {"api": ["api-nav.html"], "generated/*": ["api-nav.html"]}
 html_static_path = ["_static"]
 html_css_files = ["mgdd.css"]
