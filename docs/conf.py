@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import filecmp
+import io
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
 
+import numpydoc.docscrape_sphinx
+
 import mgdd
+from mgdd.cli import main
+from mgdd.results.labels import VARIABLES
 
 HERE = Path(__file__).parent
 
@@ -64,6 +71,8 @@ autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings name type, shape and unit
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
+numpydoc_use_plots = True  # the examples of mgdd.plot are drawn
+numpydoc.docscrape_sphinx.IMPORT_MATPLOTLIB_RE = r"from mgdd import .*\bplot\b"
 nitpick_ignore_regex = [
     (r"py:.*", r"(?!mgdd(_studies)?\.).*"),  # other projects: no inventories without a network
     (r"py:.*", r"mgdd\._core.*"),  # documented where it is offered, in mgdd.<room>
@@ -84,6 +93,29 @@ html_theme_options = {
     "footer_end": [],
 }
 html_show_sourcelink = False
+html_search_scorer = str(HERE / "_static" / "search_scorer.js")
+
+
+def help_of(command: str) -> str:
+    """Print what a command says of itself, folded; the usage line repeats its options."""
+    with contextlib.redirect_stdout(io.StringIO()) as text, contextlib.suppress(SystemExit):
+        main([*command.split(), "--help"])
+    shown = text.getvalue().partition("\n\n")[2]
+    return f"<details><summary>mgdd {command} --help</summary>\n\n```text\n{shown}```\n\n</details>\n\n"
+
+
+def insert_generated(_: Any, page: str, source: list[str]) -> None:
+    """Put into the pages what the package knows: the help below each command, the table of variables."""
+    if page == "cli":
+        head, *sections = re.split(r"^(?=## mgdd )", source[0], flags=re.MULTILINE)
+        for section in sections:
+            first, *others = section.splitlines()[0].removeprefix("## mgdd ").split(", ")
+            room = first.rpartition(" ")[0]
+            head += section.rstrip() + "\n\n" + "".join(map(help_of, [first, *(f"{room} {each}" for each in others)]))
+        source[0] = head
+    if page == "formats":
+        rows = "".join(f"| `{name}` | {label.units} | {label.long_name} |\n" for name, label in VARIABLES.items())
+        source[0] = source[0].replace("<!-- variables -->\n", f"| name | unit | meaning |\n| --- | --- | --- |\n{rows}")
 
 
 def list_versions(app: Any, error: Exception | None) -> None:
@@ -98,9 +130,18 @@ def list_versions(app: Any, error: Exception | None) -> None:
 
 
 def setup(app: Any) -> None:
-    """Let Sphinx call `list_versions`."""
+    """Let Sphinx call the functions above."""
+    app.connect("source-read", insert_generated)
     app.connect("build-finished", list_versions)
 
 
+# The side bar of the API: its modules, and the names of the one that is open.
+html_context = {
+    "api": {
+        section.splitlines()[0]: re.findall(r"^   (\w+)$", section, re.MULTILINE)
+        for section in re.split(r"^## (?=mgdd)", (HERE / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    }
+}
+html_sidebars = {"api": ["api-nav.html"], "generated/*": ["api-nav.html"]}
 html_static_path = ["_static"]
 html_css_files = ["mgdd.css"]

@@ -27,7 +27,6 @@ from tables_of_model import (
     tdc,
     timing_table,
     triangle,
-    variables,
     woschni_units,
 )
 
@@ -74,12 +73,11 @@ __all__ = [
     "torque_demand",
     "traces",
     "triangle",
-    "variables",
     "woschni_units",
 ]
 
 LABEL_COLUMNS = {
-    "woschni_units": 2, "burn_laws": 2, "variables": 3, "esc_cases": 2, "seekers": 2, "ignition_plane": 2,
+    "woschni_units": 2, "burn_laws": 2, "esc_cases": 2, "seekers": 2, "ignition_plane": 2,
     "model_stages": 2, "guided_plane": 2,
 }  # fmt: skip
 

@@ -17,6 +17,8 @@ from mgdd.engine import analyze, timing_sweep
 from mgdd.identify import best_timing
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.timing_records import BestTiming
+from mgdd.maps import optimize_map
+from mgdd.sweep import sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,6 +76,14 @@ def draw_example() -> None:
     names["figure"].savefig(FOLDER / "readme_run.png", dpi=150, metadata={"Software": None})
 
 
+def draw_map() -> None:
+    """Draw the best timing over speed and fuel under a limit, as the tour makes it."""
+    axes = {"speed_rpm": np.linspace(1000, 3000, 6), "fuel_mg": np.linspace(8, 32, 6)}
+    table = sweep("puma_single", over={**axes, "soc_cad": np.linspace(-20, 5, 101)})
+    best = optimize_map(table, "efficiency_gross", limits={"p_max_bar": 120.0}, max_loss=0.002)
+    best.plot().figure.savefig(FOLDER / "readme_map.png", dpi=100, metadata={"Software": None})
+
+
 def main() -> None:
     """Fit, draw, write."""
     mpl.use("Agg")
@@ -89,6 +99,7 @@ def main() -> None:
         draw_timing(right, row)
         fig.savefig(FOLDER / "engine_cycle.png", dpi=200, metadata={"Software": None})
     draw_example()
+    draw_map()
 
 
 if __name__ == "__main__":

@@ -183,8 +183,6 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("20→60 [ms]", _median_and_p95("large", 0, "_ms")),
             ("40→42 [ms]", _median_and_p95("small", 0, "_ms")),
             ("4→20 [ms]", _median_and_p95("up", 0, "_ms")),
-            ("20→4 [ms]", _median_and_p95("down", 0, "_ms")),
-            ("MSE 40→42 [deg²]", _median_and_p95("small_mse", 3, "_deg2")),
             ("MSE sine [deg²]", _median_and_p95("sine_mse", 4, "_deg2")),
             ("static error, p95 [deg]", _number("static_p95_deg", 2)),
             ("overshoot, p95 [deg]", _number("overshoot_p95_deg", 1)),

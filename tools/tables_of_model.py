@@ -10,7 +10,7 @@ from mgdd import engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.engine.cycle import convergence as step_error
 from mgdd.io import pressure_trace
-from mgdd.results.labels import ANGLE, VARIABLES
+from mgdd.results.labels import ANGLE
 
 __all__ = [
     "Rows",
@@ -26,7 +26,6 @@ __all__ = [
     "timing_table",
     "triangle",
     "values_of",
-    "variables",
     "woschni_units",
 ]
 
@@ -182,7 +181,3 @@ def tdc() -> Rows:
         return float(analyze(pressure_trace(angle + shift, pressure), cylinder, point=point)["imep_closed_bar"])
 
     return {f"{s:.1f}": [100.0 * (imep(s) / imep(0.0) - 1.0)] for s in (1.0, 0.1, -1.0)}
-
-
-def variables() -> Rows:
-    return {f"`{name}` {label.units} {label.long_name}": [] for name, label in VARIABLES.items()}

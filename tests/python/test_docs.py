@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 
 import mgdd
-from mgdd.results.labels import VARIABLES
 from public_objects import ROOMS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,12 +102,6 @@ def test_readme_numbers_hold() -> None:
             assert name in docs_tables.NUMBERS, f"{page.name}: no function computes {name!r}"
             (number, last), value = printed_numbers(text)[0], docs_tables.NUMBERS[name]()
             assert abs(number - value) <= 1.0001 * last, f"{page.name}: {name} = {number} is {value}"
-
-
-def test_variables_table_is_complete() -> None:
-    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| (.+?) \|$", _page("formats").split("<!-- checked")[-1], re.MULTILINE)
-    table = {name: (units, long_name) for name, units, long_name in rows}
-    assert {name: (v.units, v.long_name) for name, v in VARIABLES.items()} == table
 
 
 # --- the way from the landing page --------------------------------------------------------------------------
@@ -246,7 +239,7 @@ def test_commands_of_getting_started_run(tmp_path: Path, monkeypatch: pytest.Mon
     lines = [
         line
         for block in re.findall(r"^```shell\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-        for line in block.splitlines()
+        for line in block.replace("\\\n", "").splitlines()
     ]
     commands = [shlex.split(line)[1:] for line in lines if line.startswith("mgdd engine")]
     assert len(commands) >= 5
@@ -265,7 +258,7 @@ def test_commands_of_maps_run(
     (section,) = re.findall(r"^## From the command line\n(.*?)^## ", _page("maps"), re.MULTILINE | re.DOTALL)
     (block,) = re.findall(r"^```shell\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
     (shown,) = re.findall(r"^```text\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
-    commands = [shlex.split(line)[1:] for line in block.splitlines()]
+    commands = [shlex.split(line)[1:] for line in block.replace("\\\n", "").splitlines()]
     assert {command[1] for command in commands if command[0] == "map"} == {
         "design", "fit", "predict", "optimize", "smooth", "show", "diff", "trade-off", "export",
     }  # fmt: skip
