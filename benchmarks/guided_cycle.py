@@ -26,15 +26,15 @@ from support import machine
 
 from mgdd.engine import Cylinder
 from mgdd.guide import CurveSeeking, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 
 CYCLES, SETTLED, WINDOW, MOST_MS = 400, 50, 5, 1.0
 WRONG = Cylinder(wall_heat_scale=1.0)  # twice that of the bench
-Row = Callable[[], tuple[EngineBench, GuidedEngine | None]]
+Row = Callable[[], tuple[VirtualEngine, GuidedEngine | None]]
 
 
-def bench() -> EngineBench:
-    return EngineBench(seed=1, pressure_noise_bar=0.2)
+def bench() -> VirtualEngine:
+    return VirtualEngine(seed=1, pressure_noise_bar=0.2)
 
 
 def guided(*, calibrated: bool = True, recalibrated_cad: float = 0.1) -> GuidedEngine:
@@ -55,7 +55,7 @@ ROWS: dict[str, Row] = {
 }
 
 
-def drive(plant: EngineBench, engine: GuidedEngine | None, cycles: int) -> None:
+def drive(plant: VirtualEngine, engine: GuidedEngine | None, cycles: int) -> None:
     for _ in range(cycles):
         if engine is None:
             plant.step(-6.0)

@@ -33,7 +33,7 @@ from peers.peer_seekers import Contender, Plant, null_time_us
 from support import machine
 
 from mgdd import optimize
-from mgdd.loop import EngineBench, FunctionPlant, monte_carlo, run_seeker
+from mgdd.loop import FunctionPlant, VirtualEngine, monte_carlo, run_seeker
 
 CYCLES, PAIRS, STEPS = 1000, 20_000, 20_000
 START, LOWER, UPPER = -20.0, -30.0, 10.0
@@ -63,7 +63,7 @@ def loop_seeker() -> optimize.ExtremumSeeking:
     return optimize.ExtremumSeeking(start=START, lower=LOWER, upper=UPPER)
 
 
-def drive_from_python(bench: EngineBench, seeker: optimize.ExtremumSeeking, cycles: int) -> None:
+def drive_from_python(bench: VirtualEngine, seeker: optimize.ExtremumSeeking, cycles: int) -> None:
     for _ in range(cycles):
         cycle = bench.step(float(seeker.ask()[0]))
         seeker.tell(cycle["j"])
@@ -71,17 +71,17 @@ def drive_from_python(bench: EngineBench, seeker: optimize.ExtremumSeeking, cycl
 
 def check_agreement(loops: int) -> np.ndarray:
     """Return the applied inputs of the loop; SystemExit where a faster way gives other numbers than a slower one."""
-    run = run_seeker(EngineBench(seed=3), loop_seeker(), CYCLES)
+    run = run_seeker(VirtualEngine(seed=3), loop_seeker(), CYCLES)
     seeker = loop_seeker()
-    drive_from_python(EngineBench(seed=3), seeker, CYCLES)
+    drive_from_python(VirtualEngine(seed=3), seeker, CYCLES)
     if not np.array_equal(run.dataset["estimate"][:, 0], seeker.history["estimate"][:, 0]):
         sys.exit("the loop in the core and the loop driven from Python differ: nothing timed")
-    one, two = (monte_carlo(EngineBench(), loop_seeker(), range(loops), cycles=CYCLES, workers=n) for n in (1, 2))
+    one, two = (monte_carlo(VirtualEngine(), loop_seeker(), range(loops), cycles=CYCLES, workers=n) for n in (1, 2))
     if not one.identical(two):
         sys.exit("one thread and two threads give different numbers: nothing timed")
     if float(one["final_soc_cad"][0, 0, 3]) != run.summary["final_soc_cad"]:
         sys.exit("a loop of monte_carlo and the same loop of run_seeker differ: nothing timed")
-    lanes = monte_carlo(EngineBench(), loop_seeker(), range(2 * loops), cycles=CYCLES)
+    lanes = monte_carlo(VirtualEngine(), loop_seeker(), range(2 * loops), cycles=CYCLES)
     if not np.allclose(lanes["final_soc_cad"][0, 0, :loops], one["final_soc_cad"][0, 0], rtol=1e-9, atol=0.0):
         sys.exit("loops side by side and loops one by one differ by more than 1e-9: nothing timed")
     return seeker.history["applied"].values[:, 0].copy()
@@ -169,19 +169,19 @@ def time_loops(applied: np.ndarray, plants: dict[str, FunctionPlant], into: Time
         into.setdefault(name, []).append((time.process_time() - begin) / loops * 1e3)
 
     several, lanes, requests = range(SEVERAL), range(LANES), np.tile(applied, SEVERAL)
-    timed("run_seeker, with its Dataset", 1, lambda: run_seeker(EngineBench(), loop_seeker(), CYCLES))
-    timed("driven from Python", 1, lambda: drive_from_python(EngineBench(), loop_seeker(), CYCLES))
+    timed("run_seeker, with its Dataset", 1, lambda: run_seeker(VirtualEngine(), loop_seeker(), CYCLES))
+    timed("driven from Python", 1, lambda: drive_from_python(VirtualEngine(), loop_seeker(), CYCLES))
     timed(
         "monte_carlo, one thread",
         SEVERAL,
-        lambda: monte_carlo(EngineBench(), loop_seeker(), several, cycles=CYCLES, workers=1),
+        lambda: monte_carlo(VirtualEngine(), loop_seeker(), several, cycles=CYCLES, workers=1),
     )
     timed(
         "monte_carlo in lanes, one thread",
         LANES,
-        lambda: monte_carlo(EngineBench(), loop_seeker(), lanes, cycles=CYCLES, workers=1),
+        lambda: monte_carlo(VirtualEngine(), loop_seeker(), lanes, cycles=CYCLES, workers=1),
     )
-    timed(BENCH_ALONE, SEVERAL, lambda: EngineBench().run_columns(requests))
+    timed(BENCH_ALONE, SEVERAL, lambda: VirtualEngine().run_columns(requests))
     for name, plant in plants.items():
         timed(f"run_seeker, a plant {name}", 1, lambda plant=plant: run_seeker(plant, loop_seeker(), CYCLES))
     if compiled := plants.get("in C"):
@@ -195,7 +195,7 @@ def time_loops(applied: np.ndarray, plants: dict[str, FunctionPlant], into: Time
 
 def time_threads(options: argparse.Namespace) -> dict[str, float]:
     """Seconds of wall time: the smallest of the interleaved repeats and their ratio, and the median of the ratios."""
-    seeker, bench, seeds = loop_seeker(), EngineBench(), range(options.loops)
+    seeker, bench, seeds = loop_seeker(), VirtualEngine(), range(options.loops)
     seconds: dict[int, list[float]] = {1: [], 2: []}
     processor: dict[int, list[float]] = {1: [], 2: []}
     for _ in range(options.loop_repeats):

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.optimize import GaussianProcessSeeking
 from mgdd_studies.several_maps import EARLY
 from mgdd_studies.three_input_bench import BOUNDS, LIMITS, START, bench_optimum, bench_run, noisy_bench, told
@@ -43,7 +43,7 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=60)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    bench = EngineBench(inputs=list(BOUNDS))
+    bench = VirtualEngine(inputs=list(BOUNDS))
     best = bench_optimum()
     start = float(bench.steady_map({name: [value] for name, value in START.items()})["j"].squeeze())
     print(f"{best}; the start loses {best.value - start:.2f} points")

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mgdd.loop import EngineBench, seek_front
+from mgdd.loop import VirtualEngine, seek_front
 from mgdd.loop.front_result import front_of, undominated
 from mgdd.optimize import Input, tune
 
@@ -89,7 +89,7 @@ def pair(seed: int, skewed: bool) -> Problem:
 
 
 def engine(seed: int) -> Problem:
-    bench, steady = EngineBench(seed=seed), EngineBench().steady_map(np.linspace(-25.0, 5.0, 3001))
+    bench, steady = VirtualEngine(seed=seed), VirtualEngine().steady_map(np.linspace(-25.0, 5.0, 3001))
     at = steady["soc_cad"].to_numpy()
     table = np.stack([100.0 * steady["efficiency_gross"].to_numpy(), -steady["nox_soft_ppm"].to_numpy()], axis=1)
 

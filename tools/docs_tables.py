@@ -34,7 +34,7 @@ from mgdd import engine
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.engine.cycle import convergence as step_error
 from mgdd.guide import OnlineCalibration
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd_studies import guided_transients as plane_study
 from mgdd_studies import run_study
 from mgdd_studies.guide_cases import SpeedLoadPlane
@@ -98,7 +98,7 @@ def online_calibration() -> Rows:
     ):
         row: list[float] = []
         for method, uncertainty in (("gauss_newton", alone), ("gauss_newton", None), ("recursive", None)):
-            bench = EngineBench(pressure_noise_bar=0.1, soc_scatter_cad=0.0, seed=2, **off)
+            bench = VirtualEngine(pressure_noise_bar=0.1, soc_scatter_cad=0.0, seed=2, **off)
             settings = {"method": method, "uncertainty": uncertainty, "soc_scatter_cad": 0.0}
             guide = OnlineCalibration(Cylinder(wall_heat_scale=1.0), **settings)
             for _ in range(100):

@@ -10,7 +10,7 @@ from peers.peer_seekers import FinishedError, Point
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, ModelOptimum
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd_studies.several_maps import AWAY, CURVATURE, CYCLES, EARLY, NOISE, WIDTH, SeekingMap, Setting
 
 NEAR = 1.0
@@ -80,14 +80,14 @@ def engine() -> SeekingMap:
     """Make the map of the virtual bench at its default point, over the start of combustion."""
     lower, upper = ENGINE_BOUNDS
     point = OperatingPoint()
-    quiet = EngineBench(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+    quiet = VirtualEngine(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
     timings = np.linspace(lower, upper, 4001)
     true = np.array(quiet.run_columns(timings)["j"])
     best = float(timings[true.argmax()])
     bend = Curve(timings, true).curvature(3.0)
 
     def setting(seed: int, noisy: bool) -> Setting:
-        bench = EngineBench(
+        bench = VirtualEngine(
             soc_scatter_cad=ENGINE_SCATTER if noisy else 0.0,
             efficiency_noise_percent=ENGINE_NOISE if noisy else 0.0,
             seed=seed,

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mgdd/guide/online_calibration.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace {
 
@@ -19,7 +19,7 @@ std::vector<std::vector<double>> traces() {
   loop::BenchSettings s;
   s.soc_scatter_cad = 0.0;
   s.pressure.noise_bar = 0.05;
-  loop::EngineBench bench(s);
+  loop::VirtualEngine bench(s);
   std::vector<std::vector<double>> out;
   for (int k = 0; k < 64; ++k) {
     bench.step(-6.0);

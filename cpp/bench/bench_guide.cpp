@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "mgdd/guide/guided_engine.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace {
 
@@ -57,7 +57,7 @@ BENCHMARK_CAPTURE(ask_and_tell, curve_with_a_limit, true)->Unit(benchmark::kMicr
 void guided_cycle(benchmark::State& state) {
   loop::BenchSettings b;
   b.pressure.noise_bar = 0.1;
-  loop::EngineBench bench(b);
+  loop::VirtualEngine bench(b);
   guide::OnlineCalibrationSettings c;
   c.cylinder.wall_heat.wall_heat_scale = 1.0;
   c.window.steady_cycles = 0;

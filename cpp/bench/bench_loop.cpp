@@ -7,9 +7,9 @@
 #include <string>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/loop/engine_bench.hpp"
-#include "mgdd/loop/engine_bench_lanes.hpp"
 #include "mgdd/loop/monte_carlo.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
+#include "mgdd/loop/virtual_engine_lanes.hpp"
 
 namespace {
 
@@ -47,7 +47,7 @@ void cycle(benchmark::State& state) {
   const engine::Charge<double> charge = model.charge({});
   model.run(charge, soc_cad, work);
   const double expected = model.indicators(charge, soc_cad, work).efficiency_gross;
-  EngineBench bench(quiet());
+  VirtualEngine bench(quiet());
   if (bench.step(soc_cad).indicators.efficiency_gross != expected) {
     return state.SkipWithError("bench and cycle disagree");
   }
@@ -59,7 +59,7 @@ void cycle(benchmark::State& state) {
 BENCHMARK(cycle)->Name("bench/bare_cycle");
 
 void step(benchmark::State& state, const BenchSettings& settings) {
-  EngineBench bench(settings);
+  VirtualEngine bench(settings);
   for (auto _ : state)
     benchmark::DoNotOptimize(bench.step(soc_cad));
 }
@@ -75,7 +75,7 @@ void loops(benchmark::State& state, LoopForm form) {
   optimize::ExtremumSeekingSettings esc;
   esc.space = {optimize::scalar_input(-12.0), optimize::scalar_input(-30.0), optimize::scalar_input(10.0)};
   plan.seekers.emplace_back(optimize::ExtremumSeeking(esc));
-  plan.seeds.resize(EngineBenchLanes::width);
+  plan.seeds.resize(VirtualEngineLanes::width);
   for (std::size_t i = 0; i < plan.seeds.size(); ++i)
     plan.seeds[i] = i;
   plan.cycles = 500;

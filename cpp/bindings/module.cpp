@@ -50,7 +50,7 @@ PYBIND11_MODULE(_core, m) {
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop",
        "Virtual benches and the loops over them.",
-       {&bind_engine_bench, &bind_function_plant, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop,
+       {&bind_virtual_engine, &bind_function_plant, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop,
         &bind_mgdd1}},
       {"rig",
        "Between a controller and a real actuator: frames of a bus, their protection and signals, records, the safety "

@@ -36,7 +36,7 @@ void bind_online_calibration(pybind11::module_& m);
 void bind_benchmark_models(pybind11::module_& m);
 void bind_curve(pybind11::module_& m);
 void bind_guided_engine(pybind11::module_& m);
-void bind_engine_bench(pybind11::module_& m);
+void bind_virtual_engine(pybind11::module_& m);
 void bind_function_plant(pybind11::module_& m);
 void bind_loop(pybind11::module_& m);
 void bind_virtual_throttle(pybind11::module_& m);

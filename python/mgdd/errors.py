@@ -266,11 +266,11 @@ class Interrupted(KeyboardInterrupt):
     Examples
     --------
     >>> from mgdd.errors import Interrupted
-    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> from mgdd.loop import VirtualEngine, run_seeker
     >>> from mgdd.optimize import GoldenSection
     >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
     >>> try:
-    ...     run = run_seeker(EngineBench(), seeker, 300)
+    ...     run = run_seeker(VirtualEngine(), seeker, 300)
     ... except Interrupted as stop:
     ...     run = stop.partial
     >>> run.dataset.sizes["cycle"]

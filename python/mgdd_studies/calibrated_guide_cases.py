@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd_studies.guide_cases import (
     BOUNDS_CAD,
@@ -48,18 +48,18 @@ class Engine:
     name: str
     cylinder: Cylinder
 
-    def bench(self, seed: int = 0, *, tdc_error_cad: float = 0.0) -> EngineBench:
+    def bench(self, seed: int = 0, *, tdc_error_cad: float = 0.0) -> VirtualEngine:
         """Make the engine with a noisy pressure sensor at the default operating point."""
-        return EngineBench(self.cylinder, seed=seed, pressure_noise_bar=NOISE_BAR, tdc_error_cad=tdc_error_cad)
+        return VirtualEngine(self.cylinder, seed=seed, pressure_noise_bar=NOISE_BAR, tdc_error_cad=tdc_error_cad)
 
-    def stepping(self, seed: int, step_cycle: int) -> EngineBench:
+    def stepping(self, seed: int, step_cycle: int) -> VirtualEngine:
         """Make the engine with a load step from 12 to 30 mg."""
         schedule = [(0, _LOW), (step_cycle, _HIGH)]
-        return EngineBench(self.cylinder, schedule=schedule, seed=seed, pressure_noise_bar=NOISE_BAR)
+        return VirtualEngine(self.cylinder, schedule=schedule, seed=seed, pressure_noise_bar=NOISE_BAR)
 
     def step_maps(self) -> tuple[SteadyMap, SteadyMap]:
         """Tabulate J before and after the load step."""
-        before, after = (SteadyMap.of(EngineBench(self.cylinder, point)) for point in (_LOW, _HIGH))
+        before, after = (SteadyMap.of(VirtualEngine(self.cylinder, point)) for point in (_LOW, _HIGH))
         return before, after
 
 
@@ -141,17 +141,17 @@ def _begun(recipe: Recipe, start_cad: float, point: OperatingPoint) -> GuidedEng
     return recipe.engine(curve_seeker(curve_of(point), start=start_cad), point, keep_start=True)
 
 
-def _run(bench: EngineBench, engine: GuidedEngine, cycles: int) -> GuidedRun:
+def _run(bench: VirtualEngine, engine: GuidedEngine, cycles: int) -> GuidedRun:
     found = run_seeker(bench, engine, cycles).dataset
     return GuidedRun(*(found[name].to_numpy()[:, 0] for name in ("estimate", "guide_optimum", "asked")))
 
 
-def guided_run(bench: EngineBench, recipe: Recipe, start_cad: float, cycles: int) -> GuidedRun:
+def guided_run(bench: VirtualEngine, recipe: Recipe, start_cad: float, cycles: int) -> GuidedRun:
     """Seek by the curve of the guide while the pressure calibrates it."""
     return _run(bench, _begun(recipe, start_cad, bench.point), cycles)
 
 
-def step_run(bench: EngineBench, recipe: Recipe, form: str, cycles: int) -> GuidedRun:
+def step_run(bench: VirtualEngine, recipe: Recipe, form: str, cycles: int) -> GuidedRun:
     """Seek through a load step, by the curve or with the guide's best timing as feed-forward of extremum seeking."""
     if form == "curve":
         return _run(bench, recipe.engine(curve_seeker(curve_of(bench.point)), bench.point), cycles)
@@ -167,7 +167,7 @@ class Refit(NamedTuple):
     guide: float
 
 
-def refits_of(bench: EngineBench, recipe: Recipe, start_cad: float, cycles: int) -> list[Refit]:
+def refits_of(bench: VirtualEngine, recipe: Recipe, start_cad: float, cycles: int) -> list[Refit]:
     """Run, and beside every calibration that reaches the seeker give a twin the same reading without pressure."""
     engine, twin = (_begun(recipe, start_cad, bench.point) for _ in range(2))
     found = []

@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import FeedForward, ModelOptimum
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.results.labels import labelled_dataset
@@ -188,7 +188,7 @@ def drive(cylinder: Cylinder, guide: Any, seed: int, *, learns: bool = False) ->
     places = route(seed)
     points = [point_of(*place) for place in zip(*places, strict=True)]
     schedule = [(k * DWELL, point) for k, point in enumerate(points)]
-    bench = EngineBench(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed)
+    bench = VirtualEngine(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed)
     plain = ExtremumSeeking(
         start=_START_CAD, lower=_BOUNDS_CAD[0], upper=_BOUNDS_CAD[1], form="moving_average", gain=_GAIN,
         amplitude=1.0, limits=[Limit(name, upper) for name, upper in LIMITS.items()],

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.design import FeasibleRegion, design_points
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import ConvergenceError
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.maps import CalibrationMap, optimize_map, smooth_map
 from mgdd.optimize import Limit
 from mgdd.results.labels import labelled_dataset
@@ -81,7 +81,7 @@ def measure(cylinder: Cylinder, points: xr.Dataset, *, seed: int, cycles: int = 
     dwell = SETTLING + cycles
     quiet: dict[str, Any] = {} if noise else {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
     schedule = [(k * dwell, point_of(*at)) for k, at in enumerate(zip(speed, fuel, strict=True))]
-    bench = EngineBench(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed, **quiet)
+    bench = VirtualEngine(cylinder, schedule=schedule, limits=tuple(LIMITS), seed=seed, **quiet)
     run = bench.run_columns(np.repeat(timing, dwell))
 
     def mean(column: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.engine import OperatingPoint
 from mgdd.guide import Curve, FeedForward
-from mgdd.loop import EngineBench, SensorDynamics
+from mgdd.loop import SensorDynamics, VirtualEngine
 from mgdd.plot.convergence import convergence
 from mgdd.plot.style import new_figure
 from mgdd.results.labels import labelled_dataset
@@ -116,7 +116,7 @@ def run_guide_accuracy(
     """
     seeds = check_seeds(seeds, quick=quick, most=6)
     work = Parts(progress)
-    maps = [SteadyMap.of(EngineBench(point=point)) for point in (LOW, HIGH)]
+    maps = [SteadyMap.of(VirtualEngine(point=point)) for point in (LOW, HIGH)]
     plain: list[Guide | None] = [None, *GUIDES]
     wanted = [("feed-forward", guide) for guide in plain] + [("curve", guide) for guide in GUIDES]
     done = work(
@@ -140,7 +140,7 @@ def _step(form: str, guide: Guide | None, after: SteadyMap, seeds: int) -> _Step
     lost, back, final, refused, estimates = [], [], [], [], []
     curve_at = None if guide is None else guide.curve
     for seed in range(seeds):
-        bench = EngineBench(schedule=[(0, LOW), (SETTLED, HIGH)], soc_scatter_cad=0.0, seed=seed)
+        bench = VirtualEngine(schedule=[(0, LOW), (SETTLED, HIGH)], soc_scatter_cad=0.0, seed=seed)
         seeker = curve_seeker(guide.curve(LOW)) if guide is not None and form == "curve" else trimmed(guide)
         first = drive(bench, seeker, SETTLED + _TEST_CYCLES, curve_at=curve_at)
         refused.append(isinstance(seeker, FeedForward) and seeker.verdict == "wrong")
@@ -255,13 +255,13 @@ class HardCase:
             return no_model()
         return _BY_NAME[self.guide].curve(OperatingPoint())
 
-    def bench(self, seed: int) -> EngineBench:
+    def bench(self, seed: int) -> VirtualEngine:
         """Make the engine of one run."""
         late: dict[str, Any] = {}
         if self.told_delay is not None:
             sensor = SensorDynamics(delay_cycles=_DELAY, lag_cycles=_LAG, noise_fraction=0.0)
             late = {"analyser": sensor, "delay_whole_objective": True, "nox_sensor": "true_value"}
-        return EngineBench(efficiency_noise_percent=self.noise_percent, seed=seed, **late)
+        return VirtualEngine(efficiency_noise_percent=self.noise_percent, seed=seed, **late)
 
     def late_by_cad(self, cycle: int) -> float:
         """Give by how much combustion is later than asked for [°CA]."""
@@ -294,7 +294,7 @@ class Hard:
 
 def run_hard(case: HardCase, seeds: int) -> Hard:
     """Run a case; a jump or drift is a combustion that comes later than asked for, so that J keeps its height."""
-    curve, steady = case.curve(), SteadyMap.of(EngineBench())
+    curve, steady = case.curve(), SteadyMap.of(VirtualEngine())
     best = steady.best_cad
     target = best - np.array([case.late_by_cad(cycle) for cycle in range(CYCLES)])
 

@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.optimize import ExtremumSeeking
 from mgdd.optimize.optimum import Optimum
 
@@ -149,7 +149,7 @@ class SteadyMap:
     j: NDArray[np.float64]
 
     @classmethod
-    def of(cls, bench: EngineBench, *, cycle: int = 0) -> SteadyMap:
+    def of(cls, bench: VirtualEngine, *, cycle: int = 0) -> SteadyMap:
         """Tabulate the map of a bench at the operating point of a cycle."""
         low, high = _WIDE_CAD
         grid = np.linspace(low, high, round((high - low) / _GRID_STEP_CAD) + 1)
@@ -174,7 +174,7 @@ class SpeedLoadPlane:
     def __init__(self, speeds: Sequence[float] = SPEEDS_RPM, fuels: Sequence[float] = FUELS_MG) -> None:
         self.speeds, self.fuels = speeds, fuels
         self.points = [[OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)) for m in fuels] for n in speeds]
-        self.maps = [[SteadyMap.of(EngineBench(point=point)) for point in row] for row in self.points]
+        self.maps = [[SteadyMap.of(VirtualEngine(point=point)) for point in row] for row in self.points]
 
     @classmethod
     def of(cls, *, quick: bool) -> SpeedLoadPlane:
@@ -192,7 +192,7 @@ class Run:
 
 
 def drive(
-    bench: EngineBench,
+    bench: VirtualEngine,
     seeker: FeedForward | CurveSeeking | GuidedEngine,
     cycles: int,
     *,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.guide import Curve, CurveSeeking, ModelOptimum
-from mgdd.loop import EngineBench, SurrogatePlant, run_seeker
+from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.optimize.tuning_forms import approach_gain
 from mgdd.plot.style import BLACK, GREY, LINE_STYLES, legend, minus, new_figure
@@ -199,7 +199,7 @@ def run_guided(
 
 
 def _bench_engine() -> _Engine:
-    bench, bounds = EngineBench(), (-30.0, 10.0)
+    bench, bounds = VirtualEngine(), (-30.0, 10.0)
     best = bench.find_optimum(bounds={"soc_cad": bounds})
     grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
     model = ModelOptimum(bench.settings["cylinder"].replace(wall_heat_scale=_WRONG_WALL_HEAT), bounds_cad=bounds)
@@ -221,8 +221,8 @@ def _bench_engine() -> _Engine:
     )
 
 
-def _bench_plant(seed: int, _: float) -> EngineBench:
-    return EngineBench(seed=seed)
+def _bench_plant(seed: int, _: float) -> VirtualEngine:
+    return VirtualEngine(seed=seed)
 
 
 def _measured_engine() -> _Engine:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.plot.convergence import convergence
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
@@ -141,7 +141,7 @@ def run_guided_start_up(
     """
     seeds = check_seeds(seeds, quick=quick, most=8)
     work = Parts(progress)
-    steady = SteadyMap.of(EngineBench(point=LOW))
+    steady = SteadyMap.of(VirtualEngine(point=LOW))
     trims = [("none", None), *((guide.name, guide) for guide in _TRIM)]
     done = work((f"feed-forward, {name}", partial(_trim, guide, steady, seeds)) for name, guide in trims)
     curves = work(
@@ -166,7 +166,7 @@ def run_guided_start_up(
 def _trim(guide: Guide | None, steady: SteadyMap, seeds: int) -> _Outcome:
     best = steady.best_cad
     runs = [
-        drive(EngineBench(point=LOW, soc_scatter_cad=0.0, seed=seed), trimmed(guide), TRIM_CYCLES).estimate
+        drive(VirtualEngine(point=LOW, soc_scatter_cad=0.0, seed=seed), trimmed(guide), TRIM_CYCLES).estimate
         for seed in range(seeds)
     ]
     cycles = np.array([first_within(estimate, best, ARRIVAL_CAD) for estimate in runs])
@@ -184,12 +184,12 @@ def _trim(guide: Guide | None, steady: SteadyMap, seeds: int) -> _Outcome:
 def _seek(case: _Case, near: bool, seeds: int) -> _Outcome:
     curve = case.curve()
     start = curve.best if near else case.far_start_cad
-    steady = SteadyMap.of(EngineBench(case.plant, case.point))
+    steady = SteadyMap.of(VirtualEngine(case.plant, case.point))
     best = steady.best_cad
     runs, lost, inside, handed = [], [], [], []
     for seed in range(seeds):
         seeker = curve_seeker(curve, start=start)
-        run = drive(EngineBench(case.plant, case.point, seed=seed), seeker, CURVE_CYCLES)
+        run = drive(VirtualEngine(case.plant, case.point, seed=seed), seeker, CURVE_CYCLES)
         error = run.estimate[LATE:] - best
         runs.append(run.estimate)
         lost.append(steady.lost(run.applied[LATE:]).mean())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import OperatingPoint
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
@@ -56,7 +56,7 @@ def run_plane(form: str, name: str, plane: SpeedLoadPlane) -> Plane:
     for at in np.ndindex(*shape):
         cell, after = plane.points[at[0]][at[1]], plane.maps[at[0]][at[1]]
         schedule = [(0, LEARNT_AT), (_SETTLED, cell)]
-        bench = EngineBench(schedule=schedule, soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+        bench = VirtualEngine(schedule=schedule, soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
         run = drive(bench, guided_by(form, _BY_NAME.get(name), LEARNT_AT), _SETTLED + _JUDGED)
         cycles[at] = first_within(run.estimate[_SETTLED:], after.best_cad, 1.0)
         lost[at] = after.lost(run.applied[_SETTLED:]).sum()
@@ -131,7 +131,7 @@ def run_guided_transients(
     seeds = check_seeds(seeds, quick=quick, most=2)
     work = Parts(progress)
     points = [OperatingPoint(speed_rpm=speed, fuel_mg=fuel) for speed, fuel in SEQUENCE]
-    maps = [SteadyMap.of(EngineBench(point=point)) for point in points]
+    maps = [SteadyMap.of(VirtualEngine(point=point)) for point in points]
     plane = SpeedLoadPlane.of(quick=quick)
     wanted = [("none", "none"), *((form, name) for form in ("feed-forward", "curve") for name in _GUIDES)]
     done = work(
@@ -152,7 +152,7 @@ def _sequence(form: str, name: str, points: list[OperatingPoint], maps: list[Ste
     schedule = [(_DWELL * at, point) for at, point in enumerate(points)]
     lost, estimates = [], []
     for seed in range(seeds):
-        bench = EngineBench(schedule=schedule, seed=seed)
+        bench = VirtualEngine(schedule=schedule, seed=seed)
         run = drive(bench, guided_by(form, _BY_NAME.get(name), points[0]), _DWELL * len(points))
         parts = run.applied.reshape(len(points), _DWELL)
         lost.append(np.concatenate([own.lost(part) for own, part in zip(maps, parts, strict=True)]))

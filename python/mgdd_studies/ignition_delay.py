@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd.engine import OperatingPoint
 from mgdd.guide import CurveSeeking
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.plot.style import GREY, LINE_STYLES, axis_label, legend, new_figure
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
@@ -203,10 +203,10 @@ def _intake_row(law: DelayLaw) -> dict[str, Any]:
 def _runs(form: str, assumed: DelayLaw, seeds: int) -> _Runs:
     truth, guide = TRUTHS[0], InjectionGuide(assumed)
     points = (MEASURED_AT, AFTER)
-    maps = [SteadyMap.of(EngineBench(point=point)) for point in points]
+    maps = [SteadyMap.of(VirtualEngine(point=point)) for point in points]
     estimates, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
     for seed in range(seeds):
-        bench = EngineBench(schedule=[(0, MEASURED_AT), (_STEP_AT, AFTER)], seed=seed)
+        bench = VirtualEngine(schedule=[(0, MEASURED_AT), (_STEP_AT, AFTER)], seed=seed)
         if form == "curve":
             curve, (low, high) = guide.curve(MEASURED_AT), _BOUNDS_SOI_CAD
             seeker: Any = CurveSeeking(start=curve.best, lower=low, upper=high, curve=curve)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd import plot, presets
 from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, ignition_delay
-from mgdd.loop import EngineBench, SensorDynamics
+from mgdd.loop import SensorDynamics, VirtualEngine
 from mgdd.plot.style import new_figure
 from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
@@ -117,7 +117,7 @@ def _sweep(seeds: int) -> _Sweep:
     deviation: dict[str, list[float]] = {name: [] for name in names}
     for seed in range(seeds):
         for place, timing in enumerate(soc):
-            bench = EngineBench(soft_sensor=WRONG, seed=seed * soc.size + place)
+            bench = VirtualEngine(soft_sensor=WRONG, seed=seed * soc.size + place)
             tail = bench.run(np.full(SETTLE + STEADY, timing)).isel(cycle=slice(SETTLE, None))
             temperature[seed, place] = float(tail["t_max_k"].mean())
             for name in names:
@@ -147,8 +147,8 @@ def _step(name: str, fitted: NoxProxy) -> tuple[dict[str, NDArray[np.float64]], 
         "analyser": SensorDynamics(delay_s=3.0, lag_s=2.0, noise_fraction=0.0),
         "fast_sensor": SensorDynamics(delay_s=0.05, lag_s=0.05, noise_fraction=0.0),
     }
-    still = EngineBench(schedule=schedule, soft_sensor=WRONG, **_QUIET, **silent).run(soc)
-    noisy = EngineBench(schedule=schedule, soft_sensor=WRONG, seed=1).run(soc)
+    still = VirtualEngine(schedule=schedule, soft_sensor=WRONG, **_QUIET, **silent).run(soc)
+    noisy = VirtualEngine(schedule=schedule, soft_sensor=WRONG, seed=1).run(soc)
     quiet = {sensor: still[f"nox_{sensor}_ppm"].to_numpy() for sensor in _SENSORS}
     quiet["soft_fitted"] = fitted.affine_log_ppm(still["t_max_k"].to_numpy())
     return quiet, noisy
@@ -158,7 +158,7 @@ def _correction(seeds: int) -> NDArray[np.float64]:
     """Follow the corrected sensor from its wrong start, over seed and cycle: relative error of its ten-cycle mean."""
     out = np.empty((seeds, SETTLE))
     for seed in range(seeds):
-        run = EngineBench(soft_sensor=WRONG, seed=seed).run(np.full(SETTLE, -6.0))
+        run = VirtualEngine(soft_sensor=WRONG, seed=seed).run(np.full(SETTLE, -6.0))
         error = np.log((run["nox_soft_corrected_ppm"] / run["nox_true_ppm"]).to_numpy())
         out[seed] = np.convolve(error, np.full(10, 0.1))[:SETTLE]
         out[seed, :9] = np.cumsum(error[:9]) / np.arange(1, 10)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.guide import OnlineCalibration
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, minus, new_figure
 from mgdd.results.labels import labelled_dataset
@@ -74,7 +74,7 @@ def fact_bars(facts: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _seeking() -> tuple[float, float]:
     """Count trials until the wall heat stays within 2 % of the truth, one trial per update; and where it ends."""
-    bench = EngineBench(soc_scatter_cad=0.0)
+    bench = VirtualEngine(soc_scatter_cad=0.0)
     calibration = OnlineCalibration(
         WRONG, method="extremum_seeking", uncertainty=EXACT, window_cycles=2, soc_scatter_cad=0.0, trials_per_update=1
     )
@@ -89,7 +89,7 @@ def _seeking() -> tuple[float, float]:
 
 def _told(soc_cad: float, late_cad: float) -> float:
     """Fit the wall heat alone where the given timing is wrong."""
-    bench = EngineBench(soc_scatter_cad=0.0)
+    bench = VirtualEngine(soc_scatter_cad=0.0)
     calibration = OnlineCalibration(WRONG, uncertainty=EXACT, soc_scatter_cad=0.0)
     for _ in range(_STEADY_CYCLES):
         bench.step(soc_cad)
@@ -139,9 +139,9 @@ class Sensor:
     gain: float = 0.0
     offset_bar: float = 0.0
 
-    def bench(self, seed: int) -> EngineBench:
+    def bench(self, seed: int) -> VirtualEngine:
         """Make the engine that it sits on."""
-        return EngineBench(
+        return VirtualEngine(
             seed=seed, pressure_noise_bar=self.noise_bar, tdc_error_cad=self.tdc_cad, pressure_gain_error=self.gain,
             pressure_offset_bar=self.offset_bar,
         )  # fmt: skip

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.engine import OperatingPoint
-from mgdd.loop import EngineBench, LoopCriteria
+from mgdd.loop import LoopCriteria, VirtualEngine
 from mgdd.optimize import (
     ExtremumSeeking,
     GoldenSection,
@@ -72,7 +72,7 @@ class Learned:
 def learn(law: str, seeds: int, *, trials: int = 12, scatter_cad: float = 0.3) -> Learned:
     """Learn the commanded timing of the load step trial by trial; the scatter of combustion differs in every trial."""
     points = [(0, OperatingPoint(fuel_mg=LOW_MG)), (STEP_AT, OperatingPoint(fuel_mg=HIGH_MG))]
-    bench = EngineBench(schedule=points, soc_scatter_cad=scatter_cad, efficiency_noise_percent=0.0)
+    bench = VirtualEngine(schedule=points, soc_scatter_cad=scatter_cad, efficiency_noise_percent=0.0)
     errors = np.empty((seeds, trials))
     sigma_max = math.nan
     for seed in range(seeds):
@@ -146,7 +146,7 @@ def run_seeker_comparison(
     """
     seeds = check_seeds(seeds, quick=quick, most=6)
     work = Parts(progress)
-    best = EngineBench().find_optimum()
+    best = VirtualEngine().find_optimum()
     done = work((c.name, partial(_run, c, best, seeds)) for c in _contenders(best))
     learned = work((f"iterative learning, {law}", partial(learn, law, min(seeds, 20))) for law in LAWS)
     return work.finish(
@@ -197,13 +197,13 @@ def _short(tuning: Tuning) -> str:
 def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
     seeker = contender.seeker
     table = loops(
-        EngineBench(), seeker, range(seeds), cycles=CYCLES,
+        VirtualEngine(), seeker, range(seeds), cycles=CYCLES,
         criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD),
     )  # fmt: skip
 
-    def make(seed: int) -> tuple[EngineBench, Any]:
+    def make(seed: int) -> tuple[VirtualEngine, Any]:
         fresh = Spsa(**{**seeker.settings, "seed": seed}) if isinstance(seeker, Spsa) else copy.deepcopy(seeker)
-        return EngineBench(seed=seed), fresh
+        return VirtualEngine(seed=seed), fresh
 
     row = {
         "seeker": contender.name,

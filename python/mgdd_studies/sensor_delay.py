@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
+from mgdd.loop import LoopCriteria, SensorDynamics, VirtualEngine, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking
 from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.tuning_forms import approach_gain
@@ -95,7 +95,7 @@ def run_sensor_delay(
     seeds = check_seeds(seeds, quick=quick, most=4)
     work = Parts(progress)
     performance = Performance.efficiency_and_nox()
-    best = EngineBench(**_QUIET, performance=performance, nox_sensor="true_value").find_optimum()
+    best = VirtualEngine(**_QUIET, performance=performance, nox_sensor="true_value").find_optimum()
     done = work((f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES)
     found = work(
         (f"component by component, period {period}", partial(_component_wise, period, time, best, seeds))
@@ -121,8 +121,8 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
     sensor = SensorDynamics(delay_cycles=int(case.lag.delay_cycles), lag_cycles=case.lag.lag_cycles, noise_fraction=0.0)
     late = case.lag.delay_cycles + case.lag.lag_cycles
 
-    def bench() -> EngineBench:
-        return EngineBench(
+    def bench() -> VirtualEngine:
+        return VirtualEngine(
             **_QUIET,
             performance=Performance.efficiency_and_nox(),
             nox_sensor="true_value",
@@ -162,7 +162,7 @@ def _seeker(
     )  # fmt: skip
 
 
-def _frozen_slope(bench: EngineBench, seeker: ExtremumSeeking, settle: int, period: int) -> float:
+def _frozen_slope(bench: VirtualEngine, seeker: ExtremumSeeking, settle: int, period: int) -> float:
     """Average the demodulated slope of J over one period, once the sensor has settled, with the estimate held."""
     slopes = []
     for cycle in range(settle + period):
@@ -180,8 +180,8 @@ def _component_wise(
         delay_cycles=int(_ANALYSER.delay_cycles), lag_cycles=_ANALYSER.lag_cycles, noise_fraction=0.01
     )
 
-    def make(seed: int) -> tuple[EngineBench, ExtremumSeeking]:
-        bench = EngineBench(
+    def make(seed: int) -> tuple[VirtualEngine, ExtremumSeeking]:
+        bench = VirtualEngine(
             performance=Performance.efficiency_and_nox(), nox_sensor="analyser", analyser=sensor, seed=seed
         )
         return bench, _seeker(best, period, time_constant, components=[ComponentLag(), _ANALYSER])

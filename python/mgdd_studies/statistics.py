@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def with_quantiles(text: str) -> dict[str, str]:
     return {"median": text, "low": f"{text}, 10 % quantile", "high": f"{text}, 90 % quantile"}
 
 
-def loops(bench: EngineBench, seeker: Any, seeds: Iterable[int], **how: Any) -> xr.Dataset:
+def loops(bench: VirtualEngine, seeker: Any, seeds: Iterable[int], **how: Any) -> xr.Dataset:
     """Run `monte_carlo` of one bench and one seeker, over ``seed`` alone."""
     return monte_carlo(bench, seeker, seeds, **how).isel(bench=0, seeker=0, drop=True)
 
@@ -177,12 +177,14 @@ def loops(bench: EngineBench, seeker: Any, seeds: Iterable[int], **how: Any) -> 
 OVER_SEEDS = quantiles_of("estimate over seeds", "estimate of the best timing")
 
 
-def estimates(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], cycles: int) -> NDArray[np.float64]:
+def estimates(
+    make: Callable[[int], tuple[VirtualEngine, Any]], seeds: Iterable[int], cycles: int
+) -> NDArray[np.float64]:
     """Run a seeker on a bench for each seed, and give its estimates, shape (seeds, cycles) [°CA aTDC]."""
     return np.stack([run_seeker(*make(seed), cycles).dataset["estimate"].to_numpy()[:, 0] for seed in seeds])
 
 
-def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:
+def run_with_slope(bench: VirtualEngine, seeker: Any, cycles: int) -> xr.Dataset:
     """Give the cycles of `run_seeker` with the seeker's own slope of J, as mean over one dither period.
 
     Bench and seeker are copied: the same loop is run once in the core and once by ask and tell, which are one

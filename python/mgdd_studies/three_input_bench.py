@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Cylinder
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Limit, Seeker, Spsa
 from mgdd.optimize.optimum import Optimum
 from mgdd_studies.several_maps import EARLY
@@ -47,24 +47,24 @@ class BenchRun:
     estimate_excess: tuple[float, ...]  # of the limit that the estimate is farthest beyond [-]
 
 
-def noisy_bench(seed: int) -> EngineBench:
+def noisy_bench(seed: int) -> VirtualEngine:
     """Make the bench of a run, with its default noise."""
-    return EngineBench(inputs=list(BOUNDS), limits=list(LIMITS), seed=seed)
+    return VirtualEngine(inputs=list(BOUNDS), limits=list(LIMITS), seed=seed)
 
 
-def _quiet_bench(engine: Any = "puma_single") -> EngineBench:
+def _quiet_bench(engine: Any = "puma_single") -> VirtualEngine:
     """Make the bench without noise, of this engine."""
-    return EngineBench(
+    return VirtualEngine(
         engine, inputs=list(BOUNDS), limits=list(LIMITS), soc_scatter_cad=0.0, efficiency_noise_percent=0.0
     )
 
 
 def bench_optimum() -> Optimum:
     """Find the best inputs within bounds and limits."""
-    return EngineBench(inputs=list(BOUNDS)).find_optimum(LIMITS, bounds=BOUNDS)
+    return VirtualEngine(inputs=list(BOUNDS)).find_optimum(LIMITS, bounds=BOUNDS)
 
 
-def told(bench: EngineBench) -> list[Limit]:
+def told(bench: VirtualEngine) -> list[Limit]:
     """Say what stands between the plant and a limit: the fast sensor is 0.05 s late and slow, a cycle takes 0.08 s."""
     cycle_s = 120.0 / bench.point.speed_rpm
     sensor = bench.settings["fast_sensor"]
@@ -72,7 +72,7 @@ def told(bench: EngineBench) -> list[Limit]:
     return [Limit(name, upper, **(late if name.startswith("nox") else {})) for name, upper in LIMITS.items()]
 
 
-def bench_run(bench: EngineBench, seeker: Seeker, until: Sequence[int], best_j: float) -> BenchRun:
+def bench_run(bench: VirtualEngine, seeker: Seeker, until: Sequence[int], best_j: float) -> BenchRun:
     """Run a seeker on the bench and look at its estimate after each of these counts of cycles."""
     quiet, uppers = _quiet_bench(), np.array(list(LIMITS.values()))
     parts: list[xr.Dataset] = []

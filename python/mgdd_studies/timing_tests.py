@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, LoopCriteria
+from mgdd.loop import LoopCriteria, VirtualEngine
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit
 from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.tuning_forms import approach_gain
@@ -40,9 +40,9 @@ class _Test:
     period: int = 10
     time_constant: float = 40.0
 
-    def bench(self, seed: int = 0, *, limited: bool = False) -> EngineBench:
+    def bench(self, seed: int = 0, *, limited: bool = False) -> VirtualEngine:
         nox = self.nox_sensor != "none"
-        return EngineBench(
+        return VirtualEngine(
             performance=Performance.efficiency_and_nox(NOX_WEIGHT) if nox else None,
             nox_sensor=self.nox_sensor if nox else "soft",
             limits=["p_max_bar"] if limited else [],

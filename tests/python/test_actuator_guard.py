@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mgdd.errors import ParameterError, RigError
-from mgdd.loop import EngineBench, Measurement, Plant, run_seeker
+from mgdd.loop import Measurement, Plant, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit, Spsa
 from mgdd.rig import ActuatorGuard, SimulatedRig
 from mgdd.rig.actuator_guard import GuardedAsk
@@ -205,7 +205,7 @@ def test_wrong_names_are_errors_and_nothing_is_applied():
 @pytest.mark.parametrize("kind", [ExtremumSeeking, Spsa])
 def test_a_seeker_below_a_guard_keeps_the_bounds_and_learns_from_what_was_applied(kind):
     upper = 82.0
-    bench = EngineBench(limits=["p_max_bar"], seed=3)
+    bench = VirtualEngine(limits=["p_max_bar"], seed=3)
     guard = ActuatorGuard(
         bench,
         start={"soc_cad": 2.0},

@@ -25,7 +25,7 @@ from mgdd.engine import (
 )
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import Curve
-from mgdd.loop import EngineBench, SensorDynamics, monte_carlo, run_seeker
+from mgdd.loop import SensorDynamics, VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit, Spsa
 from mgdd.throttle import SensorPair, Throttle
 
@@ -99,15 +99,15 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: ExtremumSeeking(start=0.0, period="x"), "period", "period = 'x': must be a whole number"),
         (lambda: ExtremumSeeking(start="x"), "start", "start = 'x': must be"),
         (lambda: Spsa(start=0.0, limits=[3.0]), "limits", r"limits = \[3.0\], a list: must be a sequence of Limits"),
-        (lambda: EngineBench([Cylinder()]), "engine", "engine = .*: must be a Cylinder"),
-        (lambda: EngineBench(point=[OperatingPoint()]), None, "OperatingPoint"),
-        (lambda: EngineBench().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
-        (lambda: EngineBench().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),
-        (lambda: setattr(EngineBench(), "state", 3), "state", "state = 3: must be a mapping of names to"),
+        (lambda: VirtualEngine([Cylinder()]), "engine", "engine = .*: must be a Cylinder"),
+        (lambda: VirtualEngine(point=[OperatingPoint()]), None, "OperatingPoint"),
+        (lambda: VirtualEngine().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
+        (lambda: VirtualEngine().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),
+        (lambda: setattr(VirtualEngine(), "state", 3), "state", "state = 3: must be a mapping of names to"),
         (lambda: run_seeker(SEEKER, SEEKER, 10), None, "plant"),
-        (lambda: run_seeker(EngineBench(), EngineBench(), 10), "seeker", "seeker = .*: must be a seeker, as"),
-        (lambda: run_seeker(EngineBench(), SEEKER, 10.5), "cycles", "cycles = 10.5: must be a whole number"),
-        (lambda: monte_carlo(EngineBench(), EngineBench(), [1], cycles=5), None, "must be a seeker, as"),
+        (lambda: run_seeker(VirtualEngine(), VirtualEngine(), 10), "seeker", "seeker = .*: must be a seeker, as"),
+        (lambda: run_seeker(VirtualEngine(), SEEKER, 10.5), "cycles", "cycles = 10.5: must be a whole number"),
+        (lambda: monte_carlo(VirtualEngine(), VirtualEngine(), [1], cycles=5), None, "must be a seeker, as"),
         (
             lambda: _core.engine.volume_l(PRESET, 0.0),
             "cylinder",

@@ -14,7 +14,7 @@ from mgdd.cli import main
 from mgdd.engine import Performance
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import GuidedEngine, ModelOptimum
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.loop import seek as seek_on
 from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Spsa
 from mgdd.results.labels import check_labels
@@ -27,12 +27,12 @@ BOUNDS = {"soc_cad": (-25.0, 10.0), "egr": (0.0, 0.4), "intake_pressure_kpa": (1
 def test_steps_columns_and_measurements_are_one_run() -> None:
     rng = np.random.default_rng(1)
     columns = {"soc_cad": rng.uniform(-12, 0, 40), "egr": rng.uniform(0, 0.4, 40), "intake_pressure_kpa": 170.0}
-    bench = EngineBench(inputs=THREE, limits=["nox_fast_ppm", "p_max_bar"], seed=4)
+    bench = VirtualEngine(inputs=THREE, limits=["nox_fast_ppm", "p_max_bar"], seed=4)
     run = bench.run(columns)
     check_labels(run)
     np.testing.assert_array_equal(run["egr"], columns["egr"])
     assert set(np.unique(run["intake_pressure_kpa"])) == {170.0}
-    again = pickle.loads(pickle.dumps(EngineBench(inputs=THREE, limits=["nox_fast_ppm", "p_max_bar"], seed=4)))
+    again = pickle.loads(pickle.dumps(VirtualEngine(inputs=THREE, limits=["nox_fast_ppm", "p_max_bar"], seed=4)))
     assert again.input_names == tuple(THREE)
     rows = []
     for k in range(40):
@@ -50,22 +50,28 @@ def test_steps_columns_and_measurements_are_one_run() -> None:
 
 
 def test_what_is_left_out_stays() -> None:
-    bench = EngineBench(inputs=THREE, **QUIET)
+    bench = VirtualEngine(inputs=THREE, **QUIET)
     assert bench.step({"egr": 0.2, "soc_cad": -4.0})["intake_pressure_kpa"] == 150.0
     assert bench.step({"intake_pressure_kpa": 180.0})["egr"] == 0.2
     assert bench.step(-5.0)["intake_pressure_kpa"] == 180.0
     assert bench.step(-5.0, [0.9])["egr"] == 0.5
     assert bench.input_bounds == {"soc_cad": (-60.0, 20.0), "egr": (0.0, 0.5), "intake_pressure_kpa": (50.0, 500.0)}
-    assert set(bench.step(-5.0)) - set(EngineBench().step(-5.0)) == {"egr", "intake_pressure_kpa", "intake_o2_fraction"}
+    assert set(bench.step(-5.0)) - set(VirtualEngine().step(-5.0)) == {
+        "egr",
+        "intake_pressure_kpa",
+        "intake_o2_fraction",
+    }
 
 
 def test_the_steady_map_is_the_grid_of_what_is_named() -> None:
-    bench = EngineBench(inputs=THREE, performance=Performance.efficiency_and_nox(), nox_sensor="soft_corrected", seed=2)
+    bench = VirtualEngine(
+        inputs=THREE, performance=Performance.efficiency_and_nox(), nox_sensor="soft_corrected", seed=2
+    )
     grid = bench.steady_map({"egr": [0.0, 0.25], "soc_cad": [-8.0, -4.0, 1.0]})
     check_labels(grid)
     assert dict(grid.sizes) == {"soc_cad": 3, "egr": 2}
     assert bench.cycle == 0
-    quiet = EngineBench(inputs=THREE, **QUIET)
+    quiet = VirtualEngine(inputs=THREE, **QUIET)
     for soc, egr in itertools.product([-8.0, -4.0, 1.0], [0.0, 0.25]):
         quiet.reset()
         cycle, cell = quiet.step({"soc_cad": soc, "egr": egr}), grid.sel(soc_cad=soc, egr=egr)
@@ -73,7 +79,7 @@ def test_the_steady_map_is_the_grid_of_what_is_named() -> None:
         expected = 100.0 * cycle["efficiency_gross"] - 0.004 * cycle["nox_soft_ppm"]
         assert float(cell["j"]) == pytest.approx(expected, abs=1e-12)
     assert float(grid["j"].sel(soc_cad=-8.0, egr=0.0)) == pytest.approx(
-        float(EngineBench(performance=Performance.efficiency_and_nox()).steady_map([-8.0])["j"][0]), abs=1e-12
+        float(VirtualEngine(performance=Performance.efficiency_and_nox()).steady_map([-8.0])["j"][0]), abs=1e-12
     )
 
 
@@ -86,11 +92,11 @@ def test_the_steady_map_is_the_grid_of_what_is_named() -> None:
     ],
 )
 def test_the_optimum_under_limits_is_that_of_a_fine_grid(limits: dict[str, float], held: tuple[str, ...]) -> None:
-    best = EngineBench(inputs=THREE, seed=3).find_optimum(limits, bounds=BOUNDS)
+    best = VirtualEngine(inputs=THREE, seed=3).find_optimum(limits, bounds=BOUNDS)
     assert best.active_limits == held
     for name, upper in limits.items():
         assert best[name] <= upper * (1.0 + 1e-5)
-    quiet = EngineBench(inputs=THREE, limits=list(limits), **QUIET)
+    quiet = VirtualEngine(inputs=THREE, limits=list(limits), **QUIET)
     top = -np.inf
     centre, reach = np.array([-7.5, 0.2, 170.0]), np.array([17.5, 0.2, 50.0])
     for _ in range(7):  # grids of 17 a side, each of the best cells of the one before
@@ -107,7 +113,7 @@ def test_the_optimum_under_limits_is_that_of_a_fine_grid(limits: dict[str, float
 
 
 def test_one_input_is_bounded_by_its_name() -> None:
-    bench = EngineBench()
+    bench = VirtualEngine()
     whole = bench.find_optimum({"p_max_bar": 95.0})
     assert whole["soc_cad"] == bench.find_optimum({"p_max_bar": 95.0}, bounds={"soc_cad": (-20.0, 5.0)})["soc_cad"]
     assert bench.find_optimum(bounds={"soc_cad": (-4.0, 5.0)})["soc_cad"] == pytest.approx(-4.0, abs=1e-3)
@@ -118,7 +124,7 @@ def test_one_input_is_bounded_by_its_name() -> None:
 
 @pytest.mark.parametrize("inputs", [("soc_cad",), ("soc_cad", "egr")], ids="-".join)
 def test_a_lower_limit_of_the_optimum_is_where_a_fine_scan_has_it(inputs: tuple[str, ...]) -> None:
-    bench, pressures = EngineBench(inputs=list(inputs)), np.linspace(-25.0, 5.0, 601)
+    bench, pressures = VirtualEngine(inputs=list(inputs)), np.linspace(-25.0, 5.0, 601)
     bounds = {"soc_cad": (-25.0, 5.0), "egr": (0.0, 1e-3)}
     best = bench.find_optimum({"p_max_bar": (130.0, None)}, bounds={name: bounds[name] for name in inputs})
     steady = bench.steady_map({name: pressures if name == "soc_cad" else [0.0] for name in inputs})
@@ -136,7 +142,7 @@ def test_seekers_of_named_inputs_run_on_it_in_any_order() -> None:
         seeker = Spsa(
             inputs=bounds, start=start, perturbation=[2.0, 0.02, 4.0] if bounds is BOUNDS else [4.0, 0.02, 2.0]
         )
-        run = run_seeker(EngineBench(inputs=THREE, limits=["p_max_bar"], seed=1), seeker, 30)
+        run = run_seeker(VirtualEngine(inputs=THREE, limits=["p_max_bar"], seed=1), seeker, 30)
         assert list(run.dataset["input"].values) == THREE
         np.testing.assert_array_equal(run.dataset["applied"].sel(input="egr"), run.dataset["egr"])
         np.testing.assert_array_equal(run.dataset["estimate"][0], [start[name] for name in THREE])
@@ -145,11 +151,13 @@ def test_seekers_of_named_inputs_run_on_it_in_any_order() -> None:
 
 
 def test_whole_loops_are_those_of_one_at_a_time() -> None:
-    bench = EngineBench(inputs=THREE)
+    bench = VirtualEngine(inputs=THREE)
     start = [-6.0, 0.1, 150.0]
     seeker = GaussianProcessSeeking(inputs=BOUNDS, start=start)
     table = monte_carlo(bench, seeker, range(3), cycles=15)
-    run = run_seeker(EngineBench(inputs=THREE, seed=2), GaussianProcessSeeking(inputs=BOUNDS, start=start, seed=2), 15)
+    run = run_seeker(
+        VirtualEngine(inputs=THREE, seed=2), GaussianProcessSeeking(inputs=BOUNDS, start=start, seed=2), 15
+    )
     assert float(table["mean_j"].sel(seed=2).squeeze()) == pytest.approx(run.summary["mean_j"], rel=1e-12)
     turned = GaussianProcessSeeking(inputs={name: BOUNDS[name] for name in reversed(BOUNDS)}, start=start[::-1])
     with pytest.raises(ParameterError, match="in the order of the bench, soc_cad, egr, intake_pressure_kpa"):
@@ -176,16 +184,16 @@ ALONE = ExtremumSeeking(start=-6.0, lower=-25.0, upper=10.0)
         (lambda b: b.steady_map({"egr": [0.3]}), "soc_cad is missing"),
         (lambda b: b.find_optimum(bounds={"egr": (0.3, 0.1)}), re.escape("bounds: egr = (0.3, 0.1): must increase")),
         (lambda b: b.find_optimum({"cov_imep_percent": 1.0}), "'cov_imep_percent' is not an indicator"),
-        (lambda _: EngineBench(inputs=["egr"]), "inputs: must begin with soc_cad"),
+        (lambda _: VirtualEngine(inputs=["egr"]), "inputs: must begin with soc_cad"),
         (
-            lambda _: EngineBench(inputs=["soc_cad", "boost"]),
+            lambda _: VirtualEngine(inputs=["soc_cad", "boost"]),
             "inputs = 'boost': must be one of soc_cad, intake_pressure",
         ),
-        (lambda _: EngineBench(limits=["nox_ppm"]), "limits: 'nox_ppm' is not measured.*did you mean"),
+        (lambda _: VirtualEngine(limits=["nox_ppm"]), "limits: 'nox_ppm' is not measured.*did you mean"),
     ],
 )
 def test_refusals(call: object, message: str) -> None:
-    bench = EngineBench(inputs=THREE)
+    bench = VirtualEngine(inputs=THREE)
     with pytest.raises(ParameterError, match=message):
         call(bench)  # type: ignore[operator]
     assert bench.cycle == 0
@@ -194,9 +202,9 @@ def test_refusals(call: object, message: str) -> None:
 
 def test_columns_must_fit() -> None:
     with pytest.raises(ShapeError, match="egr has 2 entries: give one per soc_cad, 3"):
-        EngineBench(inputs=THREE).run_columns([-6.0, -5.0, -4.0], [[0.1, 0.2]])
+        VirtualEngine(inputs=THREE).run_columns([-6.0, -5.0, -4.0], [[0.1, 0.2]])
     with pytest.raises(ShapeError, match="further has 1 entries: the bench takes 0 besides soc_cad"):
-        EngineBench().step(-6.0, [0.1])
+        VirtualEngine().step(-6.0, [0.1])
 
 
 def seek(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> str:
@@ -212,7 +220,7 @@ def test_the_command_seeks_several_inputs(capsys: pytest.CaptureFixture[str], tm
     file = f"{tmp_path}/cycles.csv"
     limits = ("--limit", "nox_true_ppm=700", "--limit", "p_max_bar=120")
     out = json.loads(seek(capsys, *SOUGHT, *limits, "--cycles", "40", "--seed", "3", "--json"))
-    best = EngineBench(inputs=THREE).find_optimum(
+    best = VirtualEngine(inputs=THREE).find_optimum(
         {"nox_true_ppm": 700.0, "p_max_bar": 120.0}, bounds=BOUNDS | {"soc_cad": (-20.0, 5.0)}
     )
     assert out["optimum"] == pytest.approx(dict(best.inputs))

@@ -12,7 +12,7 @@ import pytest
 from mgdd.cli import main
 from mgdd.cli.guide_map import learn_map
 from mgdd.guide import FeedForward, TimingMap
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from typed import Capsys, commands
 
@@ -190,7 +190,7 @@ def test_a_run_that_has_not_settled_writes_nothing(
 
 
 def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None:
-    bench, timing = EngineBench(seed=2), TimingMap.from_toml(table.read_text(encoding="utf-8"))
+    bench, timing = VirtualEngine(seed=2), TimingMap.from_toml(table.read_text(encoding="utf-8"))
     seeker = FeedForward(ExtremumSeeking(start=-9.0, lower=-30.0, upper=10.0), timing)
     seeker.at(bench.point)
     run_seeker(bench, seeker, 900)

@@ -16,7 +16,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from typed import Capsys, commands
 
 seek, refused = commands("engine", "seek")
@@ -42,7 +42,7 @@ def test_every_seeker_keeps_the_pressure_limit(seeker: str, capsys: Capsys) -> N
 
 
 def test_a_dither_behind_the_analyser_arrives(capsys: Capsys) -> None:
-    bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser")
+    bench = VirtualEngine(performance=Performance.efficiency_and_nox(), nox_sensor="analyser")
     run = seek(capsys, "--sensor", "analyser", *by("extremum_seeking"))
     assert run["optimum"]["soc_cad"] == bench.find_optimum()["soc_cad"]
     assert run["cycles"] == 16 * 4 * 76  # a period of 76: a fifth of 38 + 25 cycles turns it by 60 deg

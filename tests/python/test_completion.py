@@ -33,7 +33,7 @@ def test_public_names_are_few_and_none_stands_twice() -> None:
 
 def test_a_class_of_the_core_shows_names_and_defaults_and_describes_them() -> None:
     from mgdd.control import Pid
-    from mgdd.loop import EngineBench
+    from mgdd.loop import VirtualEngine
 
     shown = inspect.signature(Pid).parameters
     assert list(shown) == list(Pid.fields())
@@ -43,8 +43,8 @@ def test_a_class_of_the_core_shows_names_and_defaults_and_describes_them() -> No
     assert "kick_width_deg : error at which the kick is full [deg]" in str(Pid.__init__.__doc__)
     assert str(inspect.signature(Pid.step)) == "(self, reference_deg, measurement_deg)"
 
-    bench = inspect.signature(EngineBench).parameters
+    bench = inspect.signature(VirtualEngine).parameters
     assert bench["pressure_noise_bar"].default == 0.0
-    assert set(EngineBench.fields()) - set(bench) == {"cylinder"}
-    assert "\npressure_noise_bar : float\n    Noise of each sample" in str(EngineBench.__doc__)
-    assert "**settings" not in str(EngineBench.__doc__)
+    assert set(VirtualEngine.fields()) - set(bench) == {"cylinder"}
+    assert "\npressure_noise_bar : float\n    Noise of each sample" in str(VirtualEngine.__doc__)
+    assert "**settings" not in str(VirtualEngine.__doc__)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mgdd.guide import Curve
-from mgdd.loop import EngineBench, VirtualThrottle, monte_carlo
+from mgdd.loop import VirtualEngine, VirtualThrottle, monte_carlo
 from mgdd.optimize import GaussianProcessSeeking, Limit, Spsa
 from mgdd.rig import GatedThrottle
 from public_objects import bound_classes, public_objects, saved_state
@@ -139,6 +139,6 @@ def test_only_the_seed_of_the_run_counts(seeker: Any, misfires: float) -> None:
     ends = []
     for made in (0, 5):
         start = seeker(start=-2.0, lower=-20.0, upper=10.0, seed=made)
-        run = monte_carlo(EngineBench(misfire_probability=misfires), [start], [5], cycles=120)
+        run = monte_carlo(VirtualEngine(misfire_probability=misfires), [start], [5], cycles=120)
         ends.append(float(np.ravel(run["final_soc_cad"].values)[0]))
     assert ends[0] == ends[1]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from independent_engine import LAWS, Engine, draw, record
-from mgdd.engine import OperatingPoint, analyze, simulate, trust
+from mgdd.engine import OperatingPoint, analyze, check_pressure, simulate
 from mgdd.identify import estimate_tdc
 from mgdd.identify.engine.tdc import TdcEstimate
 from mgdd.io import pressure_trace
@@ -46,7 +46,7 @@ def estimated(engine: Engine, angle: np.ndarray, bar: np.ndarray) -> TdcEstimate
 
 
 def doubted(engine: Engine, angle: np.ndarray, bar: np.ndarray) -> bool:
-    return trust(said_of(engine, angle, bar), engine.cylinder())["top dead centre"].verdict == "doubt"
+    return check_pressure(said_of(engine, angle, bar), engine.cylinder())["top dead centre"].verdict == "doubt"
 
 
 def motored_shares(kind: str, seeds: range) -> dict[str, float]:
@@ -93,7 +93,7 @@ def test_strokes_that_no_sound_engine_has_are_doubted_and_their_wall_heat_is_sai
         assert found.figures["wall_heat_scale"] == found.wall_heat_scale
         (said,) = (text for text in found.doubts() if "wall heat" in text)
         assert f"{found.wall_heat_scale:.2g} times Hohenberg's wall heat, sound engines 0.1 to 2.5" in said
-        check = trust(said_of(engine, angle, bar), engine.cylinder())["top dead centre"]
+        check = check_pressure(said_of(engine, angle, bar), engine.cylinder())["top dead centre"]
         assert check.verdict == "doubt"
         assert "times Hohenberg's wall heat" in check.text
 
@@ -110,7 +110,7 @@ def test_a_peak_far_before_tdc_is_doubted() -> None:
 @pytest.mark.parametrize("level", [-3.0, -0.5, 5.0])
 def test_a_motored_record_of_a_wrong_level_is_judged_all_the_same(level: float) -> None:
     engine, angle, bar = motored("spark", 0, cycles=2)
-    found = trust(said_of(engine, angle, bar + level), engine.cylinder())
+    found = check_pressure(said_of(engine, angle, bar + level), engine.cylinder())
     assert found.verdict in ("doubt", "fail")
 
 

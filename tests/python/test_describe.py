@@ -20,7 +20,7 @@ from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
-from mgdd.loop import EngineBench, SensorDynamics, SurrogatePlant, run_seeker
+from mgdd.loop import SensorDynamics, SurrogatePlant, VirtualEngine, run_seeker
 from mgdd.maps import CalibrationMap
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets.preset import Preset
@@ -59,7 +59,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "performance": Performance.efficiency_and_nox,
         "analyser": SensorDynamics,
         "limit": lambda: Limit(name="p_max_bar", upper=95.0),
-        "bench": EngineBench,
+        "bench": VirtualEngine,
         "online calibration": lambda: OnlineCalibration("puma_single"),
         "verdict": lambda: OnlineCalibration("puma_single").verdicts["wall_heat_scale"],
         "seeker": lambda: ExtremumSeeking(**seeking),
@@ -67,8 +67,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "model optimum": lambda: ModelOptimum(Cylinder()),
         "timing map": lambda: TimingMap({"speed_rpm": [900.0, 3000.0], "fuel_mg": [6.0, 20.0, 40.0]}, -5.0),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
-        "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),
-        "steady": lambda: EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0}),
+        "run": lambda: run_seeker(VirtualEngine(), ExtremumSeeking(**seeking), 300),
+        "steady": lambda: VirtualEngine(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0}),
         "optimum": lambda: find_optimum(Cylinder(), OperatingPoint()),
         "tuning": lambda: tune(0.25, -0.1, method="batch", distance=10.0, arrival=1.0),
         "pw_r": lambda: PseudoWiener("pw_r"),

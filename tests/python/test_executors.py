@@ -14,7 +14,7 @@ import parallel_work as work
 from executor_calls import CALLS, SPACE, fixed_chunks, plain, same, tuning
 from mgdd.control import Pid
 from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, Reference, monte_carlo, run_seeker, track_many
+from mgdd.loop import Reference, VirtualEngine, monte_carlo, run_seeker, track_many
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.parallel import map_items
 from mgdd.parallel.pool import cores, processes
@@ -108,10 +108,10 @@ def test_what_does_not_fit_is_refused_before_any_work() -> None:
     fits = ExtremumSeeking(**SPACE)
     capped = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 90.0)])
     for call, message in (
-        (lambda: loops_of(EngineBench(), [fits, 3.0]), "seeker = 3: must be a seeker, as"),
-        (lambda: loops_of([EngineBench(limits=["p_max_bar"]), EngineBench()], [fits, capped]), "p_max_bar"),
-        (lambda: loops_of(EngineBench(), fits, []), "seeds is empty"),
-        (lambda: loops_of(EngineBench(), fits, cycles=0), "cycles = 0: must be >= 1"),
+        (lambda: loops_of(VirtualEngine(), [fits, 3.0]), "seeker = 3: must be a seeker, as"),
+        (lambda: loops_of([VirtualEngine(limits=["p_max_bar"]), VirtualEngine()], [fits, capped]), "p_max_bar"),
+        (lambda: loops_of(VirtualEngine(), fits, []), "seeds is empty"),
+        (lambda: loops_of(VirtualEngine(), fits, cycles=0), "cycles = 0: must be >= 1"),
     ):
         with pytest.raises(ParameterError, match=message):
             call()
@@ -122,7 +122,7 @@ def test_what_does_not_fit_is_refused_before_any_work() -> None:
 
 def test_reading_is_not_moving() -> None:
     """Benches and seekers stay where they are; what they did before does not travel."""
-    bench, seeker = EngineBench(), ExtremumSeeking(**SPACE)
+    bench, seeker = VirtualEngine(), ExtremumSeeking(**SPACE)
     run_seeker(bench, seeker, 20)
     monte_carlo(bench, seeker, range(3), cycles=10, executor=ThreadPoolExecutor)
     assert (bench.cycle, seeker.cycle, len(seeker.history["cycle"])) == (20, 20, 20)

@@ -78,14 +78,14 @@ def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> No
         import numpy as np
         from mgdd.control import Pid
         from mgdd.errors import Interrupted
-        from mgdd.loop import EngineBench, monte_carlo, track_many
+        from mgdd.loop import VirtualEngine, monte_carlo, track_many
         from mgdd.optimize import ExtremumSeeking
         from mgdd.parallel.pool import processes
         from mgdd.throttle import Throttle
 
         def loops(**how):
             seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
-            return monte_carlo(EngineBench(), seeker, range(20_000), cycles=1000, **how), "mean_soc_cad"
+            return monte_carlo(VirtualEngine(), seeker, range(20_000), cycles=1000, **how), "mean_soc_cad"
 
         def tracks(**how):
             return track_many({{"pid": Pid()}}, ["step:40:42", "step:4:20"], [Throttle()] * 20_000, **how), "mse_deg2"

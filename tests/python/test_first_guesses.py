@@ -68,7 +68,7 @@ GUESSES: dict[str, tuple[Callable[[], Any], str]] = {
     "other library's word": (lambda: loop.seek(None, algorithm="spsa"), "did you mean 'seeker'"),
     "of the core": (lambda: control.Pid(ki=2.0), "'integral_above_per_deg_s' or 'integral_below_per_deg_s'"),
     "two for one": (lambda: optimize.Spsa(start=0.0, range=(-9.0, 9.0)), "did you mean 'lower' or 'upper'"),
-    "of a class": (lambda: loop.EngineBench(noise_seed=3), "has no argument 'noise_seed'"),
+    "of a class": (lambda: loop.VirtualEngine(noise_seed=3), "has no argument 'noise_seed'"),
     "of the cylinder": (lambda: engine.simulate(ENGINE, evo_cad=120), r"setting \[°CA aTDC\] of the cylinder.*replace"),
     "of the point": (lambda: engine.simulate(ENGINE, intake_pressure_kpa=90), r"point=\{'intake_pressure_kpa'"),
     "of the throttle": (lambda: throttle_module.characteristics("P1", supply=9.0), "has no argument 'supply'"),
@@ -82,7 +82,7 @@ GUESSES: dict[str, tuple[Callable[[], Any], str]] = {
         "takes 1 positional arguments, 2 were given; give kind by name",
     ),
     "order": (lambda: engine.analyze(ENGINE, xr.Dataset()), r"did you mean analyze\(trace, cylinder\) in this order"),
-    "bench by its engine": (lambda: loop.seek(ENGINE, {"soc_cad": (-9.0, 9.0)}), r"as EngineBench\('puma_single'\)"),
+    "bench by its engine": (lambda: loop.seek(ENGINE, {"soc_cad": (-9.0, 9.0)}), r"as VirtualEngine\('puma_single'\)"),
     "input beside": (lambda: sweep_module.sweep(ENGINE, soc_cad=[1.0]), r"as \{'soc_cad': \["),  # type: ignore[arg-type]
     # A method that a result has not.
     "method": (lambda: engine.find_optimum(ENGINE).summarize(), "did you mean 'summary'"),  # type: ignore[attr-defined]
@@ -107,8 +107,8 @@ RETURNED: dict[str, Callable[[], Any]] = {
     "sweep of a plane": lambda: sweep_module.sweep(ENGINE, {"speed_rpm": [900.0, 1500.0], "soc_cad": [-9.0, 0.0]}),
     "track": lambda: loop.track(control.Pid(), "step:20:60"),
     "simulate_throttle": lambda: throttle_module.simulate_throttle("P1", 0.3),
-    "run of a bench": lambda: loop.EngineBench().run([-6.0] * 5),
-    "one cycle of a bench": lambda: loop.EngineBench().run([-6.0]),
+    "run of a bench": lambda: loop.VirtualEngine().run([-6.0] * 5),
+    "one cycle of a bench": lambda: loop.VirtualEngine().run([-6.0]),
     "design": lambda: design.design_points({"fuel_mg": (6.0, 40.0)}, 8),
     "excitation": lambda: signals.chirp(5.0, offset=0.1, amplitude=0.1),
 }

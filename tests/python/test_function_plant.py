@@ -26,7 +26,7 @@ from tests.python.support.stepped import stepped
 from mgdd import optimize
 from mgdd.errors import Interrupted, InUseError, ParameterError, RigError
 from mgdd.guide import FeedForward
-from mgdd.loop import EngineBench, FunctionPlant, LoopCriteria, monte_carlo, run_seeker, seek, seek_front
+from mgdd.loop import FunctionPlant, LoopCriteria, VirtualEngine, monte_carlo, run_seeker, seek, seek_front
 
 SOURCE = r"""
 #include <math.h>
@@ -320,7 +320,7 @@ def test_loops_refuse_what_does_not_fit_and_nothing_has_moved(library: ctypes.CD
                 call(plant, own, cycles)
     assert (plant.cycle, seeker.cycle) == (0, 0)
     for plants, message in (
-        ([plant, EngineBench()], "one after the other"),
+        ([plant, VirtualEngine()], "one after the other"),
         (in_python(), "must be compiled and give J"),
         ([plant, of(library, inputs=["x"])], "the same inputs"),
     ):

@@ -13,7 +13,7 @@ import pytest
 
 from mgdd import _core, presets
 from mgdd.engine import Cylinder, NoxProxy, OperatingPoint
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, IterativeLearning
 
 Call = Callable[[], Any]
@@ -43,17 +43,17 @@ def pseudo_wiener() -> Any:
 
 @batch
 def bench() -> Call:
-    return partial(EngineBench().run_columns, np.full(20_000, -6.0))
+    return partial(VirtualEngine().run_columns, np.full(20_000, -6.0))
 
 
 @batch
 def loop() -> Call:
-    return partial(run_seeker, EngineBench(), seeker(), 20_000)
+    return partial(run_seeker, VirtualEngine(), seeker(), 20_000)
 
 
 @batch
 def many_loops() -> Call:
-    return partial(monte_carlo, EngineBench(), seeker(), range(20), cycles=1000)
+    return partial(monte_carlo, VirtualEngine(), seeker(), range(20), cycles=1000)
 
 
 @batch

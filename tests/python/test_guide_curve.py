@@ -13,7 +13,7 @@ import pytest
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import EngineBench, LoopCriteria, Measurement, monte_carlo, run_seeker
+from mgdd.loop import LoopCriteria, Measurement, VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit, Seeker
 from mgdd.rig import SimulatedRig
 
@@ -119,7 +119,7 @@ def test_a_new_curve_keeps_the_error_of_the_old_one() -> None:
 @pytest.mark.parametrize("start", [None, -20.0])
 def test_a_rough_model_is_enough(guide: dict[str, float], start: float | None) -> None:
     """Medians of 40 runs; the study has 200 and the table."""
-    bench = EngineBench()
+    bench = VirtualEngine()
     curve = ModelOptimum(Cylinder(**guide)).curve(bench.point)
     assert curve is not None
     seeker = CurveSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0, curve=curve)
@@ -137,7 +137,7 @@ def test_a_rough_model_is_enough(guide: dict[str, float], start: float | None) -
 def test_limits_by_the_guides_curves_are_kept_while_it_arrives() -> None:
     above = []
     for seed in range(10):
-        bench = EngineBench(limits=["p_max_bar"], seed=seed)
+        bench = VirtualEngine(limits=["p_max_bar"], seed=seed)
         model = ModelOptimum(ROUGH)
         curve, drawn = model.curve(bench.point), model.limit_curves(bench.point, ["p_max_bar"])
         assert curve is not None
@@ -167,7 +167,7 @@ def test_model_without_a_cycle_draws_no_curve() -> None:
 # --- the whole loop -------------------------------------------------------------------------------------------
 
 
-def guided(bench: EngineBench, *, calibrate: bool = True, plain: bool = False) -> GuidedEngine:
+def guided(bench: VirtualEngine, *, calibrate: bool = True, plain: bool = False) -> GuidedEngine:
     model = ModelOptimum(ROUGH)
     curve = model.curve(bench.point)
     assert curve is not None
@@ -179,7 +179,7 @@ def guided(bench: EngineBench, *, calibrate: bool = True, plain: bool = False) -
 
 
 def test_the_record_says_what_came_from_where() -> None:
-    bench = EngineBench(seed=1)
+    bench = VirtualEngine(seed=1)
     engine = guided(bench)
     run = run_seeker(bench, engine, 60)
     table = run.dataset
@@ -189,7 +189,7 @@ def test_the_record_says_what_came_from_where() -> None:
     assert float(engine.cylinder.wall_heat_scale) == pytest.approx(0.5, rel=0.03)
     assert engine.recalibrations > 0
     assert (engine.refusals, engine.calibration_status) == (0, "updated")
-    assert 0.7 < engine.trust <= 1.0
+    assert 0.7 < engine.check_pressure <= 1.0
     assert all("units" in table[name].attrs for name in table.variables)
     assert run_seeker(bench, engine, 5).dataset.sizes["cycle"] == 5
     assert engine.history.sizes["cycle"] == 65
@@ -198,7 +198,7 @@ def test_the_record_says_what_came_from_where() -> None:
 @pytest.mark.parametrize("plain", [False, True])
 def test_a_rig_and_the_bench_go_the_same_way(plain: bool) -> None:
     schedule = [(0, OperatingPoint(fuel_mg=12.0)), (40, OperatingPoint(fuel_mg=28.0))]
-    bench, same = EngineBench(schedule=schedule, seed=4), EngineBench(schedule=schedule, seed=4)
+    bench, same = VirtualEngine(schedule=schedule, seed=4), VirtualEngine(schedule=schedule, seed=4)
     one, other = guided(bench, plain=plain), guided(same, plain=plain)
     run = run_seeker(bench, one, 90)
     for _ in range(90):
@@ -208,14 +208,14 @@ def test_a_rig_and_the_bench_go_the_same_way(plain: bool) -> None:
     assert other.history["estimate"][:, 0].equals(one.history["estimate"][:, 0])
     guide = run.dataset["guide_optimum"][:, 0].to_numpy()
     assert guide[41] < guide[39] - 2.0
-    with SimulatedRig(EngineBench(schedule=schedule, seed=4)) as rig:
-        third = guided(EngineBench(schedule=schedule), plain=plain)
+    with SimulatedRig(VirtualEngine(schedule=schedule, seed=4)) as rig:
+        third = guided(VirtualEngine(schedule=schedule), plain=plain)
         run_seeker(rig, third, 90)
     assert third.history["estimate"][:, 0].equals(one.history["estimate"][:, 0])
 
 
 def test_a_guided_engine_is_pickled_and_goes_on() -> None:
-    bench = EngineBench(seed=2)
+    bench = VirtualEngine(seed=2)
     engine = guided(bench)
     run_seeker(bench, engine, 30)
     again, same = pickle.loads(pickle.dumps(engine)), copy.deepcopy(bench)
@@ -227,7 +227,7 @@ def test_a_guided_engine_is_pickled_and_goes_on() -> None:
 
 
 def test_a_point_without_a_best_timing_is_refused_and_the_run_goes_on() -> None:
-    bench = EngineBench(seed=2)
+    bench = VirtualEngine(seed=2)
     engine = guided(bench, calibrate=False)
     run_seeker(bench, engine, 30)
     held = engine.estimate[0]
@@ -261,7 +261,7 @@ def test_a_guide_that_would_never_be_asked_is_refused() -> None:
 
 
 def test_what_makes_no_guided_engine_is_refused() -> None:
-    bench, model = EngineBench(), ModelOptimum(ROUGH)
+    bench, model = VirtualEngine(), ModelOptimum(ROUGH)
     plain = ExtremumSeeking(start=-15.0, lower=-30.0, upper=10.0)
     with pytest.raises(ParameterError, match="model = 3"):
         GuidedEngine(plain, 3, bench.point)  # type: ignore[arg-type]
@@ -277,7 +277,7 @@ def test_what_makes_no_guided_engine_is_refused() -> None:
 
 def test_a_feed_forward_runs_in_the_loop() -> None:
     schedule = [(0, OperatingPoint(fuel_mg=12.0)), (150, OperatingPoint(fuel_mg=30.0))]
-    bench = EngineBench(schedule=schedule, seed=1)
+    bench = VirtualEngine(schedule=schedule, seed=1)
     front = FeedForward(
         ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), ModelOptimum(Cylinder(wall_heat_scale=0.65))
     )

@@ -12,7 +12,7 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import FeedForward
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Spsa
 from mgdd.optimize.optimum import Optimum
 
@@ -265,7 +265,7 @@ def test_several_inputs_move_together() -> None:
 
 
 def test_the_loop_judges_the_limits_of_its_seeker() -> None:
-    bench = EngineBench(limits=["p_max_bar"], seed=1)
+    bench = VirtualEngine(limits=["p_max_bar"], seed=1)
     seeker = ExtremumSeeking(start=0.4, lower=-30.0, upper=10.0, limits=[Limit("p_max_bar", 95.0)])
     guided = FeedForward(seeker, lambda _: 0.0, trust=0.7)
     assert guided.settings["limits"][0].upper == 95.0

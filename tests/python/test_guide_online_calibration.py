@@ -15,7 +15,7 @@ from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import OnlineCalibration
 from mgdd.identify import fit_cylinder
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.optimize import ExtremumSeeking
 from mgdd.results.labels import check_labels
 
@@ -25,7 +25,7 @@ SURE = {name: 0.0 for name in OnlineCalibration(WRONG).parameters if name != "wa
 ENGINE = dict.fromkeys(["compression_ratio_offset", "charge_temperature_offset_k", "wall_temperature_offset_k"], 0.0)
 
 
-def drive(bench: EngineBench, calibration: OnlineCalibration, cycles: int, soc_cad: float = -6.0) -> list[str]:
+def drive(bench: VirtualEngine, calibration: OnlineCalibration, cycles: int, soc_cad: float = -6.0) -> list[str]:
     statuses = []
     for _ in range(cycles):
         point = bench.point
@@ -37,7 +37,7 @@ def drive(bench: EngineBench, calibration: OnlineCalibration, cycles: int, soc_c
 
 @pytest.mark.parametrize("method", ["gauss_newton", "recursive", "extremum_seeking"])
 def test_it_follows_an_engine_that_seeks_its_best_timing(method: str) -> None:
-    bench = EngineBench(seed=3)
+    bench = VirtualEngine(seed=3)
     alone = method == "extremum_seeking"  # then the timing must be measured: nothing else is fitted
     calibration = OnlineCalibration(WRONG, method=method, uncertainty=SURE if alone else ENGINE)
     seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
@@ -59,7 +59,7 @@ def test_the_best_timing_of_the_guide_comes_right() -> None:
         gains = [float(simulate(cylinder, OperatingPoint(), soc_cad=soc)["efficiency_gross"]) for soc in timings]
         return float(timings[int(np.argmax(gains))])
 
-    bench = EngineBench(pressure_noise_bar=0.1, seed=2)
+    bench = VirtualEngine(pressure_noise_bar=0.1, seed=2)
     calibration = OnlineCalibration(WRONG, method="recursive")
     drive(bench, calibration, 60)
     assert best(WRONG) - best(Cylinder()) == pytest.approx(4.1, abs=0.3)
@@ -67,7 +67,7 @@ def test_the_best_timing_of_the_guide_comes_right() -> None:
 
 
 def test_history_and_summary_say_what_happened() -> None:
-    bench = EngineBench(pressure_noise_bar=0.1, misfire_probability=0.1, seed=1)
+    bench = VirtualEngine(pressure_noise_bar=0.1, misfire_probability=0.1, seed=1)
     calibration = OnlineCalibration("puma_single", uncertainty=ENGINE)
     empty = calibration.history
     check_labels(empty)
@@ -93,7 +93,7 @@ def test_history_and_summary_say_what_happened() -> None:
 
 @pytest.mark.parametrize("method", ["gauss_newton", "recursive", "extremum_seeking"])
 def test_state_and_pickle_go_on_bit_for_bit(method: str) -> None:
-    bench = EngineBench(pressure_noise_bar=0.2, seed=5)
+    bench = VirtualEngine(pressure_noise_bar=0.2, seed=5)
     calibration = OnlineCalibration(WRONG, method=method, window_cycles=7, uncertainty={"gamma_offset": 0.003})
     drive(bench, calibration, 25)
     twin = pickle.loads(pickle.dumps(calibration))
@@ -111,7 +111,7 @@ def test_state_and_pickle_go_on_bit_for_bit(method: str) -> None:
 
 
 def test_several_parameters_and_a_measured_fuel() -> None:
-    bench = EngineBench(pressure_noise_bar=0.1, tdc_error_cad=0.8, soc_scatter_cad=0.0, seed=4)
+    bench = VirtualEngine(pressure_noise_bar=0.1, tdc_error_cad=0.8, soc_scatter_cad=0.0, seed=4)
     names = ("wall_heat_scale", "tdc_offset_cad", "soc_offset_cad")
     told = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty=ENGINE | {"fuel_heat_scale": 0.0})
     free = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty=ENGINE)
@@ -149,7 +149,7 @@ def test_a_measured_trace_does_not_determine_the_wall_heat(method: str) -> None:
 
 
 def test_a_refused_cycle_says_why() -> None:
-    bench = EngineBench()
+    bench = VirtualEngine()
     calibration = OnlineCalibration(presets.load("puma_single"))
     drive(bench, calibration, 12)
     trace = bench.pressure()[1]

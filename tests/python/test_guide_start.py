@@ -13,7 +13,7 @@ import pytest
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Seeker, Spsa
 from mgdd.optimize.optimum import Optimum
 
@@ -48,7 +48,7 @@ def test_with_a_kept_start_the_first_point_belongs_to_the_seeker(seeker: type[An
         front = FeedForward(seeker(**SPACE), guide, keep_start=True, noise_sd=0.25)
         if guide is None:
             front.restart()  # as the first value of a guide does
-        run = run_seeker(EngineBench(schedule=schedule, seed=3), front, 90)
+        run = run_seeker(VirtualEngine(schedule=schedule, seed=3), front, 90)
         runs.append(run.dataset["estimate"][:, 0].to_numpy())
     plain, guided = runs
     assert plain[0] == START_CAD
@@ -80,7 +80,7 @@ def test_a_first_value_that_comes_late_moves_nothing() -> None:
 
 @pytest.mark.parametrize("kind", ["curve", "dither"])
 def test_a_guided_engine_keeps_the_start_of_its_seeker(kind: str) -> None:
-    bench = EngineBench(seed=5)
+    bench = VirtualEngine(seed=5)
     seeker = by_curve(rate=2.0) if kind == "curve" else ExtremumSeeking(**SPACE)
     engine = GuidedEngine(seeker, ROUGH, bench.point, keep_start=True)
     assert engine.settings["keep_start"] is True
@@ -98,13 +98,13 @@ def test_a_guided_engine_keeps_the_start_of_its_seeker(kind: str) -> None:
 
 def test_a_seeker_that_has_run_goes_on_from_where_it_stands() -> None:
     for seeker in (by_curve(), ExtremumSeeking(**SPACE)):
-        bench = EngineBench(seed=5)
+        bench = VirtualEngine(seed=5)
         run_seeker(bench, seeker, 40)
         engine = GuidedEngine(seeker, ROUGH, bench.point, keep_start=True)
         assert engine.estimate[0] == pytest.approx(float(seeker.estimate[0]), abs=1e-9)
 
 
-def engine_at(kind: str, bench: EngineBench) -> GuidedEngine | FeedForward:
+def engine_at(kind: str, bench: VirtualEngine) -> GuidedEngine | FeedForward:
     seeker: Seeker = by_curve(bench.point) if kind == "curve" else ExtremumSeeking(**SPACE)
     if kind == "feed-forward":
         return FeedForward(seeker, ROUGH, keep_start=True)
@@ -114,7 +114,7 @@ def engine_at(kind: str, bench: EngineBench) -> GuidedEngine | FeedForward:
 @pytest.mark.parametrize("cut", [0, 1, 30])
 @pytest.mark.parametrize("kind", ["curve", "dither", "feed-forward"])
 def test_a_kept_start_survives_state_pickle_and_copy(kind: str, cut: int) -> None:
-    bench = EngineBench(schedule=[(0, OperatingPoint()), (40, OperatingPoint(fuel_mg=28.0))], seed=5)
+    bench = VirtualEngine(schedule=[(0, OperatingPoint()), (40, OperatingPoint(fuel_mg=28.0))], seed=5)
     whole = engine_at(kind, bench)
     if cut:
         run_seeker(bench, whole, cut)
@@ -131,7 +131,7 @@ def test_a_kept_start_survives_state_pickle_and_copy(kind: str, cut: int) -> Non
 
 @pytest.mark.parametrize("kind", ["curve", "dither", "feed-forward"])
 def test_the_history_numbers_cycles_as_the_state_does_and_keeps_no_refused_one(kind: str) -> None:
-    bench = EngineBench(seed=5)
+    bench = VirtualEngine(seed=5)
     one = engine_at(kind, bench)
     run_seeker(bench, one, 10)
     other = engine_at(kind, bench)

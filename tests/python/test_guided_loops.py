@@ -15,7 +15,7 @@ import xarray as xr
 from mgdd.engine import Cylinder, OperatingPoint, Performance
 from mgdd.errors import ParameterError
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import EngineBench, LoopCriteria, monte_carlo, run_seeker
+from mgdd.loop import LoopCriteria, VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, GaussianProcessSeeking, GradientDescent, Limit, Spsa
 
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
@@ -32,8 +32,8 @@ def by_fuel(point: OperatingPoint) -> float | None:
     return None if fuel == 30.0 else 99.0 if fuel > 40.0 else -0.3 * fuel + 1.0
 
 
-def bench(seed: int = 0, **settings: Any) -> EngineBench:
-    return EngineBench(schedule=list(POINTS.items()), misfire_probability=0.02, seed=seed, **settings)
+def bench(seed: int = 0, **settings: Any) -> VirtualEngine:
+    return VirtualEngine(schedule=list(POINTS.items()), misfire_probability=0.02, seed=seed, **settings)
 
 
 def rough() -> ModelOptimum:
@@ -122,7 +122,7 @@ class Posted(Executor):
 
 
 def test_workers_and_pieces_change_no_bit() -> None:
-    plants = [bench(), EngineBench(point=POINTS[120])]
+    plants = [bench(), VirtualEngine(point=POINTS[120])]
     of_here = FeedForward(Spsa(**SPACE), lambda point: -0.3 * point.to_dict()["fuel_mg"])  # no pickle
     seekers = [of_here, calibrated(ExtremumSeeking(**SPACE)), ExtremumSeeking(**SPACE)]
     run_seeker(bench(), of_here, 30)

@@ -17,7 +17,7 @@ from tests.python.support.stepped import stepped
 from mgdd import presets
 from mgdd.errors import Error, InUseError, ParameterError
 from mgdd.identify import OnlineUpdate
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import (
     ExtremumSeeking,
     IterativeLearning,
@@ -67,7 +67,7 @@ def test_three_threads_cannot_corrupt_one_seeker(kind: str) -> None:
     seeker = SEEKERS[kind]()
     for _ in range(4):
         before = seeker.cycle
-        results = together(*[lambda: run_seeker(EngineBench(), seeker, 1000) for _ in range(3)])
+        results = together(*[lambda: run_seeker(VirtualEngine(), seeker, 1000) for _ in range(3)])
         done = [result for result in results if not isinstance(result, Exception)]
         assert done
         assert all(isinstance(result, InUseError) for result in results if isinstance(result, Exception)), results
@@ -77,7 +77,7 @@ def test_three_threads_cannot_corrupt_one_seeker(kind: str) -> None:
 
 def test_a_seeker_in_a_run_refuses_everything_but_what_is_constant() -> None:
     seeker, other = ExtremumSeeking(**SPACE), ExtremumSeeking(**SPACE)
-    bench = EngineBench()
+    bench = VirtualEngine()
     settings = seeker.settings
     told: list[Callable[[], Any]] = [
         seeker.ask,
@@ -92,13 +92,13 @@ def test_a_seeker_in_a_run_refuses_everything_but_what_is_constant() -> None:
         seeker.clear_history,
         lambda: pickle.dumps(seeker),
         lambda: copy.deepcopy(seeker),
-        lambda: run_seeker(EngineBench(), seeker, 1),
-        lambda: monte_carlo(EngineBench(), seeker, [1], cycles=1),
+        lambda: run_seeker(VirtualEngine(), seeker, 1),
+        lambda: monte_carlo(VirtualEngine(), seeker, [1], cycles=1),
         lambda: bench.step(-6.0),
         lambda: bench.run([-6.0]),
         bench.reset,
         lambda: bench.state,
-        lambda: setattr(bench, "state", EngineBench().state),
+        lambda: setattr(bench, "state", VirtualEngine().state),
         lambda: bench.cycle,
         lambda: bench.point,
         lambda: repr(bench),
@@ -108,22 +108,22 @@ def test_a_seeker_in_a_run_refuses_everything_but_what_is_constant() -> None:
     ]
     with Running(lambda: run_seeker(bench, seeker, 40_000)) as run:
         for number, call in enumerate(told):
-            with pytest.raises(InUseError, match=r"(ExtremumSeeking|EngineBench) is in use .* its own copy"):
+            with pytest.raises(InUseError, match=r"(ExtremumSeeking|VirtualEngine) is in use .* its own copy"):
                 call()
             assert run.thread.is_alive(), number
         assert seeker.settings == settings
         assert (seeker.limit_names, seeker.component_count) == ([], 1)
         assert bench.settings["seed"] == 0
-        assert bench.window_cad == EngineBench().window_cad
+        assert bench.window_cad == VirtualEngine().window_cad
     assert (seeker.cycle, bench.cycle, other.cycle) == (40_000, 40_000, 0)
     twin = ExtremumSeeking(**SPACE)
-    run_seeker(EngineBench(), twin, 40_000)
+    run_seeker(VirtualEngine(), twin, 40_000)
     assert seeker.state == twin.state
     np.testing.assert_array_equal(seeker.history["estimate"], twin.history["estimate"])
 
 
 def test_two_threads_cannot_race_on_one_bench() -> None:
-    bench, soc = EngineBench(seed=3), np.linspace(-20.0, 0.0, 2000)
+    bench, soc = VirtualEngine(seed=3), np.linspace(-20.0, 0.0, 2000)
     results = together(*[lambda: bench.run(soc) for _ in range(3)])
     done = [result for result in results if not isinstance(result, Exception)]
     assert done

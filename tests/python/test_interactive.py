@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from mgdd.engine import simulate
 from mgdd.errors import DataError, ParameterError
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.maps import CalibrationMap
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot import pressure
@@ -39,7 +39,7 @@ def texts(figure: Any) -> set[str]:
 
 def test_a_result_draws_itself_by_plotly() -> None:
     seeker = ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0)
-    run = run_seeker(EngineBench(seed=1), seeker, 100)
+    run = run_seeker(VirtualEngine(seed=1), seeker, 100)
     figure = run.plot(engine="plotly")
     assert any(np.array_equal(trace.y, run.dataset["estimate"][:, 0], equal_nan=True) for trace in drawn(figure))
     for wrong in ({"engine": "bokeh"}, {"engine": "plotly", "ax": Figure().add_subplot()}):

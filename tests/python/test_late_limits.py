@@ -15,7 +15,7 @@ import pytest
 from tests.python.support.stepped import stepped
 
 from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, Measurement, run_seeker
+from mgdd.loop import Measurement, VirtualEngine, run_seeker
 from mgdd.optimize import (
     ExtremumSeeking,
     GaussianProcessSeeking,
@@ -35,7 +35,7 @@ class LatePressure:
     limit_names = ("p_max_bar",)
 
     def __init__(self, seed: int) -> None:
-        self.bench, self.past = EngineBench(seed=seed, limits=["p_max_bar"]), deque[float]()
+        self.bench, self.past = VirtualEngine(seed=seed, limits=["p_max_bar"]), deque[float]()
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         self.bench.apply(inputs)
@@ -67,7 +67,7 @@ def seeded(seeker: Any, seed: int) -> Any:
 @pytest.mark.parametrize("name", list(seekers(Limit("p_max_bar", UPPER), 0)))
 def test_a_peak_pressure_ten_cycles_late_is_truly_kept(name: str) -> None:
     limit = Limit("p_max_bar", UPPER, delay_cycles=DELAY)
-    best = EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": UPPER})["soc_cad"]
+    best = VirtualEngine(limits=["p_max_bar"]).find_optimum({"p_max_bar": UPPER})["soc_cad"]
     above, applied = [], []
     for seed in range(4):
         run = run_seeker(LatePressure(seed), seekers(limit, seed)[name](), 2000)

@@ -11,10 +11,10 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop import (
-    EngineBench,
     LoopCriteria,
     Measurement,
     SurrogatePlant,
+    VirtualEngine,
     VirtualThrottle,
     monte_carlo,
     run_seeker,
@@ -89,16 +89,16 @@ def test_the_limits_may_be_named_and_the_thresholds_are_repeated() -> None:
     none = run_seeker(Scripted(p_max_bar=[1.0]), seeker(p_max_bar=2.0), 1, criteria=LoopCriteria(limits={}))
     assert not [name for name in none.summary if name.endswith("p_max_bar")]
     for limits, message in (({"p_max": 1.0}, r"limits: \['p_max'\]"), ({"p_max_bar": math.nan}, "limits: p_max_bar")):
-        for other in (EngineBench(limits=["p_max_bar"]), Scripted(p_max_bar=[1.0])):
+        for other in (VirtualEngine(limits=["p_max_bar"]), Scripted(p_max_bar=[1.0])):
             with pytest.raises(ParameterError, match=message):
                 run_seeker(other, seeker(p_max_bar=95.0), 1, criteria=LoopCriteria(limits=limits))
 
 
 def test_the_bench_from_the_core_the_rig_and_the_dataset_say_the_same() -> None:
-    def bench() -> EngineBench:
+    def bench() -> VirtualEngine:
         schedule = [(0, OperatingPoint()), (150, OperatingPoint(fuel_mg=20.0))]
         drift = {"soc_drift_cad_per_kcycle": 5.0, "wall_heat_drift_per_kcycle": 2.0}
-        return EngineBench(schedule=schedule, limits=["p_max_bar", "cov_imep_percent"], seed=3, **drift)
+        return VirtualEngine(schedule=schedule, limits=["p_max_bar", "cov_imep_percent"], seed=3, **drift)
 
     goal = LoopCriteria(exceed_above={"p_max_bar": 99.0})
     core = run_seeker(bench(), seeker(p_max_bar=95.0, cov_imep_percent=1.0), 300, criteria=goal)
@@ -127,11 +127,11 @@ def test_noise_free_is_the_same_bench_without_scatter_and_noise() -> None:
     names = ["p_max_bar", "imep_gross_bar"]
     more = {"limits": names, "soc_drift_cad_per_kcycle": 90.0, "wall_heat_drift_per_kcycle": 80.0}
     timings = [-20.0, -70.0, -3.0]
-    bench = EngineBench(**noisy, **more, seed=5)
+    bench = VirtualEngine(**noisy, **more, seed=5)
     state = bench.state
     table = bench.noise_free_limits(timings, [0, 1, 2])
     assert bench.state == state
-    still = EngineBench(**quiet, **more).run(timings)
+    still = VirtualEngine(**quiet, **more).run(timings)
     np.testing.assert_array_equal(table, np.column_stack([still[name] for name in names]))
     assert abs(table[2, 0] - bench.noise_free_limits([-3.0], [0])[0, 0]) > 0.5  # the drift
     with pytest.raises(ParameterError, match="cycle = -1: must be >= 0"):
@@ -140,7 +140,7 @@ def test_noise_free_is_the_same_bench_without_scatter_and_noise() -> None:
 
 def test_a_timing_exactly_at_the_limit_is_above_it_in_half_of_the_cycles() -> None:
     """The pressure falls with the timing, so a symmetric scatter of the timing carries half of the cycles over."""
-    bench, soc = EngineBench(limits=["p_max_bar"], seed=2), np.full(4000, -3.0)
+    bench, soc = VirtualEngine(limits=["p_max_bar"], seed=2), np.full(4000, -3.0)
     free = bench.noise_free_limits(soc, np.arange(4000))
     dataset = bench.run(soc)
     over = (("cycle", "input"), soc[:, np.newaxis])
@@ -168,8 +168,8 @@ def test_the_surrogate_knows_its_surfaces_and_the_throttle_has_no_limits() -> No
 
 
 def test_monte_carlo_tells_the_limits_of_every_loop() -> None:
-    def bench(seed: int = 0) -> EngineBench:
-        return EngineBench(limits=["p_max_bar"], seed=seed)
+    def bench(seed: int = 0) -> VirtualEngine:
+        return VirtualEngine(limits=["p_max_bar"], seed=seed)
 
     chosen = [seeker(p_max_bar=95.0), seeker(p_max_bar=110.0)]
     table = monte_carlo(bench(), chosen, range(3), cycles=200, criteria=LoopCriteria(exceed_above={"p_max_bar": 99.0}))

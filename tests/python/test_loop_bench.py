@@ -12,7 +12,7 @@ import pytest
 from mgdd import _core, presets
 from mgdd.engine import Cylinder, OperatingPoint, Performance, PerformanceTerm, simulate
 from mgdd.errors import ParameterError, RigError, ShapeError
-from mgdd.loop import EngineBench, Measurement, SensorDynamics
+from mgdd.loop import Measurement, SensorDynamics, VirtualEngine
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.rig.base import Rig
@@ -36,11 +36,11 @@ def requests(n: int) -> np.ndarray:
 def test_without_chance_it_is_the_cycle_model() -> None:
     preset = presets.load("hd_diesel_128x144")
     for engine in ("hd_diesel_128x144", preset):
-        cycle = EngineBench(engine, **QUIET).step(-4.0)
+        cycle = VirtualEngine(engine, **QUIET).step(-4.0)
         model = simulate(preset.cylinder, preset.point, soc_cad=-4.0)
         for name in ("imep_gross_bar", "p_max_bar", "efficiency_gross", "ca50_cad"):
             assert cycle[name] == float(model[name])
-    own = EngineBench(Cylinder(bore_mm=90.0), OperatingPoint(fuel_mg=15.0), **QUIET).step(-4.0)
+    own = VirtualEngine(Cylinder(bore_mm=90.0), OperatingPoint(fuel_mg=15.0), **QUIET).step(-4.0)
     assert own["p_max_bar"] == float(
         simulate(Cylinder(bore_mm=90.0), OperatingPoint(fuel_mg=15.0), soc_cad=-4.0)["p_max_bar"]
     )
@@ -49,28 +49,28 @@ def test_without_chance_it_is_the_cycle_model() -> None:
 def test_pressure_of_the_last_cycle_as_the_sensor_reads_it() -> None:
     truth = simulate(Cylinder(), OperatingPoint(), soc_cad=-6.0)
     with pytest.raises(RigError, match="before the first cycle"):
-        EngineBench().pressure()
-    exact = EngineBench(**QUIET)
+        VirtualEngine().pressure()
+    exact = VirtualEngine(**QUIET)
     exact.step(-6.0)
     angle, pressure = exact.pressure()
     np.testing.assert_array_equal(angle, truth["crank_angle_cad"])
     np.testing.assert_array_equal(pressure, truth["pressure_bar"])
     errors = {"pressure_gain_error": 0.01, "pressure_offset_bar": -0.2, "tdc_error_cad": 2.0}
-    wrong = EngineBench(**QUIET, **errors)
+    wrong = VirtualEngine(**QUIET, **errors)
     wrong.step(-6.0)
     np.testing.assert_allclose(wrong.pressure()[1][3:], 1.01 * pressure[1:-2] - 0.2, rtol=1e-3)
-    noisy = EngineBench(**RICH, **errors, pressure_noise_bar=0.3)
-    silent = EngineBench(**RICH)
+    noisy = VirtualEngine(**RICH, **errors, pressure_noise_bar=0.3)
+    silent = VirtualEngine(**RICH)
     assert noisy.run(requests(30)).identical(silent.run(requests(30)))
     again = pickle.loads(pickle.dumps(noisy))
     assert again.settings["pressure_noise_bar"] == 0.3
     np.testing.assert_array_equal(again.pressure()[1], noisy.pressure()[1])
     with pytest.raises(ParameterError, match="tdc_error_cad = 7"):
-        EngineBench(tdc_error_cad=7.0)
+        VirtualEngine(tdc_error_cad=7.0)
 
 
 def test_run_is_labelled_and_complete() -> None:
-    out = EngineBench(**RICH).run(requests(80))
+    out = VirtualEngine(**RICH).run(requests(80))
     check_labels(out)
     assert dict(out.sizes) == {"cycle": 80, "component": 2, "limit": 2}
     np.testing.assert_array_equal(out["cycle"], np.arange(80))
@@ -84,7 +84,7 @@ def test_run_is_labelled_and_complete() -> None:
     assert list(out["limit_units"].values) == ["bar", "%"]
     assert out["misfire"].dtype == bool
     assert 0 < int(out["misfire"].sum()) < 20
-    assert "limits" not in EngineBench().run([-6.0])
+    assert "limits" not in VirtualEngine().run([-6.0])
 
 
 def test_repeated_terms_keep_names_of_their_own() -> None:
@@ -93,7 +93,7 @@ def test_repeated_terms_keep_names_of_their_own() -> None:
         PerformanceTerm("p_max_bar", -1.0, above=100.0),
         PerformanceTerm("p_max_bar", -0.1, reference=10.0),
     ]
-    out = EngineBench(performance=Performance(terms), **QUIET).run([-6.0])
+    out = VirtualEngine(performance=Performance(terms), **QUIET).run([-6.0])
     assert list(out["component"].values) == ["efficiency_percent", "p_max_bar_1", "p_max_bar_2"]
     p_max = float(out["p_max_bar"][0])
     np.testing.assert_allclose(out["components"][0, 1:], [-((p_max / 100.0 - 1.0) ** 2), -0.01 * p_max])
@@ -101,20 +101,20 @@ def test_repeated_terms_keep_names_of_their_own() -> None:
 
 def test_steps_chunks_copies_and_pickles_give_one_run() -> None:
     soc = requests(120)
-    whole = EngineBench(**RICH).run(soc)
-    chunked = EngineBench(**RICH)
+    whole = VirtualEngine(**RICH).run(soc)
+    chunked = VirtualEngine(**RICH)
     parts = [chunked.run(soc[:33]), chunked.run(soc[33:34])]
-    twins = [chunked, copy.deepcopy(chunked), pickle.loads(pickle.dumps(chunked)), EngineBench(**RICH)]
+    twins = [chunked, copy.deepcopy(chunked), pickle.loads(pickle.dumps(chunked)), VirtualEngine(**RICH)]
     twins[3].state = chunked.state
     for twin in twins:
-        assert type(twin) is EngineBench
+        assert type(twin) is VirtualEngine
         assert twin.cycle == 34
         rest = twin.run(soc[34:])
         for name in whole.data_vars:
             if "cycle" in whole[name].dims:
                 joined = np.concatenate([part[name].values for part in [*parts, rest]])
                 np.testing.assert_array_equal(joined, whole[name].values, err_msg=str(name))
-    one_by_one = EngineBench(**RICH)
+    one_by_one = VirtualEngine(**RICH)
     assert [one_by_one.step(x)["j"] for x in soc] == list(whole["j"].values)
     one_by_one.reset()
     assert one_by_one.step(soc[0])["j"] == float(whole["j"][0])
@@ -124,13 +124,14 @@ def test_steps_chunks_copies_and_pickles_give_one_run() -> None:
 
 
 def test_settings_build_the_same_bench_again() -> None:
-    bench = EngineBench(**RICH, analyser=SensorDynamics(delay_cycles=3, lag_cycles=1.5))
-    again = _core.loop.EngineBench(**bench.settings)
+    bench = VirtualEngine(**RICH, analyser=SensorDynamics(delay_cycles=3, lag_cycles=1.5))
+    again = _core.loop.VirtualEngine(**bench.settings)
     assert again.settings == bench.settings
     assert again.step(-3.0)["j"] == bench.step(-3.0)["j"]
     # The Python constructor repeats the defaults of the core.
     assert (
-        EngineBench().settings == _core.loop.EngineBench(cylinder=Cylinder(), schedule=[(0, OperatingPoint())]).settings
+        VirtualEngine().settings
+        == _core.loop.VirtualEngine(cylinder=Cylinder(), schedule=[(0, OperatingPoint())]).settings
     )
 
 
@@ -157,11 +158,11 @@ def test_settings_build_the_same_bench_again() -> None:
 )
 def test_settings_are_refused_by_name(settings: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        EngineBench(**settings)
+        VirtualEngine(**settings)
 
 
 def test_a_refused_call_changes_nothing() -> None:
-    bench = EngineBench(**RICH)
+    bench = VirtualEngine(**RICH)
     bench.run(requests(20))
     state = bench.state
     with pytest.raises(ShapeError, match="soc_cad has 2 dimensions"):
@@ -173,21 +174,21 @@ def test_a_refused_call_changes_nothing() -> None:
     with pytest.raises(ParameterError, match="'last_t_max_k' holds nan: must be finite"):
         bench.state = {**state, "last_t_max_k": [math.nan]}
     assert all(np.array_equal(state[name], column) for name, column in bench.state.items())
-    twin = EngineBench(**RICH)
+    twin = VirtualEngine(**RICH)
     twin.run(requests(20))
     assert bench.step(-6.0)["j"] == twin.step(-6.0)["j"]
 
 
 def test_the_request_array_is_left_alone() -> None:
     soc = np.array([-100.0, -6.0])
-    out = EngineBench(**QUIET).run(soc)
+    out = VirtualEngine(**QUIET).run(soc)
     np.testing.assert_array_equal(soc, [-100.0, -6.0])
     np.testing.assert_array_equal(out["clamped"], [True, False])
     assert float(out["soc_cad"][0]) == -60.0
 
 
 def test_the_rig_is_the_bench() -> None:
-    bench, twin = EngineBench(**RICH), EngineBench(**RICH)
+    bench, twin = VirtualEngine(**RICH), VirtualEngine(**RICH)
     rig = SimulatedRig(bench)
     assert isinstance(rig, Rig)
     with rig as entered:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from tests.python.support.stepped import stepped
 
-from mgdd.loop import EngineBench, LoopCriteria, monte_carlo
+from mgdd.loop import LoopCriteria, VirtualEngine, monte_carlo
 from mgdd.optimize import ExtremumSeeking, Limit
 
 SPACE = {"start": -20.0, "lower": -30.0, "upper": 10.0}
@@ -23,7 +23,7 @@ def seekers(name: str, upper: float, **more: object) -> dict[str, Any]:
 
 def run(name: str, upper: float, chosen: dict[str, object]) -> tuple[float, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Optimum, and per seeker the exceeded fraction and the mean applied set-point of cycles 1500 to 3000, per seed."""
-    bench = EngineBench(limits=[name])
+    bench = VirtualEngine(limits=[name])
     best = bench.find_optimum({name: upper})
     table = monte_carlo(
         bench,
@@ -53,7 +53,7 @@ def test_the_seeker_returns_below_the_limit_after_a_load_step() -> None:
 
     low, high = OperatingPoint(fuel_mg=12.0), OperatingPoint(fuel_mg=30.0, intake_pressure_kpa=170.0)
     schedule = [(0, low), (1000, high)]
-    bench = EngineBench(schedule=schedule, limits=["p_max_bar"])
+    bench = VirtualEngine(schedule=schedule, limits=["p_max_bar"])
     upper = 92.0
     best = bench.find_optimum({"p_max_bar": upper}, cycle=1000)
     seeker = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", upper)])

@@ -15,8 +15,8 @@ import xarray as xr
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop import (
-    EngineBench,
     LoopCriteria,
+    VirtualEngine,
     monte_carlo,
     run_seeker,
 )
@@ -28,8 +28,8 @@ from mgdd.rig import SimulatedRig
 SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}
 
 
-def bench(**more: Any) -> EngineBench:
-    return EngineBench(
+def bench(**more: Any) -> VirtualEngine:
+    return VirtualEngine(
         schedule=[(0, OperatingPoint()), (160, OperatingPoint(fuel_mg=28.0))],
         performance=Performance.efficiency_and_nox(),
         nox_sensor="soft",
@@ -98,7 +98,7 @@ def test_limits_are_judged_in_short_runs_too() -> None:
 
 
 def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
-    plants = [EngineBench(), EngineBench(point=OperatingPoint(fuel_mg=30.0))]
+    plants = [VirtualEngine(), VirtualEngine(point=OperatingPoint(fuel_mg=30.0))]
     gains = [ExtremumSeeking(**SPACE, gain=g) for g in (0.5, 1.0)]
     goals = [LoopCriteria(optimum=-5.6), LoopCriteria(optimum=-8.5)]
     one = monte_carlo(plants, gains, range(6), cycles=300, workers=1, criteria=goals)
@@ -107,7 +107,7 @@ def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
     check_labels(one)
     xr.testing.assert_identical(one, two)
     alone = run_seeker(
-        EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, criteria=LoopCriteria(optimum=-8.5)
+        VirtualEngine(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, criteria=LoopCriteria(optimum=-8.5)
     )
     assert float(one["rms_soc_cad"][1, 1, 4]) == pytest.approx(alone.summary["rms_soc_cad"], rel=1e-9)  # side by side
     assert float(few["rms_soc_cad"][1, 1, 0]) == alone.summary["rms_soc_cad"]  # one by one
@@ -115,7 +115,7 @@ def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 def test_ctrl_c_leaves_a_usable_partial_result() -> None:
-    plant, it = EngineBench(seed=2), ExtremumSeeking(**SPACE)
+    plant, it = VirtualEngine(seed=2), ExtremumSeeking(**SPACE)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(Interrupted, match=r"what was finished is in \.partial") as stop:
@@ -124,10 +124,10 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
     assert run.interrupted
     n = run.dataset.sizes["cycle"]
     assert 0 < n < 200_000
-    whole = run_seeker(EngineBench(seed=2), ExtremumSeeking(**SPACE), n)
+    whole = run_seeker(VirtualEngine(seed=2), ExtremumSeeking(**SPACE), n)
     np.testing.assert_equal(dict(run.summary), dict(whole.summary))
     assert plant.cycle == it.cycle == n
-    twin = run_seeker(EngineBench(seed=2), ExtremumSeeking(**SPACE), n + 50)
+    twin = run_seeker(VirtualEngine(seed=2), ExtremumSeeking(**SPACE), n + 50)
     more = run_seeker(plant, it, 50)
     np.testing.assert_array_equal(more.dataset["estimate"][:, 0], twin.dataset["estimate"][n:, 0])
 
@@ -135,7 +135,7 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
         timer = threading.Timer(wait_s, os.kill, (os.getpid(), signal.SIGINT))
         timer.start()
         with pytest.raises(Interrupted) as stop:
-            monte_carlo(EngineBench(), it, range(20_000), cycles=1000)
+            monte_carlo(VirtualEngine(), it, range(20_000), cycles=1000)
         table = stop.value.partial
         finished = table["finished"].values
         if finished.any():
@@ -148,51 +148,51 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
 def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:
     from mgdd.engine import Cylinder, find_optimum
 
-    free = EngineBench().find_optimum()
+    free = VirtualEngine().find_optimum()
     assert free["soc_cad"] == pytest.approx(find_optimum(Cylinder(), OperatingPoint())["soc_cad"], abs=0.002)
     assert free.curvature == pytest.approx(-0.051, rel=0.05)
-    limited = EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0})
+    limited = VirtualEngine(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0})
     model = find_optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
     assert limited["soc_cad"] == pytest.approx(model["soc_cad"], abs=0.002)
-    scattered = EngineBench(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited["soc_cad"]))
+    scattered = VirtualEngine(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited["soc_cad"]))
     assert float(scattered["p_max_bar"].std()) == pytest.approx(limited["scatter_p_max_bar"], rel=0.05)
 
 
 @pytest.mark.parametrize(("weight", "soc"), [(0.0, -5.63), (0.002, -2.72), (0.004, -0.65), (0.008, 2.36)])
 def test_the_optimum_moves_late_with_the_weight_of_nox(weight: float, soc: float) -> None:
-    plant = EngineBench(performance=Performance.efficiency_and_nox(weight), nox_sensor="true_value")
+    plant = VirtualEngine(performance=Performance.efficiency_and_nox(weight), nox_sensor="true_value")
     assert plant.find_optimum()["soc_cad"] == pytest.approx(soc, abs=0.03)
 
 
 def test_steady_map_is_quiet_and_labelled() -> None:
-    table = EngineBench(soc_scatter_cad=2.0, misfire_probability=0.5).steady_map([-10.0, -6.0, 0.0])
+    table = VirtualEngine(soc_scatter_cad=2.0, misfire_probability=0.5).steady_map([-10.0, -6.0, 0.0])
     check_labels(table)
     np.testing.assert_allclose(table["efficiency_gross"], [0.5568, 0.5618, 0.5543], rtol=5e-4)
     with pytest.raises(ParameterError, match="soc_cad = 45: must lie in"):
-        EngineBench().steady_map([45.0])
+        VirtualEngine().steady_map([45.0])
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 0), "cycles = 0: must be >= 1"),
+        (lambda: run_seeker(VirtualEngine(), ExtremumSeeking(**SPACE), 0), "cycles = 0: must be >= 1"),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)]), 5),
+            lambda: run_seeker(VirtualEngine(), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)]), 5),
             r"limits of the seeker \['p_max_bar'\] are not all measured by the plant, which has \[\]",
         ),
         (
             lambda: run_seeker(
-                EngineBench(), GoldenSection(**SPACE), 5, criteria=LoopCriteria(exceed_above={"p_max_bar": 1.0})
+                VirtualEngine(), GoldenSection(**SPACE), 5, criteria=LoopCriteria(exceed_above={"p_max_bar": 1.0})
             ),
             "exceed_above: .*p_max_bar",
         ),
         (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),
-        (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
-        (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [], cycles=5), "seeds is empty"),
-        (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [1], cycles=0), "cycles = 0: must be >= 1"),
-        (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "seeker = 3: must be a seeker, as"),
-        (lambda: EngineBench().find_optimum({"nonsense": 1.0}), "'nonsense' is not an indicator"),
-        (lambda: EngineBench().find_optimum(bounds={"soc_cad": (5.0, -5.0)}), "must increase"),
+        (lambda: monte_carlo(VirtualEngine(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
+        (lambda: monte_carlo(VirtualEngine(), ExtremumSeeking(**SPACE), [], cycles=5), "seeds is empty"),
+        (lambda: monte_carlo(VirtualEngine(), ExtremumSeeking(**SPACE), [1], cycles=0), "cycles = 0: must be >= 1"),
+        (lambda: monte_carlo(VirtualEngine(), [3.0], [1], cycles=5), "seeker = 3: must be a seeker, as"),
+        (lambda: VirtualEngine().find_optimum({"nonsense": 1.0}), "'nonsense' is not an indicator"),
+        (lambda: VirtualEngine().find_optimum(bounds={"soc_cad": (5.0, -5.0)}), "must increase"),
     ],
 )
 def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:
@@ -201,10 +201,10 @@ def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:
 
 
 def test_a_refused_run_moves_neither_bench_nor_seeker() -> None:
-    plant, it = EngineBench(), Spsa(**SPACE, limits=[Limit("p_max_bar", 95.0)])
+    plant, it = VirtualEngine(), Spsa(**SPACE, limits=[Limit("p_max_bar", 95.0)])
     state = it.state
     with pytest.raises(ParameterError):
         run_seeker(plant, it, 10)
     assert plant.cycle == 0
     assert it.state == state
-    assert math.isfinite(run_seeker(EngineBench(limits=["p_max_bar"]), it, 10).summary["mean_j"])
+    assert math.isfinite(run_seeker(VirtualEngine(limits=["p_max_bar"]), it, 10).summary["mean_j"])

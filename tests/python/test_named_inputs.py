@@ -13,7 +13,7 @@ from tests.python.support.stepped import stepped
 
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import FeedForward
-from mgdd.loop import EngineBench, Measurement, monte_carlo, run_seeker
+from mgdd.loop import Measurement, VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import (
     ExtremumSeeking,
     GoldenSection,
@@ -130,16 +130,16 @@ def test_a_loop_goes_by_names() -> None:
 def test_inputs_that_the_plant_does_not_have_are_refused() -> None:
     wrong = Spsa(start=-8.0, inputs={"soi_cad": (-30.0, 10.0)})
     for call in (
-        lambda: run_seeker(EngineBench(seed=1), wrong, 5),
+        lambda: run_seeker(VirtualEngine(seed=1), wrong, 5),
         lambda: run_seeker(Two(), wrong, 5),
-        lambda: run_seeker(EngineBench(seed=1), FeedForward(wrong, None), 5),
-        lambda: monte_carlo(EngineBench(), wrong, range(2), cycles=5),
+        lambda: run_seeker(VirtualEngine(seed=1), FeedForward(wrong, None), 5),
+        lambda: monte_carlo(VirtualEngine(), wrong, range(2), cycles=5),
     ):
         with pytest.raises(ParameterError, match=r"inputs of the seeker are soi_cad: the plant takes"):
             call()
     named = Spsa(start=-8.0, inputs={"soc_cad": (-30.0, 10.0)})
     plain = Spsa(start=-8.0, lower=-30.0, upper=10.0)
-    runs = [run_seeker(EngineBench(seed=1), seeker, 60).dataset["asked"][:, 0] for seeker in (named, plain)]
+    runs = [run_seeker(VirtualEngine(seed=1), seeker, 60).dataset["asked"][:, 0] for seeker in (named, plain)]
     assert runs[0].equals(runs[1])
 
 

@@ -46,7 +46,7 @@ from mgdd.io import (
     throttle_log,
     write_csv,
 )
-from mgdd.loop import EngineBench, ThrottleFault, monte_carlo, run_seeker, simulate_drive, track, track_many
+from mgdd.loop import ThrottleFault, VirtualEngine, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import check_labels
@@ -91,7 +91,7 @@ def pressure_file(folder: Path) -> Path:
 
 
 def bench_run() -> xr.Dataset:
-    return EngineBench(seed=1).run(np.full(20, -6.0))
+    return VirtualEngine(seed=1).run(np.full(20, -6.0))
 
 
 def seeker() -> optimize.ExtremumSeeking:
@@ -99,7 +99,7 @@ def seeker() -> optimize.ExtremumSeeking:
 
 
 def rig_run() -> xr.Dataset:
-    with SimulatedRig(EngineBench(seed=1)) as rig:
+    with SimulatedRig(VirtualEngine(seed=1)) as rig:
         return run_seeker(rig, seeker(), 20).dataset
 
 
@@ -119,14 +119,14 @@ def guided() -> FeedForward:
 
 
 def guided_engine() -> GuidedEngine:
-    bench, model = EngineBench(), ModelOptimum(Cylinder())
+    bench, model = VirtualEngine(), ModelOptimum(Cylinder())
     engine = GuidedEngine(optimize.ExtremumSeeking(start=-6.0, lower=-30.0, upper=10.0), model, bench.point)
     run_seeker(bench, engine, 3)
     return engine
 
 
 def taught() -> OnlineCalibration:
-    bench, calibration = EngineBench(), OnlineCalibration(Cylinder(), window_cycles=2, steady_cycles=0)
+    bench, calibration = VirtualEngine(), OnlineCalibration(Cylinder(), window_cycles=2, steady_cycles=0)
     for _ in range(3):
         soc_cad = bench.step(-6.0)["soc_cad"]
         calibration.offer(bench.pressure()[1], bench.point, soc_cad)
@@ -251,13 +251,13 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "io.read_throttle_log": written_log,
     "io.throttle_log": lambda _: log(),
     "rig.RealtimeLoop.samples": lambda _: loop_samples(),
-    "loop.EngineBench.run": lambda _: bench_run(),
-    "loop.LoopRun.dataset": lambda _: [run_seeker(EngineBench(seed=1), seeker(), 20).dataset, rig_run()],
-    "loop.monte_carlo": lambda _: monte_carlo(EngineBench(), seeker(), [1, 2], cycles=20),
+    "loop.VirtualEngine.run": lambda _: bench_run(),
+    "loop.LoopRun.dataset": lambda _: [run_seeker(VirtualEngine(seed=1), seeker(), 20).dataset, rig_run()],
+    "loop.monte_carlo": lambda _: monte_carlo(VirtualEngine(), seeker(), [1, 2], cycles=20),
     "loop.track": lambda _: track(Pid(), "step:40:42", airflow_torque_nm=0.1),
     "loop.track_many": lambda _: track_many({"pid": Pid()}, ["step:40:42"], [Throttle()]),
     "loop.simulate_drive": lambda _: simulate_drive(DemandChain(), [10.0, 60.0], 2000.0),
-    "loop.EngineBench.steady_map": lambda _: EngineBench().steady_map([-10.0, -6.0]),
+    "loop.VirtualEngine.steady_map": lambda _: VirtualEngine().steady_map([-10.0, -6.0]),
     "optimize.IterativeLearning.history": lambda _: learned(),
     "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
     "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),

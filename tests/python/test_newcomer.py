@@ -79,7 +79,7 @@ def test_identify_a_throttle_log_from_a_data_frame() -> None:
 
 def test_plot_a_run_of_a_seeker() -> None:
     limits = {"p_max_bar": 95}
-    bench = mgdd.loop.EngineBench("puma_single", limits=limits)
+    bench = mgdd.loop.VirtualEngine("puma_single", limits=limits)
     seeker = mgdd.optimize.ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0, limits=limits)
     run = mgdd.loop.run_seeker(bench, seeker, 300)
     assert len(mgdd.plot.seeking(run).figure.axes) == len(run.plot().figure.axes)
@@ -111,7 +111,7 @@ def test_track_a_step_with_a_fitted_model() -> None:
 
 def test_save_and_load_each_result(tmp_path: Path) -> None:
     seeker = mgdd.optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
-    run = mgdd.loop.run_seeker(mgdd.loop.EngineBench("puma_single"), seeker, 50)
+    run = mgdd.loop.run_seeker(mgdd.loop.VirtualEngine("puma_single"), seeker, 50)
     run.to_netcdf(tmp_path / "run.nc")
     assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "soc_cad [°CA aTDC]"
     table = mgdd.maps.CalibrationMap({"fuel_mg": [10, 20]}, [1.0, 2.0], name="soc_cad")
@@ -182,7 +182,7 @@ def test_a_log_with_other_columns_is_told_what_it_lacks() -> None:
         (lambda: mgdd.engine.simulate("puma_single", 1200), r"point = 1200: must be an OperatingPoint.*'speed_rpm'"),
         (lambda: mgdd.throttle.simulate_throttle("puma_single", 0.5), "is an engine, not a throttle"),
         (lambda: mgdd.loop.VirtualThrottle(3.0), "throttle = 3.0: must be a Throttle, a preset, or the name of one"),
-        (lambda: mgdd.loop.EngineBench(3.0), "engine = 3.0: must be a Cylinder"),
+        (lambda: mgdd.loop.VirtualEngine(3.0), "engine = 3.0: must be a Cylinder"),
         (lambda: mgdd.maps.write_map(3.0, "a.csv"), "table = 3.0: must be a CalibrationMap"),
         (lambda: mgdd.engine.find_optimum("puma_single", limits=95.0), "limits = 95.0: must map names to numbers"),
     ],
@@ -207,7 +207,7 @@ def test_limits_have_one_grammar() -> None:
     for limits in (by_name, objects):
         seeker = mgdd.optimize.ExtremumSeeking(**start, limits=limits)
         assert seeker.settings["limits"][0].upper == 95
-        bench = mgdd.loop.EngineBench("puma_single", limits=limits)
+        bench = mgdd.loop.VirtualEngine("puma_single", limits=limits)
         assert bench.limit_names == ("p_max_bar",)
         guard = mgdd.rig.ActuatorGuard(bench, start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)}, limits=limits)
         assert [limit.name for limit in guard.limits] == ["p_max_bar"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mgdd
-from mgdd.loop import EngineBench, FunctionPlant, monte_carlo, run_seeker, seek
+from mgdd.loop import FunctionPlant, VirtualEngine, monte_carlo, run_seeker, seek
 from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Input, Limit, Seeker, Spsa
 
 RNG = np.random.default_rng(4)
@@ -49,12 +49,12 @@ def to_minimise() -> bool:
 
 
 def a_bench() -> bool:
-    found = seek(EngineBench(seed=1), {"soc_cad": (-20.0, 5.0)})
+    found = seek(VirtualEngine(seed=1), {"soc_cad": (-20.0, 5.0)})
     return abs(found.inputs["soc_cad"] + 5.63) < 1.5
 
 
 def a_limit() -> bool:
-    bench = EngineBench(seed=1, limits=["p_max_bar"])
+    bench = VirtualEngine(seed=1, limits=["p_max_bar"])
     found = seek(bench, {"soc_cad": (-20.0, 8.0)}, limits={"p_max_bar": 95.0}, start=4.0)
     return found.limits["p_max_bar"] < 97.0 and found.inputs["soc_cad"] > -4.0
 
@@ -66,13 +66,13 @@ def a_lower_limit() -> bool:
 
 
 def a_late_limit() -> bool:
-    bench = EngineBench(seed=1, limits=["p_max_bar"])
+    bench = VirtualEngine(seed=1, limits=["p_max_bar"])
     late = [Limit("p_max_bar", 95.0, delay_cycles=2.0)]
     return seek(bench, {"soc_cad": (-20.0, 8.0)}, limits=late, start=4.0, cycles=80).limits["p_max_bar"] < 110.0
 
 
 def a_seeker_by_name() -> bool:
-    found = seek(EngineBench(seed=1), {"soc_cad": (-20.0, 5.0)}, seeker="spsa", cycles=600)
+    found = seek(VirtualEngine(seed=1), {"soc_cad": (-20.0, 5.0)}, seeker="spsa", cycles=600)
     return found.seeker.kind == "Spsa" and abs(found.inputs["soc_cad"] + 5.63) < 2.0
 
 
@@ -83,11 +83,11 @@ def a_seeker_by_class_with_settings() -> bool:
 
 def a_seeker_of_my_own() -> bool:
     seeker = ExtremumSeeking(start=-10.0, lower=-30.0, upper=10.0)
-    return abs(seek(EngineBench(seed=1), seeker=seeker, cycles=600).inputs["soc_cad"] + 5.63) < 2.0
+    return abs(seek(VirtualEngine(seed=1), seeker=seeker, cycles=600).inputs["soc_cad"] + 5.63) < 2.0
 
 
 def going_on() -> bool:
-    bench = EngineBench(seed=1)
+    bench = VirtualEngine(seed=1)
     first = seek(bench, {"soc_cad": (-20.0, 5.0)}, cycles=30)
     more = seek(bench, {"soc_cad": (-20.0, 5.0)}, seeker=first.seeker, cycles=20)
     return type(more) is type(first) and more.seeker.cycle == bench.cycle == 50
@@ -130,7 +130,7 @@ def a_table() -> bool:
 
 def many_seeds() -> bool:
     seeker = GaussianProcessSeeking(inputs=ONE, start={"soc_cad": 5.0})
-    table = monte_carlo(EngineBench(), seeker, range(3), cycles=20)
+    table = monte_carlo(VirtualEngine(), seeker, range(3), cycles=20)
     return table.sizes["seed"] == 3
 
 
@@ -200,9 +200,9 @@ def test_points_that_are_asked_at_once_are_different_and_move_nothing() -> None:
 
 def test_a_search_that_stops_early_is_the_beginning_of_the_whole_one() -> None:
     inputs = {"soc_cad": (-20.0, 5.0)}
-    early = seek(EngineBench(seed=2), inputs, tolerance=1.5)
+    early = seek(VirtualEngine(seed=2), inputs, tolerance=1.5)
     count = early.dataset.sizes["cycle"]
-    whole = seek(EngineBench(seed=2), inputs, cycles=count)
+    whole = seek(VirtualEngine(seed=2), inputs, cycles=count)
     assert 20 <= count < 200
     assert early.inputs == whole.inputs
     np.testing.assert_array_equal(early.dataset["j"], whole.dataset["j"])
@@ -231,7 +231,7 @@ def test_a_lower_limit_is_the_upper_one_of_the_negated_quantity(inputs: dict[str
 
 
 def test_a_lower_limit_of_a_bench_is_kept_at_its_operating_points() -> None:
-    bench = EngineBench(seed=4, limits=["p_max_bar"])
+    bench = VirtualEngine(seed=4, limits=["p_max_bar"])
     found = seek(bench, {"soc_cad": (-20.0, 8.0)}, limits={"p_max_bar": (120.0, None)}, start=-15.0, cycles=120)
     assert 118.0 < found.limits["p_max_bar"] < 130.0
     assert bench.cycle == 120
@@ -267,7 +267,7 @@ def test_every_seeker_says_what_it_takes() -> None:
         (lambda s: seek(hill, seeker=s, start=3.0), "start: the seeker given has its own"),
         (lambda s: seek(hill, seeker=s, maximize=False), "maximize: the seeker given has its own"),
         (lambda s: seek(hill, seeker=s, limits={"p_max_bar": 9.0}), "limits: the seeker given has none"),
-        (lambda _: run_seeker(EngineBench(), "spsa", 5), r"seeker = 'spsa': must be a seeker.*seek\(plant, inputs"),
+        (lambda _: run_seeker(VirtualEngine(), "spsa", 5), r"seeker = 'spsa': must be a seeker.*seek\(plant, inputs"),
         (lambda _: seek(hill), "inputs: none given"),
         (lambda _: seek(hill, ONE, limits={"y": (5.0, 2.0)}), "limits: y = .*lower < upper"),
         (lambda _: seek(hill, ONE, limits={"y": (None, None)}), "limits: y = .*one may be None"),

@@ -11,7 +11,7 @@ import pytest
 
 from mgdd.engine import OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.loop import EngineBench, seek
+from mgdd.loop import VirtualEngine, seek
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "own_seeker.md"
 BOUNDS = {"soc_cad": (-25.0, 10.0)}
@@ -92,12 +92,12 @@ def test_an_object_is_told_what_it_takes() -> None:
 
 def test_a_failed_cycle_is_asked_again_and_a_new_point_is_a_restart(page: dict[str, Any]) -> None:
     seeker = page["BoundedSeeking"](-12.0, -25.0, 10.0)
-    bench = EngineBench(seed=2, limits=["p_max_bar"], misfire_probability=0.1)
+    bench = VirtualEngine(seed=2, limits=["p_max_bar"], misfire_probability=0.1)
     found = seek(bench, BOUNDS, seeker=seeker, cycles=500)
     assert abs(found.inputs["soc_cad"] + 5.63) < 2.0
     assert 20 < 500 - seeker.k == int(found.run.dataset["misfire"].sum())
     walk, points = Walk(-12.0), [(0, OperatingPoint()), (20, OperatingPoint(fuel_mg=26.0))]
-    found = seek(EngineBench(schedule=points), BOUNDS, seeker=walk, cycles=30)
+    found = seek(VirtualEngine(schedule=points), BOUNDS, seeker=walk, cycles=30)
     assert (found.seeker.kind, walk.restarts, found.seeker.own is walk) == ("Walk", 1, True)
 
 
@@ -105,8 +105,8 @@ def test_an_object_that_cannot_seek_is_refused_by_what_it_lacks() -> None:
     with pytest.raises(ShapeError, match="its estimate has 1 entries: must have 2"):
         seek(lambda _: 0.0, {"a": (0.0, 1.0), "b": (0.0, 1.0)}, seeker=Walk(0.0))
     with pytest.raises(ParameterError, match="inputs: none given"):
-        seek(EngineBench(), seeker=Walk(0.0))
+        seek(VirtualEngine(), seeker=Walk(0.0))
     with pytest.raises(ParameterError, match="start: the seeker given has its own"):
-        seek(EngineBench(), BOUNDS, seeker=Walk(0.0), start=1.0)
+        seek(VirtualEngine(), BOUNDS, seeker=Walk(0.0), start=1.0)
     with pytest.raises(ParameterError, match="seeker"):
-        seek(EngineBench(), BOUNDS, seeker=object())
+        seek(VirtualEngine(), BOUNDS, seeker=object())

@@ -12,7 +12,7 @@ import pytest
 from mgdd import datasets, plot
 from mgdd.errors import DataError
 from mgdd.guide import FeedForward
-from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+from mgdd.loop import LoopCriteria, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
 from mgdd.plot.convergence import convergence
@@ -331,7 +331,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
         (plot.seeking, sought, "asked", "mgdd.loop.run_seeker"),
         (convergence, tracks, "estimate_median_cad", "a study of seekers"),
-        (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
+        (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.VirtualEngine.run"),
         (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
         (plot.throttle_run, followed, "angle_deg", "mgdd.throttle.simulate_throttle"),
     ],
@@ -445,7 +445,7 @@ def test_a_run_without_a_reference_shows_what_is_there() -> None:
 def test_a_run_that_knows_its_optimum_and_limit_shows_them(guided: bool) -> None:
     seeker = ExtremumSeeking(start=-8.0, lower=-30.0, upper=10.0, limits={"p_max_bar": 104.0})
     loop = FeedForward(seeker, lambda _: -8.0) if guided else seeker
-    bench = EngineBench(seed=1, limits=["p_max_bar"], nox_sensor="none")
+    bench = VirtualEngine(seed=1, limits=["p_max_bar"], nox_sensor="none")
     run = run_seeker(bench, loop, 60, criteria=LoopCriteria(optimum=-3.25))
     ax = plot.seeking(run)
     assert line(ax, "optimum −3.25").get_ydata()[0] == -3.25

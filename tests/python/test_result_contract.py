@@ -19,11 +19,11 @@ from matplotlib.figure import Figure
 import mgdd
 from map_cases import sweep as map_sweep
 from mgdd import datasets, identify, io, plot, presets
-from mgdd.engine import Indicating, analyze, find_optimum, ignition_delay, simulate, trust
+from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignition_delay, simulate
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
-from mgdd.loop import EngineBench, SurrogatePlant, run_seeker, seek, seek_front, tune_controller
+from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
 from mgdd.plot.convergence import convergence
@@ -64,7 +64,7 @@ def throttle_fit() -> Any:
 def run() -> Any:
     limits = {"p_max_bar": 95.0}
     seeker = ExtremumSeeking(start=-2.0, lower=-30.0, upper=10.0, limits=limits)
-    return run_seeker(EngineBench(seed=1, limits=limits), seeker, 300)
+    return run_seeker(VirtualEngine(seed=1, limits=limits), seeker, 300)
 
 
 @cache
@@ -100,9 +100,9 @@ def record(folder: Path) -> Any:
 
 MADE: dict[str, Callable[[Path], Any]] = {
     "LoopRun": lambda _: run(),
-    "SeekResult": lambda _: seek(EngineBench(seed=1), {"soc_cad": (-25.0, 10.0)}, cycles=40),
+    "SeekResult": lambda _: seek(VirtualEngine(seed=1), {"soc_cad": (-25.0, 10.0)}, cycles=40),
     "FrontResult": lambda _: seek_front(
-        EngineBench(seed=1), {"soc_cad": (-15.0, 5.0)}, {"efficiency_gross": "max", "nox_soft_ppm": "min"}, cycles=60
+        VirtualEngine(seed=1), {"soc_cad": (-15.0, 5.0)}, {"efficiency_gross": "max", "nox_soft_ppm": "min"}, cycles=60
     ),
     "Fit": lambda _: throttle_fit(),
     "CylinderFit": lambda _: cylinder_fit(),
@@ -114,7 +114,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "WallHeatProfile": lambda _: identify.wall_heat_profile(cylinder_fit(), scales=[0.5, 1.0]),
     "ThrottleValidation": lambda _: identify.validate_throttle(throttle_fit(), log()),
     "ResidualTests": lambda _: identify.validate_throttle(throttle_fit(), log()).tests,
-    "Trust": lambda _: trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144"),
+    "PressureCheck": lambda _: check_pressure(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144"),
     "ExcitationCheck": lambda _: identify.check_excitation(chirp(offset=0.15, amplitude=0.1), Throttle()),
     "RecordContent": lambda _: identify.check_excitation(chirp(offset=0.15, amplitude=0.1), Throttle()).content,
     "CalibrationMap": lambda _: optimize_map(map_sweep(), "efficiency_gross"),
@@ -218,7 +218,7 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "holding_duty": (lambda: MADE["ExcitationCheck"](Path()), ()),
     "log_pv": (lambda: Drawn(simulate("puma_single")), ()),
     "throttle_run": (lambda: MADE["ExcitationCheck"](Path()), ()),
-    "sensors": (lambda: Drawn(EngineBench(seed=1).run([-6.0] * 20)), ()),
+    "sensors": (lambda: Drawn(VirtualEngine(seed=1).run([-6.0] * 20)), ()),
     "timing": (lambda: Drawn(mgdd.engine.timing_sweep("puma_single")), ()),
     "trade_off": (lambda: Drawn(mgdd.engine.timing_sweep("puma_single")), ("p_max_bar", "efficiency_gross")),
 }

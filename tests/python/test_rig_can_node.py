@@ -11,7 +11,7 @@ import pytest
 from bus_node import ETB, node, rig_on
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
-from mgdd.loop import EngineBench, VirtualThrottle
+from mgdd.loop import VirtualEngine, VirtualThrottle
 from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Inbox, Sender
@@ -334,7 +334,7 @@ def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
 
 
 def test_without_drive_an_engine_stands() -> None:
-    assert node_plant(EngineBench()).sample(None) == ({}, {})
+    assert node_plant(VirtualEngine()).sample(None) == ({}, {})
 
 
 def test_faults_of_the_plant_reach_the_host() -> None:

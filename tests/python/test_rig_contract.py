@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, RigError
-from mgdd.loop import EngineBench, Measurement, Plant, SurrogatePlant, VirtualThrottle
+from mgdd.loop import Measurement, Plant, SurrogatePlant, VirtualEngine, VirtualThrottle
 from mgdd.rig import CanRig, RecordingRig, ReplayRig, SimulatedRig
 from mgdd.rig.base import Rig
 from mgdd.rig.exchange import RigRecord
@@ -39,7 +39,7 @@ def bus_throttle() -> Plant:
 
 
 def bench() -> Plant:
-    return EngineBench(limits=["p_max_bar", "dp_max_bar_per_cad"], misfire_probability=0.1, seed=3)
+    return VirtualEngine(limits=["p_max_bar", "dp_max_bar_per_cad"], misfire_probability=0.1, seed=3)
 
 
 def surrogate_plant() -> Plant:

@@ -14,7 +14,7 @@ import pytest
 
 from hub_thread import bus_of, running_hub
 from mgdd.errors import DataError, RigError
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.rig import CanRig
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.hub import Hub
@@ -197,7 +197,7 @@ def test_a_driver_that_gives_back_what_we_sent() -> None:
 
 def test_an_input_that_is_not_finite_is_a_broken_command(tmp_path: Path) -> None:
     """A float signal can carry NaN: the plant of the node never sees it."""
-    with CanRig(write_bus(tmp_path, "float", FLOAT_DBC, FLOAT_MAP), plant=EngineBench(seed=1)) as rig:
+    with CanRig(write_bus(tmp_path, "float", FLOAT_DBC, FLOAT_MAP), plant=VirtualEngine(seed=1)) as rig:
         core = rig.bus.core  # type: ignore[attr-defined]
         assert isinstance(core, NodeCore)
         rig.apply({"soc_cad": -6.0})

@@ -13,7 +13,7 @@ import xarray as xr
 
 from mgdd.control import Pid
 from mgdd.errors import RigError
-from mgdd.loop import EngineBench, Measurement, Reference, VirtualThrottle, run_seeker
+from mgdd.loop import Measurement, Reference, VirtualEngine, VirtualThrottle, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.rig import CanRig, VirtualNode
 from mgdd.rig.base import Rig
@@ -62,12 +62,12 @@ def test_tracking_over_the_bus_is_that_of_one_process() -> None:
 
 
 @pytest.mark.slow
-def test_seeking_on_the_engine_bench_over_the_bus() -> None:
+def test_seeking_on_the_virtual_engine_over_the_bus() -> None:
     def seeker() -> ExtremumSeeking:
         return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
 
     with CanRig(
-        "engine", plant=EngineBench(limits=["cov_imep_percent", "p_max_bar", "dp_max_bar_per_cad"], seed=4)
+        "engine", plant=VirtualEngine(limits=["cov_imep_percent", "p_max_bar", "dp_max_bar_per_cad"], seed=4)
     ) as rig:
         simulated = run_seeker(rig, seeker(), 250)
     with (
@@ -76,7 +76,7 @@ def test_seeking_on_the_engine_bench_over_the_bus() -> None:
     ):
         over_the_bus = run_seeker(rig, seeker(), 250)
     xr.testing.assert_identical(over_the_bus.dataset, simulated.dataset)
-    straight = run_seeker(EngineBench(seed=4), seeker(), 250)
+    straight = run_seeker(VirtualEngine(seed=4), seeker(), 250)
     assert over_the_bus.summary["final_soc_cad"] == pytest.approx(straight.summary["final_soc_cad"], abs=0.3)
 
 

@@ -12,7 +12,7 @@ from tests.python.support.stepped import stepped
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import DataError, ParameterError, RigError
-from mgdd.loop import EngineBench, LoopCriteria, Measurement, run_seeker
+from mgdd.loop import LoopCriteria, Measurement, VirtualEngine, run_seeker
 from mgdd.loop.plant import AnnouncingPlant
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
@@ -39,10 +39,10 @@ SEEKERS["component-wise"] = lambda: ExtremumSeeking(gain=0.15, **LATE, **SPACE)
 BATCH = "ExtremumSeeking batch"
 
 
-def rough_bench(sensor: str = "analyser") -> EngineBench:
+def rough_bench(sensor: str = "analyser") -> VirtualEngine:
     """A bench on which everything happens: misfires, limits, a late sensor, drift and two new operating points."""
     point = OperatingPoint()
-    return EngineBench(
+    return VirtualEngine(
         schedule=[(0, point), (251, point.replace(speed_rpm=1900.0)), (500, point.replace(fuel_mg=12.0))],
         performance=Performance.efficiency_and_nox(),
         nox_sensor=sensor,
@@ -179,7 +179,7 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
     with pytest.raises(ParameterError, match="components has 3 entries: the plant measures 1"):
         run_seeker(rig, split, 5)
     assert limited.cycle == split.cycle == 0
-    closed = SimulatedRig(EngineBench())
+    closed = SimulatedRig(VirtualEngine())
     closed.close()
     with pytest.raises(RigError, match="rig is closed"):
         run_seeker(closed, own, 5)
@@ -192,7 +192,7 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
 
 
 def test_summary_of_half_a_run() -> None:
-    run = run_seeker(EngineBench(seed=2), seeker(), 500, criteria=LoopCriteria(optimum=-5.63))
+    run = run_seeker(VirtualEngine(seed=2), seeker(), 500, criteria=LoopCriteria(optimum=-5.63))
     part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), LoopCriteria(optimum=-5.63))
     estimate = run.dataset["estimate"][:, 0].to_numpy()[:250]
     assert part["final_soc_cad"] == pytest.approx(estimate[150:].mean())
@@ -206,10 +206,10 @@ def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
     ends = []
     for make in (lambda: ExtremumSeeking(**wide, gain=3.0, maximize=False), lambda: Spsa(**wide, maximize=False)):
         in_core, on_rig = make(), make()
-        core = run_seeker(EngineBench(seed=2), in_core, 900)
-        with SimulatedRig(EngineBench(seed=2)) as rig:
+        core = run_seeker(VirtualEngine(seed=2), in_core, 900)
+        with SimulatedRig(VirtualEngine(seed=2)) as rig:
             run = run_seeker(rig, on_rig, 900)
-        low, high = EngineBench().window_cad
+        low, high = VirtualEngine().window_cad
         assert core.dataset["clamped"].to_numpy().any()
         for key in ("applied", "asked", "estimate"):
             np.testing.assert_array_equal(core.dataset[key].to_numpy(), run.dataset[key].to_numpy(), err_msg=key)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import DataError, Interrupted, ParameterError
-from mgdd.loop import EngineBench, Measurement, seek_front
+from mgdd.loop import Measurement, VirtualEngine, seek_front
 from mgdd.loop.front_result import FrontResult, fit_of, undominated
 
 TWO = {"soc_cad": (-20.0, 20.0), "egr": (0.0, 0.4)}
@@ -98,7 +98,7 @@ def test_the_front_of_two_quadratics_is_found(seed: int) -> None:
 
 
 def test_a_front_of_the_bench_is_that_of_its_steady_map() -> None:
-    bench = EngineBench(seed=3)
+    bench = VirtualEngine(seed=3)
     ways = {"efficiency_gross": "max", "nox_soft_ppm": "min"}
     front = seek_front(bench, {"soc_cad": (-25.0, 5.0)}, ways, start=-18.0, cycles=100, weights=4, points=9)
     assert bench.cycle == 100

@@ -13,7 +13,7 @@ import pytest
 
 from mgdd.errors import DataError, Error, Interrupted, ParameterError, ShapeError
 from mgdd.guide import Curve
-from mgdd.loop import EngineBench, Measurement, run_seeker, seek
+from mgdd.loop import Measurement, VirtualEngine, run_seeker, seek
 from mgdd.loop.seek_result import SeekResult
 from mgdd.optimize import GaussianProcessSeeking, Input
 
@@ -86,13 +86,13 @@ def test_it_finds_the_best_inputs_and_says_how_well(inputs: Any, sign: float) ->
 def test_the_same_seed_gives_the_same_run_and_it_goes_on() -> None:
     first, again = (seek(engine(), TWO, cycles=40, seed=5) for _ in range(2))
     assert first.inputs == again.inputs
-    more = run_seeker(EngineBench(seed=2), seek(EngineBench(seed=2), ONE, cycles=30).seeker, 20)
+    more = run_seeker(VirtualEngine(seed=2), seek(VirtualEngine(seed=2), ONE, cycles=30).seeker, 20)
     assert more.dataset["cycle"].to_numpy()[0] == 0  # of the bench, a new one
     assert more.dataset.sizes["cycle"] == 20
 
 
 def test_a_bench_is_a_plant_and_limits_are_kept() -> None:
-    bench = EngineBench(seed=4, limits=["dp_max_bar_per_cad", "p_max_bar"])
+    bench = VirtualEngine(seed=4, limits=["dp_max_bar_per_cad", "p_max_bar"])
     found = seek(bench, {"soc_cad": (-25.0, 10.0)}, start=2.0, limits={"p_max_bar": 95.0}, cycles=300)
     assert bench.cycle == 300
     best = bench.find_optimum({"p_max_bar": 95.0})
@@ -129,7 +129,7 @@ def test_without_a_start_a_search_begins_where_engines_keep_the_limit(name: str)
 
 
 def test_of_a_quantity_kept_between_two_values_the_upper_one_says_where_to_begin() -> None:
-    bench = EngineBench(seed=1, limits=["p_max_bar"])
+    bench = VirtualEngine(seed=1, limits=["p_max_bar"])
     found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": (60.0, 95.0)}, cycles=40)
     assert found.start["soc_cad"] == 10.0
     assert float(found.dataset["noise_free_limits"].sel(limit="p_max_bar").max()) < 96.0
@@ -139,7 +139,7 @@ def test_of_a_quantity_kept_between_two_values_the_upper_one_says_where_to_begin
 def test_a_limit_that_bends_is_read_before_it_is_reached() -> None:
     """Late, the pressure is that of compression, and flat; a stride that it allows there ends far above the limit."""
     for seed in range(4):
-        bench = EngineBench(seed=seed, limits=["p_max_bar"])
+        bench = VirtualEngine(seed=seed, limits=["p_max_bar"])
         found = seek(bench, {"soc_cad": (-30.0, 10.0)}, limits={"p_max_bar": 95.0}, cycles=40, seed=seed)
         assert 90.0 < float(found.dataset["noise_free_limits"].max()) < 96.0
 

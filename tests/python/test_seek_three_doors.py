@@ -11,7 +11,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.engine import Cylinder
-from mgdd.loop import EngineBench, EngineGuide, seek
+from mgdd.loop import EngineGuide, VirtualEngine, seek
 from mgdd.loop.summary import FIGURES_OF_INPUT
 from mgdd.results.labels import to_jsonable
 from mgdd.rig import Experiment, run_experiment
@@ -88,7 +88,7 @@ def test_three_doors_give_the_same_bits(question: str, capsys: pytest.CaptureFix
     if "guide" in given:
         rough = Cylinder(wall_heat_scale=1.6 * Cylinder().wall_heat_scale)
         given["guide"] = EngineGuide(cylinder=rough, kind=given["guide"])
-    bench = EngineBench(seed=3, limits=list(asked.get("limits", ())), inputs=list(asked["inputs"]))
+    bench = VirtualEngine(seed=3, limits=list(asked.get("limits", ())), inputs=list(asked["inputs"]))
     found = seek(bench, seed=3, **given)
 
     bounds = [word for name, (low, high) in asked["inputs"].items() for word in ("--input", f"{name}={low}:{high}")]
@@ -116,8 +116,8 @@ def test_readings_of_before_go_through_every_door(capsys: pytest.CaptureFixture[
     assert main([*options, *after, "--known", str(before)]) == 0
     by_command = json.loads(capsys.readouterr().out)
     asked: dict[str, Any] = {"inputs": {"soc_cad": (-25.0, 8.0)}, "limits": {"t_evo_k": 960.0}}
-    first = seek(EngineBench(seed=3, limits=["t_evo_k"]), seed=3, cycles=40, **asked)
-    found = seek(EngineBench(seed=4, limits=["t_evo_k"]), seed=4, cycles=30, known=first.dataset, **asked)
+    first = seek(VirtualEngine(seed=3, limits=["t_evo_k"]), seed=3, cycles=40, **asked)
+    found = seek(VirtualEngine(seed=4, limits=["t_evo_k"]), seed=4, cycles=30, known=first.dataset, **asked)
     assert "after 40 readings" in by_command["reason"]
     table = "cycles = 30\nknown = 'before.csv'\ninputs.soc_cad = [-25, 8]\nlimits.t_evo_k = 960\n"
     (tmp_path / "known.toml").write_text(HEAD.format(seed=4) + table)
@@ -148,7 +148,7 @@ def test_the_cycles_of_every_plant_have_one_layout(inputs: tuple[str, ...]) -> N
     def linear(x: Any) -> float:
         return -sum(x[name] for name in inputs)
 
-    found = seek(linear if "x" in inputs else EngineBench(inputs=list(inputs), seed=1), bounds, cycles=12)
+    found = seek(linear if "x" in inputs else VirtualEngine(inputs=list(inputs), seed=1), bounds, cycles=12)
     for name in ("estimate", "asked", "applied"):
         assert found.dataset[name].dims == ("cycle", "input")
         assert found.dataset[name].sel(input=list(inputs)).shape == (12, len(inputs))
@@ -162,7 +162,7 @@ def test_the_cycles_of_every_plant_have_one_layout(inputs: tuple[str, ...]) -> N
 def test_gains_do_not_come_from_the_truth_of_the_plant() -> None:
     """Whatever the plant would say of itself without noise, a search does not ask it."""
 
-    class Closed(EngineBench):
+    class Closed(VirtualEngine):
         def _refused(self, *_: Any, **__: Any) -> Any:
             raise AssertionError("a search has asked the plant for its truth")
 

@@ -12,7 +12,7 @@ import pytest
 from mgdd.engine import Cylinder
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import FeedForward, ModelOptimum, OnlineCalibration
-from mgdd.loop import EngineBench, LoopCriteria, monte_carlo, run_seeker
+from mgdd.loop import LoopCriteria, VirtualEngine, monte_carlo, run_seeker
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     ExtremumSeeking,
@@ -40,7 +40,7 @@ def test_golden_section_finds_its_width_again() -> None:
     """Of 200 seeds at another operating point none may end more than 1.5 CAD off (one in fifty did)."""
     from mgdd.engine import OperatingPoint
 
-    bench = EngineBench(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
+    bench = VirtualEngine(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
     best = bench.find_optimum()
     seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
     table = monte_carlo(bench, seeker, range(200), cycles=2000, criteria=LoopCriteria(optimum=best["soc_cad"]))
@@ -49,7 +49,7 @@ def test_golden_section_finds_its_width_again() -> None:
 
 def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
     """COV of IMEP looks back 50 cycles: its answer to the timing is hidden, and it is feasible at the optimum only."""
-    bench = EngineBench(limits=["cov_imep_percent"])
+    bench = VirtualEngine(limits=["cov_imep_percent"])
     space = {"start": -20.0, "lower": -30.0, "upper": 10.0}
     limits = [Limit("cov_imep_percent", 0.6)]
     table = monte_carlo(bench, ExtremumSeeking(**space, limits=limits), range(10), cycles=3000)
@@ -57,12 +57,12 @@ def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
 
 
 def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
-    bench = EngineBench(limits=["p_max_bar"])
+    bench = VirtualEngine(limits=["p_max_bar"])
     rig, seeker = SimulatedRig(bench), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
     with pytest.raises(ParameterError, match=r"exceed_above: \['p_max'\]"):
         run_seeker(rig, seeker, 5, criteria=LoopCriteria(exceed_above={"p_max": 80.0}))
     with pytest.raises(ParameterError, match="not all measured by the plant"):
-        run_seeker(SimulatedRig(other := EngineBench()), seeker, 5)
+        run_seeker(SimulatedRig(other := VirtualEngine()), seeker, 5)
     with pytest.raises(ParameterError, match=r"must have input_names, limit_names, apply\(\) and measure\(\)"):
         run_seeker(object(), seeker, 5)  # type: ignore[arg-type]
     assert bench.cycle == other.cycle == seeker.cycle == 0
@@ -78,31 +78,31 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
     ("call", "error", "message"),
     [
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(start=-100.0), 5),
+            lambda: run_seeker(VirtualEngine(), ExtremumSeeking(start=-100.0), 5),
             ParameterError,
             "-100 °CA aTDC: must be in",
         ),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(tail_cycles=0)),
+            lambda: run_seeker(VirtualEngine(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(tail_cycles=0)),
             ParameterError,
             "tail_cycles = 0",
         ),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(arrival=-1.0)),
+            lambda: run_seeker(VirtualEngine(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(arrival=-1.0)),
             ParameterError,
             "arrival = -1",
         ),
         (
-            lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [0.5], cycles=5),
+            lambda: monte_carlo(VirtualEngine(), ExtremumSeeking(**SPACE), [0.5], cycles=5),
             ParameterError,
             "whole numbers",
         ),
-        (lambda: EngineBench().find_optimum({"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
-        (lambda: EngineBench().find_optimum({"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
-        (lambda: EngineBench().find_optimum({"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
-        (lambda: EngineBench().find_optimum(cycle=-1), ParameterError, "cycle = -1"),
-        (lambda: EngineBench().steady_map([-6.0], cycle=-1), ParameterError, "cycle = -1"),
-        (lambda: EngineBench().steady_map([[1.0, 2.0]]), ShapeError, "2 dimensions"),
+        (lambda: VirtualEngine().find_optimum({"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
+        (lambda: VirtualEngine().find_optimum({"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
+        (lambda: VirtualEngine().find_optimum({"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
+        (lambda: VirtualEngine().find_optimum(cycle=-1), ParameterError, "cycle = -1"),
+        (lambda: VirtualEngine().steady_map([-6.0], cycle=-1), ParameterError, "cycle = -1"),
+        (lambda: VirtualEngine().steady_map([[1.0, 2.0]]), ShapeError, "2 dimensions"),
         (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
         (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: Spsa(**SPACE, limits=[Limit("a", 1.0), Limit("a", 2.0)]), ParameterError, "limit a: is given twice"),
@@ -121,7 +121,7 @@ def test_wrong_questions_get_an_answer_that_names_them(call: Any, error: type[Ex
 
 # Numbers of what guides and benches are made of; those of seekers have a test of their own.
 MADE: dict[str, Callable[..., Any]] = {
-    "EngineBench": EngineBench,
+    "VirtualEngine": VirtualEngine,
     "FeedForward": lambda **own: FeedForward(ExtremumSeeking(**SPACE), **own),
     "ModelOptimum": lambda **own: ModelOptimum(Cylinder(), **own),
     "OnlineCalibration": lambda **own: OnlineCalibration(**{"engine": Cylinder(), "soc_scatter_cad": 0.3, **own}),

@@ -9,7 +9,7 @@ import pytest
 
 from independent_engine import draw, record
 from mgdd import datasets
-from mgdd.engine import OperatingPoint, trust
+from mgdd.engine import OperatingPoint, check_pressure
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import pressure_trace, read_pressure
 from mgdd.results.labels import check_labels
@@ -20,7 +20,7 @@ ANGLE, BAR, FUEL = RECORD.angle, RECORD.bar, RECORD.fuel_mg
 
 
 def seen(bar: np.ndarray = BAR, angle: np.ndarray = ANGLE, **options: object):
-    return trust(pressure_trace(angle, bar, name="bench 4"), ENGINE.cylinder(), **options)
+    return check_pressure(pressure_trace(angle, bar, name="bench 4"), ENGINE.cylinder(), **options)
 
 
 def test_a_sound_record_passes_and_says_what_stays_open() -> None:
@@ -38,7 +38,7 @@ def test_a_sound_record_passes_and_says_what_stays_open() -> None:
 
 
 def test_one_closed_cycle_leaves_more_open() -> None:
-    report = trust(datasets.read("hd_diesel_128x144")[2], "hd_diesel_128x144")
+    report = check_pressure(datasets.read("hd_diesel_128x144")[2], "hd_diesel_128x144")
     opened = {check.name for check in report.checks if check.verdict == "open"}
     assert opened == {"crank angle", "top dead centre", "work and heat", "gas exchange", "cycles", "amplifier"}
 
@@ -49,7 +49,7 @@ def test_stated_fuel_judges_the_gain() -> None:
     doubted = seen(1.3 * BAR, fuel_mg=fuel)["work and heat"]
     assert doubted.verdict == "doubt"
     assert "gain" in doubted.remedy
-    assert trust(
+    assert check_pressure(
         pressure_trace(ANGLE, BAR).assign_attrs(fuel_mg=fuel), ENGINE.cylinder()
     )["work and heat"].verdict == "no fault found"  # fmt: skip
 
@@ -94,7 +94,7 @@ def test_the_worst_comes_first_and_the_reader_is_told_what_to_do() -> None:
 
 def test_every_doubt_of_the_reader_is_passed_on() -> None:
     trace = pressure_trace(ANGLE, BAR).assign_attrs(warnings="one thing\nanother thing")
-    assert trust(trace, ENGINE.cylinder())["file"].text == "one thing; another thing"
+    assert check_pressure(trace, ENGINE.cylinder())["file"].text == "one thing; another thing"
 
 
 def test_a_motored_record_decides_dead_centre_and_not_the_burn() -> None:
@@ -112,7 +112,7 @@ def test_a_swing_of_the_speed_is_the_first_cause_where_the_angle_is_a_time(tmp_p
     even = np.arange(BAR.size) * (120.0 / ENGINE.speed / ANGLE.size)
     np.savetxt(file, np.column_stack([even, np.interp(even, seconds.ravel(), BAR.ravel())]), delimiter=",",
                header="time_s,p_bar", comments="", fmt="%.9f")  # fmt: skip
-    report = trust(read_pressure(file, speed_rpm=ENGINE.speed, firing_tdc_deg=360.0), ENGINE.cylinder())
+    report = check_pressure(read_pressure(file, speed_rpm=ENGINE.speed, firing_tdc_deg=360.0), ENGINE.cylinder())
     named = [check for check in report.checks if check.verdict == "doubt" and check.remedy]
     assert any(check.remedy.startswith("take the angle of an encoder") for check in named), report.summary()
 
@@ -137,13 +137,13 @@ def test_the_gas_exchange_is_judged() -> None:
 def test_a_refused_file_fails_and_raises_nothing(tmp_path: Path) -> None:
     file = tmp_path / "torn.csv"
     file.write_text("crank_angle_cad,p\n-30,5\n-29,x\n", encoding="utf-8")
-    report = trust(str(file), ENGINE.cylinder())
+    report = check_pressure(str(file), ENGINE.cylinder())
     assert report.verdict == "fail"
     assert report.analysis is None
     assert "torn.csv" in report["file"].text
     assert report.dataset.sizes["check"] == 1
     with pytest.raises(FileNotFoundError):
-        trust(str(tmp_path / "none.csv"), ENGINE.cylinder())
+        check_pressure(str(tmp_path / "none.csv"), ENGINE.cylinder())
     with pytest.raises(DataError):  # an analysis says why
         pressure_trace(ANGLE, np.roll(BAR, 480, axis=1))
 
@@ -153,7 +153,7 @@ def test_every_kind_of_doubt_belongs_to_a_check() -> None:
     text = "".join(file.read_text(encoding="utf-8") for file in source.glob("*.cpp"))
     import re
 
-    from mgdd.engine.trust import _CHECKS, _REMEDIES
+    from mgdd.engine.pressure_check import _CHECKS, _REMEDIES
 
     kinds = set(re.findall(r'warnings\.push_back\(\s*\{\s*"(\w+)"', text)) | {"clipped", "stuck"}
     known = {kind for own in _CHECKS.values() for kind in own}

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from independent_engine import LAWS, Engine, draw, record
-from mgdd.engine import Trust, trust
+from mgdd.engine import PressureCheck, check_pressure
 from mgdd.errors import DataError
 from mgdd.io import pressure_trace
 
@@ -174,7 +174,7 @@ class Fault:
     ):
         self.spoil, self.checks, self.needs, self.pairs, self.says = spoil, checks.split(","), needs, pairs, says
 
-    def met(self, seen: Trust) -> bool:
+    def met(self, seen: PressureCheck) -> bool:
         if self.says:  # a cycle cut off at the end is a doubt of the file as well
             return self.says in seen["file"].text or seen.analysis is None
         named = [check for check in seen.checks if check.verdict in ("doubt", "fail")]
@@ -228,7 +228,7 @@ def drawn(random: np.random.Generator, number: int, cycles: int, kind: str, *, m
     return engine, step, record(random, engine, cycles, step=step, noise_bar=noise, motored=motored)
 
 
-def made(random: np.random.Generator, faults: list[Fault], number: int, kind: str) -> Trust:
+def made(random: np.random.Generator, faults: list[Fault], number: int, kind: str) -> PressureCheck:
     needs = {fault.needs for fault in faults}
     motored = "motored" in needs
     engine, step, whole = drawn(random, number, CYCLES, kind, motored=motored)
@@ -247,13 +247,13 @@ def made(random: np.random.Generator, faults: list[Fault], number: int, kind: st
     trace = trace.assign_attrs(speed_rpm=engine.speed)
     if not motored and any("gain" in name for name, fault in ALL.items() if fault in faults):
         trace = trace.assign_attrs(fuel_mg=float(fuel.mean()), bmep_bar=max(0.0, gross - random.uniform(1.0, 2.2)))
-    return trust(trace, engine.cylinder())
+    return check_pressure(trace, engine.cylinder())
 
 
-def trust_of(error: DataError) -> Trust:
-    from mgdd.engine.trust import Check
+def trust_of(error: DataError) -> PressureCheck:
+    from mgdd.engine.pressure_check import Check
 
-    return Trust("bench", (Check("file", "fail", str(error)),))
+    return PressureCheck("bench", (Check("file", "fail", str(error)),))
 
 
 def gross_imep_bar(engine: Engine, angle: Array, bar: Array) -> float:
@@ -264,7 +264,7 @@ def gross_imep_bar(engine: Engine, angle: Array, bar: Array) -> float:
 ALL = {**FAULTS, **OUT_OF_REACH}
 
 
-def doubted(seen: Trust) -> list[str]:
+def doubted(seen: PressureCheck) -> list[str]:
     return [check.name for check in seen.checks if check.verdict in ("doubt", "fail")]
 
 
@@ -277,7 +277,7 @@ def sound(n: int, kind: str, looks: tuple[int, ...] = LOOKS, *, seed: int = 7) -
         for cycles in looks:
             bar = whole.bar[:cycles] if cycles > 1 else whole.bar[0]
             trace = pressure_trace(whole.angle, bar).assign_attrs(speed_rpm=engine.speed)
-            names = doubted(trust(trace, engine.cylinder()))
+            names = doubted(check_pressure(trace, engine.cylinder()))
             out[cycles].update([*names, *(["any"] if names else [])])
     return out
 

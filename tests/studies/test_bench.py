@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.results.labels import check_labels
 from mgdd_studies import run_study
 from mgdd_studies.base import StudyResult
@@ -62,7 +62,7 @@ def test_every_form_of_every_seeker_competes_and_arrives(seekers: StudyResult) -
     rows = {row["seeker"]: row for row in seekers.summary["rows"]}
     assert len(rows) == 10
     assert all(row["share_arrived"] == 1.0 for row in rows.values())
-    best = EngineBench().find_optimum()["soc_cad"]
+    best = VirtualEngine().find_optimum()["soc_cad"]
     assert seekers.summary["optimum_cad"] == pytest.approx(best)
     for row in rows.values():
         assert row["final_cad"] == pytest.approx(best, abs=1.0), row["seeker"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mgdd.engine import OperatingPoint
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.results.labels import check_labels
 from mgdd_studies.base import StudyResult
 from mgdd_studies.guide_accuracy import HARD, HardCase, run_hard
@@ -99,8 +99,8 @@ def test_a_motored_point_has_no_guide() -> None:
 
 
 def test_loss_is_that_of_the_steady_map() -> None:
-    steady = SteadyMap.of(EngineBench(point=HIGH))
-    bench = EngineBench(point=HIGH, soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+    steady = SteadyMap.of(VirtualEngine(point=HIGH))
+    bench = VirtualEngine(point=HIGH, soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
     j = [bench.step(soc)["j"] for soc in (steady.best_cad, -17.3)]
     assert steady.best_cad == pytest.approx(-10.7, abs=0.1)
     assert steady.lost(np.array([-17.3]))[0] == pytest.approx(j[0] - j[1], abs=2e-4)
@@ -109,15 +109,15 @@ def test_loss_is_that_of_the_steady_map() -> None:
 def test_what_comes_late_is_seen_by_the_plant_alone() -> None:
     quiet = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
     seeker = curve_seeker(GUIDE["exact"].curve(OperatingPoint()))
-    run = drive(EngineBench(**quiet), seeker, 120, late_by_cad=lambda _: 4.0)
-    best = SteadyMap.of(EngineBench()).best_cad
+    run = drive(VirtualEngine(**quiet), seeker, 120, late_by_cad=lambda _: 4.0)
+    best = SteadyMap.of(VirtualEngine()).best_cad
     assert run.estimate[-1] == pytest.approx(best - 4.0, abs=0.5)
     assert run.applied[-40:].mean() == pytest.approx(best, abs=0.5)
 
 
 def test_a_feed_forward_without_a_guide_starts_far_and_with_one_near() -> None:
     for guide, start in ((None, -20.0), (GUIDE["adiabatic"], GUIDE["adiabatic"](LOW)["soc_cad"])):
-        run = drive(EngineBench(point=LOW, soc_scatter_cad=0.0), trimmed(guide), 3)
+        run = drive(VirtualEngine(point=LOW, soc_scatter_cad=0.0), trimmed(guide), 3)
         assert run.estimate[0] == pytest.approx(start, abs=1e-9)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd.engine import OperatingPoint, ignition_delay
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.results.labels import check_labels
 from mgdd_studies.base import StudyResult
 from mgdd_studies.guide_cases import PLANT, Guide, SpeedLoadPlane, curve_seeker, drive, trimmed
@@ -33,7 +33,7 @@ def test_a_guide_that_is_told_the_truth_asks_for_the_best_combustion() -> None:
     for law in TRUTHS:
         guide = InjectionGuide(law)
         burns = ignition_delay(law.cylinder, LATE, soi_cad=guide(LATE)["soi_cad"]).soc_cad
-        assert burns == pytest.approx(EngineBench(point=LATE).find_optimum()["soc_cad"], abs=0.05), law.name
+        assert burns == pytest.approx(VirtualEngine(point=LATE).find_optimum()["soc_cad"], abs=0.05), law.name
         assert guide.curve(LATE).best == pytest.approx(guide(LATE)["soi_cad"], abs=0.15), law.name
 
 
@@ -58,7 +58,7 @@ def test_the_measured_delays_make_the_polynomial_and_the_constant() -> None:
 
 def test_a_constant_delay_is_a_shift_of_the_input() -> None:
     late = DelayLaw("late", PLANT.replace(ignition_model="polynomial", ignition_c0_cad=5.5, ignition_c1=0.0))
-    bench, twin = (EngineBench(schedule=[(0, MEASURED_AT), (40, LATE)], seed=4) for _ in range(2))
+    bench, twin = (VirtualEngine(schedule=[(0, MEASURED_AT), (40, LATE)], seed=4) for _ in range(2))
     injected = drive(bench, trimmed(InjectionGuide(late)), 90, soc_of=late.soc_of)
     burning = drive(twin, trimmed(Guide("exact", PLANT)), 90)
     assert injected.applied == pytest.approx(burning.applied, abs=1e-6)
@@ -77,7 +77,7 @@ def test_the_trim_of_a_point_cancels_every_error_there() -> None:
 
 
 def test_what_a_cell_loses_is_what_the_bench_loses() -> None:
-    bench = EngineBench(point=LATE)
+    bench = VirtualEngine(point=LATE)
     plane = plane_of(WATSON, HARDENBERG, SpeedLoadPlane([LATE.speed_rpm], [LATE.fuel_mg]))
     said = InjectionGuide(HARDENBERG)(LATE)["soi_cad"]
     burns = ignition_delay(WATSON.cylinder, LATE, soi_cad=said).soc_cad
@@ -120,7 +120,7 @@ def test_few_seeds(result: StudyResult) -> None:
 
 
 def test_a_new_curve_is_drawn_after_the_step() -> None:
-    bench = EngineBench(schedule=[(0, MEASURED_AT), (30, LATE)], seed=7)
+    bench = VirtualEngine(schedule=[(0, MEASURED_AT), (30, LATE)], seed=7)
     guide = InjectionGuide(WATSON)
     run = drive(bench, curve_seeker(guide.curve(MEASURED_AT)), 31, curve_at=guide.curve, soc_of=WATSON.soc_of)
     move = guide(LATE)["soi_cad"] - guide(MEASURED_AT)["soi_cad"]

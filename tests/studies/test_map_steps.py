@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ConvergenceError
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd_studies import design_to_map_steps
 from mgdd_studies.design_to_map_engine import AXES, CELLS, ENGINES, LIMITS, OBJECTIVE, ROUGH, Truth, point_of
 from mgdd_studies.design_to_map_steps import (
@@ -44,7 +44,7 @@ def test_the_truth_is_what_the_bench_measures_without_noise() -> None:
     own, timing = Truth.of(OWN, places), np.array([-7.3, -2.45])
     for k, place in enumerate(zip(*places, strict=True)):
         quiet = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
-        bench = EngineBench(OWN, point_of(*place), limits=tuple(LIMITS), **quiet)
+        bench = VirtualEngine(OWN, point_of(*place), limits=tuple(LIMITS), **quiet)
         cycle = bench.step(timing[k])
         assert own.at(timing)[k] == pytest.approx(cycle["j"], abs=2e-3)
         for name in LIMITS:

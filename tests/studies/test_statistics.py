@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Spsa
 from mgdd_studies.statistics import (
     band_variables,
@@ -47,8 +47,8 @@ def test_what_never_arrived_is_left_out() -> None:
 def test_rms_and_bands() -> None:
     assert rms([3.0, 4.0]) == pytest.approx(math.sqrt(12.5))
 
-    def make(seed: int) -> tuple[EngineBench, ExtremumSeeking]:
-        return EngineBench(seed=seed), ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    def make(seed: int) -> tuple[VirtualEngine, ExtremumSeeking]:
+        return VirtualEngine(seed=seed), ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
 
     found = estimates(make, range(11), 120)
     variables = band_variables("x_{}_cad", ("run", "cycle"), [found], "°CA", with_quantiles("x"))
@@ -66,19 +66,19 @@ def test_slope_belongs_to_the_same_trajectory(form: str) -> None:
         return ExtremumSeeking(start=-15.0, lower=-30.0, upper=10.0, form=form, hold_cycles=400)
 
     quiet = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
-    bench, mine = EngineBench(**quiet), seeker()
+    bench, mine = VirtualEngine(**quiet), seeker()
     run = run_with_slope(bench, mine, 300)
-    same = run_seeker(EngineBench(**quiet), seeker(), 300).dataset
+    same = run_seeker(VirtualEngine(**quiet), seeker(), 300).dataset
     np.testing.assert_array_equal(run["j"], same["j"])
     assert (bench.cycle, mine.cycle) == (300, 300)
-    model = EngineBench(**quiet)
+    model = VirtualEngine(**quiet)
     rise = 0.5 * (model.step(-14.0)["j"] - model.step(-16.0)["j"])  # held at -15: the slope is that of the map
     assert float(run["gradient_per_cad"][-1]) == pytest.approx(rise, rel=0.02)
 
 
 def test_loops_are_those_of_the_monte_carlo_over_seeds_alone() -> None:
     seeker = Spsa(start=-12.0, lower=-30.0, upper=10.0)
-    table = loops(EngineBench(), seeker, range(3), cycles=50)
+    table = loops(VirtualEngine(), seeker, range(3), cycles=50)
     assert dict(table.sizes) == {"seed": 3}
-    whole = monte_carlo(EngineBench(), seeker, range(3), cycles=50)
+    whole = monte_carlo(VirtualEngine(), seeker, range(3), cycles=50)
     np.testing.assert_array_equal(table["mean_soc_cad"], whole["mean_soc_cad"][0, 0])

@@ -5,11 +5,11 @@
 
 #include "binding.hpp"
 #include "guarded.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace mgdd::bindings {
 
-using BoundBench = Guarded<loop::EngineBench>;
+using BoundBench = Guarded<loop::VirtualEngine>;
 
 /// One array per measured quantity, by name; `components` and `limits` are tables.
 py::dict bench_columns(const std::vector<loop::BenchCycle>& rows, const loop::BenchSettings& settings);

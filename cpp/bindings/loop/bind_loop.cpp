@@ -182,7 +182,7 @@ void bind_runs(py::module_& m, const std::variant<S...>*) {
 
 void bind_loop(py::module_& m) {
   bind_runs(m, static_cast<const Seeker*>(nullptr));
-  bind_many<EngineBench>(m);
+  bind_many<VirtualEngine>(m);
   bind_many<FunctionPlant>(m);
   m.def(
       "loop_form", [](std::size_t loops) { return std::string(name_of(form_of_loops(loops, LoopForm::automatic))); },

@@ -29,7 +29,7 @@ void require_same_limits(const std::string& plant, const std::vector<std::string
 
 }  // namespace
 
-void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
+void require_match(const VirtualEngine& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits) {
   const std::vector<BenchInput>& inputs = bench.settings().inputs;
   if (static_cast<std::size_t>(estimate.size()) != inputs.size()) {

@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "mgdd/common/parallel.hpp"
-#include "mgdd/loop/engine_bench_lanes.hpp"
+#include "mgdd/loop/virtual_engine_lanes.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -90,7 +90,7 @@ void run_alone(const MonteCarloPlanOf<Plant>& plan, std::size_t number, StopRequ
   Loop loop(plan, number);
   Plant bench = loop.bench(plan);
   constexpr std::int64_t looks =
-      std::is_same_v<Plant, EngineBench> ? cycles_between_looks : 1;  // a function may be slow
+      std::is_same_v<Plant, VirtualEngine> ? cycles_between_looks : 1;  // a function may be slow
   std::visit(
       [&](auto& seeker) {
         for (std::int64_t k = 0; k < plan.cycles; ++k) {
@@ -111,15 +111,15 @@ struct LoopRange {
 void run_side_by_side(const MonteCarloPlan& plan, const LoopRange& range, StopRequest& stopped,
                       std::vector<LoopSummary>& out) {
   std::vector<Loop> loops;
-  std::vector<EngineBench> benches;
+  std::vector<VirtualEngine> benches;
   for (std::size_t number = range.first; number < range.last; ++number) {
     loops.emplace_back(plan, number);
     benches.push_back(loops.back().bench(plan));
   }
-  EngineBenchLanes lanes(std::move(benches));
+  VirtualEngineLanes lanes(std::move(benches));
   std::vector<double> soc_cad(loops.size()), estimate_cad(loops.size());
   std::vector<BenchCycle> cycles(loops.size());
-  constexpr auto looks = cycles_between_looks / static_cast<std::int64_t>(EngineBenchLanes::width);
+  constexpr auto looks = cycles_between_looks / static_cast<std::int64_t>(VirtualEngineLanes::width);
   for (std::int64_t k = 0; k < plan.cycles; ++k) {
     if (k % looks == 0 && stopped()) return;
     for (std::size_t i = 0; i < loops.size(); ++i) {
@@ -142,13 +142,13 @@ std::vector<LoopRange> groups_of(const MonteCarloPlan& plan, LoopForm form) {
   const std::size_t threads = thread_count(n, static_cast<std::size_t>(plan.threads));
   std::vector<LoopRange> groups;
   for (std::size_t bench = 0; bench < plan.benches.size();) {
-    const EngineBench& one = plan.benches[bench];
+    const VirtualEngine& one = plan.benches[bench];
     std::size_t end = bench + 1;
     while (end < plan.benches.size() && side_by_side(plan.benches[end], one))
       ++end;
     const bool lanes = form == LoopForm::lanes && side_by_side(one, one);
     const std::size_t first = bench * each, count = (end - bench) * each;
-    const std::size_t full = (count + EngineBenchLanes::width - 1) / EngineBenchLanes::width;
+    const std::size_t full = (count + VirtualEngineLanes::width - 1) / VirtualEngineLanes::width;
     const std::size_t parts = lanes ? std::min(count, (full + threads - 1) / threads * threads) : count;
     for (std::size_t part = 0; part < parts; ++part)
       groups.push_back({first + part * count / parts, first + (part + 1) * count / parts, lanes});
@@ -180,7 +180,7 @@ LoopForm form_of_loops(std::size_t loops, LoopForm wanted) {
     throw ParameterError("form", name_of(wanted), "must be automatic, single or lanes");
   }
   if (wanted != LoopForm::automatic) return wanted;
-  return loops >= EngineBenchLanes::width ? LoopForm::lanes : LoopForm::single;
+  return loops >= VirtualEngineLanes::width ? LoopForm::lanes : LoopForm::single;
 }
 
 MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<bool()>& stop) {

@@ -23,8 +23,8 @@ from mgdd.cli.options import (
     refuse_idle,
 )
 from mgdd.cli.output import check_file, emit, error_of, lines, warn, wrote
-from mgdd.engine import Cylinder, OperatingPoint, Trust, analyze, trust
-from mgdd.engine.trust import Check
+from mgdd.engine import Cylinder, OperatingPoint, PressureCheck, analyze, check_pressure
+from mgdd.engine.pressure_check import Check
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import estimate_tdc
 from mgdd.io.pressure import mean_cycle
@@ -46,7 +46,7 @@ _ANALYSIS = Options(
     "knock_band_hz", "knock_window_cad", "knock_threshold_bar", gamma="analysis_gamma", n_cylinders="cylinders",
 )  # fmt: skip
 _BRAKE = Options(analyze, "bmep_bar", "brake_torque_nm")
-_CHECKED = Options(trust, "pegging", "pegging_exponent", "inlet_pressure_kpa", "bmep_bar", "brake_torque_nm",
+_CHECKED = Options(check_pressure, "pegging", "pegging_exponent", "inlet_pressure_kpa", "bmep_bar", "brake_torque_nm",
                    n_cylinders="cylinders")  # fmt: skip
 _REFUSED = 2  # exit code where a file is refused
 # Columns of a record: what stands before and after the name of a figure.
@@ -114,11 +114,11 @@ def _analyze(args: argparse.Namespace) -> None:
             checked = None
             if args.report:
                 own_checks = {"assumed": assumed, "fuel_mg": fuel_mg, **_CHECKED.given(args)}
-                checked = trust(trace, cylinder, point=point, **own_checks)
+                checked = check_pressure(trace, cylinder, point=point, **own_checks)
         except DataError as error:  # one that is refused does not stop the others
             if not several and args.report is None:
                 raise
-            result, checked = None, Trust(Path(file).name, (Check("file", "fail", str(error)),))
+            result, checked = None, PressureCheck(Path(file).name, (Check("file", "fail", str(error)),))
             payload = {"file": checked.file, "error": error_of(error, str(error))}
             text = [f"{checked.file}: refused: {error}"]
             _LOG.error("%s", error)
@@ -187,7 +187,7 @@ def _drawn(trace: xr.Dataset, cylinder: Cylinder, point: OperatingPoint, given: 
     return analyze(trace.isel(cycle=slice(None, None, every)), cylinder, point=point, quiet=True, **given)
 
 
-def _verdict(report: Trust) -> str:
+def _verdict(report: PressureCheck) -> str:
     """Name the worst of a file's checks."""
     worst = ", ".join(check.name for check in report.checks if check.verdict == report.verdict)
     return report.title + (f" ({worst})" if report.verdict in ("doubt", "fail") else "")
@@ -261,7 +261,7 @@ def _check_analysis(args: argparse.Namespace) -> None:
         raise ParameterError("--cylinders acts with --brake-torque-nm only: give it")
 
 
-_STATED = Options(trust, "bmep_bar", "brake_torque_nm", n_cylinders="cylinders")
+_STATED = Options(check_pressure, "bmep_bar", "brake_torque_nm", n_cylinders="cylinders")
 
 
 def _add_check(parser: Any) -> None:
@@ -278,11 +278,11 @@ def _check(args: argparse.Namespace) -> None:
     given = PEGGING.given(args) | _STATED.given(args) | {"fuel_mg": point_given(args).get("fuel_mg")}
     assumed = assumed_geometry(args)
 
-    def report(file: str, read: Callable[[], xr.Dataset]) -> Trust:
+    def report(file: str, read: Callable[[], xr.Dataset]) -> PressureCheck:
         try:
-            return trust(read(), cylinder, point=point, assumed=assumed, **given)
+            return check_pressure(read(), cylinder, point=point, assumed=assumed, **given)
         except DataError as error:
-            return Trust(Path(file).name, (Check("file", "fail", str(error)),))
+            return PressureCheck(Path(file).name, (Check("file", "fail", str(error)),))
 
     reports = [report(file, read) for file, read in readers_of(args).items()]
     payload = {

@@ -22,7 +22,7 @@ from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table
 from mgdd.io.files import existing_file
 from mgdd.io.parameters import ParameterFile
-from mgdd.loop import EngineBench
+from mgdd.loop import VirtualEngine
 from mgdd.loop.engine_guide import KINDS, EngineGuide
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def check_guide(args: argparse.Namespace) -> None:
         refuse_idle(args, "guide_map_out", why=why)
 
 
-def guide_of(args: argparse.Namespace, bench: EngineBench) -> TimingMap | EngineGuide | None:
+def guide_of(args: argparse.Namespace, bench: VirtualEngine) -> TimingMap | EngineGuide | None:
     """Give the guide of a search on this bench, whose cylinder the model has unless another is named."""
     if args.guide == "none":
         return None

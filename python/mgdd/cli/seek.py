@@ -23,7 +23,7 @@ from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError, hinted
 from mgdd.guide import GuidedEngine, TimingMap
 from mgdd.io.point_table import read_points
-from mgdd.loop import EngineBench, seek
+from mgdd.loop import VirtualEngine, seek
 from mgdd.loop.lower_limits import plain_name
 from mgdd.loop.seek_choice import SEEKERS
 from mgdd.loop.seek_result import SeekResult
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _BENCH = Options(
-    EngineBench, "soc_scatter_cad", "seed", efficiency_noise_percent="noise", misfire_probability="misfire"
+    VirtualEngine, "soc_scatter_cad", "seed", efficiency_noise_percent="noise", misfire_probability="misfire"
 )  # fmt: skip
 _SEARCH = Options(seek, "cycles", "noise_sd")
 _BOUNDS_CAD = (-30.0, 10.0)  # of the timing, where nobody says
@@ -116,7 +116,7 @@ def _seek(args: argparse.Namespace) -> None:
         raise Stopped(f"{run.dataset.sizes['cycle']} cycles are kept")
 
 
-def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[EngineBench, str]:
+def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[VirtualEngine, str]:
     for name in inputs:
         if name not in bench_inputs:
             raise ParameterError(hinted(f"--input {name}: the bench has {', '.join(bench_inputs)}", name, bench_inputs))
@@ -124,7 +124,7 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[
     if not point.fuel_mg > 0.0:
         raise ParameterError("fuel_mg = 0: nothing burns, so a best timing does not exist; leave --motored out")
     nox = args.sensor != "none"
-    bench = EngineBench(
+    bench = VirtualEngine(
         cylinder,
         point,
         performance=Performance.efficiency_and_nox() if nox else Performance.efficiency_only(),
@@ -142,7 +142,7 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, Any], inputs: Mapping[
     return bench, preset.name
 
 
-def _lags(bench: EngineBench) -> list[ComponentLag] | None:
+def _lags(bench: VirtualEngine) -> list[ComponentLag] | None:
     """Say what stands between the plant and each component of J: the data sheet of the analyser."""
     if bench.settings["nox_sensor"] != "analyser":
         return None
@@ -151,7 +151,7 @@ def _lags(bench: EngineBench) -> list[ComponentLag] | None:
     return [ComponentLag(), ComponentLag(delay_cycles=float(bench.analyser_delay_cycles), lag_cycles=lag)]
 
 
-def _judged(bench: EngineBench, best: Optimum, found: SeekResult) -> dict[str, Any]:
+def _judged(bench: VirtualEngine, best: Optimum, found: SeekResult) -> dict[str, Any]:
     """Judge by the noise-free bench, which the search does not know."""
     steady = bench.steady_map({name: [value] for name, value in found.inputs.items()}, cycle=max(bench.cycle - 1, 0))
     names, aim = list(best.inputs), np.array(list(best.inputs.values()))

@@ -12,9 +12,9 @@ from mgdd.engine.ignition import ignition_delay
 from mgdd.engine.indicating import Indicating
 from mgdd.engine.nox import fit_nox_proxy, nox_at_reference_humidity, nox_g_per_kwh
 from mgdd.engine.optimum import find_optimum
+from mgdd.engine.pressure_check import PressureCheck, check_pressure
 from mgdd.engine.thermal_no import ThermalNo
 from mgdd.engine.trace import analyze
-from mgdd.engine.trust import Trust, trust
 
 __all__ = [
     "Cylinder",
@@ -24,10 +24,11 @@ __all__ = [
     "OperatingPoint",
     "Performance",
     "PerformanceTerm",
+    "PressureCheck",
     "SoftSensor",
     "ThermalNo",
-    "Trust",
     "analyze",
+    "check_pressure",
     "find_optimum",
     "fit_nox_proxy",
     "ignition_delay",
@@ -36,7 +37,6 @@ __all__ = [
     "sensitivities",
     "simulate",
     "timing_sweep",
-    "trust",
 ]
 
 _furnish(__name__)

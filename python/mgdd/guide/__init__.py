@@ -11,11 +11,11 @@ Examples
 --------
 >>> from mgdd.engine import Cylinder, OperatingPoint
 >>> from mgdd.guide import CurveSeeking, ModelOptimum
->>> from mgdd.loop import EngineBench
+>>> from mgdd.loop import VirtualEngine
 >>> rough = ModelOptimum(Cylinder(wall_heat_scale=1.0))  # twice the wall heat of the bench
 >>> curve = rough.curve(OperatingPoint())
 >>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
->>> bench = EngineBench(seed=3)
+>>> bench = VirtualEngine(seed=3)
 >>> for _ in range(40):
 ...     seeker.tell(bench.step(seeker.ask()[0])["j"])
 >>> round(curve.best, 1), abs(seeker.estimate[0] - bench.find_optimum()["soc_cad"]) < 1.5

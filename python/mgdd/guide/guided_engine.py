@@ -68,8 +68,8 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
     --------
     >>> from mgdd.engine import Cylinder
     >>> from mgdd.guide import CurveSeeking, GuidedEngine, ModelOptimum, OnlineCalibration
-    >>> from mgdd.loop import EngineBench, run_seeker
-    >>> bench = EngineBench(seed=2)  # its wall heat is 0.5
+    >>> from mgdd.loop import VirtualEngine, run_seeker
+    >>> bench = VirtualEngine(seed=2)  # its wall heat is 0.5
     >>> rough = Cylinder(wall_heat_scale=1.0)
     >>> model = ModelOptimum(rough)
     >>> curve = model.curve(bench.point)

@@ -109,8 +109,8 @@ class OnlineCalibration:
     --------
     >>> from mgdd.engine import Cylinder
     >>> from mgdd.guide import OnlineCalibration
-    >>> from mgdd.loop import EngineBench
-    >>> bench = EngineBench(pressure_noise_bar=0.05)  # its wall heat is 0.5
+    >>> from mgdd.loop import VirtualEngine
+    >>> bench = VirtualEngine(pressure_noise_bar=0.05)  # its wall heat is 0.5
     >>> known = {"charge_temperature_offset_k": 2.0, "wall_temperature_offset_k": 10.0, "compression_ratio_offset": 0.0}
     >>> calibration = OnlineCalibration(Cylinder(wall_heat_scale=1.0), uncertainty=known)
     >>> for _ in range(40):

@@ -1,9 +1,9 @@
 """Closed loops: plants behind one protocol, a seeker on any of them, and thousands of runs on the virtual bench.
 
-`EngineBench`, `SurrogatePlant`, `VirtualThrottle` and `FunctionPlant`, a function of your own, are plants: ``apply``
+`VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and `FunctionPlant`, a function of your own, are plants: ``apply``
 inputs by name, ``measure``. `run_seeker` closes the loop on any of them and on a test rig, `monte_carlo` does so for
 seeds, gains and operating points of the bench, or on a compiled function, on all cores or an executor,
-`EngineBench.find_optimum` says where a seeker should end. `track` and `track_many` run controllers of the throttle
+`VirtualEngine.find_optimum` says where a seeker should end. `track` and `track_many` run controllers of the throttle
 along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's torque.
 """
 
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from mgdd._core.loop import SensorDynamics
 from mgdd._rooms import furnish as _furnish
-from mgdd.loop.bench import EngineBench
 from mgdd.loop.closed_loop import run_seeker
 from mgdd.loop.drive import simulate_drive
 from mgdd.loop.engine_guide import EngineGuide
@@ -27,13 +26,31 @@ from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.track import track
 from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
+from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.throttle.faults import ThrottleFault
 
 __all__ = [
-    "EngineBench", "EngineGuide", "FunctionPlant", "LoopCriteria", "Measurement", "Plant", "Reference",
-    "SensorDynamics", "SurrogatePlant", "ThrottleFault", "VirtualThrottle", "monte_carlo", "run_seeker", "seek",
-    "seek_front", "simulate_drive", "track", "track_many", "tune_controller", "tuned_controller",
+    "EngineGuide",
+    "FunctionPlant",
+    "LoopCriteria",
+    "Measurement",
+    "Plant",
+    "Reference",
+    "SensorDynamics",
+    "SurrogatePlant",
+    "ThrottleFault",
+    "VirtualEngine",
+    "VirtualThrottle",
+    "monte_carlo",
+    "run_seeker",
+    "seek",
+    "seek_front",
+    "simulate_drive",
+    "track",
+    "track_many",
+    "tune_controller",
+    "tuned_controller",
 ]  # fmt: skip
 
 _furnish(__name__)

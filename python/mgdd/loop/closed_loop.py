@@ -10,10 +10,10 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, argument
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.loop.bench import EngineBench
 from mgdd.loop.plant_loop import LoopRun, require_inputs_of, steer
 from mgdd.loop.plant_record import VOID, cycles_to_dataset, steered
 from mgdd.loop.summary import NOISE_FREE, LoopCriteria, limit_figures, of_first_input, summarize_cycles, with_a_limit
+from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.optimize import Seeker
 from mgdd.optimize.inputs import named_values
 from mgdd.optimize.seeker_findings import findings_of
@@ -35,7 +35,7 @@ def run_seeker(
     Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is reported as such. A new operating
     point restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after
     the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither
-    point and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` of
+    point and counts as void. Both go on from where they stand: calling again continues. On an `VirtualEngine` of
     one input, and on a compiled `FunctionPlant`, the loop runs in the core without the GIL where a seeker of
     `mgdd.optimize` or a `CurveSeeking` has the inputs and limits of the plant in their order; one ask and tell at a
     time from Python gives the same trajectory, bit for bit.
@@ -73,16 +73,16 @@ def run_seeker(
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+    >>> from mgdd.loop import VirtualEngine, LoopCriteria, run_seeker
     >>> from mgdd.optimize import ExtremumSeeking
     >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
-    >>> run = run_seeker(EngineBench(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
+    >>> run = run_seeker(VirtualEngine(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
     >>> run.summary["cycles_to"] < 400
     True
     """
     criteria = criteria or LoopCriteria()
     if (
-        not isinstance(plant, EngineBench)
+        not isinstance(plant, VirtualEngine)
         or len(plant.input_names) > 1
         or not isinstance(seeker, Seeker)
         or tuple(seeker.limit_names) != plant.limit_names  # the core wants the same

@@ -48,9 +48,9 @@ class EngineGuide:
     Examples
     --------
     >>> from mgdd.engine import Cylinder
-    >>> from mgdd.loop import EngineBench, EngineGuide, seek
+    >>> from mgdd.loop import VirtualEngine, EngineGuide, seek
     >>> rough = EngineGuide(cylinder=Cylinder(wall_heat_scale=1.0))
-    >>> found = seek(EngineBench(seed=1), {"soc_cad": (-20.0, 5.0)}, guide=rough, cycles=80)
+    >>> found = seek(VirtualEngine(seed=1), {"soc_cad": (-20.0, 5.0)}, guide=rough, cycles=80)
     >>> abs(found.inputs["soc_cad"] + 5.63) < 1.0
     True
     """

@@ -13,10 +13,10 @@ from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.guide.feed_forward import Said, answers_along
-from mgdd.loop.bench import EngineBench
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.plant_loop import require_inputs_of, require_point_for
 from mgdd.loop.summary import FIGURES_OF_INPUT, LoopCriteria, limit_label, of_first_input, with_a_limit
+from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.parallel.chunks import pieces, run_chunks
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import Seeker
 
-    _Plant = EngineBench | FunctionPlant
+    _Plant = VirtualEngine | FunctionPlant
     _Seeker = Seeker | FeedForward | GuidedEngine
     _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
 
@@ -68,7 +68,7 @@ def monte_carlo(
 
     Parameters
     ----------
-    benches : EngineBench, FunctionPlant or sequence
+    benches : VirtualEngine, FunctionPlant or sequence
         Plants, for example several operating points; read, not advanced. Either benches, or compiled functions, which
         run from cycle 0 with the seed of the loop; several threads call one function at once, and no other process
         does.
@@ -104,14 +104,14 @@ def monte_carlo(
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, LoopCriteria, monte_carlo
+    >>> from mgdd.loop import VirtualEngine, LoopCriteria, monte_carlo
     >>> from mgdd.optimize import ExtremumSeeking
     >>> gains = [ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=g) for g in (0.5, 1.0)]
-    >>> table = monte_carlo(EngineBench(), gains, range(4), cycles=400, criteria=LoopCriteria(optimum=-5.63))
+    >>> table = monte_carlo(VirtualEngine(), gains, range(4), cycles=400, criteria=LoopCriteria(optimum=-5.63))
     >>> dict(table.sizes)
     {'bench': 1, 'seeker': 2, 'seed': 4}
     """
-    bench_list = [benches] if isinstance(benches, EngineBench | FunctionPlant) else list(benches)
+    bench_list = [benches] if isinstance(benches, VirtualEngine | FunctionPlant) else list(benches)
     seeker_list = list(seekers) if isinstance(seekers, Sequence) else [seekers]
     seed_list = _whole_seeds(seeds)
     for seed in seed_list:
@@ -230,7 +230,7 @@ def _functions_of(plants: Sequence[_Plant]) -> list[FunctionPlant]:
     """Give the compiled functions, none of benches; ParameterError for a mixture, and for a function in Python."""
     functions = [plant for plant in plants if isinstance(plant, FunctionPlant)]
     if functions and len(functions) < len(plants):
-        raise ParameterError("benches: EngineBench and FunctionPlant were both given: run them one after the other")
+        raise ParameterError("benches: VirtualEngine and FunctionPlant were both given: run them one after the other")
     for plant in functions:
         if not plant.compiled:
             raise ParameterError(f"benches: {plant!r}: must be compiled and give J; run_seeker runs others")
@@ -241,7 +241,7 @@ def _functions_of(plants: Sequence[_Plant]) -> list[FunctionPlant]:
 
 def _answers(plant: _Plant, seeker: _Seeker, cycles: int) -> list[Said]:
     require_point_for(plant, seeker)
-    if isinstance(seeker, FeedForward) and isinstance(plant, EngineBench):
+    if isinstance(seeker, FeedForward) and isinstance(plant, VirtualEngine):
         return answers_along(seeker, plant.settings["schedule"], cycles)
     return []
 

@@ -66,13 +66,13 @@ class Measurement:
 class Plant(Protocol):
     """Takes inputs by name, gives back what was measured.
 
-    `EngineBench`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; a class of your own with
+    `VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; a class of your own with
     these members is one too.
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, Plant
-    >>> bench = EngineBench(seed=1)
+    >>> from mgdd.loop import VirtualEngine, Plant
+    >>> bench = VirtualEngine(seed=1)
     >>> isinstance(bench, Plant), bench.input_names
     (True, ('soc_cad',))
     >>> bench.apply({"soc_cad": -6.0})

@@ -144,7 +144,7 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     if not isinstance(plant, Plant):
         raise ParameterError(
             f"plant = {plant!r}: must have input_names, limit_names, apply() and measure(), as "
-            "EngineBench('puma_single') has"
+            "VirtualEngine('puma_single') has"
         )
     require_inputs_of(plant, seeker)
     if seeker.estimate.size != len(plant.input_names):

@@ -32,7 +32,7 @@ OWN_LABELS = {"egr": ("-", "recirculated exhaust gas, share of the charge's mass
 
 
 def cycles_to_dataset(
-    bench: _core.loop.EngineBench,
+    bench: _core.loop.VirtualEngine,
     columns: dict[str, Any],
     *,
     noise_free_limits: NDArray[np.float64] | None = None,

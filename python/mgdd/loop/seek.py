@@ -203,7 +203,7 @@ def plant_of(plant: Any, inputs: Sequence[Input], limits: Sequence[Limit], value
     if callable(plant):
         return FunctionPlant(plant, names, held, values=tuple(values))
     raise ParameterError(
-        f"plant = {plant!r}: must be a Plant, as EngineBench('puma_single'), or a function of the inputs by name"
+        f"plant = {plant!r}: must be a Plant, as VirtualEngine('puma_single'), or a function of the inputs by name"
     )
 
 

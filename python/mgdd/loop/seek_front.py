@@ -97,8 +97,8 @@ def seek_front(
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, seek_front
-    >>> bench = EngineBench(seed=1)
+    >>> from mgdd.loop import VirtualEngine, seek_front
+    >>> bench = VirtualEngine(seed=1)
     >>> wanted = {"efficiency_gross": "max", "nox_soft_ppm": "min"}
     >>> front = seek_front(bench, {"soc_cad": (-15.0, 5.0)}, wanted, cycles=80)
     >>> ends = front.dataset["inputs"].sel(input="soc_cad")[[0, -1]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core.loop import EngineBench, bench_limits
+from mgdd._core.loop import VirtualEngine, bench_limits
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError, hinted
 from mgdd.loop.lower_limits import both_sides, measured_names, plain_name
@@ -43,7 +43,7 @@ def split_inputs(names: Sequence[str], inputs: Any, missing: Any) -> tuple[Any, 
     return first, further
 
 
-def steady_map(quiet: EngineBench, inputs: ArrayLike | Mapping[str, ArrayLike]) -> xr.Dataset:
+def steady_map(quiet: VirtualEngine, inputs: ArrayLike | Mapping[str, ArrayLike]) -> xr.Dataset:
     """Measure a bench that shows nothing random or slow, each sensor settled, over the grid of these values."""
     names = tuple(quiet.input_bounds)
     split_inputs(names, inputs, None)
@@ -82,7 +82,7 @@ def limits_to_keep(limits: Any) -> tuple[Limit, ...]:
 
 
 def find_optimum(
-    quiet: EngineBench, kept: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
+    quiet: VirtualEngine, kept: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
 ) -> Optimum:
     """Find the best inputs of such a bench, whose limits are those to keep, and what this scatter of SOC would do."""
     windows = quiet.input_bounds
@@ -117,7 +117,7 @@ def find_optimum(
 
 
 def _best_timing(
-    quiet: EngineBench, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+    quiet: VirtualEngine, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[Point, Point, float]:
     """Give the best timing, that without limits, and the bend of J there."""
     from scipy.optimize import brentq, minimize_scalar
@@ -152,7 +152,7 @@ def _best_timing(
 
 
 def _best_of_several(
-    quiet: EngineBench, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+    quiet: VirtualEngine, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[Point, Point, float]:
     """Give the best inputs and those without limits: a grid, then SLSQP from its best points."""
     low, span = np.array([b[0] for b in bounds.values()]), np.array([b[1] - b[0] for b in bounds.values()])
@@ -199,7 +199,7 @@ def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float
     return np.asarray(max(ends, key=worth))
 
 
-def _settled(quiet: EngineBench, inputs: Point) -> dict[str, Any]:
+def _settled(quiet: VirtualEngine, inputs: Point) -> dict[str, Any]:
     """Measure one cycle from rest: every sensor stands at its steady value."""
     quiet.reset()
     first, *further = map(float, inputs)
@@ -217,7 +217,7 @@ def _sides(limited: Mapping[str, float], caps: Mapping[str, float]) -> dict[str,
     return {cap: side * limited[name] for cap in caps for name, side in [plain_name(cap)]}
 
 
-def _limited(quiet: EngineBench, inputs: Point) -> dict[str, float]:
+def _limited(quiet: VirtualEngine, inputs: Point) -> dict[str, float]:
     """Give the limited quantities, the true NOx for every sensor."""
     quiet.reset()
     first, *further = map(float, inputs)

@@ -69,9 +69,9 @@ def seeking(
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> from mgdd.loop import VirtualEngine, run_seeker
     >>> from mgdd.optimize import ExtremumSeeking
-    >>> run = run_seeker(EngineBench(nox_sensor="none"), ExtremumSeeking(start=-16.0), 60).dataset
+    >>> run = run_seeker(VirtualEngine(nox_sensor="none"), ExtremumSeeking(start=-16.0), 60).dataset
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
     ['soc_cad [°CA aTDC]', 'J [unit of J]']
     """

@@ -56,17 +56,17 @@ def sensors(readings: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.loop import EngineBench
-    >>> plot.sensors(EngineBench(seed=1).run([-6.0] * 20)).get_ylabel()
+    >>> from mgdd.loop import VirtualEngine
+    >>> plot.sensors(VirtualEngine(seed=1).run([-6.0] * 20)).get_ylabel()
     'NOx [ppm]'
     """
-    readings = require("readings", readings, ("nox_true_ppm",), "mgdd.loop.EngineBench.run", tuple(_SENSORS))
+    readings = require("readings", readings, ("nox_true_ppm",), "mgdd.loop.VirtualEngine.run", tuple(_SENSORS))
     names = [name for name in _SENSORS if name in readings]
     dims = readings["nox_true_ppm"].dims
     if len(dims) != 1 or dims[0] not in _OVER:
         raise DataError(f"nox_true_ppm has dimensions {dims}: must be one of {', '.join(_OVER)}")
     over = str(dims[0])
-    require("readings", readings, (over,), "mgdd.loop.EngineBench.run")
+    require("readings", readings, (over,), "mgdd.loop.VirtualEngine.run")
     ax = new_axes(ax)
     lines: list[Artist] = []
     for name in names:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mgdd.engine import Trust
+    from mgdd.engine import PressureCheck
 
 __all__ = ["DRAWN_CYCLES", "record_section"]
 
@@ -33,12 +33,12 @@ _SIZE, _TALL, _WIDE = (6.6, 3.8), (6.6, 4.4), (8.4, 4.2)
 _BURN = (-40.0, 100.0)  # °CA aTDC
 
 
-def record_section(report: Trust, figures: xr.Dataset | None, traces: xr.Dataset | None = None) -> Section:
+def record_section(report: PressureCheck, figures: xr.Dataset | None, traces: xr.Dataset | None = None) -> Section:
     """Make the section of one file.
 
     Parameters
     ----------
-    report : Trust
+    report : PressureCheck
         Its checks.
     figures : xarray.Dataset, optional
         Of `mgdd.engine.analyze`; None where it refused the file.

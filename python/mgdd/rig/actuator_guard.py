@@ -27,9 +27,9 @@ class GuardedAsk(NamedTuple):
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.loop import VirtualEngine
     >>> from mgdd.rig import ActuatorGuard
-    >>> guard = ActuatorGuard(EngineBench(), start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)})
+    >>> guard = ActuatorGuard(VirtualEngine(), start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)})
     >>> guard.apply({"soc_cad": -40.0})
     >>> guard.log
     [GuardedAsk(cycle=0, reason='bounds', name='soc_cad', asked={'soc_cad': -40.0}, applied={'soc_cad': 0.0})]
@@ -74,10 +74,10 @@ class ActuatorGuard(AroundPlant):
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> from mgdd.loop import VirtualEngine, run_seeker
     >>> from mgdd.optimize import ExtremumSeeking, Limit
     >>> from mgdd.rig import ActuatorGuard
-    >>> bench = EngineBench(limits=["p_max_bar"], seed=1)
+    >>> bench = VirtualEngine(limits=["p_max_bar"], seed=1)
     >>> guard = ActuatorGuard(
     ...     bench, start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)}, limits=[Limit("p_max_bar", 80.0)]
     ... )

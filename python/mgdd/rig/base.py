@@ -20,10 +20,10 @@ class Rig(Plant, Protocol):
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.loop import VirtualEngine
     >>> from mgdd.rig.base import Rig
     >>> from mgdd.rig import SimulatedRig
-    >>> isinstance(SimulatedRig(EngineBench()), Rig), isinstance(EngineBench(), Rig)
+    >>> isinstance(SimulatedRig(VirtualEngine()), Rig), isinstance(VirtualEngine(), Rig)
     (True, False)
     """
 
@@ -92,9 +92,9 @@ class SimulatedRig(AroundPlant, OpenOnce):
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.loop import VirtualEngine
     >>> from mgdd.rig import SimulatedRig
-    >>> with SimulatedRig(EngineBench(limits=["p_max_bar"])) as rig:
+    >>> with SimulatedRig(VirtualEngine(limits=["p_max_bar"])) as rig:
     ...     rig.apply({"soc_cad": -6.0})
     ...     measured = rig.measure()
     >>> sorted(measured.limits), measured.misfire

@@ -43,10 +43,10 @@ class RigRecord:
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.loop import VirtualEngine
     >>> from mgdd.rig import RecordingRig, SimulatedRig
     >>> from mgdd.rig.exchange import RigRecord
-    >>> with RecordingRig(SimulatedRig(EngineBench())) as rig:
+    >>> with RecordingRig(SimulatedRig(VirtualEngine())) as rig:
     ...     rig.apply({"soc_cad": -6.0})
     ...     measured = rig.measure()
     >>> record = RigRecord.from_columns(*rig.record.to_columns())

@@ -29,7 +29,7 @@ constexpr CalibrationMethod every_method[] = {CalibrationMethod::extremum_seekin
 TEST(OnlineCalibration, EveryMethodFindsTheWallHeatOfACleanEngine) {
   for (const CalibrationMethod method : every_method) {
     for (const double start : {1.0, 0.25, 2.0}) {
-      loop::EngineBench bench(steady_bench());
+      loop::VirtualEngine bench(steady_bench());
       OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method, start)));
       run(bench, calibration, 120);
       EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.01) << name_of(method) << " from " << start;
@@ -44,7 +44,7 @@ TEST(OnlineCalibration, EveryMethodFindsTheWallHeatOfACleanEngine) {
 
 // Acceptance fact 32: theta -6, closed cycle, gain from J'': 0.5 from 1.0 to 2 % within 150 trials, noise-free.
 TEST(OnlineCalibration, ExtremumSeekingArrivesWithinAHundredAndFiftyTrials) {
-  loop::EngineBench bench(steady_bench());
+  loop::VirtualEngine bench(steady_bench());
   OnlineCalibrationSettings s = sure_of_the_rest(wrong_guide(CalibrationMethod::extremum_seeking));
   s.trials_per_update = 1;
   OnlineCalibration calibration(s);
@@ -66,7 +66,7 @@ TEST(OnlineCalibration, AWrongTimingShiftsAWallHeatThatIsFittedAlone) {
   } known[] = {{-6.0, 0.075}, {-10.0, 0.053}, {0.0, 0.114}};
   for (const auto& [soc, shift] : known) {
     for (const double error : {0.5, -0.5}) {
-      loop::EngineBench bench(steady_bench());
+      loop::VirtualEngine bench(steady_bench());
       OnlineCalibration calibration(sure_of_the_rest(wrong_guide(CalibrationMethod::gauss_newton)));
       run(bench, calibration, 40, soc, error);
       EXPECT_NEAR(calibration.parameters()[wall] - 0.5, error > 0.0 ? -shift : shift, 0.02) << soc << " " << error;
@@ -77,7 +77,7 @@ TEST(OnlineCalibration, AWrongTimingShiftsAWallHeatThatIsFittedAlone) {
 TEST(OnlineCalibration, WhatIsKnownBeforehandLeavesRoomForAWrongTiming) {
   for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
     for (const double error : {0.5, -0.5}) {
-      loop::EngineBench bench(steady_bench(0.1));
+      loop::VirtualEngine bench(steady_bench(0.1));
       OnlineCalibration calibration(wrong_guide(method));
       run(bench, calibration, 60, -6.0, error);
       EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.025) << name_of(method) << " " << error;
@@ -99,7 +99,7 @@ TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
     for (const double noise : {0.02, 0.1, 0.5}) {
       for (const auto& s : {with(0.5, 0.0, 0.0, noise), with(-0.5, 0.0, 0.0, noise), with(0.0, 0.01, 0.0, noise),
                             with(0.0, -0.01, 0.0, noise), with(0.0, 0.0, 0.1, noise), with(0.3, 0.005, -0.1, noise)}) {
-        loop::EngineBench bench(s);
+        loop::VirtualEngine bench(s);
         OnlineCalibration calibration(sure_of_the_engine(wrong_guide(method)));
         run(bench, calibration, 150);
         const double bias = calibration.parameters()[wall] / 0.5 - 1.0;
@@ -116,7 +116,7 @@ TEST(OnlineCalibration, ErrorsOfTheSensorAreSeenOrSaid) {
 }
 
 TEST(OnlineCalibration, ExtremumSeekingSaysWhatItCannotKnow) {
-  loop::EngineBench bench(steady_bench(0.1));
+  loop::VirtualEngine bench(steady_bench(0.1));
   OnlineCalibration calibration(wrong_guide(CalibrationMethod::extremum_seeking));
   run(bench, calibration, 100);
   EXPECT_FALSE(calibration.determined());
@@ -134,7 +134,7 @@ TEST(OnlineCalibration, AModelOfAnotherShapeIsNotBelieved) {
         s.cylinder.burn.burn_shape = engine::BurnShape::double_wiebe;
         s.cylinder.wall_heat.wall_heat_scale = 0.0;
       }
-      loop::EngineBench bench(s);
+      loop::VirtualEngine bench(s);
       OnlineCalibration calibration(wrong_guide(method));
       run(bench, calibration, 150);
       EXPECT_FALSE(calibration.determined()) << name_of(method) << kind << " " << calibration.explain(wall);
@@ -163,7 +163,7 @@ Coverage coverage_of(CalibrationMethod method, double noise_bar, double correlat
     s.cylinder.geometry.compression_ratio += 0.1 * drawn(7);
     s.cylinder.wall_heat.wall_temperature_k += 70.0 * drawn(8);
     s.schedule[0].point.intake_temperature_k += 10.0 * drawn(9);
-    loop::EngineBench bench(s);
+    loop::VirtualEngine bench(s);
     OnlineCalibration calibration(wrong_guide(method, 0.8));
     std::vector<double> shown;
     for (int k = 0; k < cycles; ++k) {
@@ -212,7 +212,7 @@ TEST(OnlineCalibration, WhatBelongsToAPointIsForgottenWithIt) {
   low.burn_duration_cad = 31.0;
   high.burn_duration_cad = 33.5;
   s.schedule = {{0, low}, {150, high}};
-  loop::EngineBench bench(s);
+  loop::VirtualEngine bench(s);
   OnlineCalibration calibration(wrong_guide(CalibrationMethod::recursive));
   const auto drive = [&](int cycles, double fuel, double duration) {
     engine::OperatingPoint told;
@@ -242,7 +242,7 @@ TEST(OnlineCalibration, WhatBelongsToAPointIsForgottenWithIt) {
 TEST(OnlineCalibration, AtABoundTheOthersStandAsIfItWereKnown) {
   loop::BenchSettings s = steady_bench();
   s.cylinder.wall_heat.wall_heat_scale = 0.12;
-  loop::EngineBench bench(s);
+  loop::VirtualEngine bench(s);
   OnlineCalibrationSettings free = wrong_guide(CalibrationMethod::gauss_newton, 0.2), fixed = free;
   free.wanted[Calibrated::tdc] = fixed.wanted[Calibrated::tdc] = true;
   fixed.wanted[wall] = false;
@@ -263,7 +263,7 @@ TEST(OnlineCalibration, AtABoundTheOthersStandAsIfItWereKnown) {
 TEST(OnlineCalibration, AMotoredCycleHoldsWhatItDoesNotShow) {
   loop::BenchSettings s = steady_bench(0.1);
   s.misfire_probability = 1.0;  // the motored cycle
-  loop::EngineBench bench(s);
+  loop::VirtualEngine bench(s);
   OnlineCalibrationSettings g = wrong_guide(CalibrationMethod::gauss_newton);
   g.wanted[Calibrated::burn_duration] = true;
   OnlineCalibration calibration(g);

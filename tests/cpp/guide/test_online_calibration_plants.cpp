@@ -77,7 +77,7 @@ double dithered_cad(int cycle) {
 
 // Runs the plant; the truth of the timing is that of the last window.
 OnlineCalibration taught(Plant& p, CalibrationMethod method, int cycles) {
-  loop::EngineBench bench(p.bench);
+  loop::VirtualEngine bench(p.bench);
   OnlineCalibrationSettings s = wrong_guide(method, 0.8);
   s.soc_scatter_cad = 0.3;
   OnlineCalibration calibration(s);
@@ -172,7 +172,7 @@ TEST(OnlineCalibrationPlants, ManyWindowsDoNotKnowWhatNoneOfThemShows) {
 // A parameter that is adapted goes into the cylinder, where the cylinder has it.
 TEST(OnlineCalibrationPlants, AnAdaptedCompressionRatioGoesIntoTheCylinder) {
   Plant p = plant(2, 3.0, 0.0, 0.0);
-  loop::EngineBench bench(p.bench);
+  loop::VirtualEngine bench(p.bench);
   OnlineCalibrationSettings s = wrong_guide(CalibrationMethod::recursive);
   s.soc_scatter_cad = 0.3;
   s.wanted[Calibrated::compression_ratio] = s.wanted[Calibrated::wall_temperature] = true;

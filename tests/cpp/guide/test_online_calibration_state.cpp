@@ -28,7 +28,7 @@ static_assert(noexcept(std::declval<OnlineCalibration&>().offer({}, engine::Oper
 constexpr CalibrationMethod every_method[] = {CalibrationMethod::extremum_seeking, CalibrationMethod::gauss_newton,
                                               CalibrationMethod::recursive};
 
-std::vector<double> trace_of(loop::EngineBench& bench, double soc_cad = -6.0) {
+std::vector<double> trace_of(loop::VirtualEngine& bench, double soc_cad = -6.0) {
   bench.step(soc_cad);
   const auto shown = bench.pressure().pressure_bar;
   return {shown.begin(), shown.end()};
@@ -36,7 +36,7 @@ std::vector<double> trace_of(loop::EngineBench& bench, double soc_cad = -6.0) {
 
 TEST(OnlineCalibrationLoop, BadCyclesNeverReachIt) {
   using enum CalibrationStatus;
-  loop::EngineBench bench(steady_bench(0.05));
+  loop::VirtualEngine bench(steady_bench(0.05));
   OnlineCalibration calibration(wrong_guide(CalibrationMethod::gauss_newton));
   run(bench, calibration, 40);
   const std::vector<double> good = trace_of(bench);
@@ -67,7 +67,7 @@ TEST(OnlineCalibrationLoop, BadCyclesNeverReachIt) {
   EXPECT_EQ(offered([](auto&) {}, true), misfire);
   loop::BenchSettings motored = steady_bench();
   motored.misfire_probability = 1.0;
-  loop::EngineBench unlit(motored);
+  loop::VirtualEngine unlit(motored);
   const std::vector<double> unburned = trace_of(unlit);
   EXPECT_EQ(offered([&](auto& p) { p = unburned; }), misfire);  // seen, not said
   EXPECT_EQ(calibration.offer(good, {}, -6.0), accepted);
@@ -81,7 +81,7 @@ TEST(OnlineCalibrationLoop, WaitsAfterAChangeOfOperatingPoint) {
   load.fuel_mg = 26.0;
   s.schedule = {{0, {}}, {30, load}, {100, {}}};
   for (const CalibrationMethod method : every_method) {
-    loop::EngineBench bench(s);
+    loop::VirtualEngine bench(s);
     OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method)));
     for (int k = 0; k < 140; ++k) {
       const CalibrationVector before = calibration.parameters();
@@ -102,7 +102,7 @@ TEST(OnlineCalibrationLoop, WaitsAfterAChangeOfOperatingPoint) {
 TEST(OnlineCalibrationLoop, FreezesWhereCyclesScatter) {
   loop::BenchSettings s = steady_bench();
   s.soc_scatter_cad = 4.0;
-  loop::EngineBench bench(s);
+  loop::VirtualEngine bench(s);
   OnlineCalibration calibration(wrong_guide(CalibrationMethod::gauss_newton));
   int frozen = 0;
   for (int k = 0; k < 60; ++k) {
@@ -117,20 +117,20 @@ TEST(OnlineCalibrationLoop, FreezesWhereCyclesScatter) {
 
 TEST(OnlineCalibrationLoop, AJumpIsNotAveragedButLearntAnew) {
   for (const CalibrationMethod method : every_method) {
-    loop::EngineBench bench(steady_bench(0.05));
+    loop::VirtualEngine bench(steady_bench(0.05));
     OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method, 0.6)));
     run(bench, calibration, 80);
     EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02);
     EXPECT_EQ(calibration.jumps(), 0);
     loop::BenchSettings changed = steady_bench(0.05);
     changed.cylinder.wall_heat.wall_heat_scale = 1.2;
-    loop::EngineBench other(changed);
+    loop::VirtualEngine other(changed);
     EXPECT_EQ(name_of(cycle_of(other, calibration)), "jump") << name_of(method);
     EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02);  // one cycle is not believed
     run(other, calibration, 60);
     EXPECT_EQ(calibration.jumps(), 1) << name_of(method);
     EXPECT_NEAR(calibration.parameters()[wall], 1.2, 0.04) << name_of(method);
-    loop::EngineBench again(steady_bench(0.05, 8));
+    loop::VirtualEngine again(steady_bench(0.05, 8));
     cycle_of(again, calibration);  // a single odd cycle
     run(other, calibration, 30);
     EXPECT_EQ(calibration.jumps(), 1);
@@ -143,7 +143,7 @@ TEST(OnlineCalibrationLoop, StaysInsideItsBounds) {
     for (const double truth : {0.0, 4.0}) {
       loop::BenchSettings s = steady_bench(0.02);
       s.cylinder.wall_heat.wall_heat_scale = truth;
-      loop::EngineBench bench(s);
+      loop::VirtualEngine bench(s);
       OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method)));
       for (int k = 0; k < 100; ++k) {
         cycle_of(bench, calibration);
@@ -164,7 +164,7 @@ TEST(OnlineCalibrationLoop, NothingIsAllocatedAndTheStateGoesOnBitForBit) {
   s.schedule = {{0, {}}, {70, load}};
   for (const CalibrationMethod method : every_method) {
     for (const int cut : {0, 3, 25, 75, 101}) {
-      loop::EngineBench bench(s);
+      loop::VirtualEngine bench(s);
       OnlineCalibration whole(wrong_guide(method)), later(wrong_guide(method));
       run(bench, later, 13, -4.0);
       bench.reset();
@@ -195,7 +195,7 @@ TEST(OnlineCalibrationLoop, NothingIsAllocatedAndTheStateGoesOnBitForBit) {
 }
 
 TEST(OnlineCalibrationLoop, ARefusedStateChangesNothing) {
-  loop::EngineBench bench(steady_bench(0.1));
+  loop::VirtualEngine bench(steady_bench(0.1));
   OnlineCalibration calibration(wrong_guide(CalibrationMethod::recursive));
   run(bench, calibration, 35);
   const StateColumns good = save_state(calibration);

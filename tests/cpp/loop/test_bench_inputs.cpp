@@ -8,9 +8,9 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/recirculation.hpp"
-#include "mgdd/loop/engine_bench.hpp"
-#include "mgdd/loop/engine_bench_lanes.hpp"
 #include "mgdd/loop/engine_loop.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
+#include "mgdd/loop/virtual_engine_lanes.hpp"
 #include "support/bench_case.hpp"
 
 namespace mgdd::loop {
@@ -27,7 +27,7 @@ BenchSettings steering(std::vector<BenchInput> inputs, BenchSettings s = quiet_b
   return s;
 }
 
-BenchCycle step(EngineBench& bench, const std::vector<double>& inputs) {
+BenchCycle step(VirtualEngine& bench, const std::vector<double>& inputs) {
   return bench.step(inputs);
 }
 
@@ -37,7 +37,7 @@ TEST(BenchInputs, LeftAloneTheyChangeNoBit) {
   s.wall_heat_drift_per_kcycle = 0.2;
   s.limits = {"p_max_bar", "nox_fast_ppm"};
   s.schedule[0].point.burn_duration_cad = 41.0;
-  EngineBench plain(s), further(steering({soc_cad, egr, intake_pressure_kpa, burn_duration_cad}, s));
+  VirtualEngine plain(s), further(steering({soc_cad, egr, intake_pressure_kpa, burn_duration_cad}, s));
   for (int k = 0; k < 60; ++k) {
     const double soc = test_support::wandering_soc_cad(k);
     ASSERT_EQ(bits_of(plain.step(soc)), bits_of(further.step(soc))) << k;
@@ -85,7 +85,7 @@ TEST(BenchInputs, GammaFallsAsTheTablesSay) {
   EXPECT_NEAR(gas.gamma_change, gamma((1.0 - share) * air + share * burned) - gamma(air), 1e-4);
   EXPECT_LT(gas.gamma_change, -0.008);
 
-  EngineBench bench(steering({soc_cad, egr}));
+  VirtualEngine bench(steering({soc_cad, egr}));
   step(bench, {-6.0, 0.4});
   const double charge_g = engine::mass_of_gas_g(bench.model().charge(bench.point()).gas_j_per_k);
   EXPECT_DOUBLE_EQ(bench.model().cylinder().gas.gamma, 1.37 + engine::recirculation(0.4, charge_g, 20.0).gamma_change);
@@ -94,7 +94,7 @@ TEST(BenchInputs, GammaFallsAsTheTablesSay) {
 TEST(BenchInputs, NoxTakesTheOxygenFactorAndTheChargeKeepsItsMass) {
   BenchSettings s = steering({soc_cad, egr});
   s.soft_sensor.model.o2_exponent = 2.2;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   const double gas = 0.9 * 150e3 * bench.model().geometry().swept_m3 / 313.0;  // J/K, Tan 2018, eq. 2-3
   for (const double rate : {0.0, 0.15, 0.42}) {
     const BenchCycle c = step(bench, {-7.0, rate});
@@ -113,7 +113,7 @@ TEST(BenchInputs, NoxTakesTheOxygenFactorAndTheChargeKeepsItsMass) {
 
 TEST(BenchInputs, EachIsTheSameAsInThePointOrTheCylinder) {
   const auto same = [](const BenchSettings& steered, const std::vector<double>& inputs, const BenchSettings& fixed) {
-    EngineBench one(steered), other(fixed);
+    VirtualEngine one(steered), other(fixed);
     EXPECT_EQ(bits_of(one.step(inputs)), bits_of(other.step(inputs[0])));
   };
   BenchSettings s = quiet_bench();
@@ -136,7 +136,7 @@ TEST(BenchInputs, EachIsTheSameAsInThePointOrTheCylinder) {
 TEST(BenchInputs, NoxAndExhaustTemperatureAreLimits) {
   BenchSettings s = steering({soc_cad, egr}, BenchSettings{});
   s.limits = {"nox_soft_ppm", "t_evo_k", "nox_fast_ppm", "dp_max_bar_per_cad", "nox_true_ppm"};
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   step(bench, {-9.0, 0.1});
   const BenchCycle c = step(bench, {-6.0, 0.3});
   const double expected[] = {c.nox_soft_ppm, c.t_evo_k, c.nox_fast_ppm, c.indicators.dp_max_bar_per_cad,
@@ -145,7 +145,7 @@ TEST(BenchInputs, NoxAndExhaustTemperatureAreLimits) {
     EXPECT_EQ(c.limits()[i], expected[i]);
   BenchSettings quiet = steering({soc_cad, egr});
   quiet.limits = s.limits;
-  EngineBench silent(quiet);
+  VirtualEngine silent(quiet);
   const BenchCycle truth = step(silent, {-6.0, 0.3});
   const std::vector<double> inputs{-6.0, 0.3};
   const auto free = bench.noise_free_limits(2, inputs);
@@ -157,7 +157,7 @@ TEST(BenchInputs, NoxAndExhaustTemperatureAreLimits) {
 }
 
 TEST(BenchInputs, WhatFindsNoOxygenDoesNotBurn) {
-  EngineBench bench(steering({soc_cad, egr, intake_pressure_kpa}));
+  VirtualEngine bench(steering({soc_cad, egr, intake_pressure_kpa}));
   const double full = step(bench, {-6.0, 0.5, 110.0}).indicators.work_gross_j;
   const BenchCycle starved = step(bench, {-6.0, 0.5, 60.0});
   const double charge_g = engine::mass_of_gas_g(0.9 * 60e3 * bench.model().geometry().swept_m3 / 313.0);
@@ -178,7 +178,7 @@ TEST(BenchInputs, ALoopOfTheCoreSteersThemAll) {
   o.perturbation = Eigen::Vector3d(2.0, 0.02, 5.0);
   o.step_max = Eigen::Vector3d(2.0, 0.02, 5.0);
   const optimize::Spsa begun(o);
-  EngineBench bench(s), twin(s);
+  VirtualEngine bench(s), twin(s);
   optimize::Spsa seeker = begun, other = begun;
   for (int k = 0; k < 80; ++k) {
     const LoopCycle cycle = loop_step(bench, seeker);
@@ -188,7 +188,7 @@ TEST(BenchInputs, ALoopOfTheCoreSteersThemAll) {
     ASSERT_EQ(bits_of(c), bits_of(cycle.bench));
   }
   EXPECT_FALSE(side_by_side(bench, bench));
-  EXPECT_THROW(EngineBenchLanes({bench}), ParameterError);
+  EXPECT_THROW(VirtualEngineLanes({bench}), ParameterError);
 }
 
 }  // namespace

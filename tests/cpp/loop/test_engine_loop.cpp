@@ -35,7 +35,7 @@ BenchSettings rich_bench() {
 }
 
 TEST(EngineLoop, AStepAllocatesNothing) {
-  EngineBench bench(rich_bench());
+  VirtualEngine bench(rich_bench());
   optimize::ExtremumSeekingSettings s = batch(-12.0);
   s.limits = {{.name = "p_max_bar", .upper = 110.0}, {.name = "cov_imep_percent", .upper = 50.0}};
   s.components = {{}, {38.0, 25.0}};
@@ -49,7 +49,7 @@ TEST(EngineLoop, AStepAllocatesNothing) {
 }
 
 TEST(EngineLoop, ASeekerThatDoesNotFitIsRefused) {
-  const EngineBench bench(rich_bench());
+  const VirtualEngine bench(rich_bench());
   optimize::ExtremumSeekingSettings s = batch(-12.0);
   EXPECT_THROW(require_match(bench, optimize::ExtremumSeeking(s)), ParameterError);  // no limits
   s.limits = {{.name = "cov_imep_percent", .upper = 5.0}, {.name = "p_max_bar", .upper = 95.0}};

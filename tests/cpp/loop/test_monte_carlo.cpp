@@ -56,7 +56,7 @@ TEST(MonteCarlo, IsTheSameLoopsOnAnyNumberOfThreads) {
     EXPECT_TRUE(same(one.loops[i], five.loops[i])) << i;
   }
   // ... and each is the loop that one would run alone: bench 1, seeker 1 (SPSA), seed 4.
-  EngineBench bench = plan.benches[1];
+  VirtualEngine bench = plan.benches[1];
   bench.reset(4);
   auto spsa = std::get<optimize::Spsa>(plan.seekers[1]);
   spsa.reseed(4);

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/units.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 #include "support/bench_case.hpp"
 
 namespace mgdd::loop {
@@ -19,9 +19,9 @@ using test_support::bits_of;
 using test_support::quiet_bench;
 using test_support::wandering_soc_cad;
 
-static_assert(noexcept(std::declval<EngineBench&>().pressure()));
+static_assert(noexcept(std::declval<VirtualEngine&>().pressure()));
 
-std::vector<double> trace_of(EngineBench& bench, double soc_cad) {
+std::vector<double> trace_of(VirtualEngine& bench, double soc_cad) {
   bench.step(soc_cad);
   const PressureTrace trace = bench.pressure();
   return {trace.pressure_bar.begin(), trace.pressure_bar.end()};
@@ -41,7 +41,7 @@ std::vector<double> true_trace(double soc_cad, double step_cad = 1.0, double sca
 }
 
 TEST(PressureSensor, ExactItShowsTheCycleOnTheCrankGrid) {
-  EngineBench bench(quiet_bench());
+  VirtualEngine bench(quiet_bench());
   EXPECT_TRUE(bench.pressure().pressure_bar.empty());
   for (const double soc : {-20.0, -6.0, 3.5})
     EXPECT_EQ(trace_of(bench, soc), true_trace(soc));
@@ -56,7 +56,7 @@ TEST(PressureSensor, GainAndADriftingOffsetAreThoseOfALine) {
   s.pressure.gain_error = 0.02;
   s.pressure.offset_bar = -0.3;
   s.pressure.drift_bar_per_kcycle = 40.0;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   const std::vector<double> real = true_trace(-6.0);
   for (int cycle = 0; cycle < 3; ++cycle) {
     const std::vector<double> shown = trace_of(bench, -6.0);
@@ -73,7 +73,7 @@ TEST(PressureSensor, ALateTdcShowsEachPressureLater) {
     BenchSettings s = quiet_bench();
     s.pressure.tdc_error_cad = error;
     s.step_cad = 0.25;
-    EngineBench bench(s);
+    VirtualEngine bench(s);
     bench.step(-6.0);
     const PressureTrace trace = bench.pressure();
     for (std::size_t k = 0; k < trace.angle_cad.size(); ++k) {
@@ -90,12 +90,12 @@ TEST(PressureSensor, ALateTdcShowsEachPressureLater) {
 TEST(PressureSensor, NoiseIsWhiteAndNothingElseHearsOfIt) {
   BenchSettings s;
   s.misfire_probability = 0.05;
-  EngineBench silent(s);
+  VirtualEngine silent(s);
   s.pressure.noise_bar = 0.4;
   s.pressure.tdc_error_cad = 0.3;
-  EngineBench noisy(s);
+  VirtualEngine noisy(s);
   s.pressure.noise_bar = 0.0;
-  EngineBench clean(s);
+  VirtualEngine clean(s);
   double square = 0.0, neighbour = 0.0, next_cycle = 0.0;
   std::vector<double> before;
   std::size_t n = 0;
@@ -124,7 +124,7 @@ TEST(PressureSensor, ShowsTheBurnOfTheCycleWithItsScatterDriftAndMisfires) {
   s.soc_scatter_cad = 0.8;
   s.wall_heat_drift_per_kcycle = 10.0;
   s.misfire_probability = 0.3;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   int misfires = 0;
   for (int k = 0; k < 20; ++k) {
     const BenchCycle c = bench.step(-6.0);

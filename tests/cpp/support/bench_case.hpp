@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace mgdd::test_support {
 

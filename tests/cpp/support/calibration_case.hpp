@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/guide/online_calibration.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 #include "support/bench_case.hpp"
 
 namespace mgdd::test_support {
@@ -48,7 +48,7 @@ inline guide::OnlineCalibrationSettings sure_of_the_rest(guide::OnlineCalibratio
 }
 
 /// One cycle of the engine, offered and used; what the update came to.
-inline guide::CalibrationStatus cycle_of(loop::EngineBench& bench, guide::OnlineCalibration& calibration,
+inline guide::CalibrationStatus cycle_of(loop::VirtualEngine& bench, guide::OnlineCalibration& calibration,
                                          double soc_cad = -6.0, double told_error_cad = 0.0) {
   const engine::OperatingPoint point = bench.point();
   const loop::BenchCycle c = bench.step(soc_cad);
@@ -56,7 +56,7 @@ inline guide::CalibrationStatus cycle_of(loop::EngineBench& bench, guide::Online
   return calibration.update();
 }
 
-inline void run(loop::EngineBench& bench, guide::OnlineCalibration& calibration, int cycles, double soc_cad = -6.0,
+inline void run(loop::VirtualEngine& bench, guide::OnlineCalibration& calibration, int cycles, double soc_cad = -6.0,
                 double told_error_cad = 0.0) {
   for (int k = 0; k < cycles; ++k)
     cycle_of(bench, calibration, soc_cad, told_error_cad);

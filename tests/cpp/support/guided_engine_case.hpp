@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "mgdd/guide/guided_engine.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 #include "support/seeker_case.hpp"
 
 namespace mgdd::guide {
@@ -58,16 +58,16 @@ inline std::optional<OnlineCalibration> calibration() {
   return std::optional<OnlineCalibration>(std::in_place, s);
 }
 
-inline loop::EngineBench bench_at(std::vector<loop::ScheduledPoint> schedule, std::uint64_t seed) {
+inline loop::VirtualEngine bench_at(std::vector<loop::ScheduledPoint> schedule, std::uint64_t seed) {
   loop::BenchSettings s;
   s.schedule = std::move(schedule);
   s.pressure.noise_bar = 0.05;
   s.seed = seed;
-  return loop::EngineBench(s);
+  return loop::VirtualEngine(s);
 }
 
 /// One cycle as 7.2 of the loop has it.
-inline double cycle(loop::EngineBench& bench, GuidedEngine& guided) {
+inline double cycle(loop::VirtualEngine& bench, GuidedEngine& guided) {
   guided.at(bench.point());
   const loop::BenchCycle c = bench.step(guided.ask()[0]);
   const double j[] = {c.j};
@@ -77,7 +77,7 @@ inline double cycle(loop::EngineBench& bench, GuidedEngine& guided) {
   return guided.estimate()[0];
 }
 
-inline std::vector<double> path_of(loop::EngineBench& bench, GuidedEngine& guided, int cycles) {
+inline std::vector<double> path_of(loop::VirtualEngine& bench, GuidedEngine& guided, int cycles) {
   std::vector<double> path;
   for (int k = 0; k < cycles; ++k)
     path.push_back(cycle(bench, guided));

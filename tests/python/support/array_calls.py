@@ -26,7 +26,7 @@ from mgdd.engine import (
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
-from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
+from mgdd.loop import Reference, VirtualEngine, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
 from mgdd.rig.exchange import RigRecord
 from mgdd.rig.realtime import RingTransport
@@ -136,7 +136,7 @@ def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
 
 
 def pressure() -> Array:
-    bench = EngineBench(soc_scatter_cad=0.0)
+    bench = VirtualEngine(soc_scatter_cad=0.0)
     bench.step(-6.0)
     return bench.pressure()[1]
 
@@ -241,8 +241,8 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
     "maps.CalibrationMap.__call__": (lambda x: table(FUEL, TIMING, 0.2)(fuel_mg=x), (OPEN,)),
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
-    "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
-    "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
+    "loop.VirtualEngine.run": (lambda soc: VirtualEngine(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
+    "loop.VirtualEngine.steady_map": (lambda soc: VirtualEngine().steady_map(soc)["j"].to_numpy(), (SOC,)),
     "loop.track": (
         lambda wanted, air: track(Pid(), wanted, airflow_torque_nm=air)["angle_deg"].to_numpy(), (OPEN, 1e-3 * OPEN),
     ),

@@ -15,9 +15,9 @@ from mgdd.identify import fit_ode
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.loop import (
-    EngineBench,
     LoopCriteria,
     Reference,
+    VirtualEngine,
     monte_carlo,
     track_many,
     tune_controller,
@@ -36,7 +36,7 @@ def loops(**how: Any) -> xr.Dataset:
     """Two operating points, three kinds of seeker of which one has moved, 7 seeds: nothing is square."""
     caps = [Limit("p_max_bar", 95.0), Limit("dp_max_bar_per_cad", 6.0)]
     limits = [cap.name for cap in caps]
-    benches = [EngineBench(limits=limits), EngineBench(point=OperatingPoint(fuel_mg=30.0), limits=limits)]
+    benches = [VirtualEngine(limits=limits), VirtualEngine(point=OperatingPoint(fuel_mg=30.0), limits=limits)]
     benches[0].run(np.full(5, -6.0))
     moved = ExtremumSeeking(**SPACE, gain=0.7, limits=caps)
     for k in range(30):

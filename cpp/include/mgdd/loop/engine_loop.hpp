@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "mgdd/guide/curve_seeking.hpp"
-#include "mgdd/loop/engine_bench.hpp"
 #include "mgdd/loop/function_plant.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 #include "mgdd/optimize/ask_tell/seekers.hpp"
 
 namespace mgdd::loop {
@@ -33,7 +33,7 @@ struct LoopCycle {
 
 /// ParameterError unless the seeker has the inputs of the bench, each in its window, as many components as the bench's
 /// performance (or one, for their sum) and the bench's limits in the same order.
-void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
+void require_match(const VirtualEngine& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits);
 void require_match(const FunctionPlant& plant, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits);
@@ -66,7 +66,7 @@ void tell(Plant& plant, const BenchCycle& c, S& seeker) noexcept(noexcept(seeker
   const bool summed = seeker.component_count() == 1;
   const std::span<const double> components = summed ? std::span<const double>(&c.j, 1) : c.component_values();
   const std::size_t applied =
-      std::is_same_v<Plant, EngineBench> ? static_cast<std::size_t>(seeker.estimate().size()) : 0;
+      std::is_same_v<Plant, VirtualEngine> ? static_cast<std::size_t>(seeker.estimate().size()) : 0;
   const optimize::Reading reading{components, c.limits(), c.misfire || c.unphysical, {c.applied.data(), applied}};
   if constexpr (requires { seeker.tell(reading, plant.pressure().pressure_bar); }) {
     seeker.tell(reading, seeker.calibration() ? plant.pressure().pressure_bar : std::span<const double>());

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace mgdd::loop {
 

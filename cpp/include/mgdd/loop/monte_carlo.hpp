@@ -32,7 +32,7 @@ struct MonteCarloPlanOf {
   int threads = 0;                      ///< 0 = all cores
   LoopForm form = LoopForm::automatic;  ///< of functions always `single`
 };
-using MonteCarloPlan = MonteCarloPlanOf<EngineBench>;
+using MonteCarloPlan = MonteCarloPlanOf<VirtualEngine>;
 
 struct MonteCarloResult {
   std::vector<LoopSummary> loops;  ///< [bench][seeker][seed], the last index fastest

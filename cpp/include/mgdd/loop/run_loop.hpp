@@ -20,7 +20,7 @@ struct LoopRun {
 
 /// ParameterError for fewer than one cycle or a seeker that does not fit; nothing has moved then.
 template <optimize::AnySeeker S>
-LoopRun run_loop(EngineBench& bench, optimize::RecordedSeeker<S>& seeker, std::int64_t cycles,
+LoopRun run_loop(VirtualEngine& bench, optimize::RecordedSeeker<S>& seeker, std::int64_t cycles,
                  const LoopCriteria& criteria, const std::stop_token& stop = {}) {
   if (cycles < 1) throw ParameterError("cycles", cycles, "must be >= 1");
   validate(criteria, cycles);

@@ -13,7 +13,7 @@ from typing import IO, Any, Self
 
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
-from mgdd.loop import EngineBench, Plant, ThrottleFault, VirtualThrottle
+from mgdd.loop import Plant, ThrottleFault, VirtualEngine, VirtualThrottle
 from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.hub_faults import fault_of
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
@@ -129,7 +129,7 @@ def node_of(
         raise ParameterError.of("fault", faults[0], "left out: only a throttle has faults of its own")
     if names == ("soc_cad",):
         wanted = [name for name in ("cov_imep_percent", *signal_map.limits) if name in signal_map.value_names]
-        return node_plant(EngineBench(limits=wanted, seed=seed))
+        return node_plant(VirtualEngine(limits=wanted, seed=seed))
     raise ParameterError.of(
         "inputs of the map", ", ".join(names), "those of a virtual throttle (duty) or engine bench (soc_cad)"
     )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.io.files import existing_file
-from mgdd.loop import EngineBench, Plant, VirtualThrottle
+from mgdd.loop import Plant, VirtualEngine, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.results.describe import described
 from mgdd.rig.can.loop_map import loop_messages
@@ -274,7 +274,7 @@ def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: S
     if isinstance(plant, EnginePlant):
         engine, steered = engine_named(plant.preset, folder), getattr(experiment.settings, "inputs", ("soc_cad",))
         try:
-            return EngineBench(
+            return VirtualEngine(
                 scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
                 inputs=list(steered), soc_scatter_cad=plant.soc_scatter_cad,
                 efficiency_noise_percent=plant.efficiency_noise_percent, seed=experiment.seed,

@@ -35,8 +35,8 @@ _RANDOM = (
 )  # fmt: skip
 
 
-@takes_settings_of(_core.loop.EngineBench, without=("cylinder",))
-class EngineBench(_core.loop.EngineBench):
+@takes_settings_of(_core.loop.VirtualEngine, without=("cylinder",))
+class VirtualEngine(_core.loop.VirtualEngine):
     """A virtual engine bench: the cycle model with noise, drift and the sensors of a real one.
 
     The plant scatters, misfires and drifts as asked, and runs through a schedule of operating points. Its sensors are
@@ -71,15 +71,15 @@ class EngineBench(_core.loop.EngineBench):
     Examples
     --------
     >>> from mgdd.engine import Performance
-    >>> from mgdd.loop import EngineBench
-    >>> bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser", seed=1)
+    >>> from mgdd.loop import VirtualEngine
+    >>> bench = VirtualEngine(performance=Performance.efficiency_and_nox(), nox_sensor="analyser", seed=1)
     >>> cycle = bench.step(-6.0)
     >>> len(cycle["components"]), cycle["misfire"]
     (2, False)
 
     Three inputs, of which EGR takes NOx:
 
-    >>> bench = EngineBench(inputs=["soc_cad", "egr", "intake_pressure_kpa"], soc_scatter_cad=0.0)
+    >>> bench = VirtualEngine(inputs=["soc_cad", "egr", "intake_pressure_kpa"], soc_scatter_cad=0.0)
     >>> [round(bench.step({"soc_cad": -6.0, "egr": egr})["nox_true_ppm"]) for egr in (0.0, 0.3)]
     [1545, 763]
     """
@@ -180,8 +180,8 @@ class EngineBench(_core.loop.EngineBench):
 
         Examples
         --------
-        >>> from mgdd.loop import EngineBench
-        >>> cycle = EngineBench(inputs=["soc_cad", "egr"], seed=1).step({"soc_cad": -6.0, "egr": 0.9})
+        >>> from mgdd.loop import VirtualEngine
+        >>> cycle = VirtualEngine(inputs=["soc_cad", "egr"], seed=1).step({"soc_cad": -6.0, "egr": 0.9})
         >>> cycle["egr"], cycle["clamped"]
         (0.5, True)
         """
@@ -206,8 +206,8 @@ class EngineBench(_core.loop.EngineBench):
 
         Examples
         --------
-        >>> from mgdd.loop import EngineBench
-        >>> bench = EngineBench(soc_scatter_cad=0.0, pressure_gain_error=0.01)
+        >>> from mgdd.loop import VirtualEngine
+        >>> bench = VirtualEngine(soc_scatter_cad=0.0, pressure_gain_error=0.01)
         >>> cycle = bench.step(-6.0)
         >>> angle_cad, pressure_bar = bench.pressure()
         >>> float(pressure_bar.max().round(1))
@@ -237,8 +237,8 @@ class EngineBench(_core.loop.EngineBench):
 
         Examples
         --------
-        >>> from mgdd.loop import EngineBench
-        >>> bench = EngineBench(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+        >>> from mgdd.loop import VirtualEngine
+        >>> bench = VirtualEngine(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
         >>> bench.run([-6.0, -5.0])["p_max_bar"].values.round(1)
         array([107.2, 103. ])
         """
@@ -266,8 +266,8 @@ class EngineBench(_core.loop.EngineBench):
 
         Examples
         --------
-        >>> from mgdd.loop import EngineBench
-        >>> EngineBench().steady_map([-10.0, -5.0])["efficiency_gross"].values.round(3)
+        >>> from mgdd.loop import VirtualEngine
+        >>> VirtualEngine().steady_map([-10.0, -5.0])["efficiency_gross"].values.round(3)
         array([0.557, 0.562])
         """
         return steady_map(self._quiet(cycle), soc_cad)
@@ -308,8 +308,8 @@ class EngineBench(_core.loop.EngineBench):
 
         Examples
         --------
-        >>> from mgdd.loop import EngineBench
-        >>> round(EngineBench().find_optimum()["soc_cad"], 2)
+        >>> from mgdd.loop import VirtualEngine
+        >>> round(VirtualEngine().find_optimum()["soc_cad"], 2)
         -5.63
         """
         kept = limits_to_keep(limits)
@@ -318,7 +318,7 @@ class EngineBench(_core.loop.EngineBench):
         quiet = self._quiet(cycle, limits=measured_names(kept))
         return find_optimum(quiet, kept, searched, float(self.settings["soc_scatter_cad"]))
 
-    def _quiet(self, cycle: int, **changes: Any) -> EngineBench:
+    def _quiet(self, cycle: int, **changes: Any) -> VirtualEngine:
         """Copy the bench without anything random or slow, at the operating point of one cycle."""
         if cycle < 0:
             raise ParameterError.of("cycle", cycle, ">= 0")
@@ -327,7 +327,7 @@ class EngineBench(_core.loop.EngineBench):
         settings.pop("schedule")
         silent = SensorDynamics(delay_s=0.0, lag_s=0.0, noise_fraction=0.0)
         settings |= {"analyser": silent, "fast_sensor": silent} | dict.fromkeys(_RANDOM, 0.0)
-        return EngineBench(cylinder, self.point_at(cycle), **settings | changes)
+        return VirtualEngine(cylinder, self.point_at(cycle), **settings | changes)
 
     def _repr_html_(self) -> str:
-        return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))
+        return as_html(f"VirtualEngine at cycle {self.cycle}", rows_of(self.settings))

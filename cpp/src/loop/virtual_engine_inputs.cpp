@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "mgdd/engine/recirculation.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -27,7 +27,7 @@ double value_of_point(BenchInput input, const BenchSettings& s, const engine::Op
 
 }  // namespace
 
-BenchInputs EngineBench::applied_of(std::span<const double> inputs) const noexcept {
+BenchInputs VirtualEngine::applied_of(std::span<const double> inputs) const noexcept {
   BenchInputs out{};
   for (std::size_t i = 0; i < windows_.size(); ++i) {
     const bool given = i < inputs.size() && !std::isnan(inputs[i]);
@@ -38,7 +38,7 @@ BenchInputs EngineBench::applied_of(std::span<const double> inputs) const noexce
 }
 
 // The charge of these inputs; the model becomes that of the cycle, as drift, recirculation and fuel split have it.
-EngineBench::Filling EngineBench::fill(std::int64_t cycle, const BenchInputs& inputs) noexcept {
+VirtualEngine::Filling VirtualEngine::fill(std::int64_t cycle, const BenchInputs& inputs) noexcept {
   const std::size_t index = index_at(cycle);
   const engine::Charge<double>& prepared = prepared_[index].charge;
   Filling out{prepared, settings_.true_nox.intake_o2_fraction, prepared.fuel_heat_j};

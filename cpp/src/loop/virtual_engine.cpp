@@ -1,4 +1,4 @@
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -82,7 +82,7 @@ double routed_ppm(NoxSensor sensor, const BenchCycle& c) noexcept {
 
 }  // namespace
 
-EngineBench::EngineBench(const BenchSettings& settings)
+VirtualEngine::VirtualEngine(const BenchSettings& settings)
     : settings_(checked(settings)),
       model_(settings_.cylinder, engine::crank_grid(settings_.cylinder, settings_.step_cad), settings_.integrator),
       work_(model_.make_workspace()),
@@ -115,7 +115,7 @@ EngineBench::EngineBench(const BenchSettings& settings)
   }
 }
 
-void EngineBench::reset(std::uint64_t seed) noexcept {
+void VirtualEngine::reset(std::uint64_t seed) noexcept {
   seed_ = seed;
   cycle_ = 0;
   last_inputs_.fill(0.0);
@@ -124,58 +124,58 @@ void EngineBench::reset(std::uint64_t seed) noexcept {
   imep_bar_.fill(0.0);
 }
 
-std::size_t EngineBench::index_at(std::int64_t cycle) const noexcept {
+std::size_t VirtualEngine::index_at(std::int64_t cycle) const noexcept {
   const auto after = std::upper_bound(settings_.schedule.begin() + 1, settings_.schedule.end(), cycle,
                                       [](std::int64_t c, const ScheduledPoint& entry) { return c < entry.cycle; });
   return static_cast<std::size_t>(after - settings_.schedule.begin()) - 1;
 }
 
-const engine::OperatingPoint& EngineBench::point_at(std::int64_t cycle) const noexcept {
+const engine::OperatingPoint& VirtualEngine::point_at(std::int64_t cycle) const noexcept {
   return settings_.schedule[index_at(cycle)].point;
 }
 
-bool EngineBench::point_changes_at(std::int64_t cycle) const noexcept {
+bool VirtualEngine::point_changes_at(std::int64_t cycle) const noexcept {
   const engine::OperatingPoint& now = point_at(cycle);
   const engine::OperatingPoint& before = point_at(cycle - 1);
   return differs(now.speed_rpm, before.speed_rpm) || differs(now.fuel_mg, before.fuel_mg);
 }
 
-std::size_t EngineBench::analyser_delay_cycles() const noexcept {
+std::size_t VirtualEngine::analyser_delay_cycles() const noexcept {
   return prepared_[index_at(cycle_)].analyser_delay;
 }
-double EngineBench::analyser_gain() const noexcept {
+double VirtualEngine::analyser_gain() const noexcept {
   return prepared_[index_at(cycle_)].analyser_gain;
 }
 
-double EngineBench::noise_at(BenchStream stream, std::int64_t cycle) const noexcept {
+double VirtualEngine::noise_at(BenchStream stream, std::int64_t cycle) const noexcept {
   return random::normal(seed_, static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(cycle));
 }
 
-engine::Cylinder EngineBench::drifted_cylinder(std::int64_t cycle) const noexcept {
+engine::Cylinder VirtualEngine::drifted_cylinder(std::int64_t cycle) const noexcept {
   engine::Cylinder drifted = settings_.cylinder;
   drifted.wall_heat.wall_heat_scale = std::clamp(
       drifted.wall_heat.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * kcycles(cycle), 0.0, wall_heat_upper);
   return drifted;
 }
 
-double EngineBench::drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
+double VirtualEngine::drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
   return soc_cad + settings_.soc_drift_cad_per_kcycle * kcycles(cycle);
 }
 
 // Drift must not carry the burn out of the cycle.
-double EngineBench::burning_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
+double VirtualEngine::burning_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
   double burning = drifted_soc_cad(soc_cad, cycle);
   if (settings_.soc_scatter_cad > 0.0) burning += settings_.soc_scatter_cad * noise_at(BenchStream::soc, cycle);
   return std::clamp(burning, closed_[0], closed_[1]);
 }
 
-bool EngineBench::misfires_at(std::int64_t cycle) const noexcept {
+bool VirtualEngine::misfires_at(std::int64_t cycle) const noexcept {
   return random::bernoulli(settings_.misfire_probability, seed_, static_cast<std::uint64_t>(BenchStream::misfire),
                            static_cast<std::uint64_t>(cycle));
 }
 
 // The noise of a cycle is a function of its number, so the state needs no trace.
-PressureTrace EngineBench::pressure() noexcept {
+PressureTrace VirtualEngine::pressure() noexcept {
   if (cycle_ == 0) return {};
   const std::int64_t last = cycle_ - 1;
   Filling filling = fill(last, last_inputs_);
@@ -184,8 +184,8 @@ PressureTrace EngineBench::pressure() noexcept {
   return pressure_sensor_.read(model_, work_, seed_, static_cast<std::uint64_t>(BenchStream::pressure), last);
 }
 
-std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle,
-                                                              std::span<const double> inputs) noexcept {
+std::array<double, max_limits> VirtualEngine::noise_free_limits(std::int64_t cycle,
+                                                                std::span<const double> inputs) noexcept {
   std::array<double, max_limits> out{};
   out.fill(std::numeric_limits<double>::quiet_NaN());
   if (std::any_of(inputs.begin(), inputs.end(), [](double x) { return std::isnan(x); })) return out;
@@ -204,7 +204,7 @@ std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle
   return out;
 }
 
-EngineBench::Burned EngineBench::burn(const Filling& filling, double soc_cad) noexcept {
+VirtualEngine::Burned VirtualEngine::burn(const Filling& filling, double soc_cad) noexcept {
   Burned out;
   model_.run(filling.charge, soc_cad, work_);
   out.unphysical = model_.first_unphysical(work_) < model_.angles_cad().size();
@@ -216,13 +216,13 @@ EngineBench::Burned EngineBench::burn(const Filling& filling, double soc_cad) no
   return out;
 }
 
-double EngineBench::nox_of(engine::NoxModel model, double t_max_k, const Filling& filling) const noexcept {
+double VirtualEngine::nox_of(engine::NoxModel model, double t_max_k, const Filling& filling) const noexcept {
   if (egr_steered_) model.intake_o2_fraction = filling.intake_o2_fraction;
   return model.ppm(t_max_k);
 }
 
 // Fills every sensor with its steady value at the first request, free of scatter and noise.
-void EngineBench::start(double soc_cad) noexcept {
+void VirtualEngine::start(double soc_cad) noexcept {
   const Burned steady = burn(filling_, soc_cad);
   if (!steady.unphysical) last_t_max_k_ = steady.indicators.t_max_k;
   const double nox = nox_of(settings_.true_nox, last_t_max_k_, filling_);
@@ -234,7 +234,7 @@ void EngineBench::start(double soc_cad) noexcept {
     component_lags_[i].fill(last_components_[i]);
 }
 
-BenchCycle EngineBench::step(std::span<const double> inputs) noexcept {
+BenchCycle VirtualEngine::step(std::span<const double> inputs) noexcept {
   BenchCycle c = begin(inputs);
   Filling filling = filling_;
   filling.charge = charge_of(c);
@@ -246,13 +246,13 @@ BenchCycle EngineBench::step(std::span<const double> inputs) noexcept {
   return c;
 }
 
-engine::Charge<double> EngineBench::charge_of(const BenchCycle& cycle) const noexcept {
+engine::Charge<double> VirtualEngine::charge_of(const BenchCycle& cycle) const noexcept {
   engine::Charge<double> charge = filling_.charge;
   if (cycle.misfire) charge.fuel_heat_j = 0.0;
   return charge;
 }
 
-BenchCycle EngineBench::begin(std::span<const double> inputs) noexcept {
+BenchCycle VirtualEngine::begin(std::span<const double> inputs) noexcept {
   BenchCycle c;
   c.cycle = cycle_;
   c.soc_requested_cad = inputs[0];
@@ -271,7 +271,7 @@ BenchCycle EngineBench::begin(std::span<const double> inputs) noexcept {
   return c;
 }
 
-void EngineBench::conclude(BenchCycle& c) noexcept {
+void VirtualEngine::conclude(BenchCycle& c) noexcept {
   const Prepared& at = prepared_[index_at(cycle_)];
   if (c.misfire) c.indicators.efficiency_gross = c.indicators.work_gross_j / at.charge.fuel_heat_j;
   if (settings_.efficiency_noise_percent > 0.0 && !c.misfire && !c.unphysical) {
@@ -290,7 +290,7 @@ void EngineBench::conclude(BenchCycle& c) noexcept {
   ++cycle_;
 }
 
-void EngineBench::measure_nox(const Prepared& at, BenchCycle& c) noexcept {
+void VirtualEngine::measure_nox(const Prepared& at, BenchCycle& c) noexcept {
   if (!c.unphysical) last_t_max_k_ = c.indicators.t_max_k;
   const auto read = [&](double level, double noise_fraction, BenchStream stream) {
     return noise_fraction > 0.0 ? std::max(0.0, level * (1.0 + noise_fraction * noise(stream))) : level;
@@ -306,7 +306,7 @@ void EngineBench::measure_nox(const Prepared& at, BenchCycle& c) noexcept {
   ln_bias_ = settings_.soft_sensor.next_bias(ln_bias_, c.nox_analyser_ppm, delayed);
 }
 
-void EngineBench::judge(const Prepared& at, BenchCycle& c) noexcept {
+void VirtualEngine::judge(const Prepared& at, BenchCycle& c) noexcept {
   const engine::Performance& performance = settings_.performance;
   const bool whole = settings_.delay_whole_objective;
   const double nox = whole ? c.nox_true_ppm : routed_ppm(settings_.nox_sensor, c);
@@ -319,7 +319,7 @@ void EngineBench::judge(const Prepared& at, BenchCycle& c) noexcept {
   }
 }
 
-void EngineBench::measure_limits(BenchCycle& c) noexcept {
+void VirtualEngine::measure_limits(BenchCycle& c) noexcept {
   if (!c.unphysical) last_imep_bar_ = c.indicators.imep_gross_bar;
   imep_bar_[static_cast<std::size_t>(cycle_) % cov_window_cycles] = last_imep_bar_;
   c.limit_count = limit_members_.size();
@@ -331,7 +331,7 @@ void EngineBench::measure_limits(BenchCycle& c) noexcept {
 }
 
 // Two passes over the window: a running sum would drift and depend on where a run was cut.
-double EngineBench::cov_imep_percent() const noexcept {
+double VirtualEngine::cov_imep_percent() const noexcept {
   const std::size_t n = std::min(static_cast<std::size_t>(cycle_) + 1, cov_window_cycles);
   if (n < 2) return 0.0;
   double mean = 0.0, squares = 0.0;

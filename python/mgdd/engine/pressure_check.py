@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from mgdd.presets.meant import CylinderLike, PointLike
 
-__all__ = ["Check", "Trust", "trust"]
+__all__ = ["Check", "PressureCheck", "check_pressure"]
 
 Verdict = Literal["no fault found", "open", "doubt", "fail"]
 _WORST: tuple[Verdict, ...] = ("no fault found", "open", "doubt", "fail")
@@ -106,7 +106,7 @@ class Check:
 
 
 @dataclass(frozen=True, repr=False)
-class Trust(Result):
+class PressureCheck(Result):
     """The checks of one pressure file.
 
     Parameters
@@ -122,8 +122,8 @@ class Trust(Result):
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.engine import trust
-    >>> report = trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144", bmep_bar=12.5)
+    >>> from mgdd.engine import check_pressure
+    >>> report = check_pressure(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144", bmep_bar=12.5)
     >>> report["work and heat"].verdict, report["gas exchange"].text
     ('no fault found', 'the record has no 720 degrees')
     >>> report.summary().splitlines()[0]
@@ -186,7 +186,7 @@ class Trust(Result):
         return "\n".join([self._title(), *(f"  {check.name:16}{check}" for check in ordered)])
 
 
-def trust(
+def check_pressure(
     trace: Any,
     cylinder: CylinderLike,
     *,
@@ -199,7 +199,7 @@ def trust(
     n_cylinders: int = 1,
     fuel_mg: float | None = None,
     assumed: str = "",
-) -> Trust:
+) -> PressureCheck:
     """Check a pressure file before its figures are believed.
 
     Parameters
@@ -220,7 +220,7 @@ def trust(
 
     Returns
     -------
-    Trust
+    PressureCheck
         Every check with its verdict. A file that `analyze` refuses fails the check ``file``; it raises nothing.
 
     Raises
@@ -239,12 +239,12 @@ def trust(
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.engine import trust
+    >>> from mgdd.engine import check_pressure
     >>> sound = datasets.read("hd_diesel_128x144")[1]
-    >>> trust(sound, "hd_diesel_128x144").verdict
+    >>> check_pressure(sound, "hd_diesel_128x144").verdict
     'no fault found'
     >>> clipped = sound.assign(pressure_bar=sound["pressure_bar"].clip(max=100.0))
-    >>> trust(clipped, "hd_diesel_128x144")["samples"].verdict
+    >>> check_pressure(clipped, "hd_diesel_128x144")["samples"].verdict
     'fail'
     """
     name = str(getattr(trace, "attrs", {}).get("file", trace if isinstance(trace, str) else "trace"))
@@ -266,7 +266,7 @@ def trust(
             quiet=True,
         )
     except DataError as error:
-        return Trust(name, (Check("file", "fail", str(error)),))
+        return PressureCheck(name, (Check("file", "fail", str(error)),))
     said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
     said = [(kind, text) for kind, text in said if not (kind == "reading" and _of_angle(text))]
     engine = cylinder_of(cylinder)
@@ -281,7 +281,7 @@ def trust(
         text = f"no engine is given: read with {assumed}"
         remedy = "give the engine: cylinder= in Python, --preset or --set bore_mm=... on the command line"
         checks.insert(0, Check(ENGINE, "open", text, remedy))
-    return Trust(name, tuple(checks), found)
+    return PressureCheck(name, tuple(checks), found)
 
 
 def _of_angle(text: str) -> bool:

@@ -1,6 +1,6 @@
 // Benches side by side: the numbers of single ones, whatever stands in the other lanes and on any instruction set;
 // a cycle that does not exist; refusals; no allocation.
-#include "mgdd/loop/engine_bench_lanes.hpp"
+#include "mgdd/loop/virtual_engine_lanes.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -41,8 +41,8 @@ BenchSettings settings_of(std::size_t i) {
   return s;
 }
 
-std::vector<EngineBench> benches_of(std::size_t n) {
-  std::vector<EngineBench> out;
+std::vector<VirtualEngine> benches_of(std::size_t n) {
+  std::vector<VirtualEngine> out;
   for (std::size_t i = 0; i < n; ++i)
     out.emplace_back(settings_of(i));
   return out;
@@ -70,10 +70,10 @@ std::vector<double> numbers_of(const BenchCycle& c) {
 
 /// A whole run of some of the benches, the numbers of each in a row of its own.
 std::vector<std::vector<double>> run(const std::vector<std::size_t>& which, InstructionSet set, int cycles = 90) {
-  std::vector<EngineBench> benches;
+  std::vector<VirtualEngine> benches;
   for (const std::size_t i : which)
     benches.emplace_back(settings_of(i));
-  EngineBenchLanes lanes(std::move(benches), set);
+  VirtualEngineLanes lanes(std::move(benches), set);
   std::vector<double> soc(which.size());
   std::vector<BenchCycle> out(which.size());
   std::vector<std::vector<double>> rows(which.size());
@@ -97,10 +97,10 @@ bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
   return true;
 }
 
-TEST(EngineBenchLanes, EachMeasuresWhatItMeasuresAlone) {
-  EngineBenchLanes lanes(benches_of(9));
+TEST(VirtualEngineLanes, EachMeasuresWhatItMeasuresAlone) {
+  VirtualEngineLanes lanes(benches_of(9));
   ASSERT_EQ(lanes.size(), 9u);
-  std::vector<EngineBench> alone = benches_of(9);
+  std::vector<VirtualEngine> alone = benches_of(9);
   std::vector<double> soc(9);
   std::vector<BenchCycle> out(9);
   int misfires = 0;
@@ -125,7 +125,7 @@ TEST(EngineBenchLanes, EachMeasuresWhatItMeasuresAlone) {
   EXPECT_GT(misfires, 10);  // a lane without fuel beside lanes with fuel
 }
 
-TEST(EngineBenchLanes, ALaneDependsOnNothingBesideIt) {
+TEST(VirtualEngineLanes, ALaneDependsOnNothingBesideIt) {
   const auto all = run({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}, instruction_set());
   const auto some = run({11, 3, 5}, instruction_set());
   EXPECT_TRUE(same_bits(some[0], all[11]));
@@ -135,14 +135,14 @@ TEST(EngineBenchLanes, ALaneDependsOnNothingBesideIt) {
   EXPECT_TRUE(same_bits(run({3}, InstructionSet::baseline)[0], all[3]));
 }
 
-TEST(EngineBenchLanes, ACycleThatDoesNotExistLeavesItsNeighboursAlone) {
+TEST(VirtualEngineLanes, ACycleThatDoesNotExistLeavesItsNeighboursAlone) {
   BenchSettings well;
   well.step_cad = 5.0;
   BenchSettings hot = well;  // wall heat grows until the pressure turns negative
   hot.schedule.front().point.speed_rpm = 50.0;
   hot.wall_heat_drift_per_kcycle = 100.0;
-  EngineBenchLanes lanes({EngineBench(well), EngineBench(hot)});
-  EngineBench healthy(well), alone(hot);
+  VirtualEngineLanes lanes({VirtualEngine(well), VirtualEngine(hot)});
+  VirtualEngine healthy(well), alone(hot);
   std::vector<BenchCycle> out(2);
   const std::vector<double> soc{-6.0, -6.0};
   int unphysical = 0;
@@ -159,22 +159,22 @@ TEST(EngineBenchLanes, ACycleThatDoesNotExistLeavesItsNeighboursAlone) {
   EXPECT_LT(unphysical, 1000);
 }
 
-TEST(EngineBenchLanes, RefusesWhatCannotRunSideBySide) {
-  EXPECT_THROW(EngineBenchLanes({}), ParameterError);
-  EXPECT_THROW(EngineBenchLanes(benches_of(17)), ParameterError);
+TEST(VirtualEngineLanes, RefusesWhatCannotRunSideBySide) {
+  EXPECT_THROW(VirtualEngineLanes({}), ParameterError);
+  EXPECT_THROW(VirtualEngineLanes(benches_of(17)), ParameterError);
   BenchSettings other;
   other.cylinder.gas.gamma_model = engine::GammaModel::linear;
-  EXPECT_FALSE(side_by_side(EngineBench(other), EngineBench(other)));
+  EXPECT_FALSE(side_by_side(VirtualEngine(other), VirtualEngine(other)));
   other = {};
   other.step_cad = 0.5;
-  EXPECT_FALSE(side_by_side(EngineBench(other), EngineBench(BenchSettings{})));
+  EXPECT_FALSE(side_by_side(VirtualEngine(other), VirtualEngine(BenchSettings{})));
   other = {};
   other.cylinder.geometry.bore_mm += 1.0;
-  EXPECT_THROW(EngineBenchLanes({EngineBench(other), EngineBench(BenchSettings{})}), ParameterError);
+  EXPECT_THROW(VirtualEngineLanes({VirtualEngine(other), VirtualEngine(BenchSettings{})}), ParameterError);
 }
 
-TEST(EngineBenchLanes, AStepAllocatesNothing) {
-  EngineBenchLanes lanes(benches_of(6));
+TEST(VirtualEngineLanes, AStepAllocatesNothing) {
+  VirtualEngineLanes lanes(benches_of(6));
   const std::vector<double> soc(6, -6.0);
   std::vector<BenchCycle> out(6);
   const test_support::AllocationCounter counter;

@@ -10,7 +10,7 @@
 #include "mgdd/common/record.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/engine/burn.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 namespace mgdd::loop {
 namespace {

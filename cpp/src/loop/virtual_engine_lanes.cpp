@@ -1,4 +1,4 @@
-#include "mgdd/loop/engine_bench_lanes.hpp"
+#include "mgdd/loop/virtual_engine_lanes.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -9,10 +9,10 @@
 namespace mgdd::loop {
 namespace {
 
-std::vector<EngineBench> checked(std::vector<EngineBench> benches) {
+std::vector<VirtualEngine> checked(std::vector<VirtualEngine> benches) {
   require_within("number of benches", static_cast<double>(benches.size()), 1.0,
-                 static_cast<double>(EngineBenchLanes::width));
-  for (const EngineBench& bench : benches) {
+                 static_cast<double>(VirtualEngineLanes::width));
+  for (const VirtualEngine& bench : benches) {
     if (!side_by_side(bench, benches[0])) {
       throw ParameterError(
           "benches side by side must have a constant gamma, one input and no limit on t_evo_k, and be alike in "
@@ -25,7 +25,7 @@ std::vector<EngineBench> checked(std::vector<EngineBench> benches) {
 
 }  // namespace
 
-bool side_by_side(const EngineBench& one, const EngineBench& other) noexcept {
+bool side_by_side(const VirtualEngine& one, const VirtualEngine& other) noexcept {
   const BenchSettings &a = one.settings(), &b = other.settings();
   const auto simple = [](const BenchSettings& s) {
     return s.inputs.size() == 1 && std::find(s.limits.begin(), s.limits.end(), "t_evo_k") == s.limits.end();
@@ -36,14 +36,14 @@ bool side_by_side(const EngineBench& one, const EngineBench& other) noexcept {
          a.cylinder.wall_heat.wall_heat_model == b.cylinder.wall_heat.wall_heat_model;
 }
 
-EngineBenchLanes::EngineBenchLanes(std::vector<EngineBench> benches, InstructionSet set)
+VirtualEngineLanes::VirtualEngineLanes(std::vector<VirtualEngine> benches, InstructionSet set)
     : benches_(checked(std::move(benches))), set_(set) {
   cycles_.use(benches_[0].model());
 }
 
-void EngineBenchLanes::step(std::span<const double> soc_cad, std::span<BenchCycle> out) noexcept {
+void VirtualEngineLanes::step(std::span<const double> soc_cad, std::span<BenchCycle> out) noexcept {
   for (std::size_t lane = 0; lane < size(); ++lane) {
-    EngineBench& bench = benches_[lane];
+    VirtualEngine& bench = benches_[lane];
     out[lane] = bench.begin(soc_cad.subspan(lane, 1));
     const engine::Cylinder& cylinder = bench.model().cylinder();  // as it has drifted
     cycles_.set_charge(lane, bench.charge_of(out[lane]), cylinder.wall_heat);

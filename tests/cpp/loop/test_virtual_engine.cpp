@@ -1,5 +1,5 @@
 // Laws of the virtual bench: it is the cycle model, its sensors are their closed forms, its chance has its statistics.
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +25,8 @@ engine::Indicators<double> cycle_of(const engine::Cylinder& cylinder, const engi
   return model.indicators(charge, soc, work);
 }
 
-TEST(EngineBench, WithoutChanceItIsTheCycleModel) {
-  EngineBench bench(quiet_bench());
+TEST(VirtualEngine, WithoutChanceItIsTheCycleModel) {
+  VirtualEngine bench(quiet_bench());
   for (const double soc : {-20.0, -6.0, 3.5}) {
     const BenchCycle c = bench.step(soc);
     const auto expected = cycle_of({}, {}, soc);
@@ -39,8 +39,8 @@ TEST(EngineBench, WithoutChanceItIsTheCycleModel) {
   EXPECT_EQ(bench.cycle(), 3);
 }
 
-TEST(EngineBench, SensorsStartSteadyAndAnswerAStepInClosedForm) {
-  EngineBench bench(quiet_bench());
+TEST(VirtualEngine, SensorsStartSteadyAndAnswerAStepInClosedForm) {
+  VirtualEngine bench(quiet_bench());
   const BenchCycle first = bench.step(-10.0);
   EXPECT_EQ(first.nox_analyser_ppm, first.nox_true_ppm);
   EXPECT_EQ(first.nox_fast_ppm, first.nox_true_ppm);
@@ -58,11 +58,11 @@ TEST(EngineBench, SensorsStartSteadyAndAnswerAStepInClosedForm) {
   EXPECT_DOUBLE_EQ(bench.analyser_gain(), -std::expm1(-1.0 / 25.0));
 }
 
-TEST(EngineBench, TheCorrectionFindsTheAnalyserAtItsRate) {
+TEST(VirtualEngine, TheCorrectionFindsTheAnalyserAtItsRate) {
   BenchSettings s = quiet_bench();
   s.soft_sensor.model = s.true_nox;
   s.soft_sensor.model.proxy.reference_nox_ppm *= 1.3;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   for (int k = 0; k < 400; ++k) {
     const BenchCycle c = bench.step(-6.0);
     ASSERT_NEAR(std::log(c.nox_soft_corrected_ppm / c.nox_soft_ppm), -std::log(1.3) * (1.0 - std::pow(0.99, k)), 1e-9);
@@ -70,23 +70,23 @@ TEST(EngineBench, TheCorrectionFindsTheAnalyserAtItsRate) {
   }
 }
 
-TEST(EngineBench, ATrueProxyIsNotCorrectedEvenInTransients) {
+TEST(VirtualEngine, ATrueProxyIsNotCorrectedEvenInTransients) {
   BenchSettings s = quiet_bench();
   s.soft_sensor.model = s.true_nox;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   for (int k = 0; k < 500; ++k) {
     const BenchCycle c = bench.step(test_support::wandering_soc_cad(k));
     ASSERT_NEAR(c.nox_soft_corrected_ppm, c.nox_true_ppm, 1e-9);
   }
 }
 
-TEST(EngineBench, EachSensorReachesThePerformance) {
+TEST(VirtualEngine, EachSensorReachesThePerformance) {
   for (const NoxSensor sensor :
        {NoxSensor::analyser, NoxSensor::fast, NoxSensor::soft, NoxSensor::soft_corrected, NoxSensor::true_value}) {
     BenchSettings s = quiet_bench(1.0);
     s.nox_sensor = sensor;
     s.soft_sensor.correction_gain = 0.3;
-    EngineBench bench(s);
+    VirtualEngine bench(s);
     BenchCycle c;
     for (int k = 0; k < 60; ++k)
       c = bench.step(test_support::wandering_soc_cad(k));
@@ -98,13 +98,13 @@ TEST(EngineBench, EachSensorReachesThePerformance) {
   }
 }
 
-TEST(EngineBench, TheWholeObjectiveCanPassTheAnalyser) {
+TEST(VirtualEngine, TheWholeObjectiveCanPassTheAnalyser) {
   BenchSettings s = quiet_bench();
-  const double before = EngineBench(s).step(-10.0).j, after = EngineBench(s).step(0.0).j;
+  const double before = VirtualEngine(s).step(-10.0).j, after = VirtualEngine(s).step(0.0).j;
   s.delay_whole_objective = true;
   s.analyser.delay_cycles = 7;
   s.analyser.lag_cycles = 3.0;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   EXPECT_EQ(bench.step(-10.0).j, before);
   for (int k = 1; k < 40; ++k) {
     const double expected = k >= 8 ? after + (before - after) * std::exp(-(k - 7.0) / 3.0) : before;
@@ -112,11 +112,11 @@ TEST(EngineBench, TheWholeObjectiveCanPassTheAnalyser) {
   }
 }
 
-TEST(EngineBench, ScatterAndNoiseHaveTheirStatistics) {
+TEST(VirtualEngine, ScatterAndNoiseHaveTheirStatistics) {
   constexpr int n = 4000;
   BenchSettings s;
   s.analyser.lag_s = s.analyser.delay_s = 0.0;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   double soc = 0.0, soc2 = 0.0, eta = 0.0, eta2 = 0.0, both = 0.0, reading2 = 0.0, fast2 = 0.0, cross = 0.0;
   const double swept_m3 = engine::Geometry<double>({}).swept_m3;
   double fast_level = bench.step(-6.0).nox_true_ppm;
@@ -151,11 +151,11 @@ TEST(EngineBench, ScatterAndNoiseHaveTheirStatistics) {
   EXPECT_NEAR(std::sqrt(fast2), 0.03, 0.03 * four);
 }
 
-TEST(EngineBench, AMisfireBurnsNothing) {
+TEST(VirtualEngine, AMisfireBurnsNothing) {
   constexpr int n = 4000;
   BenchSettings s = quiet_bench();
   s.misfire_probability = 0.1;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   engine::OperatingPoint motored;
   motored.fuel_mg = 0.0;
   const auto dead = cycle_of({}, motored, -6.0);
@@ -178,11 +178,11 @@ TEST(EngineBench, AMisfireBurnsNothing) {
   EXPECT_NEAR(pairs, 0.01 * n, 4.0 * std::sqrt(0.0099 * n));
 }
 
-TEST(EngineBench, DriftMovesTimingAndWallHeat) {
+TEST(VirtualEngine, DriftMovesTimingAndWallHeat) {
   BenchSettings s = quiet_bench();
   s.soc_drift_cad_per_kcycle = 2.0;
   s.wall_heat_drift_per_kcycle = 0.4;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   BenchCycle c;
   for (int k = 0; k <= 500; ++k)
     c = bench.step(-6.0);
@@ -194,7 +194,7 @@ TEST(EngineBench, DriftMovesTimingAndWallHeat) {
   EXPECT_EQ(bench.step(-6.0).indicators.efficiency_gross, cycle_of({}, {}, -6.0).efficiency_gross);
 }
 
-TEST(EngineBench, TheScheduleChangesThePointAndSaysSo) {
+TEST(VirtualEngine, TheScheduleChangesThePointAndSaysSo) {
   BenchSettings s = quiet_bench();
   engine::OperatingPoint warm, fast, little;
   warm.intake_temperature_k = 330.0;
@@ -202,7 +202,7 @@ TEST(EngineBench, TheScheduleChangesThePointAndSaysSo) {
   little.speed_rpm = 3000.0;
   little.fuel_mg = 20.8;
   s.schedule = {{0, {}}, {3, warm}, {5, fast}, {8, little}};
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   for (std::int64_t k = 0; k < 12; ++k) {
     const engine::OperatingPoint& expected = k < 3 ? engine::OperatingPoint{} : k < 5 ? warm : k < 8 ? fast : little;
     EXPECT_EQ(bench.point(), expected);
@@ -214,8 +214,8 @@ TEST(EngineBench, TheScheduleChangesThePointAndSaysSo) {
   }
 }
 
-TEST(EngineBench, RequestsOutsideTheWindowAreClampedAndFlagged) {
-  EngineBench bench(quiet_bench());
+TEST(VirtualEngine, RequestsOutsideTheWindowAreClampedAndFlagged) {
+  VirtualEngine bench(quiet_bench());
   EXPECT_EQ(bench.window_cad(), (std::array<double, 2>{-60.0, 20.0}));
   EXPECT_EQ(bench.step(-61.0).soc_cad, -60.0);
   EXPECT_FALSE(bench.step(-7.0).clamped);
@@ -232,10 +232,10 @@ TEST(EngineBench, RequestsOutsideTheWindowAreClampedAndFlagged) {
   EXPECT_LT(timing_window(narrow)[1], 15.0);
 }
 
-TEST(EngineBench, LimitsAreTheMeasuredValues) {
+TEST(VirtualEngine, LimitsAreTheMeasuredValues) {
   BenchSettings s;
   s.limits = {"p_max_bar", std::string(cov_imep_name), "dp_max_bar_per_cad", "t_max_k"};
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   std::vector<double> imep;
   for (int k = 0; k < 120; ++k) {
     const BenchCycle c = bench.step(-6.0);
@@ -255,12 +255,12 @@ TEST(EngineBench, LimitsAreTheMeasuredValues) {
   }
 }
 
-TEST(EngineBench, AnImpossibleCycleIsFlaggedAndRepeatsTheLastValue) {
+TEST(VirtualEngine, AnImpossibleCycleIsFlaggedAndRepeatsTheLastValue) {
   BenchSettings s = quiet_bench();
   s.schedule.front().point.speed_rpm = 50.0;
   s.step_cad = 5.0;
   s.wall_heat_drift_per_kcycle = 100.0;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   BenchCycle last = bench.step(-6.0), c = last;
   while (!(c = bench.step(-6.0)).unphysical && c.cycle < 1000)
     last = c;

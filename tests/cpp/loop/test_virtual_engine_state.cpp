@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 #include "support/bench_case.hpp"
 #include "support/no_alloc.hpp"
 
@@ -18,8 +18,8 @@ using test_support::bits_of;
 using test_support::wandering_soc_cad;
 using History = std::vector<std::vector<std::uint64_t>>;
 
-static_assert(noexcept(std::declval<EngineBench&>().step(0.0)));
-static_assert(noexcept(std::declval<EngineBench&>().reset(0)));
+static_assert(noexcept(std::declval<VirtualEngine&>().step(0.0)));
+static_assert(noexcept(std::declval<VirtualEngine&>().reset(0)));
 
 BenchSettings eventful(std::uint64_t seed = 7) {
   BenchSettings s;
@@ -36,24 +36,24 @@ BenchSettings eventful(std::uint64_t seed = 7) {
   return s;
 }
 
-History run(EngineBench& bench, int cycles) {
+History run(VirtualEngine& bench, int cycles) {
   History out;
   for (int k = 0; k < cycles; ++k)
     out.push_back(bits_of(bench.step(wandering_soc_cad(bench.cycle()))));
   return out;
 }
 
-TEST(EngineBenchState, ARestoredRunContinuesBitForBit) {
+TEST(VirtualEngineState, ARestoredRunContinuesBitForBit) {
   for (const bool delayed : {false, true}) {
     BenchSettings s = eventful();
     s.delay_whole_objective = delayed;
     for (const int cut : {0, 1, 60, 130}) {
-      EngineBench bench(s);
+      VirtualEngine bench(s);
       run(bench, cut);
       const auto state = save_state(bench);
       const History rest = run(bench, 120);
       s.seed = 99;  // the seed belongs to the state
-      EngineBench other(s);
+      VirtualEngine other(s);
       run(other, 33);
       restore_state(other, state);
       EXPECT_EQ(save_state(other), state);
@@ -63,10 +63,10 @@ TEST(EngineBenchState, ARestoredRunContinuesBitForBit) {
   }
 }
 
-TEST(EngineBenchState, EveryNumberThatIsNotFiniteIsRefusedByName) {
+TEST(VirtualEngineState, EveryNumberThatIsNotFiniteIsRefusedByName) {
   BenchSettings s = eventful();
   s.delay_whole_objective = true;
-  EngineBench bench(s);
+  VirtualEngine bench(s);
   run(bench, 40);
   const StateColumns good = save_state(bench);
   for (const auto& [name, values] : good) {
@@ -87,7 +87,7 @@ TEST(EngineBenchState, EveryNumberThatIsNotFiniteIsRefusedByName) {
   EXPECT_EQ(save_state(bench), good);
 }
 
-TEST(EngineBenchState, NothingIsAllocatedWithAnyOption) {
+TEST(VirtualEngineState, NothingIsAllocatedWithAnyOption) {
   int combinations = 0;
   for (const NoxSensor sensor : {NoxSensor::none, NoxSensor::analyser, NoxSensor::fast, NoxSensor::soft,
                                  NoxSensor::soft_corrected, NoxSensor::true_value}) {
@@ -105,7 +105,7 @@ TEST(EngineBenchState, NothingIsAllocatedWithAnyOption) {
             s.soc_drift_cad_per_kcycle = s.wall_heat_drift_per_kcycle = drift;
             s.cylinder.burn.burn_shape = shape;
             s.schedule.back().cycle = 2;
-            EngineBench bench(s);
+            VirtualEngine bench(s);
             const test_support::AllocationCounter counter;
             for (int k = 0; k < 6; ++k) {
               bench.step(-60.0 + 20.0 * k);

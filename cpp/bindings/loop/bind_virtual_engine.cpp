@@ -1,4 +1,4 @@
-// Binds loop/engine_bench.hpp: the virtual engine bench and the dynamics of its sensors.
+// Binds loop/virtual_engine.hpp: the virtual engine bench and the dynamics of its sensors.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -13,7 +13,7 @@
 #include "loop/bench_columns.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
-#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/virtual_engine.hpp"
 #include "record_binding.hpp"
 
 namespace mgdd::bindings {
@@ -250,7 +250,7 @@ Examples
 
 }  // namespace
 
-void bind_engine_bench(py::module_& m) {
+void bind_virtual_engine(py::module_& m) {
   using py::arg;
   bind_dynamics(m);
   py::list limits;
@@ -262,9 +262,10 @@ void bind_engine_bench(py::module_& m) {
     inputs.append(as_str(name));
   m.attr("bench_inputs") = py::tuple(inputs);
   using B = BoundBench;
-  py::class_<B> cls(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.");
+  py::class_<B> cls(m, "VirtualEngine", "The virtual engine bench; use mgdd.loop.VirtualEngine.");
   const Members& members = members_of(fields_of(BenchSettings{}), BenchSettings{});
-  bind_keywords<BenchSettings>(cls, members, [](const BenchSettings& s) { return B("EngineBench", EngineBench(s)); });
+  bind_keywords<BenchSettings>(cls, members,
+                               [](const BenchSettings& s) { return B("VirtualEngine", VirtualEngine(s)); });
   cls.def_static(
          "fields", [&members] { return members.described(); },
          "Every setting by name: unit, bounds or choices, meaning, default.")
@@ -323,7 +324,7 @@ void bind_engine_bench(py::module_& m) {
       .def_property_readonly(
           "input_bounds",
           [](const B& b) {
-            const EngineBench& bench = b.constant();
+            const VirtualEngine& bench = b.constant();
             py::dict out;
             for (std::size_t i = 0; i < bench.windows().size(); ++i) {
               const auto [least, greatest] = bench.windows()[i];
@@ -344,7 +345,7 @@ void bind_engine_bench(py::module_& m) {
       .def("__repr__",
            [](const B& b) {
              const std::int64_t cycle = b.use()->cycle();
-             return py::str("<EngineBench at cycle {}, {!r}>").format(cycle, b.constant().point_at(cycle));
+             return py::str("<VirtualEngine at cycle {}, {!r}>").format(cycle, b.constant().point_at(cycle));
            })
       .def(py::pickle(
           [&members](const B& b) {

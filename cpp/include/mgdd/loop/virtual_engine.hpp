@@ -182,10 +182,10 @@ inline constexpr std::array<BenchLimit, 6> bench_limits{{
     {"nox_soft_corrected_ppm", &BenchCycle::nox_soft_corrected_ppm},
 }};
 
-class EngineBench {
+class VirtualEngine {
  public:
   /// ParameterError by `validate`; ConvergenceError if a scheduled point has no physical cycle.
-  explicit EngineBench(const BenchSettings& settings);
+  explicit VirtualEngine(const BenchSettings& settings);
 
   /// Runs one cycle. Requests stand in the order of `BenchSettings::inputs` and are clamped to `windows`; NaN and what
   /// is left out repeat the last one, at first the value of the operating point. Before the first cycle every sensor
@@ -193,7 +193,7 @@ class EngineBench {
   BenchCycle step(std::span<const double> inputs) noexcept;
   BenchCycle step(double soc_cad) noexcept { return step({&soc_cad, 1}); }
 
-  /// The halves of `step` for who runs the cycle elsewhere, as `EngineBenchLanes` does: what burns, its charge, and
+  /// The halves of `step` for who runs the cycle elsewhere, as `VirtualEngineLanes` does: what burns, its charge, and
   /// what is measured of it. Once for each cycle and in this order; between them `indicators` and `unphysical` are
   /// filled in.
   BenchCycle begin(std::span<const double> inputs) noexcept;
