@@ -1,4 +1,4 @@
-"""An experiment over vcan whose loop has a raw socket of its own: run by tests/python/test_rig_uml.py."""
+"""An experiment over vcan whose loop has a raw socket of its own: run by tests/python/rig/test_rig_uml.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// The reference numbers of tests/data/engine_golden.csv; tests/python/test_engine_cycle.py reads the same file.
+// The reference numbers of tests/data/engine_golden.csv; tests/python/engine/test_engine_cycle.py reads the same file.
 #include <cmath>
 #include <limits>
 #include <map>

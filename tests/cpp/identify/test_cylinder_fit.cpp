@@ -1,5 +1,5 @@
 // Calibration: recovers what made the data, names what the data do not identify, and meets the reference fits of the
-// measured traces. tests/python/test_identify_cylinder.py reads the same reference rows.
+// measured traces. tests/python/identify/test_identify_cylinder.py reads the same reference rows.
 #include "mgdd/identify/engine/cylinder_fit.hpp"
 
 #include <algorithm>

@@ -51,7 +51,7 @@ TEST(E2e, PublishedCheckValues) {
   EXPECT_THROW(named_crc8("crc8"), ParameterError);
 }
 
-TEST(E2e, TheSameBytesAsThePythonTest) {  // tests/python/test_rig_e2e.py holds the same list
+TEST(E2e, TheSameBytesAsThePythonTest) {  // tests/python/rig/test_rig_e2e.py holds the same list
   Payload payload{0, 0, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66};
   const auto bytes = [&payload](E2eSettings s, int counter) {
     Payload out = payload;

@@ -29,7 +29,7 @@ Payload packed(const SignalLayout& layout, double value, PackStatus wanted = Pac
   return payload;
 }
 
-// The same vectors as in tests/python/test_rig_codec.py, by hand from the bit charts of the DBC convention.
+// The same vectors as in tests/python/rig/test_rig_codec.py, by hand from the bit charts of the DBC convention.
 TEST(SignalCodec, KnownBytes) {
   EXPECT_EQ(packed({.start = 0, .length = 16, .scale = 0.01}, 81.92), (Payload{0x00, 0x20}));
   EXPECT_EQ(packed({.start = 4, .length = 12}, 0xABC), (Payload{0xC0, 0xAB}));

@@ -137,7 +137,7 @@ def test_a_forgotten_loop_ends_with_an_open_bridge() -> None:
 
 PRELUDE = f"""
 import signal, sys
-sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path(__file__).parent / "support")!r}]
+sys.path[:0] = [{str(Path(__file__).parent)!r}, {str(Path(__file__).parents[1] / "support")!r}]
 from realtime_loops import *
 from throttle_node import *
 transport = RingTransport()

@@ -13,7 +13,7 @@ import pytest
 
 from mgdd.loop import seek
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "howto.md"
 BEST = np.array([-4.0, 0.15])
 BOX = SimpleNamespace(
     low=np.array([-25.0, 0.0], np.float32), high=np.array([15.0, 0.4], np.float32), shape=(2,), dtype=np.float32

@@ -15,7 +15,7 @@ import pytest
 from mgdd.control import Pid, SlidingMode
 from mgdd.errors import ParameterError
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tools"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "tools"))
 control = importlib.import_module("tables_of_control")
 
 KINDS = {

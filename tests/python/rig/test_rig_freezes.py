@@ -23,7 +23,7 @@ from mgdd.rig import VirtualNode
 pytest.importorskip("can", reason="the extra `can` is not installed")
 pytest.importorskip("cantools", reason="the extra `can` is not installed")
 
-HOST = Path(__file__).parent / "support" / "steady_host.py"
+HOST = Path(__file__).parents[1] / "support" / "steady_host.py"
 PARTS = ("node", "hub", "host")
 WAYS = ("goes on", "falls silent", "arms again")  # what the host does while another part stands still
 LIMIT_S = 0.02  # of the command, in etb.toml

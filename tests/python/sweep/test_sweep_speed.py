@@ -14,7 +14,7 @@ from mgdd import _core
 
 pytestmark = pytest.mark.slow
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 # On the grid, just beside it, between; first and last of the range.
 TIMINGS = np.array([-20.0, -13.0 - 1e-9, -6.0, -5.37, 0.0, 4.5, 11.0])
 

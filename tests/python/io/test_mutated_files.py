@@ -253,7 +253,7 @@ def test_many_mutants_of_any_file_are_refused_with_an_error_of_mgdd(name: str, t
 
 
 # --- random files -------------------------------------------------------------------------------------------
-TOOL = Path(__file__).parents[2] / "tools/fuzz_readers.py"
+TOOL = Path(__file__).parents[3] / "tools/fuzz_readers.py"
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from map_cases import FUEL, SPEED, timing_table
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.maps import CalibrationMap, read_dcm, read_map, smooth_map, write_map
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 VALUES = np.arange(15.0).reshape(3, 5) + 0.25  # nothing of it is symmetric
 AXES = {"speed_rpm": SPEED, "fuel_mg": FUEL}
 

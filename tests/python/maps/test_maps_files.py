@@ -20,7 +20,7 @@ from mgdd.errors import DataError, Error, ParameterError
 from mgdd.io.files import write_whole
 from mgdd.maps import CalibrationMap, optimize_map, read_dcm, read_map, smooth_map, write_map
 
-FOREIGN = Path(__file__).parents[1] / "data" / "foreign.dcm"
+FOREIGN = Path(__file__).parents[2] / "data" / "foreign.dcm"
 
 
 def curve() -> CalibrationMap:

@@ -19,7 +19,7 @@ import pytest
 import mgdd
 
 pytestmark = [pytest.mark.uml, pytest.mark.slow]
-UML = Path(__file__).parents[1] / "uml"
+UML = Path(__file__).parents[2] / "uml"
 LIMIT_S = 360
 # Root becomes nobody, who may read everything (the interpreter may stand in a home) and write nothing.
 _READ_ONLY = "-all,+dac_read_search"

@@ -149,7 +149,7 @@ def test_a_refused_file_fails_and_raises_nothing(tmp_path: Path) -> None:
 
 
 def test_every_kind_of_doubt_belongs_to_a_check() -> None:
-    source = Path(__file__).parents[2] / "cpp" / "src" / "engine" / "pressure"
+    source = Path(__file__).parents[3] / "cpp" / "src" / "engine" / "pressure"
     text = "".join(file.read_text(encoding="utf-8") for file in source.glob("*.cpp"))
     import re
 

@@ -2,7 +2,7 @@
 
 The engines are of both kinds and four wall-heat laws, and share no code with the package.
 
-``python tests/python/test_trust_faults.py N`` prints the table of docs/validation.md.
+``python tests/python/engine/test_trust_faults.py N`` prints the table of docs/validation.md.
 """
 
 from __future__ import annotations

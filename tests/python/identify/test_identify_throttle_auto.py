@@ -22,7 +22,7 @@ from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle
 
-sys.path.append(str(Path(__file__).parent / "support"))
+sys.path.append(str(Path(__file__).parents[1] / "support"))
 from throttle_bodies import draw_body, make_logs
 
 HAS = {
