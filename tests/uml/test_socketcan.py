@@ -1,4 +1,4 @@
-"""On a kernel with CAN: run inside User-Mode Linux by tests/python/rig/test_rig_uml.py, or by hand where vcan0 exists."""
+"""On a kernel with CAN: run in User-Mode Linux by tests/python/rig/test_rig_uml.py, or by hand where vcan0 exists."""
 
 from __future__ import annotations
 

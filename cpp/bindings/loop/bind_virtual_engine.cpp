@@ -169,7 +169,7 @@ py::dict step(BoundBench& bound, double soc_cad, const std::vector<double>& furt
   return to_dict(bound.use()->step({row.data(), further.size() + 1}), s);
 }
 
-py::dict run(BoundBench& bound, const InputArray& soc_cad, const std::vector<InputArray>& further) {
+py::dict run_columns(BoundBench& bound, const InputArray& soc_cad, const std::vector<InputArray>& further) {
   Requests requests(bound.constant().settings(), soc_cad, further);
   std::vector<BenchCycle> rows;
   rows.reserve(requests.size());
@@ -273,7 +273,7 @@ void bind_virtual_engine(py::module_& m) {
           "step", &step, arg("soc_cad"), arg("further") = py::tuple(),
           "Run one cycle: what was measured, by name. `further` are the other inputs in their order; what is left out\n"
           "stays.")
-      .def("run_columns", &run, arg("soc_cad"), arg("further") = py::tuple(),
+      .def("run_columns", &run_columns, arg("soc_cad"), arg("further") = py::tuple(),
            "Run one cycle per request, without the GIL: columns by name. `further` are columns of the other inputs.")
       .def(
           "noise_free_limits", &noise_free_limits, arg("soc_cad"), arg("cycle"), arg("further") = py::tuple(),

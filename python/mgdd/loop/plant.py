@@ -66,8 +66,8 @@ class Measurement:
 class Plant(Protocol):
     """Takes inputs by name, gives back what was measured.
 
-    `VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; a class of your own with
-    these members is one too.
+    `VirtualEngine`, `SurrogatePlant`, `VirtualThrottle` and every rig of `mgdd.rig` are plants; so is a class of yours
+    with these members.
 
     Examples
     --------

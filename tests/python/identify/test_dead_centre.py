@@ -1,6 +1,6 @@
 """Top dead centre on engines that share no code with the package, and what a degree of it costs.
 
-``python tests/python/identify/test_dead_centre.py N`` prints the shares of docs/validation.md over N engines of each kind.
+``python tests/python/identify/test_dead_centre.py N`` prints the shares of docs/validation.md over N engines each.
 """
 
 from __future__ import annotations
