@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['VirtualEngine', 'FunctionPlant', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualThrottle', 'bench_inputs', 'bench_limits', 'loop_form', 'monte_carlo', 'plant_noise', 'run_function', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
+__all__: list[str] = ['FunctionPlant', 'Mgdd1', 'ObjectGuidedMgdd1', 'SensorDynamics', 'VirtualEngine', 'VirtualThrottle', 'bench_inputs', 'bench_limits', 'loop_form', 'monte_carlo', 'plant_noise', 'run_function', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
