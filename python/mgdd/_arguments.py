@@ -16,8 +16,6 @@ from mgdd.errors import Error, ParameterError, did_you_mean, shortened
 if TYPE_CHECKING:
     import inspect
 
-__all__ = ["refusal", "require_plain", "shown", "unbound", "unit_refusal"]
-
 _NUMBERS, _NUMBER, _WHOLE = "ArrayLike", "SupportsFloat", "SupportsInt"
 _NAMED = {
     _NUMBER: "one number",
@@ -77,24 +75,9 @@ def unbound(
 def refusal(
     name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
 ) -> TypeError | ParameterError:
-    """Say why a call fits none of its signatures.
+    """Say why a call fits none of its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
 
-    Parameters
-    ----------
-    name : str
-        Of the function or class.
-    signatures : sequence of str
-        As pybind11 writes them: ``(point: mgdd._core.engine.OperatingPoint, soc_cad: typing.SupportsFloat) -> dict``.
-    given, keywords : sequence, mapping
-        The arguments, without ``self``.
-    method : bool
-        The first argument of the signatures is ``self``.
-
-    Returns
-    -------
-    TypeError or ParameterError
-        TypeError for arguments that are missing, too many or unknown, as Python itself raises it; otherwise
-        ParameterError naming the argument that has the wrong kind.
+    The latter names the argument that has the wrong kind; the first one of a `method` is ``self``.
     """
     culprits: list[tuple[int, _Argument, Any]] = []
     for signature in signatures:

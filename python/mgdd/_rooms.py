@@ -39,13 +39,7 @@ class _Room(ModuleType):
 
 
 def furnish(name: str) -> None:
-    """Let a public module, its functions and its classes answer wrong guesses.
-
-    Parameters
-    ----------
-    name : str
-        Of the module, which has ``__all__``.
-    """
+    """Let a public module, which has ``__all__``, its functions and its classes answer wrong guesses."""
     room = sys.modules[name]
     room.__class__ = _Room
     for each in room.__all__:

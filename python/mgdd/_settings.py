@@ -10,27 +10,12 @@ from collections.abc import Callable, Iterator
 from textwrap import wrap
 from typing import Any, TypeVar
 
-__all__ = ["takes_settings_of"]
-
 _MARK = "**settings\n    As `fields` lists them.\n"
 Class = TypeVar("Class", bound=type)
 
 
 def takes_settings_of(core: Any, *, without: tuple[str, ...] = ()) -> Callable[[Class], Class]:
-    """Show the settings of `core` in place of the ``**settings`` of a class.
-
-    Parameters
-    ----------
-    core : type
-        Class of the core with ``fields``, whose keywords they are.
-    without : tuple of str
-        Keywords of the core that the class makes of its own arguments.
-
-    Returns
-    -------
-    callable
-        A decorator of the class; it leaves the behaviour alone.
-    """
+    """Show the settings of `core`, but for some, in place of the ``**settings`` of a class."""
 
     def decorate(cls: Class) -> Class:
         own = inspect.signature(cls.__init__).parameters  # type: ignore[misc]

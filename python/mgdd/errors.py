@@ -60,48 +60,12 @@ _ACTING = {
 
 
 def printable(text: str) -> str:
-    r"""Write out what a terminal would obey, as the escapes of a name in a file.
-
-    Parameters
-    ----------
-    text : str
-        Of a file, a person or a library.
-
-    Returns
-    -------
-    str
-        The text with such letters as Python writes them.
-
-    Examples
-    --------
-    >>> from mgdd.errors import printable
-    >>> print(printable("torque \x1b[2J"))
-    torque \x1b[2J
-    """
+    """Write out what a terminal would obey, as the escapes of a name in a file."""
     return text.translate(_ACTING)
 
 
 def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
-    """Cut a long text in its middle.
-
-    Parameters
-    ----------
-    text : str
-        Of any length.
-    longest : int
-        Letters of the result, without the note of what is left out.
-
-    Returns
-    -------
-    str
-        The text itself, or its beginning and end with the number of letters between them.
-
-    Examples
-    --------
-    >>> from mgdd.errors import shortened
-    >>> shortened("a" * 500_000, 12)
-    'aaaaaaaaa[... 499988 letters ...]aaa'
-    """
+    """Cut a long text in its middle."""
     if len(text) <= longest:
         return text
     tail = longest // 4

@@ -12,8 +12,6 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Mgdd1"]
-
 _MOST_STATES = 32  # of an object that guides, as in the core
 
 

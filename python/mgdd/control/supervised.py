@@ -9,8 +9,6 @@ from typing import Protocol
 from mgdd._core.control import ThrottleSupervisor
 from mgdd.errors import ParameterError
 
-__all__ = ["Controller", "SupervisedController"]
-
 
 class Controller(Protocol):
     """What a supervisor can stand beside."""

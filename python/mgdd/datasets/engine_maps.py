@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["engine_map"]
-
 _AXES = ("speed_rpm", "torque_Nm")
 # Column of the file: name here, offset, unit, long name.
 _COLUMNS: dict[str, tuple[str, float, str, str]] = {

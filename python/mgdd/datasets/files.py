@@ -10,8 +10,6 @@ from pathlib import Path
 from mgdd.datasets.origins import ORIGINS, fetched, find_fetched
 from mgdd.errors import DataError
 
-__all__ = ["ENGINE_MAPS", "FILES", "HD", "LICENCES", "names", "path", "place"]
-
 _VARIABLE = "MGDD_DATA_DIR"
 _PACKAGE = Path(__file__).parents[1] / "data"
 HD = "hd_diesel_128x144"
@@ -73,33 +71,7 @@ def names() -> tuple[str, ...]:
 
 
 def path(name: str, file: str) -> Path:
-    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package, then what was fetched.
-
-    Parameters
-    ----------
-    name : str
-        The data set, see `names`.
-    file : str
-        The file in it.
-
-    Returns
-    -------
-    pathlib.Path
-        An existing file; one from the package has passed its SHA-256 check.
-
-    Raises
-    ------
-    FileNotFoundError
-        It is in none of these places; the message names them.
-    DataError
-        The packaged file differs from what was shipped.
-
-    Examples
-    --------
-    >>> from mgdd.datasets.files import path
-    >>> path("hd_diesel_128x144", "hd_diesel_128x144_traces.csv").suffix
-    '.csv'
-    """
+    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package, then what was fetched."""
     folder = _data_dir()
     if folder is not None and (folder / name / file).is_file():
         return folder / name / file

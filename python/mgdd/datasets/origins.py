@@ -9,8 +9,6 @@ from typing import Any, NamedTuple
 
 from mgdd.errors import DataError, ParameterError
 
-__all__ = ["ORIGINS", "Origin", "fetch", "fetched", "find_fetched"]
-
 _LOG = logging.getLogger(__name__)
 _CACHE = "MGDD_CACHE_DIR"
 _EXTRA = "pip install 'mgdd[datasets]'"
@@ -54,38 +52,10 @@ ORIGINS: dict[str, dict[str, Origin]] = {
 
 
 def fetch(name: str) -> Path:
-    """Download a data set that has a public address, check it, and keep it for the next time.
+    """Download a data set that has a public address, check it, and keep it for the next time, in ``MGDD_CACHE_DIR``.
 
     Nothing is downloaded without this call. Read the terms of the data first: the attributes of the loaded records
     name them.
-
-    Parameters
-    ----------
-    name : {"cascaded_tanks", "emps", "wh2009"}
-        The set.
-
-    Returns
-    -------
-    pathlib.Path
-        The folder with its files: in ``MGDD_CACHE_DIR`` if that is set, else in the cache folder of the user. The
-        loaders look there after ``MGDD_DATA_DIR``.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A set without a public address.
-    mgdd.errors.DataError
-        A file that differs from the known one, or cannot be fetched.
-    ImportError
-        The package pooch is missing.
-
-    Examples
-    --------
-    >>> from mgdd.datasets.origins import fetch
-    >>> fetch("h2df_502")
-    Traceback (most recent call last):
-        ...
-    mgdd.errors.ParameterError: data set 'h2df_502': must be one of cascaded_tanks, emps, wh2009 to be fetched
     """
     if name not in ORIGINS:
         raise ParameterError(f"data set {name!r}: must be one of {', '.join(ORIGINS)} to be fetched")

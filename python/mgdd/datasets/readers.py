@@ -21,8 +21,6 @@ from mgdd.signals.even_grid import check_count
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["read"]
-
 _H2DF_SHA256 = "482b1cd0ce7e6389d8872f547d6fb05f7f63df9715eb6de1e76d7c066dada39c"
 _CAD = "°CA aTDC"
 _SIGN = "given in degrees before TDC (positive = early), sign turned here"

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["Factor", "Factors", "factors_of"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Factor:
@@ -109,13 +107,7 @@ class Factors:
 
 
 def factors_of(factors: Any) -> Factors:
-    """Check a mapping of names to ranges or levels.
-
-    Raises
-    ------
-    ParameterError
-        Not such a mapping, a name twice, a range that is empty or reversed, levels that repeat.
-    """
+    """Check a mapping of names to ranges or levels."""
     if not isinstance(factors, Mapping) or not factors:
         raise ParameterError.of(
             "factors", factors, "a mapping of names to (low, high), for example {'fuel_mg': (5, 40)}"

@@ -12,8 +12,6 @@ from mgdd.errors import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Exchange", "d_efficiency_percent", "d_optimal"]
-
 _LEAST_GAIN = 1e-8  # relative gain in det that is worth an exchange; below it rounding decides
 _SWEEPS = 200
 _RIDGE = 1e-6
@@ -44,8 +42,6 @@ def d_optimal(
     hold the p terms of the model at points that may be chosen and that stay; a DataError says that they do not
     determine the terms.
 
-    References
-    ----------
     Fedorov (1972), Theory of Optimal Experiments.
     Cook and Nachtsheim (1980), A comparison of algorithms for constructing exact D-optimal designs.
     """

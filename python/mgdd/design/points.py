@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["design_points"]
-
 METHODS = ("sobol", "halton", "lhs", "maximin", "factorial", "d_optimal")
 _POOL = 30  # candidates per point where points are chosen by distance
 _MOST_GRID = 8192  # points of a grid of candidates; beyond it they are drawn

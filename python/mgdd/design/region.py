@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FeasibleRegion", "inside_of"]
-
 Indicators = Callable[[dict[str, "NDArray[np.float64]"]], Mapping[str, "ArrayLike"]]
 
 

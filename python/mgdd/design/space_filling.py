@@ -12,8 +12,6 @@ from mgdd.errors import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Sampler", "draw_inside", "extend_hypercube", "far_points", "least_distance", "sampler_of"]
-
 Sampler = Callable[[int], "NDArray[np.float64]"]
 
 _MOST_PER_POINT, _MOST_FIRST = 200, 10_000  # draws until a region counts as too small
@@ -46,18 +44,7 @@ def draw_inside(
     inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
     what: str,
 ) -> tuple[NDArray[np.float64], int, int]:
-    """Draw points until n of them are feasible.
-
-    Returns
-    -------
-    points, feasible, drawn
-        The first n feasible points, and how many of how many were.
-
-    Raises
-    ------
-    DataError
-        Too few after 200 draws per point and 10 000 more.
-    """
+    """Draw points until n of them are feasible: those, and how many of how many were."""
     kept: list[NDArray[np.float64]] = []
     found = drawn = 0
     most = _MOST_FIRST + _MOST_PER_POINT * n
@@ -78,8 +65,6 @@ def draw_inside(
 def far_points(pool: NDArray[np.float64], n: int, *, existing: NDArray[np.float64]) -> NDArray[np.intp]:
     """Choose n rows of a pool one by one, each as far as possible from those before and the existing ones.
 
-    References
-    ----------
     Kennard and Stone (1969), Computer aided design of experiments.
     """
     rows: list[int] = []
@@ -100,8 +85,6 @@ def extend_hypercube(
 ) -> NDArray[np.float64]:
     """Return n rows in strata that the existing ones leave free, of k + n strata per column; the best of many tries.
 
-    References
-    ----------
     Wang (2003), Adaptive response surface method using inherited Latin hypercube design points.
     """
     k, m = existing.shape

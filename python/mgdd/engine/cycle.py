@@ -259,36 +259,10 @@ def convergence(
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
 ) -> xr.Dataset:
-    """Estimate the step-size error of every indicator from runs at h, h/2 and h/4.
+    """Estimate the step-size error of every indicator from runs at h, h/2 and h/4, with h at least 0.004.
 
-    Parameters
-    ----------
-    cylinder, point, soc_cad, step_cad, integrator
-        As in `simulate`; ``step_cad`` must be at least 0.004.
-
-    Returns
-    -------
-    xarray.Dataset
-        Over ``indicator``: ``value`` at h, ``extrapolated`` (Richardson's limit), ``error`` (value minus limit), all
-        in the unit of the indicator (coordinate ``indicator_units``), and the observed ``order`` [-], NaN where
-        the differences do not shrink regularly.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        As in `simulate`.
-
-    References
-    ----------
-    Richardson (1911); Roache (1994).
-
-    Examples
-    --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint
-    >>> from mgdd.engine.cycle import convergence
-    >>> c = convergence(Cylinder(), OperatingPoint())
-    >>> abs(float(c["error"].sel(indicator="efficiency_gross"))) < 2e-4
-    True
+    The limit is Richardson's (1911; Roache 1994); the observed order is NaN where the differences do not shrink
+    regularly.
     """
     cylinder, point = engine_of(cylinder, point)
     raw = _core.engine.convergence(cylinder, point, soc_cad, step_cad, integrator)

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["DegreeCost", "MotoredTdc", "degree_cost", "motored_tdc"]
-
 # Distances from TDC that are compared: nearer ones hold the peak alone, farther ones the flows of the valves.
 _FROM_CAD, _TO_CAD, _ROUNDS = 5.0, 60.0, 5
 _PEAK_CAD, _START_CAD, _FARTHEST_CAD = 8.0, 20.0, 5.0

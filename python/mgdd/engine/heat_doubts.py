@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     from mgdd._core.engine import Cylinder
 
-__all__ = ["expansion_doubts", "lost_heat"]
-
 # Late expansion [°CA aTDC]: most burns have ended, and the valve is shut.
 _FROM_CAD, _TO_CAD, _BEFORE_EVO_CAD, _MARGIN_CAD, _LEAST_CAD = 60.0, 90.0, 10.0, 5.0, 20.0
 _DEGREE, _WALL_K, _GAS_J_PER_KG_K = 4, 440.0, 287.0

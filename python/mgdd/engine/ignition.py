@@ -10,8 +10,6 @@ from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.result import NumbersResult
 
-__all__ = ["Timing", "ignited_soc_cad", "ignition_delay", "reached_soi_cad"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Timing(NumbersResult):
@@ -27,12 +25,6 @@ class Timing(NumbersResult):
         Whether the charge ignites before the exhaust valve opens.
     clipped : bool
         The wanted SOC cannot be reached; this is the edge of what can.
-
-    Examples
-    --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, ignition_delay
-    >>> ignition_delay(Cylinder(), OperatingPoint(), soi_cad=-10.0).ignites
-    True
     """
 
     soi_cad: float

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Indicating"]
-
 
 class Indicating:
     """Work, peaks, burn angles, exponents and knock of cycle after cycle on the same crank angles.

@@ -12,8 +12,6 @@ from mgdd.errors import DataError, ParameterError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["a_weighting_db", "noise_levels", "pressure_levels"]
-
 _CYCLE_DEG = 720.0
 _REFERENCE_PA, _PA_PER_BAR = 20e-6, 1e5
 # Of the audible range, by their number from 1 kHz on: 20 Hz to 20 kHz (IEC 61260-1, base-ten).

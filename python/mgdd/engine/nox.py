@@ -14,8 +14,6 @@ from mgdd.errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["fit_nox_proxy", "nox_at_reference_humidity", "nox_g_per_kwh"]
-
 _NO2_G_PER_MOL = 46.0055
 # 40 CFR 1065.670: factor = slope times the water of the intake air [mol/mol] + constant.
 _HUMIDITY = {"compression": (9.953, 0.832), "spark": (18.840, 0.68094)}

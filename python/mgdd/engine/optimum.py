@@ -16,8 +16,6 @@ from mgdd.optimize.optimum import Optimum, idle_limits, limits_of
 from mgdd.presets.meant import CylinderLike, PointLike, engine_of
 from mgdd.results.units import unit_of
 
-__all__ = ["find_optimum"]
-
 OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
 _SCAN_CAD = 0.5
 _SECANT_CAD = 3.0

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from mgdd.presets.meant import CylinderLike, PointLike
 
-__all__ = ["Check", "PressureCheck", "check_pressure"]
-
 Verdict = Literal["no fault found", "open", "doubt", "fail"]
 _WORST: tuple[Verdict, ...] = ("no fault found", "open", "doubt", "fail")
 # Kinds of doubts of `analyze` by the check that they belong to, in the order of a look at a file.

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from mgdd._core.engine import Cylinder, OperatingPoint
 
-__all__ = ["hidden", "record_doubts"]
-
 _COARSE_CAD = 2.5
 # A soft saturation is told from a burn by spark alone, and by so many cycles; a shift of a degree matters.
 _SPARK_RATIO, _SOFT_CYCLES, _WANTED_CAD = 14.0, 10, 1.0

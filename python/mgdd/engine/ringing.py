@@ -10,8 +10,6 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Spectrum", "ringing", "spectrum_of"]
-
 # A peak must stand so many times above both its shoulders, and above what noise of a known level hardly reaches.
 _ABOVE, _BY_NOISE = 4.0, 0.001
 _SHOULDERS = ((0.75, 0.9), (1.1, 1.25))  # of its frequency

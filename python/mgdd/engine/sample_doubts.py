@@ -11,8 +11,6 @@ from mgdd.signals.repeats import copies, noise_of, still
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Top", "copy_doubts", "sample_doubts", "top_of"]
-
 # Compression from where the valves are shut to before any burn [°CA aTDC]: smooth, so that its third differences are
 # the noise.
 _QUIET_CAD = (-140.0, -60.0)

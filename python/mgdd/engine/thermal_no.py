@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from mgdd._core.engine import Cylinder, OperatingPoint
     from mgdd.presets.meant import CylinderLike, PointLike
 
-__all__ = ["ThermalNo", "ThermalNoFit"]
-
 # Where the mixture of burned gas is sought; half of it leaves the NO of any engine.
 _LAMBDA, _STEPS = (0.85, 1.6), 11
 _FEWEST_FOR_LAMBDA = 4

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.dataset import Dataset
 
-__all__ = ["analyze", "conditions"]
-
 _CONDITIONS = ("speed_rpm", "trapped_mass_g", "intake_temperature_k", "ivc_temperature_k")
 _LOG = logging.getLogger(__name__)
 # A point's intake pressure is often that of a preset at another load; what the caller states is judged closer.

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.dataset import Dataset
 
-__all__ = ["COLUMNS", "CYCLE", "burn_marks", "burn_warnings", "expansion_of", "is_of_cycles", "of_cycles", "scatter"]
-
 CYCLE = "cycle"
 # Net heat over the median of the record; own choices, in the spirit of a fifth and four fifths of the IMEP.
 _MISFIRE, _PARTIAL, _NAMED = 0.2, 0.8, 8

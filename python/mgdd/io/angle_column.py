@@ -19,8 +19,6 @@ from mgdd.io.wrong_channel import no_angle
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Angle", "angle_of", "at_the_speed_of_the_record", "headings"]
-
 # A speed is stated to a digit or read off a display; one that is further off is of another point.
 _CORRECTED = 0.01
 

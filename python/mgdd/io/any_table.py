@@ -23,7 +23,8 @@ from mgdd.io.column_names import heading
 from mgdd.io.extras import import_extra
 from mgdd.io.files import Stamp, bytes_of, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
-from mgdd.io.table import Table, TextTable, parse_number, read_table, text_table
+from mgdd.io.row_text import parse_number
+from mgdd.io.table import Table, TextTable, read_table, text_table
 from mgdd.io.text_rows import TextRows
 from mgdd.results.labels import ANGLE
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
-
-__all__ = ["TEXT", "cells_as_text", "format_of", "open_parts", "open_table", "read_any_table", "read_format"]
 
 # Arguments that say how the cells of a text or a sheet become columns.
 TEXT = ("delimiter", "decimal", "sheet", "cycle_per_row")
@@ -63,27 +62,6 @@ def read_any_table(
     Text (also with a preamble, as of LabVIEW or INCA), MATLAB 4 to 7.3, HDF5 and netCDF, TDMS, MDF 3 and 4, Parquet,
     NPY and NPZ, XLSX. ``delimiter`` and ``decimal`` are those of `read_table`, for text; ``sheet`` names one of a
     workbook, else it is the one with the most numbers; ``cycle_per_row`` makes a column of each row.
-
-    Raises
-    ------
-    FileNotFoundError
-        No such file.
-    mgdd.errors.DataError
-        Nothing with numbers in it, or a file that its own library cannot read.
-    ImportError
-        The extra that reads the format is not installed; the message names it.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import numpy as np
-    >>> from mgdd.io.any_table import read_any_table
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "log.npz"
-    ...     np.savez(file, time_s=np.arange(3.0), duty=np.zeros(3))
-    ...     table = read_any_table(file)
-    >>> table.header, table.numbers(0).tolist()
-    (('time_s', 'duty'), [0.0, 1.0, 2.0])
     """
     with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return table.loaded()

@@ -20,8 +20,6 @@ from mgdd.results.labels import ANGLE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["of_hdf5", "of_matlab", "of_netcdf", "of_numpy", "of_parquet"]
-
 _LONGEST_MARK = 128  # bytes of an attribute that marks values, sixteen numbers
 
 

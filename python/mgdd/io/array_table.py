@@ -23,11 +23,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import DTypeLike, NDArray
 
-__all__ = [
-    "ArrayTable", "Column", "Columns", "Named", "Reversed", "Samples", "columns_of", "damaged", "marked",
-    "naming_damage",
-]  # fmt: skip
-
 
 class Named(NamedTuple):
     """An array of a file by name: whatever has a shape and a dtype, and gives numbers for slices."""

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from mgdd.io.encoder import Encoder
 
-__all__ = ["bench_record", "read"]
-
 
 def read(
     path: str | os.PathLike[str],

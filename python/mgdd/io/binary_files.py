@@ -15,32 +15,11 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = [
-    "read_netcdf",
-    "write_netcdf",
-    "write_parquet",
-]
-
 _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 
 
 def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a netCDF file of the classic formats (version 3) into memory; another format or a cut file is a DataError.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.errors import DataError
-    >>> from mgdd.io.binary_files import read_netcdf
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "table.nc"
-    ...     _ = file.write_text("speed_rpm,fuel_mg")
-    ...     try:
-    ...         read_netcdf(file)
-    ...     except DataError as error:
-    ...         print(str(error).rpartition("/")[2])
-    table.nc: not a netCDF file: it begins with b'speed_rp'; a text table ends in .csv
-    """
+    """Read a netCDF file of the classic formats (version 3) into memory; another or a cut file is a DataError."""
     import xarray as xr
 
     file = existing_file(path)

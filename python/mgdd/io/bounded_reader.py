@@ -28,8 +28,6 @@ from mgdd.io.read_limits import ReadLimits
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["open_bounded"]
-
 _KEPT = 2  # processes that wait for a file, for callers with several threads
 # Of waiting beside computing, as for a disk or other programs; all there is where computing cannot be limited.
 _WAITING = 4.0
@@ -247,13 +245,6 @@ def open_bounded(file: Path, form: str, **how: Any) -> Iterator[Columns | tuple[
     """Open a binary file of a format in a process with limits: its columns, or what to call its text and the text.
 
     `how` are keywords of `mgdd.io.any_table.read_format`.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        It claims more than its size lets believe, or its reader takes too much memory or time, or ends.
-    ImportError
-        Its library is not installed.
     """
     limits = ReadLimits.of(file, form)
     process = _kept.take()

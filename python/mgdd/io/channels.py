@@ -23,8 +23,6 @@ from mgdd.results.units import attribute_units
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Channel", "Layout", "columns_shown", "kept_channels", "layout_of"]
-
 Kind = Literal["pressure", "fast", "slow", "other"]
 # Of units that no expression of a units library spells so.
 _WRITTEN = {"°c": "degC", "degc": "degC", "nm": "N m", "n m": "N m", "n·m": "N m", "1/min": "rpm", "min-1": "rpm"}

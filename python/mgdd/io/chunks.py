@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["pressure_chunks"]
-
 # Rows that are looked at first, four times as many until they hold some cycles; and rows of text in memory at a time.
 _ROWS, _CYCLES = 1 << 16, 4
 _COLUMNS = 8  # with a cycle each, that are looked at first

@@ -9,11 +9,6 @@ from typing import NamedTuple
 
 from mgdd.errors import DataError
 
-__all__ = [
-    "TIME_UNITS", "Heading", "bare_unit", "check_choice", "heading", "last_number", "spelled_unit", "stated_unit",
-    "stem", "unit_text", "without_brackets",
-]  # fmt: skip
-
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 # Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
 _SPELLINGS = {

@@ -11,8 +11,6 @@ from mgdd.io.cycle_phase import COMPRESSION_CAD, DRIFT_CAD, SIGNIFICANT, phases
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["CYCLE_DEG", "Period", "repetition"]
-
 CYCLE_DEG = 720.0
 # Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed told as half.
 _SHORTEST_DEG = 200.0

@@ -13,18 +13,6 @@ from mgdd.errors import DataError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = [
-    "COMPRESSION_CAD",
-    "DRIFT_CAD",
-    "SIGNIFICANT",
-    "Jump",
-    "Phases",
-    "lost_turn",
-    "odd_bound",
-    "phase_warnings",
-    "phases",
-]
-
 # Compression before any burn, a spark-ignited one too [°CA aTDC]: cycles differ there by level and factor alone. It is
 # drawn out towards TDC, where the shift tells itself from the factor, while what is left stays noise.
 _FROM_CAD, _TO_CAD, _LEAST_CAD = -110.0, -60.0, 40.0

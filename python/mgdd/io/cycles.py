@@ -16,8 +16,6 @@ from mgdd.signals.even_grid import wide_steps
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["SAME_ANGLE", "Cycles", "arranged", "several_cycles"]
-
 # Share of a step by which the angles of two cycles may differ and still be one grid.
 SAME_ANGLE = 0.01
 # Share of a step by which the end of a cycle may be missed: angles of three digits in radians are rounded by as much.
@@ -57,12 +55,6 @@ def arranged(
 
     The columns of a channel are cycles; the first channel is a cylinder pressure, whose period must be a cycle, unless
     the angle `counts_turns` by a mark of the shaft.
-
-    Raises
-    ------
-    DataError
-        Two conventions, several cycles in several columns, no complete cycle, cycles of different angles, angles that
-        run on without `firing_tdc_deg`, a gap.
     """
     rows = np.arange(degrees.size)
     if before_tdc and firing_tdc_deg is not None:

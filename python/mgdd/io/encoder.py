@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Encoder", "Turning", "on_even_angles", "turning_of"]
-
 # Steps of the even grid that divide a turn [deg]; the widest one that is not above that of the samples is taken.
 _STEPS_DEG = (0.01, 0.02, 0.025, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 # Mean pressure around the two places of TDC: the firing one has more, by at least this share of the whole range.

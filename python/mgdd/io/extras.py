@@ -5,20 +5,9 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-__all__ = ["import_extra"]
-
 
 def import_extra(module: str, extra: str, purpose: str) -> Any:
-    """Import a module that only an extra of mgdd installs; the ImportError says what needs it and how it is installed.
-
-    Examples
-    --------
-    >>> from mgdd.io.extras import import_extra
-    >>> import_extra("no_such_package", "can", "a log of a CAN bus")
-    Traceback (most recent call last):
-    ...
-    ImportError: a log of a CAN bus needs no_such_package: pip install "mgdd[can]"
-    """
+    """Import a module that only an extra of mgdd installs; the ImportError says what needs it and how to install it."""
     package = module.partition(".")[0]
     try:
         importlib.import_module(package)

@@ -20,17 +20,6 @@ from mgdd._arguments import shown
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.read_limits import ReadLimits
 
-__all__ = [
-    "Stamp",
-    "bytes_of",
-    "decoded",
-    "existing_file",
-    "parsed",
-    "read_plain_text",
-    "write_whole",
-    "write_whole_text",
-]
-
 # Letters of more than one byte as UTF-8 has them; in older encodings they would be pairs as "Ã¤" or "Â°".
 _UTF8 = re.compile(rb"[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3}")
 _SPECIAL = {stat.S_ISFIFO: "a pipe", stat.S_ISCHR: "a device", stat.S_ISBLK: "a device", stat.S_ISSOCK: "a socket"}
@@ -42,28 +31,7 @@ _WIDEST = 64  # bits of a whole number, with or without a sign
 
 
 def existing_file(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a file that is there.
-
-    Raises
-    ------
-    FileNotFoundError
-        No such file; the message names the one of its folder whose name is nearest.
-    mgdd.errors.ParameterError
-        A folder, a pipe or a device, which may have no end; or a path that cannot be looked up: too long, with a NUL,
-        or behind a folder that must not be entered.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.files import existing_file
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = (pathlib.Path(folder) / "chirp.csv").write_text("time_s,duty,angle_deg")
-    ...     try:
-    ...         existing_file(pathlib.Path(folder) / "chrip.csv")
-    ...     except FileNotFoundError as error:
-    ...         print(error.strerror)
-    no such file: did you mean 'chirp.csv'?
-    """
+    """Return the path of a file that is there."""
     given: object = path
     if not isinstance(given, str | os.PathLike):
         bound = (
@@ -112,24 +80,7 @@ def _gives_bytes(file: Path) -> bool:
 
 @dataclass(frozen=True)
 class Stamp:
-    """Size and time of a file that is read in parts, which must not change meanwhile.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.errors import DataError
-    >>> from mgdd.io.files import Stamp
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "log.csv"
-    ...     _ = file.write_text("0,1")
-    ...     stamp = Stamp.of(file)
-    ...     _ = file.write_text("0,1,2")
-    ...     try:
-    ...         stamp.require_same()
-    ...     except DataError as error:
-    ...         print(str(error).rpartition("/")[2])
-    log.csv: changed while it was read, from 3 to 5 bytes: read it again once it is complete
-    """
+    """Size and time of a file that is read in parts, which must not change meanwhile."""
 
     file: Path
     size: int
@@ -166,13 +117,7 @@ def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) ->
 
 
 def bytes_of(file: Path) -> bytes:
-    """Read a file as far as its size says, in memory that this machine has.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        More bytes than half of the memory, or than its size says.
-    """
+    """Read a file as far as its size says, in memory that this machine has."""
     limits = ReadLimits.of(file)
     limits.require_free(limits.size)
     with file.open("rb") as stream:
@@ -183,35 +128,7 @@ def bytes_of(file: Path) -> bytes:
 
 
 def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) -> str:
-    """Decode a text: UTF-8, UTF-16 that begins with its mark, or Windows-1252 as older tools write it.
-
-    Parameters
-    ----------
-    raw : bytes
-        Content of a file.
-    origin : str
-        The file, for messages.
-    only_utf8 : bool
-        Whether its form allows no other encoding, as TOML and JSON do.
-    line : int
-        Of the file, where `raw` is a part of it that begins there.
-
-    Returns
-    -------
-    str
-        The text, without the mark at its beginning.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        Not text, damaged UTF-8, or of no known encoding.
-
-    Examples
-    --------
-    >>> from mgdd.io.files import decoded
-    >>> [decoded(text.encode(name), "a.csv") for name in ("utf-8", "cp1252", "utf-16") for text in ("20 °C",)]
-    ['20 °C', '20 °C', '20 °C']
-    """
+    """Decode a text: UTF-8, UTF-16 that begins with its mark, or Windows-1252 as older tools write it."""
 
     def refused(error: UnicodeDecodeError, said: str) -> DataError:
         at = raw.count(b"\n", 0, error.start) + line
@@ -249,41 +166,7 @@ def _binary(origin: str) -> DataError:
 def parsed(
     text: str, origin: str, form: Literal["TOML", "JSON"], decode: Callable[[dict[str, Any]], Any] | None = None
 ) -> Any:
-    r"""Parse a text that nests values: bounded in depth and in its numbers, and nothing stands in it twice.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-    origin : str
-        The file, for messages.
-    form : {"TOML", "JSON"}
-        How it is written.
-    decode : callable, optional
-        What becomes of each object of a JSON text, the innermost first.
-
-    Returns
-    -------
-    object
-        Dicts, lists, texts and numbers.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        Another form, a key that stands twice in an object, more than 64 levels, a number beyond all floats or 64 bits.
-
-    Examples
-    --------
-    >>> from mgdd.errors import DataError
-    >>> from mgdd.io.files import parsed
-    >>> parsed("[plant]\nseed = 3", "experiment", "TOML")
-    {'plant': {'seed': 3}}
-    >>> try:
-    ...     parsed("[" * 5000 + "]" * 5000, "a.json", "JSON")
-    ... except DataError as error:
-    ...     print(error)
-    a.json: nests more than 64 levels deep: correct the brackets
-    """
+    """Parse a text that nests values: bounded in depth and in its numbers, and nothing stands in it twice."""
     too_deep = f"{origin}: nests more than {_DEEPEST} levels deep: correct the brackets"
     try:
         if form == "TOML":
@@ -332,15 +215,6 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[Path], object]) -
     """Let ``write(other)`` make a file beside `path`, and give it its name in one step once it is on the disk.
 
     What `write` raises is passed on, and nothing remains of it: a file that was there is as before.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.files import write_whole
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_whole(pathlib.Path(folder) / "map.json", lambda path: path.write_text("{}"))
-    ...     [file.name for file in pathlib.Path(folder).iterdir()]
-    ['map.json']
     """
     whole = Path(path).resolve()  # a link stays one
     if whole.exists() and not whole.is_file():  # a terminal or a pipe has no other name

@@ -12,8 +12,6 @@ from mgdd.io.array_table import marked
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["MARKS", "Decoded"]
-
 _MISSING = ("_FillValue", "missing_value")
 MARKS = (*_MISSING, "valid_min", "valid_max", "valid_range", "scale_factor", "add_offset")
 # What stands where nothing was written, by type; of bytes every value is data ("NetCDF Users Guide", fill values).
@@ -24,24 +22,7 @@ _UNWRITTEN = {
 
 
 class Decoded:
-    """An array that gives what is missing as NaN, and packed numbers unpacked.
-
-    Parameters
-    ----------
-    values : array
-        Whatever has a shape and a dtype, and gives numbers for slices.
-    marks : mapping of str to array_like
-        Attributes of the array, of which those in `MARKS` count.
-    unwritten : bool
-        Whether the value that netCDF writes by default stands for a missing one where the file names no other.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.io.netcdf_marks import Decoded
-    >>> Decoded(np.array([12, -99, 13], np.int16), {"missing_value": -99, "scale_factor": 0.5})[:].tolist()
-    [6.0, nan, 6.5]
-    """
+    """An array that gives what is missing as NaN, and packed numbers unpacked."""
 
     def __init__(self, values: Any, marks: Mapping[str, Any], *, unwritten: bool = False) -> None:
         self._values, self.shape = values, values.shape

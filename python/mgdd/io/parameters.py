@@ -21,11 +21,6 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     import os
 
-__all__ = [
-    "FIT_NOTES", "FORMS", "Entry", "ModelParameters", "ParameterFile", "Parameters", "Wanted", "entries", "wanted",
-    "written",
-]  # fmt: skip
-
 FORMAT = 1
 FIT_NOTES = ("source", "unidentifiable")  # what a fit says beside its model, in a table [fit] too
 _HEAD = ("kind", "format")
@@ -138,19 +133,6 @@ class ParameterFile:
         Notes on them: ``name``, ``title``, ``source``, ...
     origin : str
         The file, for messages; not compared.
-
-    Examples
-    --------
-    >>> from mgdd.io.parameters import Entry, ParameterFile
-    >>> file = ParameterFile(kind="lag", tables={"parameters": {"tau_s": Entry(value=0.02, unit="s")}})
-    >>> print(file.to_toml(), end="")
-    kind = "lag"
-    format = 1
-    <BLANKLINE>
-    [parameters]
-    tau_s = { value = 0.02, unit = "s" }
-    >>> ParameterFile.from_toml(file.to_toml()) == file
-    True
     """
 
     kind: str
@@ -197,15 +179,7 @@ class ParameterFile:
 
     @classmethod
     def from_toml(cls, text: str, *, origin: str = "text") -> ParameterFile:
-        """Read what `to_toml` wrote, or what a person wrote in its form.
-
-        Raises
-        ------
-        DataError
-            Not TOML, no kind, or another format version.
-        ParameterError
-            A value that does not stand as ``{ value = ..., unit = "..." }``.
-        """
+        """Read what `to_toml` wrote, or what a person wrote in its form."""
         data = parsed(text, origin, "TOML")
         kind, version = data.get("kind"), data.get("format")
         if not isinstance(kind, str):
@@ -245,15 +219,7 @@ class ParameterFile:
                 raise DataError(f"{self.origin}: no table [{table}]: a file of kind {self.kind!r} has one")
 
     def values(self, table: str, wanted: Mapping[str, Wanted]) -> dict[str, Any]:
-        """Take the values of a table, none of one that may be missing: numbers as float, lists as they stand.
-
-        Raises
-        ------
-        DataError
-            A missing key.
-        ParameterError
-            An unknown key, another unit, a value of the wrong type.
-        """
+        """Take the values of a table, none of one that may be missing: numbers as float, lists as they stand."""
         found = self.tables.get(table, {})
         out = {}
         for key, entry in found.items():

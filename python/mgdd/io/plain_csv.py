@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["long_columns", "write_columns", "write_csv", "write_long", "write_traces"]
-
 _LOG = ("time_s", "duty", "angle_deg", "current_a", "supply_v")
 
 
@@ -71,19 +69,9 @@ def write_csv(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
 
 
 def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]) -> None:
-    r"""Write columns of one length as CSV that any reader takes without options: a header, then rows.
+    """Write columns of one length as CSV that any reader takes without options: a header, then rows.
 
     Numbers come back bit for bit; texts, which hold no comma, quote or line break, stand as they are.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.plain_csv import write_columns
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "map.csv"
-    ...     write_columns({"fuel_mg": [6.0, 20.0], "source": ["idle", "model"]}, file)
-    ...     file.read_text()
-    'fuel_mg,source\n6.0,idle\n20.0,model\n'
     """
     cells = [
         column.tolist() if column.dtype.kind == "U" else [repr(value) for value in column.astype(np.float64).tolist()]
@@ -97,17 +85,6 @@ def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write every variable of a Dataset over its one dimension by `write_columns`; its scalars are left out.
 
     A variable without units is a DataError, variables over different dimensions are a ShapeError.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
-    >>> from mgdd.io.plain_csv import write_traces
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "cycle.csv"
-    ...     write_traces(simulate(Cylinder(), OperatingPoint()), file)
-    ...     file.read_text().splitlines()[0][:28]
-    'crank_angle_cad,pressure_bar'
     """
     check_labels(dataset)
     dims = [dim for dim in dataset.dims if any(v.dims == (dim,) for v in dataset.data_vars.values())]

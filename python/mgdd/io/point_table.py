@@ -12,7 +12,8 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.binary_files import read_netcdf
 from mgdd.io.pressure_checks import CONVENTION
-from mgdd.io.table import TextTable, parse_number, read_table
+from mgdd.io.row_text import parse_number
+from mgdd.io.table import TextTable, read_table
 from mgdd.results.labels import VARIABLES, Label, labelled_dataset, named_label
 from mgdd.results.units import attribute_units
 
@@ -21,16 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     import xarray as xr
-
-__all__ = [
-    "CONDITIONS",
-    "POINT",
-    "conditions_of",
-    "flat_points",
-    "input_names",
-    "read_conditions",
-    "read_points",
-]
 
 POINT = "point"
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\[\]()]*)[\])]")
@@ -50,39 +41,10 @@ def read_points(
     delimiter: str | None = None,
     decimal: str = ".",
 ) -> xr.Dataset:
-    r"""Read points, one per row of a CSV file; of a netCDF file its list of points, or every cell of its grid.
+    """Read points, one per row of a CSV file; of a netCDF file its list of points, or every cell of its grid.
 
-    Parameters
-    ----------
-    path : path-like
-        ``.csv``, with a header and perhaps a row of units below it, or ``.nc``; another ending is a ParameterError.
-    names : sequence of str, optional
-        Columns that are wanted, as the header has them, without a unit in brackets; all, if left out. Only these need a
-        number in every row.
-    always : collection of str
-        Columns that must hold numbers where a CSV file has them, even if all columns are wanted; others without a
-        number, remarks for example, are left out then.
-    delimiter : str, optional
-        Column separator of a CSV file; found in it if left out.
-    decimal : {".", ","}
-        Decimal mark of a CSV file.
-
-    Returns
-    -------
-    xarray.Dataset
-        The columns over ``point``: numbered by the column ``point`` of the file, else from 0. The unit is that of the
-        units row, of the brackets behind a name, or of the ending of the name. Inputs of a grid are columns too.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.point_table import read_points
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "bench.csv"
-    ...     _ = file.write_text("speed;fuel_mg;remark\n1/min;mg;\n900;6.5;cold\n1500;20;\n")
-    ...     table = read_points(file, ["speed", "fuel_mg"])
-    >>> table["fuel_mg"].values.tolist(), table["speed"].attrs["units"]
-    ([6.5, 20.0], 'rpm')
+    Only columns in `names` need a number in every row, or those in `always` where all are wanted. The unit is that of
+    the units row, of the brackets behind a name, or of the ending of the name.
     """
     ending = Path(path).suffix.lower()
     if ending == ".csv":
@@ -199,40 +161,7 @@ _CLOSED = (*_ANGLES, "fuel_mg")
 
 
 def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
-    r"""Read the operating conditions of several traces.
-
-    Parameters
-    ----------
-    path : path-like
-        CSV with a header. Column ``file`` names the trace; ``load_percent`` [%], ``speed_rpm`` [rpm],
-        ``trapped_mass_g`` [g per cycle], ``soi_cad`` and ``spark_cad`` (start of injection, spark timing [°CA aTDC]),
-        ``intake_pressure_kpa`` [kPa], ``intake_temperature_k`` and ``ivc_temperature_k`` [K], ``fuel_mg`` [mg per
-        cycle, 0 = motored], ``bmep_bar`` [bar], ``brake_torque_nm`` [N m] of all ``n_cylinders`` are optional, and so
-        is every cell in them.
-
-    Returns
-    -------
-    dict
-        ``{file: {column: value}}`` in the order of the rows; an empty cell has no entry.
-
-    Raises
-    ------
-    FileNotFoundError
-        No such file.
-    DataError
-        No column ``file``, an unknown column, a trace named twice, a value that is not a number or out of
-        bounds.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.point_table import read_conditions
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "conditions.csv"
-    ...     _ = file.write_text("file,speed_rpm,soi_cad\nmean.csv,1200,-5.06\n")
-    ...     read_conditions(file)
-    {'mean.csv': {'speed_rpm': 1200.0, 'soi_cad': -5.06}}
-    """
+    """Read the operating conditions of several traces: by the column ``file``, what each row has of `CONDITIONS`."""
     table = read_table(path, units_row=False)
     header = table.header
     if header is None or "file" not in header:

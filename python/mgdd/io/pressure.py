@@ -26,18 +26,6 @@ if TYPE_CHECKING:
     from mgdd.io.encoder import Encoder
     from mgdd.io.pressure_file import Record
 
-__all__ = [
-    "CYCLE",
-    "as_trace",
-    "cycle_count",
-    "cycles_dataset",
-    "mean_cycle",
-    "one_cycle",
-    "pressure_trace",
-    "read_pressure",
-    "record_attrs",
-]
-
 CYCLE = "cycle"
 
 
@@ -304,26 +292,7 @@ def mean_cycle(trace: xr.Dataset) -> xr.Dataset:
 
 
 def as_trace(trace: Any) -> xr.Dataset:
-    """Return a trace as a Dataset; one that is a Dataset over crank angle already is returned as it is.
-
-    Parameters
-    ----------
-    trace : Dataset, DataFrame, mapping, DataArray, Series, pair of array_like, or path-like
-        Columns are ``crank_angle_cad`` [°CA aTDC], which may be the index, and ``pressure_bar`` [bar]; the index of a
-        Series is the crank angle. Several cycles are ``pressure_bar(cycle, crank_angle_cad)``, the second array of the
-        pair (cycle, angle), or the columns of a DataFrame beside the angle. A path is read by `read_pressure` with its
-        defaults.
-
-    Returns
-    -------
-    xarray.Dataset
-        With ``pressure_bar`` over ``crank_angle_cad``, or over ``cycle`` and it, and the attributes of the source.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        Another form, a missing column, and all of `check_trace`.
-    """
+    """Return any form of a trace as a Dataset; one that is a Dataset over crank angle already is returned as it is."""
     if isinstance(trace, str | os.PathLike):
         with taken((), _in_file):
             return read_pressure(trace)

@@ -18,11 +18,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "CONVENTION", "MIN_SAMPLES", "PRESSURE_UNITS", "check_magnitude", "check_span", "check_trace", "level_warning",
-    "pair", "steep_warning", "to_bar",
-]  # fmt: skip
-
 CONVENTION = "crank angle is in °CA aTDC: firing TDC = 0, compression negative"
 # An exact integer keeps the value in bar correctly rounded: units per bar here, bar per unit below.
 _PER_BAR = {"bar": 1.0, "mbar": 1000.0, "kPa": 100.0, "Pa": 100000.0}
@@ -177,23 +172,6 @@ def check_trace(
     The angle [`angle_unit`] rises strictly in even steps; the pressure [`unit`] stands over it or (cycle, angle).
     Messages call the trace `source`, a sample by its line in `rows` or else by its index, and a unit that cannot be
     is to be corrected in the file where the `unit_of_file` says it.
-
-    Raises
-    ------
-    DataError
-        Fewer than 20 samples, NaN or infinity, unsorted or repeated angles, a step above 1.5 times the median
-        step, angles in another convention or unit, a pressure that cannot be in the given unit.
-    ShapeError
-        Arrays that are not equally long.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.io.pressure_checks import check_trace
-    >>> angle = np.arange(-30.0, 31.0)
-    >>> _, pressure = check_trace(angle, 6e6 - 1000.0 * angle**2, unit="Pa")
-    >>> float(pressure.max())
-    60.0
     """
     check_choice("pressure_unit", unit, PRESSURE_UNITS)
     check_choice("angle_unit", angle_unit, ("deg", "rad"))

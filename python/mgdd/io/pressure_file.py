@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-__all__ = ["Pressure", "Record", "checked", "choose_pressure", "cycles_of", "odd_shape", "pressure_of", "record_of"]
-
 # Cycles of one cylinder, fired or not, share their compression; another cylinder has its peak elsewhere.
 _MIN_CORRELATION = 0.5
 _PEAK_WITHIN_CAD = 40.0

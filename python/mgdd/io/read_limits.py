@@ -9,8 +9,6 @@ from pathlib import Path
 
 from mgdd.errors import DataError
 
-__all__ = ["ReadLimits"]
-
 _MEMORY, _SECONDS = "MGDD_READ_LIMIT_MB", "MGDD_READ_LIMIT_S"
 _MB = 1 << 20
 # Numbers that any file may hold: with the copies that are made of them a reader and its caller stay below 1 GB.
@@ -39,17 +37,6 @@ class ReadLimits:
     """Limits of reading one file: bytes of numbers that are believed, bytes of its reader, seconds of computing.
 
     ``MGDD_READ_LIMIT_MB`` and ``MGDD_READ_LIMIT_S`` in the environment stand above what follows from its size.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.read_limits import ReadLimits
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "log.h5"
-    ...     _ = file.write_bytes(b"x")
-    ...     limits = ReadLimits.of(file)
-    >>> limits.believed >> 20, limits.memory >> 20, round(limits.seconds)
-    (128, 768, 3)
     """
 
     file: Path

@@ -13,8 +13,6 @@ from mgdd.io.cycle_period import CYCLE_DEG
 from mgdd.io.encoder import Encoder
 from mgdd.io.pressure_checks import PRESSURE_UNITS
 
-__all__ = ["ANGLE_UNITS", "Reading"]
-
 ANGLE_UNITS = ("deg", "rad", *TIME_UNITS)
 
 

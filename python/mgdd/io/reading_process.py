@@ -16,8 +16,6 @@ import numpy as np
 
 from mgdd.errors import DataError
 
-__all__ = ["answer", "serve"]
-
 # Imported before the fork, once for all files of a format.
 _LIBRARIES = {
     "HDF5": ("h5py",), "MATLAB": ("scipy.io",), "TDMS": ("nptdms",), "MDF": ("asammdf",),

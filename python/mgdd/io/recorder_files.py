@@ -21,8 +21,6 @@ from mgdd.io.watched_file import WatchedFile
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["of_mdf", "of_tdms"]
-
 
 def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of a TDMS file until the stack closes it."""

@@ -13,24 +13,12 @@ from mgdd._core import math as core
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Rows", "cells_of", "parse_number"]
-
 _TAB = 9
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    r"""Rows of a text that are neither empty nor remarks: where each stands in its bytes, and its line.
-
-    Examples
-    --------
-    >>> from mgdd.io.row_text import Rows
-    >>> rows = Rows.of("t,u\n# a remark\n0,1\n1,-2\n")
-    >>> list(rows)
-    [(1, 't,u'), (3, '0,1'), (4, '1,-2')]
-    >>> rows.part(1).numbers([1], ",", ".")[0].tolist()
-    [[1.0, -2.0]]
-    """
+    """Rows of a text that are neither empty nor remarks: where each stands in its bytes, and its line."""
 
     raw: bytes
     begin: NDArray[np.int64]

@@ -24,17 +24,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = [
-    "Place",
-    "Table",
-    "TextTable",
-    "check_text_options",
-    "parse_number",
-    "read_table",
-    "require_width",
-    "text_table",
-]
-
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 _NARROW = 4  # columns
 _SHOWN = 12  # names of columns in a message

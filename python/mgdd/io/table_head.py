@@ -13,8 +13,6 @@ from mgdd.io.row_text import Rows, cells_of, parse_number
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["first_row_of", "names_and_units", "separator_of", "spells_units", "units_filled"]
-
 _ROWS = 4  # of one width, one below the other, are data
 _HEADER_ENDS = "***End_of_Header***"  # of LabVIEW, below lines that look like labelled rows
 _RATIO = re.compile(r"[^\W\d_]{1,3}\d?/[^\W\d_]{1,4}\d?")  # of units that no list has: g/kWh

@@ -11,36 +11,12 @@ from mgdd.io.files import Stamp, decoded
 from mgdd.io.row_text import Rows
 from mgdd.io.table import TextTable, check_text_options, require_width, text_table
 
-__all__ = ["TextRows"]
-
 _BLOCK = 1 << 20  # bytes; names and what stands above them must be within
 _LONGEST_LINE = 1 << 24  # bytes, of a text without ends of lines
 
 
 class TextRows:
-    r"""The rows of a text file; in memory are those from the first that was asked for last.
-
-    Parameters
-    ----------
-    file : Path
-        The file.
-    stream : file object
-        The same, open for its bytes; it must stay open.
-    delimiter, decimal
-        As in `mgdd.io.table.read_table`.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> from mgdd.io.text_rows import TextRows
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "log.csv"
-    ...     _ = file.write_text("time_s,duty" + "".join(f"\n{k},{k}e-1" for k in range(9)))
-    ...     with file.open("rb") as stream:
-    ...         table = TextRows(file, stream).part(3, 5)
-    >>> table.header, table.lines.tolist(), table.numbers(1).tolist()
-    (('time_s', 'duty'), [5, 6], [0.3, 0.4])
-    """
+    """The rows of a text file; in memory are those from the first that was asked for last."""
 
     def __init__(self, file: Path, stream: IO[bytes], *, delimiter: str | None = None, decimal: str = ".") -> None:
         check_text_options(delimiter, decimal)

@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = [
-    "check_even", "check_samples", "check_sides", "check_signals", "check_throttle_log", "in_arrays", "without_gaps",
-]  # fmt: skip
-
 MIN_SAMPLES = 50
 _INFINITE = 1e100  # of differences and products something is left below it
 MIN_DURATION_S = 0.5
@@ -39,25 +35,7 @@ SIDE_DEG, SIDE_S = 0.5, 0.1
 
 
 def check_throttle_log(log: xr.Dataset) -> xr.Dataset:
-    """Refuse what no throttle can be identified from: ``duty`` and ``angle_deg`` over ``time_s``; return the same log.
-
-    Raises
-    ------
-    DataError
-        NaN, repeated or falling time, gaps, uneven sampling, duty beyond ±1, a duty or an angle that stands still, an
-        angle that cannot be in degrees, exchanged columns, fewer than 50 samples or 0.5 s; the message names row,
-        column and remedy.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.io import throttle_log
-    >>> from mgdd.io.throttle_checks import check_throttle_log
-    >>> time = np.arange(2000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> check_throttle_log(log) is log
-    True
-    """
+    """Refuse what no throttle can be identified from, of ``duty`` and ``angle_deg`` over ``time_s``; return the log."""
     for name in ("time_s", "duty", "angle_deg"):
         if name not in log.variables or log[name].dims != ("time_s",):
             raise DataError(f"log has no {name}(time_s): make one with mgdd.io.read_throttle_log or throttle_log")

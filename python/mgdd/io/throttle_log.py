@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["read_throttle_log", "throttle_log"]
-
 # The first unit of each column is taken where nothing is said.
 _UNITS = {
     "time_s": ("s", "ms"), "duty": ("-", "%"), "angle_deg": ("deg", "rad", "%"), "current_a": ("A",), "supply_v": ("V",)

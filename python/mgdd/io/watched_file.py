@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 from typing import IO, Any
 
-__all__ = ["WatchedFile"]
-
 _CIRCLES = 10_000  # that a reader may go; what many channels share is read as often
 _LONG = 1 << 16  # bytes, from which on what is left of the file is looked at
 

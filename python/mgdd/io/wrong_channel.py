@@ -11,8 +11,6 @@ from mgdd.io.pressure_checks import MIN_SAMPLES, RADIAN_SPAN
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["no_angle", "no_pressure"]
-
 # Two levels hold at least this share of the samples each, so near to an end of the range, and next to none is between.
 _HELD, _NEAR, _BETWEEN = 0.05, 0.08, 0.01
 _STANDS, _EVEN, _SOME = 0.2, 0.9, 101

@@ -20,8 +20,6 @@ from mgdd.results.labels import Label
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["CalibrationMap", "MapPoints", "map_of"]
-
 _TIMING = "°CA aTDC"
 
 

@@ -16,8 +16,6 @@ from xml.parsers import expat
 from mgdd.errors import DataError
 from mgdd.maps.dcm import DcmBlock, finite_number, share_breakpoints
 
-__all__ = ["cdfx_blocks", "cdfx_text", "is_xml"]
-
 _DEEPEST = 64  # levels
 _AXES = {"VALUE": 0, "CURVE": 1, "MAP": 2, "COM_AXIS": 1}
 _FORMAT = "CDF20"

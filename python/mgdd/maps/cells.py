@@ -18,19 +18,6 @@ from mgdd.results.units import attribute_units, unit_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "NUMBERS",
-    "SOURCES",
-    "TEXTS",
-    "MapTask",
-    "can_be_name",
-    "cell_at",
-    "checked_cells",
-    "checked_label",
-    "checked_name",
-    "spoken_name",
-]
-
 # Where a value comes from; the last two say why there is none.
 SOURCES = (
     "given", "measured", "predicted", "extrapolated", "optimised", "smoothed", "interpolated", "held", "learned",

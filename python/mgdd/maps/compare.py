@@ -16,8 +16,6 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["achieved_figures", "apply_map", "compare_maps", "steepest"]
-
 
 def compare_maps(
     first: CalibrationMap | xr.Dataset,

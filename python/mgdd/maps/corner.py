@@ -9,8 +9,6 @@ from mgdd.errors import DataError, argument, printable
 from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, without_brackets
 from mgdd.results.units import attribute_units
 
-__all__ = ["axes_of"]
-
 _BRACKETED = re.compile(r"[\[({][^\[\](){}]*[\])}]")
 _X_AND_Y = re.compile(r"([xy])\s*[:=]\s*(.+?)[\s,;/|\\]+([xy])\s*[:=]\s*(.+)", re.IGNORECASE)
 # By rank; a blank on both sides of a slash sets it apart from those of units.
@@ -25,21 +23,7 @@ _BOTH = re.compile(rf"(.+?\s*(?:{_DOWN}|{_ACROSS}))[\s/\\|,;]+(.+?\s*(?:{_DOWN}|
 def axes_of(
     corner: str, *, rows: str | None, columns: str | None, above: str = "", taken: tuple[str, ...] = (), where: str
 ) -> tuple[Heading, Heading]:
-    """Give the axis that runs down and the one that runs across.
-
-    Parameters
-    ----------
-    corner : str
-        As the file has it.
-    rows, columns : str, optional
-        One of the labels of the corner, which says that this axis runs down or across, or another name for it.
-    above : str
-        Label of the columns, where it stands in the line above them.
-    taken : tuple of str
-        Names that an axis cannot have.
-    where : str
-        File and line, for messages.
-    """
+    """Give the axis that runs down and the one across, from a corner's label, names for them, or the label above."""
     down, across, is_open = _parts(corner)
     if above and not across:
         across, is_open = _side(above)[0], False

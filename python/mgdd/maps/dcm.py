@@ -18,8 +18,6 @@ import numpy as np
 
 from mgdd.errors import DataError, did_you_mean
 
-__all__ = ["DcmBlock", "dcm_blocks", "dcm_text", "finite_number", "share_breakpoints"]
-
 _HEAD = "KONSERVIERUNG_FORMAT"
 _VERSION = "2.0"
 _PER_LINE = 6  # some readers take no longer lines
@@ -37,24 +35,9 @@ _COMMENTS = {"*SSTX": "axis_x", "*SSTY": "axis_y", "*SST": "axis_x"}
 
 @dataclass(kw_only=True)
 class DcmBlock:
-    """A value, curve or map of a file.
+    """A value, curve or map of a file: one row of values per entry of y; axes and texts that it lacks are empty.
 
-    Parameters
-    ----------
-    name : str
-        Of the label.
-    x, y : list of float
-        Breakpoints; empty where there is no such axis.
-    values : list of list of float
-        One row per entry of y, one number per entry of x.
-    long_name, unit, unit_x, unit_y, axis_x, axis_y : str
-        Texts, empty where the file says nothing.
-    sizes : list of int
-        Entries of the axes as the head of the block gives them.
-    line : int
-        Where the block begins, for messages.
-    is_axis : bool
-        Whether it holds breakpoints alone, in x.
+    `sizes` are the entries of the axes as the head gives them; `is_axis` says that it holds breakpoints alone, in x.
     """
 
     name: str

@@ -22,8 +22,6 @@ from mgdd.maps.written import unit_from, unit_to
 if TYPE_CHECKING:
     import os
 
-__all__ = ["DcmFile", "read_dcm", "write_labels"]
-
 ENCODINGS = ("utf-8", "latin-1", "cp1252")
 
 
@@ -42,12 +40,6 @@ class DcmFile:
         and keywords that are not known.
     breakpoints : mapping of str to (tuple of float, str)
         Axes that several maps share, with their units.
-
-    Examples
-    --------
-    >>> from mgdd.maps.dcm_files import DcmFile
-    >>> DcmFile(maps={}, values={"idle_rpm": (850.0, "rpm")}).values["idle_rpm"]
-    (850.0, 'rpm')
     """
 
     maps: Mapping[str, CalibrationMap]

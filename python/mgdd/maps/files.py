@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["map_content", "read_map", "write_map"]
-
 _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".cdfx", ".nc")
 _HEAD = 1 << 16  # bytes that tell a form

@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, did_you_mean
-from mgdd.io.table import parse_number
+from mgdd.io.row_text import parse_number
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import NUMBERS, TEXTS, MapTask, spoken_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-__all__ = ["csv_of_map", "is_map_csv", "map_of_csv", "require_rise", "trimmed"]
 
 _FORMAT = "1"
 _HEADS = ("mgdd_map", "value", "rows", "columns", "objective", "limit", "provenance")

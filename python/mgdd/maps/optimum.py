@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["optimize_map"]
-
 _LOG = logging.getLogger(__name__)
 
 EDGE = "end_of_sweep"

@@ -13,13 +13,11 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.column_names import spelled_unit
-from mgdd.io.table import parse_number
+from mgdd.io.row_text import parse_number
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.corner import axes_of
 from mgdd.maps.grid_csv import require_rise, trimmed
 from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, unit_from, without_brackets
-
-__all__ = ["map_of_grid", "number_in", "require_two", "value_heading"]
 
 _EMPTY = frozenset({"", "-", "--", "–", "nan", "na", "n/a", "#n/a"})  # how a cell without a value is written
 _MARKS = (";", "\t", ",", None)  # None: blanks

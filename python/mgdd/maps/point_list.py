@@ -11,7 +11,8 @@ import numpy as np
 
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.array_table import ArrayTable
-from mgdd.io.table import Table, TextTable, parse_number
+from mgdd.io.row_text import parse_number
+from mgdd.io.table import Table, TextTable
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import cell_at
 from mgdd.maps.plain_grid import number_in, require_two, value_heading
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-__all__ = ["map_of_points"]
 
 _SHOWN = 3  # cells that a message names
 _NUMBERED = re.compile(r"(.*?) ?(\d+)")

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["smooth_map"]
-
 _KEPT = 1e-7  # of the median range: how far a value that is kept may move in the search, before it is set back
 _NARROWEST = 0.05  # of the median range: an optimum is not held more tightly than this
 _INSIDE = 1e-7  # of a slope limit or range: kept free for the tolerance of the solver

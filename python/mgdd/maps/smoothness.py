@@ -8,8 +8,6 @@ import numpy as np
 
 from mgdd.maps.calibration_map import CalibrationMap
 
-__all__ = ["smoothness_of"]
-
 _LEAST = 1e-4  # weight where cells are empty
 _TWIST = 1e-3  # share of the mixed differences in the smoothness where cells are empty
 

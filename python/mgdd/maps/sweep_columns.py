@@ -17,26 +17,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["SweepColumns", "sweep_columns"]
-
 _FEWEST = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepColumns:
-    """Variables of a sweep by name, each of shape (cells, points).
-
-    Parameters
-    ----------
-    axes : mapping of str to numpy.ndarray
-        The operating axes, in the order of the cells.
-    over : numpy.ndarray, shape (points,)
-        The swept input, increasing.
-    columns : mapping of str to numpy.ndarray
-        The variables.
-    labels : mapping of str to Label
-        Of axes, swept input and variables.
-    """
+    """Variables of a sweep by name, each of shape (cells, points); the swept input increases, cells follow the axes."""
 
     axes: Mapping[str, Array]
     over: Array
@@ -50,31 +36,7 @@ class SweepColumns:
 
 
 def sweep_columns(sweep: xr.Dataset, over: str, names: tuple[str, ...], lead: str) -> SweepColumns:
-    """Take variables out of a sweep, or name what is wrong with it.
-
-    Parameters
-    ----------
-    sweep : xarray.Dataset
-        Variables over one or two operating axes and `over`.
-    over : str
-        The swept input.
-    names : tuple of str
-        The variables.
-    lead : str
-        The one of them whose axes are those of the map; the others are broadcast.
-
-    Returns
-    -------
-    SweepColumns
-        The arrays.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A name that the sweep does not have.
-    mgdd.errors.DataError
-        Another number of axes, too few points, coordinates that do not increase, no units.
-    """
+    """Take variables out of a sweep, or name what is wrong with it; the axes are those of the variable `lead`."""
     for name in names:
         if name not in sweep.data_vars:
             near = did_you_mean(name, map(str, sweep.data_vars)) or f"it has {', '.join(map(str, sweep.data_vars))}"

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Parts", "between", "feasible_parts", "range_around"]
-
 _NOWHERE = 2.0  # beyond any share of an interval
 
 
@@ -25,13 +23,8 @@ _NOWHERE = 2.0  # beyond any share of an interval
 class Parts:
     """The part of every interval in which all quantities are at most zero, as shares of its length.
 
-    Parameters
-    ----------
-    low, high : numpy.ndarray, shape (cells, intervals)
-        Ends of the part; low > high where there is none. A point that keeps the limits between two that do not is a
-        part of length zero.
-    first, last : numpy.ndarray of int
-        Which quantity ends the part there.
+    Low is above high where there is none; a point that keeps the limits between two that do not is a part of length
+    zero. First and last are the quantities that end it.
     """
 
     low: Array
@@ -41,18 +34,7 @@ class Parts:
 
 
 def feasible_parts(excess: Array) -> Parts:
-    """Find the part of every interval in which all quantities are at most zero.
-
-    Parameters
-    ----------
-    excess : numpy.ndarray, shape (quantities, cells, points)
-        At most zero where the limit is kept; infinite where nothing is known.
-
-    Returns
-    -------
-    Parts
-        As shares of the intervals.
-    """
+    """Find the part of every interval in which all quantities (quantity, cell, point) are at most zero, as shares."""
     before, after = excess[:, :, :-1], excess[:, :, 1:]
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = before / (before - after)
@@ -64,21 +46,9 @@ def feasible_parts(excess: Array) -> Parts:
 
 
 def between(columns: Array, share: Array, interval: NDArray[np.intp] | None = None) -> Array:
-    """Interpolate columns linearly at shares of intervals; the ends need no other end.
+    """Interpolate columns (..., cells, points) at shares of intervals, one of each or `interval` of each cell.
 
-    Parameters
-    ----------
-    columns : numpy.ndarray, shape (..., cells, points)
-        Values at the points.
-    share : numpy.ndarray
-        One per interval, or one per cell with `interval`.
-    interval : numpy.ndarray of int, shape (cells,), optional
-        The interval of each cell.
-
-    Returns
-    -------
-    numpy.ndarray
-        In the shape of `share`, with the leading axes of `columns`.
+    The ends need no other end.
     """
     if interval is None:
         before, after = columns[..., :-1], columns[..., 1:]
@@ -91,23 +61,9 @@ def between(columns: Array, share: Array, interval: NDArray[np.intp] | None = No
 
 
 def range_around(timings: Array, parts: Parts, at: Array) -> tuple[Array, Array, NDArray[np.intp], NDArray[np.intp]]:
-    """Find the connected range of kept limits around a timing of every cell.
+    """Find the connected range of kept limits around a timing of every cell, and which quantity ends it at each side.
 
-    Parameters
-    ----------
-    timings : numpy.ndarray, shape (points,)
-        Strictly increasing.
-    parts : Parts
-        Where the limits are kept.
-    at : numpy.ndarray, shape (cells,)
-        The timings; they belong to the range, whatever `parts` say.
-
-    Returns
-    -------
-    low, high : numpy.ndarray, shape (cells,)
-        Ends of the range.
-    first, last : numpy.ndarray of int
-        Which quantity ends it there; -1 at the end of the sweep, and where the range is the timing alone.
+    That is -1 at the end of the sweep, and where the range is the timing alone.
     """
     step = np.diff(timings)
     rows, n = np.arange(at.size), step.size

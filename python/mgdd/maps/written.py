@@ -11,8 +11,6 @@ from mgdd.maps.cells import can_be_name, spoken_name
 from mgdd.results.labels import VARIABLES, said_unit
 from mgdd.results.units import attribute_units
 
-__all__ = ["NOT_GIVEN", "Heading", "heading_of", "unit_from", "unit_to", "without_brackets"]
-
 NOT_GIVEN = "not given"
 # Units as calibration tools write them; everything else stands as it is. Where an angle counts from they do not say.
 _UNITS = {

@@ -29,49 +29,14 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["calibration_overlay", "tdc_scan", "wall_heat_profile"]
-
 _EVENTS = {"soi_cad": (":", ORANGE), "soc_cad": ("--", BLUE)}
 
 
 def calibration_overlay(overlay: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw measured points under the model's line, and their difference in a panel below.
+    """Draw measured points under the model's line, and their difference in a panel below, ``ax.figure.axes[-1]``.
 
-    Parameters
-    ----------
-    overlay : xarray.Dataset or Result
-        ``measured_bar``, ``model_bar`` and ``residual_bar`` (model minus measured) [bar] over
-        ``crank_angle_cad`` [°CA aTDC] of one trace, as `mgdd.identify.fit_cylinder` gives. Start of injection
-        and of combustion, RMSE and IMEP error are shown where the Dataset has them.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; it gives its lower quarter to the residual panel. None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The upper axes; the residual panel is ``ax.figure.axes[-1]``.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.plot.calibration import calibration_overlay
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> angle = np.arange(-30.0, 31.0)
-    >>> measured = 60.0 - 0.01 * angle**2
-    >>> overlay = labelled_dataset({
-    ...     "crank_angle_cad": ("crank_angle_cad", angle),
-    ...     "measured_bar": ("crank_angle_cad", measured),
-    ...     "model_bar": ("crank_angle_cad", measured + 0.2),
-    ...     "residual_bar": ("crank_angle_cad", 0.2 + 0.0 * angle),
-    ... })
-    >>> ax = calibration_overlay(overlay)
-    >>> ax.figure.axes[-1].get_xlabel()
-    'crank angle [°CA aTDC]'
+    The data are those of one trace of `mgdd.identify.fit_cylinder`; start of injection and of combustion, RMSE and IMEP
+    error are shown where the Dataset has them.
     """
     needed = (ANGLE, "measured_bar", "model_bar", "residual_bar")
     optional = (*_EVENTS, "rmse_percent", "imep_closed_error_percent")
@@ -156,38 +121,7 @@ def _model_name(overlay: xr.Dataset) -> str:
 
 
 def tdc_scan(scan: xr.Dataset | Result, possible: tuple[float, float] | None = None, *, ax: Axes | None = None) -> Axes:
-    """Draw the least RMSE over the TDC offset, and the range of offsets that are possible.
-
-    Parameters
-    ----------
-    scan : xarray.Dataset or Result
-        ``rmse_percent`` [% of p_max] over ``tdc_offset_cad`` [°CA], as `mgdd.identify.estimate_tdc` gives.
-    possible : tuple of float, optional
-        Lowest and highest possible offset [°CA]; ``low_cad`` and ``high_cad`` of `scan` if left out.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> from mgdd.plot.calibration import tdc_scan
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> scan = labelled_dataset({
-    ...     "tdc_offset_cad": ("tdc_offset_cad", [-0.5, 0.0, 0.5], "°CA", "angle taken off the trace"),
-    ...     "rmse_percent": ("tdc_offset_cad", [0.30, 0.10, 0.25]),
-    ... })
-    >>> tdc_scan(scan, (-0.1, 0.1)).get_xlabel()
-    'angle taken off the trace [°CA]'
-    """
+    """Draw the least RMSE over the TDC offset, and the range of offsets that are possible, of `estimate_tdc`."""
     scan = require("scan", scan, ("tdc_offset_cad", "rmse_percent"), "mgdd.identify.estimate_tdc")
     if possible is None:
         require("scan", scan, ("low_cad", "high_cad"), "mgdd.identify.estimate_tdc")

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["convergence"]
-
 _BAND = ("estimate_low_cad", "estimate_high_cad")
 # Two colours-and-dashes more than the shared style has: a comparison of seekers needs them.
 _STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK))
@@ -26,41 +24,8 @@ _STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK
 def convergence(tracks: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw how estimates approach the optimum: medians as lines, quantiles over seeds as bands.
 
-    Parameters
-    ----------
-    tracks : xarray.Dataset or Result
-        ``estimate_median_cad`` [°CA aTDC] over ``cycle`` and one more dimension, whose coordinate names the lines (at
-        most nine). Where the Dataset has them, ``estimate_low_cad`` and ``estimate_high_cad`` are the band and
-        ``optimum_cad``, a number, is where the estimates should go.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit, other dimensions, too many lines.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import xarray as xr
-    >>> from mgdd.plot.convergence import convergence
-    >>> cycle, angle = np.arange(200), {"units": "degree", "long_name": "estimate, °CA aTDC"}
-    >>> estimates = [-14.0 * np.exp(-cycle / t) - 6.0 for t in (80.0, 20.0)]
-    >>> tracks = xr.Dataset(
-    ...     {"estimate_median_cad": (("case", "cycle"), estimates, angle)},
-    ...     {
-    ...         "cycle": ("cycle", cycle, {"units": "1", "long_name": "engine cycle"}),
-    ...         "case": ("case", ["slow", "fast"], {"units": "1", "long_name": "case"}),
-    ...     },
-    ... )
-    >>> convergence(tracks).get_ylabel()
-    'estimate [°CA aTDC]'
+    ``estimate_median_cad`` stands over ``cycle`` and one more dimension, whose coordinate names the lines. Where the
+    Dataset has them, ``estimate_low_cad`` and ``estimate_high_cad`` are the band, and ``optimum_cad`` is the goal.
     """
     optional = (*_BAND, "optimum_cad")
     tracks = require("tracks", tracks, ("cycle", "estimate_median_cad"), "a study of seekers", optional)

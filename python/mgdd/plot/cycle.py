@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["pressure"]
-
 _RATES = {
     "heat_release_j_per_cad": ("-.", ORANGE),
     "heat_release_net_j_per_cad": ("-.", ORANGE),

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["CYCLE", "cloud", "cycles"]
-
 CYCLE = "cycle"
 _LINES = 60  # of a cloud; the band says the rest
 _MARKS = {"misfire": ("x", ORANGE), "partial_burn": ("+", BLUE)}

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["data"]
-
 # The first figure whose variables stand over these dimensions: those of `mgdd.plot` that need no choice.
 _FIGURES = (
     (pressure, {"pressure_bar": {ANGLE}}),
@@ -39,32 +37,7 @@ _PANELS = 4  # that can be read below each other
 
 
 def data(data: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw a Dataset by the figure that its variables have, or as curves, as cells, or as a table of its numbers.
-
-    Parameters
-    ----------
-    data : xarray.Dataset or Result
-        Of any function of mgdd.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes, the first where there are several.
-
-    Raises
-    ------
-    DataError
-        A variable without unit.
-
-    Examples
-    --------
-    >>> from mgdd.plot.data import data
-    >>> from mgdd.sweep import sweep
-    >>> data(sweep("puma_single", {"speed_rpm": [1000.0, 2000.0, 3000.0]}, outputs=["p_max_bar"])).get_ylabel()
-    'p_max_bar [bar]'
-    """
+    """Draw a Dataset by the figure that its variables have, or as curves, as cells, or as a table of its numbers."""
     data = require("data", data, (), "mgdd.engine.simulate")
     for draw, needed in _FIGURES:
         if all(name in data and set(data[name].dims) == dims for name, dims in needed.items()):

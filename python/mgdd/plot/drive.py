@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["drive"]
-
 # Panels: label, and the lines, what is wanted first.
 _PANELS = (
     ("torque [N m]", (("wanted_torque_nm", "wanted"), ("torque_nm", "obtained"))),
@@ -23,33 +21,7 @@ _PANELS = (
 
 
 def drive(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw pedal, torque, plate angle and manifold pressure of a drive over time.
-
-    Parameters
-    ----------
-    run : xarray.Dataset or Result
-        A drive as `mgdd.loop.simulate_drive` gives it.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; it gives its lower part to the panels. None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes of the pedal.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> from mgdd.loop import simulate_drive
-    >>> from mgdd.plot.drive import drive
-    >>> from mgdd.throttle import DemandChain
-    >>> drive(simulate_drive(DemandChain(), [10.0] * 20 + [40.0] * 80, 2000.0)).get_ylabel()
-    'pedal [%]'
-    """
+    """Draw pedal, torque, plate angle and manifold pressure of a `mgdd.loop.simulate_drive` over time."""
     names = tuple(name for _, lines in _PANELS for name, _ in lines)
     run = require("run", run, ("time_s", "pedal_percent", *names), "mgdd.loop.simulate_drive")
     ax = new_axes(ax, height=6.4)

@@ -17,44 +17,14 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["family_strip", "family_strips"]
-
 _NEEDED = ("free_ca50_cad", "fitted_ca50_cad", "plausible")
 _LABEL = "best CA50, no pressure limit [°CA aTDC]"
 
 
 def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw each member's best CA50 without a pressure limit, one row per member.
+    """Draw each member's best CA50 without a pressure limit, one row per member, of a load of `best_timing`.
 
-    Parameters
-    ----------
-    timing : xarray.Dataset or BestTiming
-        ``free_ca50_cad``, ``fitted_ca50_cad`` [°CA aTDC] and ``plausible`` over ``member`` of one load of
-        `mgdd.identify.best_timing`; attribute ``best`` names the best member,
-        ``free_ca50_low_cad`` and ``free_ca50_high_cad`` are the ends of the range.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        Filled: plausible; open: not; ringed: the best; band: the range; dashed: burn as measured.
-
-    Raises
-    ------
-    DataError
-        No members.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import ModelFamily, best_timing
-    >>> from mgdd.plot.family import family_strip
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> row = best_timing(datasets.read("hd_diesel_128x144"), cylinder, family=family)[1]
-    >>> family_strip(row).get_xlabel()
-    'best CA50, no pressure limit [°CA aTDC]'
+    Filled: plausible; open: not; ringed: the best; band: the range; dashed: burn as measured.
     """
     timing = require("timing", timing, ("member", *_NEEDED), "mgdd.identify.best_timing")
     names = [str(name) for name in timing["member"].to_numpy()]

@@ -17,46 +17,11 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["correlation_matrix", "error_growth", "residual_correlation"]
-
 _TANGLED = 0.98
 
 
 def error_growth(n_step: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw how the error of a prediction grows with its horizon: one line per predictor.
-
-    Parameters
-    ----------
-    n_step : xarray.Dataset or Result
-        ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as in the `n_step` of `validate_throttle`;
-        at most five predictors.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes; errors are on a logarithmic scale.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit; too many predictors.
-
-    Examples
-    --------
-    >>> from mgdd.plot.identification import error_growth
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> n_step = labelled_dataset({
-    ...     "predictor": ("predictor", ["pw_r", "persistence"], "-", "predictor"),
-    ...     "horizon_s": ("horizon_s", [0.005, 0.02, 0.05], "s", "horizon"),
-    ...     "n_step_rms_deg": (
-    ...         ("predictor", "horizon_s"), [[0.03, 0.05, 0.08], [0.41, 1.55, 3.98]], "deg", "RMS error ahead"
-    ...     ),
-    ... })
-    >>> error_growth(n_step).get_ylabel()
-    'RMS error ahead [deg]'
-    """
+    """Draw how the error of a prediction grows with its horizon: one line per predictor of `validate_throttle`."""
     n_step = require("n_step", n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.validate_throttle")
     names = [str(name).replace("_", " ") for name in n_step["predictor"].to_numpy()]
     if len(names) > len(LINE_STYLES):
@@ -76,39 +41,7 @@ def error_growth(n_step: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes
 
 
 def residual_correlation(correlations: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw the autocorrelation of a residual and, below, its correlation with earlier input.
-
-    Parameters
-    ----------
-    correlations : xarray.Dataset or Result
-        ``autocorrelation`` and ``cross_correlation`` over ``lag`` and the number ``limit``, as
-        `mgdd.identify.validate_throttle` gives it in ``tests.correlations``.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; it gives its lower half away. None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The upper axes; the lower one is ``ax.figure.axes[-1]``.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> from mgdd.plot.identification import residual_correlation
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> correlations = labelled_dataset({
-    ...     "lag": ("lag", [1, 2, 3], "samples", "lag"),
-    ...     "autocorrelation": ("lag", [0.3, 0.1, 0.0], "-", "autocorrelation of the residual"),
-    ...     "cross_correlation": ("lag", [0.0, 0.02, 0.01], "-", "correlation of residual and earlier duty"),
-    ...     "limit": ((), 0.05, "-", "95 % limit"),
-    ... })
-    >>> residual_correlation(correlations).figure.axes[-1].get_xlabel()
-    'lag [samples]'
-    """
+    """Draw the autocorrelation of a residual and, below, its correlation with earlier input, of `validate_throttle`."""
     names = ("autocorrelation", "cross_correlation")
     correlations = require("correlations", correlations, ("lag", *names, "limit"), "mgdd.identify.validate_throttle")
     ax = new_axes(ax, height=4.4)

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["map_cells", "map_contour"]
-
 _MADE_BY = "mgdd.maps.optimize_map or mgdd.datasets.read"
 # Beside a value in its cell; what is not named here needs no mark.
 _MARKS = {

@@ -13,42 +13,9 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["measured_and_model"]
-
 
 def measured_and_model(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw a measured signal and the free run of its model over each other.
-
-    Parameters
-    ----------
-    run : xarray.Dataset or Result
-        ``measured`` and ``model`` over ``time_s``, as the attribute ``run`` of a `mgdd.results.Fit` has them.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> from mgdd.plot.measured import measured_and_model
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> run = labelled_dataset({
-    ...     "time_s": ("time_s", [0.0, 1.0]),
-    ...     "measured": ("time_s", [0.0, 1.0], "V", "level, measured"),
-    ...     "model": ("time_s", [0.0, 0.9], "V", "level, free run"),
-    ... })
-    >>> measured_and_model(run, ax=Figure().add_subplot()).get_ylabel()
-    'level, measured [V]'
-    """
+    """Draw a measured signal and the free run of its model over each other, the `run` of a `mgdd.results.Fit`."""
     run = require("run", run, ("time_s", "measured", "model"), "mgdd.results.Fit")
     ax = new_axes(ax)
     lines: list[Artist] = []

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["response_diagnostics"]
-
 _CUTS_IN_A_ROW = 3
 _NEEDED = (
     "point", "measured", "fitted", "left_out", "studentised", "normal_score", "outlier", "outlier_bound", "factor",
@@ -28,34 +26,9 @@ _NEEDED = (
 
 
 def response_diagnostics(diagnostics: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw the diagnostics of a response model: four panels of residuals, and a cut along each factor.
+    """Draw the diagnostics of `mgdd.surrogate.fit_response`: four panels of residuals, and a cut along each factor.
 
-    Parameters
-    ----------
-    diagnostics : xarray.Dataset or Result
-        The ``diagnostics`` of `mgdd.surrogate.fit_response`.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; it is divided into the panels. None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The first panel, left-out against measured; the others follow in ``ax.figure.axes``: residuals over run order,
-        over the fitted value, and over normal scores; then the cuts. Points beyond the bound for outliers are squares.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> from mgdd.plot.response import response_diagnostics
-    >>> from mgdd.surrogate import fit_response
-    >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
-    >>> fit = fit_response(line, "imep_bar", degree=1)
-    >>> [panel.get_xlabel() for panel in response_diagnostics(fit.diagnostics).figure.axes][-1]
-    'fuel [mg]'
+    Points beyond the bound for outliers are squares.
     """
     diagnostics = require("diagnostics", diagnostics, _NEEDED, "mgdd.surrogate.fit_response")
     names = [str(name) for name in diagnostics["factor"].to_numpy()]

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["seeking"]
-
 _NEEDED = ("cycle", "asked", "estimate", "j")
 _MADE_BY = "mgdd.loop.run_seeker"
 _SLOPE = "gradient_per_cad"

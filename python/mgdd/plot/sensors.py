@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["sensors"]
-
 # Behind each other in this order: the noisy ones first, the true value above them.
 _SENSORS: dict[str, dict[str, Any]] = {
     "nox_fast_ppm": {"color": GREY, "linestyle": "-", "marker": "x", "linewidth": 0.7},

@@ -19,27 +19,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = [
-    "BLACK",
-    "BLUE",
-    "COLOURS",
-    "GREEN",
-    "GREY",
-    "LINE_STYLES",
-    "ORANGE",
-    "axis_label",
-    "beside",
-    "divide",
-    "drawn",
-    "finished",
-    "legend",
-    "minus",
-    "new_axes",
-    "new_figure",
-    "require",
-    "residual_below",
-]
-
 # Okabe and Ito's palette: apart for colour-blind eyes, and of different lightness in print.
 BLACK, BLUE, ORANGE, GREEN, GREY = "#000000", "#0072B2", "#D55E00", "#009E73", "#777777"
 COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
@@ -121,33 +100,7 @@ def residual_below(ax: Axes, data: xr.Dataset, x: str, residual: str) -> Axes:
 def require(
     argument: str, given: xr.Dataset | Result, names: tuple[str, ...], made_by: str, optional: tuple[str, ...] = ()
 ) -> xr.Dataset:
-    """Return the Dataset of what a figure is given, a result or the Dataset itself, with these variables and labels.
-
-    Parameters
-    ----------
-    argument : str
-        Its name, for the error.
-    given : xarray.Dataset or Result
-        What the figure is given.
-    names : tuple of str
-        Variables that it needs.
-    made_by : str
-        The function whose result has them.
-    optional : tuple of str
-        Variables that are drawn where they are there.
-
-    Returns
-    -------
-    xarray.Dataset
-        The data to draw.
-
-    Raises
-    ------
-    ParameterError
-        Neither a result nor a Dataset.
-    DataError
-        A variable is missing or has no unit.
-    """
+    """Return the Dataset of what a figure is given, a result or the Dataset itself, with these variables and labels."""
     import xarray as xr
 
     dataset = given if isinstance(given, xr.Dataset) else getattr(given, "dataset", None)

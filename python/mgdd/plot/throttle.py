@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["free_run", "holding_duty"]
-
 _MADE_BY = "mgdd.io.read_throttle_log"
 
 
@@ -71,41 +69,7 @@ def holding_duty(log: xr.Dataset | Result, *, limp_home_deg: float | None = None
 
 
 def free_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw measured and modelled angle over time, and their difference in a panel below.
-
-    Parameters
-    ----------
-    run : xarray.Dataset or Result
-        ``angle_deg``, ``model_deg`` and ``residual_deg`` [deg] over ``time_s`` [s], as
-        `mgdd.identify.validate_throttle` gives it in ``free_run``.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; it gives its lower quarter to the residual panel. None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The upper axes; the residual panel is ``ax.figure.axes[-1]``.
-
-    Raises
-    ------
-    DataError
-        A variable is missing or has no unit.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.plot.throttle import free_run
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> time = np.arange(100) * 0.01
-    >>> run = labelled_dataset({
-    ...     "time_s": ("time_s", time),
-    ...     "angle_deg": ("time_s", 20.0 + time),
-    ...     "model_deg": ("time_s", 20.1 + time),
-    ...     "residual_deg": ("time_s", 0.1 + 0.0 * time, "deg", "model minus measured angle"),
-    ... })
-    >>> free_run(run).figure.axes[-1].get_xlabel()
-    'time [s]'
-    """
+    """Draw measured and modelled angle of `validate_throttle`, the difference in ``ax.figure.axes[-1]``."""
     run = require("run", run, ("time_s", "angle_deg", "model_deg", "residual_deg"), "mgdd.identify.validate_throttle")
     ax = new_axes(ax, height=4.4)
     residual_below(ax, run, "time_s", "residual_deg").grid(alpha=0.3)

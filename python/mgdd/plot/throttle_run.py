@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["throttle_run"]
-
 _OPTIONAL = ("reference_deg", "current_a")
 _PANELS = (("error_deg", ORANGE), ("duty", BLUE), ("current_a", GREEN))
 

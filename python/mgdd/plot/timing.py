@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["scanned", "timing"]
-
 _NOX = {"nox_affine_log_ppm": ("--", BLUE), "nox_arrhenius_ppm": ("-.", ORANGE)}
 
 
@@ -92,26 +90,7 @@ def timing(sweep: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
 def scanned(
     scan: xr.Dataset, objective: str, best: float, value: float, caps: Mapping[str, float], *, ax: Axes | None = None
 ) -> Axes:
-    """Draw an objective over the only input, with its optimum, and each limited quantity with its limit below.
-
-    Parameters
-    ----------
-    scan : xarray.Dataset
-        Objective and limited quantities over the input.
-    objective : str
-        Name of the objective.
-    best, value : float
-        The optimum and the objective there.
-    caps : mapping of str to float
-        Limits by name.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; it is divided into the panels. None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes of the objective.
-    """
+    """Draw an objective over the only input, with its optimum, and each limited quantity with its limit below."""
     over = str(scan[objective].dims[0])
     x, kept = scan[over].to_numpy(), np.ones(scan.sizes[over], bool)
     for name, cap in caps.items():

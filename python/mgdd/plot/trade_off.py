@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.result import Result
 
-__all__ = ["trade_off"]
-
 _MARKERS = "osv^DPX"  # more than there are colours: a sixth line is not the first again
 
 

@@ -13,49 +13,13 @@ from mgdd.errors import ParameterError
 from mgdd.presets.preset import Preset, available, load
 from mgdd.results import Fit
 
-__all__ = [
-    "CylinderLike",
-    "PointLike",
-    "ThrottleLike",
-    "cylinder_of",
-    "engine_of",
-    "point_of",
-    "stated",
-    "throttle_model_of",
-    "throttle_of",
-]
-
 CylinderLike = str | os.PathLike[str] | Preset | Cylinder | Fit
 PointLike = str | os.PathLike[str] | Preset | OperatingPoint | Mapping[str, float]
 ThrottleLike = str | os.PathLike[str] | Preset | Throttle
 
 
 def cylinder_of(given: Any, argument: str = "cylinder") -> Cylinder:
-    """Return the cylinder that is meant.
-
-    Parameters
-    ----------
-    given : Cylinder, Preset, str, path-like or fit
-        The cylinder; a preset of an engine, its name, or its ``.toml`` file; or a fit of a cylinder.
-    argument : str
-        Its name, for the error.
-
-    Returns
-    -------
-    mgdd.engine.Cylinder
-        The cylinder.
-
-    Raises
-    ------
-    ParameterError
-        Anything else, or a preset of a throttle.
-
-    Examples
-    --------
-    >>> from mgdd.presets.meant import cylinder_of
-    >>> cylinder_of("puma_single").bore_mm
-    86.0
-    """
+    """Return the cylinder that is meant by one, a preset of an engine, its name, its ``.toml`` file, or a fit."""
     meant = _loaded(given, "engine")
     if isinstance(meant, Preset):
         return meant.cylinder
@@ -79,33 +43,7 @@ def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoin
 
 
 def stated(name: str, keyword: float | None, point: Any) -> float | None:
-    """Return what a caller says of this record, by keyword or by name in its point; None where neither does.
-
-    Parameters
-    ----------
-    name : str
-        Of the keyword and of the field.
-    keyword : float, optional
-        The keyword.
-    point : OperatingPoint, Preset, str, path-like, mapping of str to float, optional
-        Numbers by name are said of this record; a preset or an OperatingPoint has every field, perhaps of another load.
-
-    Returns
-    -------
-    float or None
-        The number.
-
-    Raises
-    ------
-    ParameterError
-        Both, with different numbers.
-
-    Examples
-    --------
-    >>> from mgdd.presets.meant import stated
-    >>> stated("fuel_mg", None, {"fuel_mg": 60.0})
-    60.0
-    """
+    """Return what a caller says of this record, by keyword or by name in its point; None where neither does."""
     named = point.get(name) if isinstance(point, Mapping) else None
     if named is None or keyword is None or float(keyword) == float(named):
         return keyword if named is None else float(named)
@@ -118,38 +56,7 @@ def stated(name: str, keyword: float | None, point: Any) -> float | None:
 def engine_of(
     cylinder: Any, point: Any = None, *, argument: str = "cylinder", **fields: float | None
 ) -> tuple[Cylinder, OperatingPoint]:
-    """Return the cylinder and the operating point that are meant.
-
-    Parameters
-    ----------
-    cylinder : Cylinder, Preset, str, path-like or fit
-        As of `cylinder_of`.
-    point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
-        The operating point; numbers by name replace those of the preset's nominal one, of ``OperatingPoint()`` where no
-        preset is given. The nominal one if left out, which only a preset has.
-    argument : str
-        Name of the cylinder, for the error.
-    **fields
-        Further numbers of the point; None leaves one as it is.
-
-    Returns
-    -------
-    tuple of Cylinder and OperatingPoint
-        Both.
-
-    Raises
-    ------
-    ParameterError
-        Anything else, an unknown number, or two values of one.
-    TypeError
-        A cylinder without a point.
-
-    Examples
-    --------
-    >>> from mgdd.presets.meant import engine_of
-    >>> engine_of("puma_single", {"speed_rpm": 1200.0})[1].speed_rpm
-    1200.0
-    """
+    """Return the cylinder and the operating point that are meant; numbers by name replace those of the nominal one."""
     meant = _loaded(cylinder, "engine")
     own, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
     changes = {name: value for name, value in fields.items() if value is not None}
@@ -166,31 +73,7 @@ def engine_of(
 
 
 def throttle_of(given: Any, argument: str = "throttle") -> Throttle:
-    """Return the throttle that is meant.
-
-    Parameters
-    ----------
-    given : Throttle, Preset, str or path-like
-        The throttle; or a preset of one, its name, or its ``.toml`` file.
-    argument : str
-        Its name, for the error.
-
-    Returns
-    -------
-    mgdd.throttle.Throttle
-        The throttle.
-
-    Raises
-    ------
-    ParameterError
-        Anything else, or a preset of an engine.
-
-    Examples
-    --------
-    >>> from mgdd.presets.meant import throttle_of
-    >>> throttle_of("P1").limp_home_deg
-    8.0
-    """
+    """Return the throttle that is meant by one, a preset of one, its name, or its ``.toml`` file."""
     meant = _loaded(given, "throttle")
     if isinstance(meant, Preset):
         return meant.throttle

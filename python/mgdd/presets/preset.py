@@ -17,8 +17,6 @@ from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
 from mgdd.results.describe import core_rows, described
 
-__all__ = ["Preset", "available", "load"]
-
 _TABLES: Mapping[str, Any] = MappingProxyType({"cylinder": Cylinder, "point": OperatingPoint, "throttle": Throttle})
 _OF_KIND: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"engine": ("cylinder", "point"), "throttle": ("throttle",)},

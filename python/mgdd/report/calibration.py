@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from mgdd.identify.engine.timing_records import BestTiming
     from mgdd.presets.meant import CylinderLike, PointLike
 
-__all__ = ["calibration_report", "shipped_report"]
-
 _GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from mgdd.identify.engine.family import Member
     from mgdd.identify.engine.timing_records import BestTiming
 
-__all__ = ["draw", "move_of", "sections_of"]
-
 _ANALYSIS = {
     "p_max_bar": ("p_max [bar]", ".1f"),
     "p_max_cad": ("at [°CA aTDC]", ".1f"),

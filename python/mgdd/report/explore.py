@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from mgdd.presets.meant import CylinderLike, PointLike
 
-__all__ = ["explore"]
-
 _SHOWN = ("imep_gross_bar", "ca50_cad", "p_max_bar")
 _SIZE = (6.6, 4.4)
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from mgdd.report.report import Report
     from mgdd.report.sections import Section
 
-__all__ = ["write_page", "write_report"]
-
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
 _INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine", "records": "Records"}  # in a summary

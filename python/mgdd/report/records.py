@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from mgdd.engine import PressureCheck
 
-__all__ = ["DRAWN_CYCLES", "record_section"]
-
 DRAWN_CYCLES = 400  # of a longer record every second, third, ... one: a picture has no more rows
 _SPECTRUM = "pressure_psd_bar2_per_khz"
 _STATISTICS = {
@@ -34,21 +32,9 @@ _BURN = (-40.0, 100.0)  # °CA aTDC
 
 
 def record_section(report: PressureCheck, figures: xr.Dataset | None, traces: xr.Dataset | None = None) -> Section:
-    """Make the section of one file.
+    """Make the section of one file: checks as a list, and of an analysed file text, table and figures.
 
-    Parameters
-    ----------
-    report : PressureCheck
-        Its checks.
-    figures : xarray.Dataset, optional
-        Of `mgdd.engine.analyze`; None where it refused the file.
-    traces : xarray.Dataset, optional
-        The same with traces, perhaps of fewer cycles; `figures` if left out.
-
-    Returns
-    -------
-    Section
-        Checks as a list, and of an analysed file text, table and figures.
+    `traces` are perhaps of fewer cycles than `figures`, which are None where `analyze` refused the file.
     """
     passed = [check.name for check in report.checks if check.verdict == "no fault found"]
     rest = sorted((check for check in report.checks if check.verdict != "no fault found"), key=_urgency)

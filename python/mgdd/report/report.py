@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Report"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Report(Result):

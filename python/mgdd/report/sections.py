@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Section", "Table", "as_number", "cells", "column_names", "standard_sections", "table_of"]
-
 _ENDS = ("_low", "_high")
 _INTERVAL = "Brackets: 95 % interval over seeds, of the mean or, for cycles, of the median."
 _SAID = ("study", "seeds", "rows", "interrupted", "mgdd", "verdict")

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-__all__ = ["Dataset"]
-
 
 class _Plot(DatasetPlotAccessor):
     """``data.plot()`` draws the figure of `mgdd.plot` for these data; ``data.plot.scatter`` and others are xarray's."""

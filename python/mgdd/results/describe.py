@@ -20,21 +20,6 @@ from mgdd.results.units import unit_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "PLAIN",
-    "Row",
-    "as_figure",
-    "as_html",
-    "as_text",
-    "core_rows",
-    "dataset_text",
-    "described",
-    "fields_of",
-    "picture_of",
-    "rows_of",
-    "title_of",
-]
-
 _WIDTH, _LINES = 100, 15
 _LONG = 60  # of a text in a table
 _LEAD, _MANY = 8, 60  # rows in HTML: that are seen at once, and behind a fold
@@ -54,20 +39,7 @@ class Row(NamedTuple):
 
 
 def as_text(title: str, rows: Iterable[Row]) -> str:
-    """Lay out rows as text of at most 15 lines and 100 columns.
-
-    Parameters
-    ----------
-    title : str
-        First line.
-    rows : iterable of Row
-        One per line; side by side where they are many.
-
-    Returns
-    -------
-    str
-        The text; what does not fit is counted in its last line.
-    """
+    """Lay out rows as text of at most 15 lines and 100 columns."""
     cells = [f"{row.name} {row.value}" + ("" if row.unit == "-" else f" {row.unit}") for row in rows]
     head = textwrap.shorten(title, _WIDTH, placeholder=" …")
     most = _LINES - 1
@@ -82,22 +54,7 @@ def as_text(title: str, rows: Iterable[Row]) -> str:
 
 
 def as_html(title: str, rows: Iterable[Row], picture: str = "") -> str:
-    """Lay out rows as an HTML table, for notebooks.
-
-    Parameters
-    ----------
-    title : str
-        Above the table.
-    rows : iterable of Row
-        One per line.
-    picture : str
-        Between title and table.
-
-    Returns
-    -------
-    str
-        The HTML: a few rows, the others folded; what does not fit is counted below.
-    """
+    """Lay out rows as an HTML table, for notebooks."""
     known = list(rows)
     lead = len(known) if len(known) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
     rest = known[lead:_MANY]
@@ -160,22 +117,7 @@ def _cells_of(shades: Any) -> str:
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
-    """Draw rows as a table.
-
-    Parameters
-    ----------
-    title : str
-        Above the table.
-    rows : iterable of Row
-        One per line.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes, without axis lines.
-    """
+    """Draw rows as a table."""
     cells = [(row.name, row.value, "" if row.unit == "-" else row.unit) for row in rows] or [("", "", "")]
     if ax is None:
         import matplotlib.pyplot as plt
@@ -190,21 +132,7 @@ def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
 
 
 def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Row]:
-    """Make rows of names and values; units as given, else as the results' labels or the names say.
-
-    Parameters
-    ----------
-    values : mapping of str to object
-        Numbers and text as they stand; mappings of numbers become rows of their own; arrays, Datasets and other
-        objects are named with their size.
-    units : mapping of str to str, optional
-        Units that the names do not say.
-
-    Returns
-    -------
-    list of Row
-        In order.
-    """
+    """Make rows of names and values; units as given, else as the results' labels or the names say."""
     out = []
     for name, value in values.items():
         if isinstance(value, Mapping) and value and all(_is_scalar(item) for item in value.values()):
@@ -235,22 +163,7 @@ def dataset_text(data: Any) -> str:
 def described(
     cls: type[T], *, title: Callable[[Any], str] | None = None, rows: Callable[[Any], Any] | None = None
 ) -> type[T]:
-    """Give a class a short text and an HTML form.
-
-    Parameters
-    ----------
-    cls : type
-        A dataclass, or any class with `rows`.
-    title : callable, optional
-        First line of an object; its class, name and kind if left out.
-    rows : callable, optional
-        Rows of an object, or a mapping for `rows_of`; the fields of a dataclass if left out.
-
-    Returns
-    -------
-    type
-        The same class.
-    """
+    """Give a class a short text and an HTML form."""
     head = title_of if title is None else title
 
     def known(obj: Any) -> list[Row]:

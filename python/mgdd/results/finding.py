@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
     from mgdd import _core
 
-__all__ = ["Finding", "classified", "findings_html", "unique"]
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -29,13 +27,6 @@ class Finding:
         What was found, as a sentence without a full stop.
     remedy : str
         What to do about it; empty where the text says all.
-
-    Examples
-    --------
-    >>> from mgdd.results.finding import Finding
-    >>> found = Finding("one_way", (), "the plate only opens", "add a triangle across limp-home")
-    >>> found.code, str(found)
-    ('one_way', 'the plate only opens; add a triangle across limp-home')
     """
 
     code: str
@@ -47,13 +38,7 @@ class Finding:
         return f"{self.text}; {self.remedy}" if self.remedy else self.text
 
     def to_dict(self) -> dict[str, Any]:
-        """Give code, names, text and remedy as plain values.
-
-        Returns
-        -------
-        dict
-            Field names to values; names as a list.
-        """
+        """Give code, names, text and remedy as plain values."""
         return {"code": self.code, "names": list(self.names), "text": self.text, "remedy": self.remedy}
 
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["Fit", "FitQuality", "figures_of", "n_best_of"]
-
 ARRIVED = 1.005  # a start within 0.5 % of the best error counts as having found it
 
 
@@ -38,12 +36,6 @@ class FitQuality:
         Unit of the error.
     n : int
         Samples that were compared.
-
-    Examples
-    --------
-    >>> from mgdd.results.fit import FitQuality
-    >>> print(FitQuality(nrmse_fit_percent=97.5, rmse=0.21, unit="deg", n=11_950))
-    97.50 %, RMSE 0.21 deg
     """
 
     nrmse_fit_percent: float | None
@@ -56,13 +48,7 @@ class FitQuality:
         return f"{percent}RMSE {self.rmse:.4g} {'' if self.unit == '-' else self.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the figures as plain values.
-
-        Returns
-        -------
-        dict
-            Field names to values.
-        """
+        """Give the figures as plain values."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 

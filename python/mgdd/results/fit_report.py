@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["FitReport"]
-
 _COLUMNS = ("parameter", "value", "stderr", "lower", "upper", "remark")
 
 

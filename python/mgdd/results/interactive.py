@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Transform
 
-__all__ = ["as_plotly", "plotly_script"]
-
 _PIXELS = 80.0  # per inch: a wide figure fits a page
 _STEPS = {"steps": "vh", "steps-pre": "vh", "steps-post": "hv", "steps-mid": "hvh"}
 _NONE = ("None", "none", " ", "")

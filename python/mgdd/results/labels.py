@@ -24,18 +24,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.dataset import Dataset
 
-__all__ = [
-    "ANGLE",
-    "VARIABLES",
-    "Label",
-    "check_labels",
-    "label_of",
-    "labelled_dataset",
-    "named_label",
-    "said_unit",
-    "to_jsonable",
-]
-
 ANGLE = "crank_angle_cad"
 
 
@@ -48,12 +36,6 @@ class Label(NamedTuple):
         Unit as figures print it, ``"-"`` if dimensionless; attributes hold it as `labelled_dataset` says.
     long_name : str
         Name for axis labels.
-
-    Examples
-    --------
-    >>> from mgdd.results.labels import VARIABLES
-    >>> VARIABLES["pressure_bar"].units
-    'bar'
     """
 
     units: str
@@ -205,45 +187,11 @@ def labelled_dataset(
     attrs: Mapping[str, Any] | None = None,
     copy: bool = True,
 ) -> Dataset:
-    """Build a Dataset in which nothing lacks a unit; the values are copied.
+    """Build a Dataset in which nothing lacks a unit, of ``name: (dims, values, units, long_name)``; values are copied.
 
-    Parameters
-    ----------
-    variables : mapping of str to tuple
-        ``name: (dims, values)`` for a name in `VARIABLES`, otherwise
-        ``name: (dims, values, units, long_name)``. ``dims`` is a name, a tuple of names, or ``()`` for a
-        scalar. A name that is its own only dimension becomes the coordinate of that dimension. ``units`` are as
-        figures print them (``"-"`` if dimensionless) or an expression that pint parses.
-    attrs : mapping, optional
-        Attributes of the Dataset, as netCDF stores them: text, a number, or a flat sequence of numbers.
-    copy : bool
-        False where large arrays belong to nobody else: the Dataset takes them as they are.
-
-    Returns
-    -------
-    mgdd.results.Dataset
-        With ``attrs["units"]`` and ``attrs["long_name"]`` on every variable and coordinate. The units are expressions
-        that pint parses (``degree``, ``percent``, ``N*m``, ``1``); a convention that they cannot hold ends the long
-        name: ``crank angle, °CA aTDC``.
-
-    Raises
-    ------
-    DataError
-        A variable without unit or long name, a unit that contradicts `VARIABLES`, a dimension without
-        coordinate, an attribute that netCDF cannot hold.
-    ShapeError
-        Values whose shape does not fit ``dims``.
-
-    Examples
-    --------
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> ds = labelled_dataset({
-    ...     "crank_angle_cad": ("crank_angle_cad", [-1.0, 0.0, 1.0]),
-    ...     "pressure_bar": ("crank_angle_cad", [60.0, 61.0, 60.5]),
-    ...     "speed_rpm": ((), 1200.0, "rpm", "engine speed"),
-    ... })
-    >>> ds["pressure_bar"].attrs["units"], ds["crank_angle_cad"].attrs["long_name"]
-    ('bar', 'crank angle, °CA aTDC')
+    The last two are left out for a name in `VARIABLES`. A name that is its own only dimension becomes its coordinate.
+    Units are as figures print them or as pint parses them, and are kept for pint; a convention that they cannot hold
+    ends the long name: ``crank angle, °CA aTDC``.
     """
     from mgdd.results.dataset import Dataset
 
@@ -269,25 +217,7 @@ def labelled_dataset(
 
 
 def label_of(variable: xr.DataArray | xr.Variable) -> Label:
-    """Return unit and name of a variable as figures print them.
-
-    Parameters
-    ----------
-    variable : xarray.DataArray
-        With the attributes ``units`` and ``long_name``.
-
-    Returns
-    -------
-    Label
-        The printed unit, and the name without the convention behind it.
-
-    Examples
-    --------
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> from mgdd.results.labels import label_of
-    >>> label_of(labelled_dataset({"ca50_cad": ((), 8.0)})["ca50_cad"])
-    Label(units='°CA aTDC', long_name='CA50, angle of 50 % heat released')
-    """
+    """Return unit and name of a variable as figures print them."""
     return Label(*printed_units(str(variable.attrs["units"]), str(variable.attrs["long_name"])))
 
 
@@ -295,12 +225,6 @@ def said_unit(name: str) -> str:
     """Return the unit that a name says for certain, whoever chose it; ``"-"`` for none.
 
     A letter at the end of a name, but for seconds, is a unit behind a word of its quantity alone.
-
-    Examples
-    --------
-    >>> from mgdd.results.labels import said_unit
-    >>> [said_unit(name) for name in ("current_a", "load_a", "row_k", "gain_per_k", "speed_rpm", "delay_s", "n")]
-    ['A', '-', '-', '1/K', 'rpm', 's', '-']
     """
     if name in VARIABLES:
         return VARIABLES[name].units
@@ -310,51 +234,12 @@ def said_unit(name: str) -> str:
 
 
 def named_label(name: str) -> Label:
-    """Return unit and name of a quantity of which nothing but its name is known.
-
-    Parameters
-    ----------
-    name : str
-        One of `VARIABLES`, or a name that ends in its unit.
-
-    Returns
-    -------
-    Label
-        As `VARIABLES` has it; otherwise the unit of the ending and the words before it.
-
-    Examples
-    --------
-    >>> from mgdd.results.labels import named_label
-    >>> named_label("soi_cad").long_name, named_label("fuel_mg")
-    ('start of injection', Label(units='mg', long_name='fuel'))
-    """
+    """Return unit and name of a quantity of which nothing but its name is known."""
     return VARIABLES[name] if name in VARIABLES else Label(unit_of(name), without_unit(name))
 
 
 def check_labels(dataset: xr.Dataset) -> None:
-    """Refuse a Dataset in which a variable lacks its unit or long name, or that netCDF cannot store.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Any Dataset; names in `VARIABLES` must also carry the unit that stands there.
-
-    Raises
-    ------
-    DataError
-        Names the first offending variable or attribute.
-
-    Examples
-    --------
-    >>> import xarray as xr
-    >>> from mgdd.errors import DataError
-    >>> from mgdd.results.labels import check_labels
-    >>> try:
-    ...     check_labels(xr.Dataset({"pressure_bar": ((), 1.0)}))
-    ... except DataError as error:
-    ...     print(error)
-    variable pressure_bar has no units: say them ('-' if dimensionless)
-    """
+    """Refuse a Dataset in which a variable lacks its unit or long name, or that netCDF cannot store."""
     _check_attributes("the Dataset", dataset.attrs)
     for name, variable in dataset.variables.items():
         _check_attributes(f"variable {name}", variable.attrs)
@@ -365,31 +250,7 @@ def check_labels(dataset: xr.Dataset) -> None:
 
 
 def to_jsonable(obj: Any) -> Any:
-    """Turn results into what `json.dumps(..., allow_nan=False)` takes.
-
-    Parameters
-    ----------
-    obj : object
-        Numbers, strings, None, mappings, sequences, sets, NumPy scalars and arrays, xarray objects, paths and
-        enums, nested at will. NaN and infinities become None, arrays nested lists, Datasets mappings.
-
-    Returns
-    -------
-    object
-        Built of dict, list, str, int, float, bool and None only.
-
-    Raises
-    ------
-    TypeError
-        Anything else, with the type in the message.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.results.labels import to_jsonable
-    >>> to_jsonable({"a": np.float64(1.5), "b": np.array([1.0, np.nan])})
-    {'a': 1.5, 'b': [1.0, None]}
-    """
+    """Turn results into what `json.dumps(..., allow_nan=False)` takes: NaN and infinities become None."""
     if isinstance(obj, Enum):
         return to_jsonable(obj.value)
     if obj is None or isinstance(obj, bool | str | int):

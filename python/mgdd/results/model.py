@@ -10,21 +10,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-__all__ = ["Model"]
-
-
 @runtime_checkable
 class Model(Protocol):
     """A model with sampled inputs and outputs: it runs free, predicts ahead, and is written to a file.
 
     Inputs and records are a Dataset, a DataFrame or a mapping of columns; ``time_s`` [s] is one of them.
-
-    Examples
-    --------
-    >>> from mgdd.results.model import Model
-    >>> from mgdd.throttle import PseudoWiener
-    >>> isinstance(PseudoWiener("pw_r"), Model), isinstance(3.0, Model)
-    (True, False)
     """
 
     @property

@@ -21,19 +21,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Figures", "NumbersResult", "Result", "drawn_by", "merged", "saved"]
-
 
 class Figures(dict[str, Any]):
-    r"""Figures of a run by name; called, they give the summary of the result as a text.
-
-    Examples
-    --------
-    >>> from mgdd.results.result import Figures
-    >>> figures = Figures({"final_soc_cad": -5.6})
-    >>> figures["final_soc_cad"], figures()
-    (-5.6, 'figures\n  final_soc_cad -5.6 °CA aTDC')
-    """
+    """Figures of a run by name; called, they give the summary of the result as a text."""
 
     def __call__(self) -> str:
         """Return them as a text."""
@@ -253,20 +243,7 @@ def drawn_by(engine: str, draw: Callable[[Any], Any], ax: Axes | None) -> Any:
 
 
 def merged(*datasets: xr.Dataset, attrs: Mapping[str, Any] | None = None) -> xr.Dataset:
-    """Put Datasets of one result beside each other.
-
-    Parameters
-    ----------
-    *datasets : xarray.Dataset
-        Of different variables.
-    attrs : mapping, optional
-        Attributes of the whole; those of the parts are left out.
-
-    Returns
-    -------
-    xarray.Dataset
-        With all their variables.
-    """
+    """Put Datasets of one result beside each other."""
     import xarray as xr
 
     from mgdd.results.dataset import Dataset

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["attribute_units", "printed_units", "unit_attributes", "unit_of", "without_unit"]
-
 # Printed units that only say whose unit it is, and counts: without a dimension in an attribute.
 _WHOSE = ("unit of ", "in the unit of ", "not given")
 _COUNTS = frozenset({"-", "cycle", "cycles", "sample", "samples"})
@@ -108,77 +106,20 @@ _LONGEST_FIRST = sorted(_UNITS, key=len, reverse=True)
 
 
 def unit_of(name: str) -> str:
-    """Read the unit off the end of a name.
-
-    Parameters
-    ----------
-    name : str
-        Name of a parameter or result.
-
-    Returns
-    -------
-    str
-        Its unit, ``"-"`` if the name ends in none; a single letter is a name.
-
-    Examples
-    --------
-    >>> from mgdd.results.units import unit_of
-    >>> unit_of("spring_above_nm_per_rad"), unit_of("compression_ratio")
-    ('N m/rad', '-')
-    """
+    """Read the unit off the end of a name, ``"-"`` if it has none; a single letter is a name."""
     whole = f"_{name}" if len(name) > 1 else name
     unit = next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
     return "°CA" if unit == "°CA aTDC" and name.startswith("rms_") else unit  # a distance, not an angle
 
 
 def without_unit(name: str) -> str:
-    """Return a name in words, without the unit at its end.
-
-    Parameters
-    ----------
-    name : str
-        Name of a parameter or result.
-
-    Returns
-    -------
-    str
-        Spaces for underscores; the whole name where the unit is all of it.
-
-    Examples
-    --------
-    >>> from mgdd.results.units import without_unit
-    >>> without_unit("intake_pressure_kpa"), without_unit("compression_ratio")
-    ('intake pressure', 'compression ratio')
-    """
+    """Return a name in words, without the unit at its end; the whole name where the unit is all of it."""
     ending = next((ending for ending in _LONGEST_FIRST if name.endswith(ending)), "")
     return (name.removesuffix(ending) or name).replace("_", " ").strip()
 
 
 def attribute_units(printed: str) -> str:
-    """Return a printed unit as an expression that pint parses.
-
-    Parameters
-    ----------
-    printed : str
-        As figures print it, ``"-"`` if dimensionless; an expression stays as it is.
-
-    Returns
-    -------
-    str
-        For example ``degree``, ``percent``, ``N*m`` or ``degree/second**2``; ``"1"`` if dimensionless, a count, or the
-        unit of something else.
-
-    Raises
-    ------
-    ValueError
-        Text that is not a product or quotient of units.
-
-    Examples
-    --------
-    >>> from mgdd.results.units import attribute_units
-    >>> [attribute_units(unit) for unit in ("°CA aTDC", "N m", "deg/s²", "% of p_max", "-", "unit of J")]
-    ['degree', 'N*m', 'degree/second**2', 'percent', '1', '1']
-    """
+    """Return a printed unit as an expression that pint parses: ``"1"`` if dimensionless or a count."""
     text = printed.strip()
     if text.startswith(_WHOSE):
         return "1"
@@ -193,50 +134,14 @@ def attribute_units(printed: str) -> str:
 
 
 def unit_attributes(printed: str, long_name: str) -> dict[str, str]:
-    """Return the attributes ``units`` and ``long_name``; what the expression loses, ends the long name.
-
-    Parameters
-    ----------
-    printed : str
-        Unit as figures print it.
-    long_name : str
-        Name of the quantity.
-
-    Returns
-    -------
-    dict
-        The two attributes.
-
-    Examples
-    --------
-    >>> from mgdd.results.units import unit_attributes
-    >>> unit_attributes("°CA aTDC", "crank angle")
-    {'units': 'degree', 'long_name': 'crank angle, °CA aTDC'}
-    """
+    """Return the attributes ``units`` and ``long_name``; what the expression loses, ends the long name."""
     units = attribute_units(printed)
     whole = printed in (units, _typeset(units))
     return {"units": units, "long_name": long_name if whole else f"{long_name}, {printed}"}
 
 
 def printed_units(units: str, long_name: str) -> tuple[str, str]:
-    """Turn the two attributes back into the unit that figures print, and the name.
-
-    Parameters
-    ----------
-    units, long_name : str
-        As `unit_attributes` gives them.
-
-    Returns
-    -------
-    tuple of str
-        Printed unit and name.
-
-    Examples
-    --------
-    >>> from mgdd.results.units import printed_units
-    >>> printed_units("degree", "crank angle, °CA aTDC"), printed_units("degree", "plate angle")
-    (('°CA aTDC', 'crank angle'), ('deg', 'plate angle'))
-    """
+    """Turn the two attributes back into the unit that figures print, and the name."""
     name, _, remark = long_name.rpartition(", ")
     if name and remark not in (units, _typeset(units)):
         try:

@@ -12,8 +12,6 @@ from mgdd.errors import DataError, ShapeError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["DRIFT", "GAP", "JITTER", "check_count", "common_step", "even_step", "is_same_step", "wide_steps"]
-
 # Share of the mean step by which a step may differ from it: what the clock of a test bench jitters.
 JITTER = 0.1
 # Share of a step by which a sample may be off the even grid of the whole record: beyond it a sample is missing.
@@ -32,38 +30,11 @@ def even_step(
     where: Callable[[int], str] = "time_s, sample {}".format,
     remedy: str = "resample the record to an even step first",
 ) -> float:
-    """Return the step of an even time column, and refuse an uneven one.
+    """Return the step [s] of an even time column, and refuse an uneven one.
 
     Even are times that rise, in steps within 10 % of their mean, each sample within half a step of the even grid
-    through the first and the last.
-
-    Parameters
-    ----------
-    time_s : array_like, shape (n,)
-        Time [s], at least two samples.
-    where : callable
-        What a message calls sample k.
-    remedy : str
-        End of the message of an uneven column; ``{step:g}`` stands for its mean step [s], to two digits.
-
-    Returns
-    -------
-    float
-        Mean step [s]; rounded to a nanosecond where that moves the last sample by at most 1 µs and 1 % of a step, so
-        that a table with six digits means the step that it was written with.
-
-    Raises
-    ------
-    mgdd.errors.ShapeError
-        Not one column of at least two samples.
-    mgdd.errors.DataError
-        A time that is not finite or does not rise, or an uneven column.
-
-    Examples
-    --------
-    >>> from mgdd.signals.even_grid import even_step
-    >>> even_step([0.0, 0.001, 0.00205, 0.003])
-    0.001
+    through the first and the last. The step is rounded to a nanosecond where that moves the last sample by at most 1 µs
+    and 1 % of a step, so that a table with six digits means the step that it was written with.
     """
     time = np.asarray(time_s, dtype=np.float64)
     if time.ndim != 1 or time.size < 2:
@@ -94,53 +65,12 @@ def even_step(
 
 
 def is_same_step(first_s: float, second_s: float) -> bool:
-    """Return whether two sample times [s] are one, within 0.1 %.
-
-    Parameters
-    ----------
-    first_s, second_s : float
-        Sample times [s].
-
-    Returns
-    -------
-    bool
-        Whether they differ by at most 0.1 % of the second.
-
-    Examples
-    --------
-    >>> from mgdd.signals.even_grid import is_same_step
-    >>> is_same_step(0.001, 0.0010005), is_same_step(0.001, 0.002)
-    (True, False)
-    """
+    """Return whether two sample times [s] are one, within 0.1 %."""
     return bool(abs(first_s - second_s) <= _SAME * second_s)
 
 
 def common_step(times_s: Sequence[ArrayLike], names: Sequence[str]) -> float:
-    """Return the step that several even time columns share.
-
-    Parameters
-    ----------
-    times_s : sequence of array_like
-        Time columns [s], at least one.
-    names : sequence of str
-        What a message calls them.
-
-    Returns
-    -------
-    float
-        Step of the first [s].
-
-    Raises
-    ------
-    mgdd.errors.DataError, mgdd.errors.ShapeError
-        As in `even_step`; steps that differ by more than 0.1 %.
-
-    Examples
-    --------
-    >>> from mgdd.signals.even_grid import common_step
-    >>> common_step([[0.0, 0.1, 0.2], [5.0, 5.1]], ["first", "second"])
-    0.1
-    """
+    """Return the step that several even time columns share."""
     steps = [even_step(time, where=f"{name}, sample {{}}".format) for name, time in zip(names, times_s, strict=True)]
     for name, step in zip(names, steps, strict=True):
         if not is_same_step(step, steps[0]):
@@ -151,25 +81,7 @@ def common_step(times_s: Sequence[ArrayLike], names: Sequence[str]) -> float:
 
 
 def check_count(values: ArrayLike, name: str = "cycle") -> None:
-    """Refuse a count that does not go up by exactly one.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        The count, for example of engine cycles [-].
-    name : str
-        What the message calls it.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        A repeat, a gap or a fall.
-
-    Examples
-    --------
-    >>> from mgdd.signals.even_grid import check_count
-    >>> check_count([7, 8, 9])
-    """
+    """Refuse a count that does not go up by exactly one."""
     count = np.asarray(values, dtype=np.float64)
     wrong = np.diff(count) != 1.0
     if wrong.any():

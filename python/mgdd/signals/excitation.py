@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle"]
-
 # Feedback taps of maximum-length registers, exclusive or of the bits named (from 1).
 _TAPS = {
     3: (3, 2), 4: (4, 3), 5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7), 11: (11, 9),

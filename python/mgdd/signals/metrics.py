@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ResidualTests", "mse", "nrmse_fit_percent", "residual_tests", "rmse", "vaf_percent"]
-
 _LIMIT = 1.96
 _SHARE = 0.95
 
@@ -52,86 +50,20 @@ def nrmse_fit_percent(measured: ArrayLike, model: ArrayLike) -> float:
 
 
 def vaf_percent(measured: ArrayLike, model: ArrayLike) -> float:
-    """Return 100 (1 - var(y - yh) / var(y)), which a constant offset does not change.
-
-    Parameters
-    ----------
-    measured, model : array_like
-        y and yh in one unit.
-
-    Returns
-    -------
-    float
-        Variance accounted for [%].
-
-    Raises
-    ------
-    DataError, ShapeError
-        As in `nrmse_fit_percent`.
-
-    Examples
-    --------
-    >>> from mgdd.signals.metrics import vaf_percent
-    >>> vaf_percent([1.0, 2.0, 3.0], [11.0, 12.0, 13.0])
-    100.0
-    """
+    """Return 100 (1 - var(y - yh) / var(y)), which a constant offset does not change."""
     y, yh = _pair(measured, model)
     error = y - yh
     return 100.0 * (1.0 - float(np.linalg.norm(error - error.mean()) / _spread(y)) ** 2)
 
 
 def mse(measured: ArrayLike, model: ArrayLike) -> float:
-    """Return the mean squared error, in the square of the unit.
-
-    Parameters
-    ----------
-    measured, model : array_like
-        y and yh in one unit.
-
-    Returns
-    -------
-    float
-        Mean squared error.
-
-    Raises
-    ------
-    DataError, ShapeError
-        Values that are not finite, arrays of different shape.
-
-    Examples
-    --------
-    >>> from mgdd.signals.metrics import mse
-    >>> mse([1.0, 2.0], [1.0, 4.0])
-    2.0
-    """
+    """Return the mean squared error, in the square of the unit."""
     y, yh = _pair(measured, model)
     return float(np.mean((y - yh) ** 2))
 
 
 def rmse(measured: ArrayLike, model: ArrayLike) -> float:
-    """Return the root of the mean squared error, in the unit.
-
-    Parameters
-    ----------
-    measured, model : array_like
-        y and yh in one unit.
-
-    Returns
-    -------
-    float
-        Root mean square of the error.
-
-    Raises
-    ------
-    DataError, ShapeError
-        As in `mse`.
-
-    Examples
-    --------
-    >>> from mgdd.signals.metrics import rmse
-    >>> rmse([1.0, 2.0], [4.0, -1.0])
-    3.0
-    """
+    """Return the root of the mean squared error, in the unit."""
     return float(np.sqrt(mse(measured, model)))
 
 
@@ -156,14 +88,6 @@ class ResidualTests(Result):
     -----
     With 25 lags the rule forgives one: a residual that is white passes it in 64 of 100 records, so a failure by two
     lags means little. Near stiction a failure is the rule and no reason to reject a model.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.signals.metrics import residual_tests
-    >>> noise = np.random.default_rng(0).standard_normal((2, 4000))
-    >>> residual_tests(np.cumsum(noise[0]), noise[1]).white
-    False
     """
 
     white: bool
@@ -180,43 +104,9 @@ class ResidualTests(Result):
 
 
 def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> ResidualTests:
-    """Test a residual for memory and for what the input still explains.
+    """Test a residual for memory and for what the input still explains, over lags 1 to `lags`.
 
-    Parameters
-    ----------
-    residual : array_like
-        One-step residual, measured minus predicted.
-    duty : array_like
-        Input of the same samples [-].
-    lags : int
-        Lags 1 to this; the residual against itself and against earlier duty.
-
-    Returns
-    -------
-    ResidualTests
-        Verdicts, shares and the correlations.
-
-    Raises
-    ------
-    ParameterError
-        Less than one lag.
-    DataError
-        Fewer than four samples per lag, a constant residual or input, values that are not finite.
-    ShapeError
-        Arrays of different shape.
-
-    Notes
-    -----
     A prediction that starts from the last noisy sample carries its noise: the residual then has -0.5 at lag 1.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.signals.metrics import residual_tests
-    >>> noise = np.random.default_rng(0).standard_normal((2, 4000))
-    >>> tests = residual_tests(noise[0], noise[1])
-    >>> tests.share_white >= 0.88, round(tests.limit, 3)
-    (True, 0.031)
     """
     if lags < 1:
         raise ParameterError.of("lags", lags, ">= 1")

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["RunInputs", "SampledModel", "as_signal", "check_horizon", "columns_of", "is_timed", "table_of"]
-
 
 class RunInputs(NamedTuple):
     """What a free run is driven by: times [s], their step [s], the input columns, and the state at the first sample."""
@@ -162,28 +160,10 @@ def columns_of(table: Any, names: Sequence[str], *, what: str = "inputs", least:
 
 
 def table_of(given: Any, names: Sequence[str], *, what: str) -> Any:
-    """Return something that gives columns by name, of any form of a signal.
+    """Return something that gives columns by name, of any form of a signal; the time is the first of `names`.
 
-    Parameters
-    ----------
-    given : Dataset, Result, DataFrame, mapping, DataArray, Series, or array_like, shape (n, columns)
-        The index of a DataFrame or Series that is named as the first of `names`, or has no name and is not whole
-        numbers, is that column; an array has its columns in the order of `names`. Tables of pandas, polars and others
-        serve alike.
-    names : sequence of str
-        Columns that are wanted, the time first; a DataArray or a Series of another name is the second.
-    what : str
-        What it is, for the error.
-
-    Returns
-    -------
-    mapping
-        Or a table with the same access.
-
-    Raises
-    ------
-    ParameterError
-        Another form, or a signal without its time.
+    The index of a DataFrame or Series that is named as it, or has no name and is not whole numbers, is that column; an
+    array has its columns in the order of `names`.
     """
     table, time = getattr(given, "dataset", given), names[0]
     if isinstance(table, Mapping):

@@ -13,8 +13,6 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Copies", "Still", "copies", "noise_of", "resolution_of", "still"]
-
 # Two windows are alike by chance once in a thousand records; a window has this many samples at least, and changes.
 _CHANCE, _WINDOW, _CHANGES = 1e-3, 64, 8
 # Equal values of two cycles at one place, as rounding makes them: less is not believed, more is no noise at all.

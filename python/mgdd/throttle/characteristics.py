@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["airflow_torque_nm", "characteristics", "mass_flow_kg_per_s"]
-
 _DEG = math.radians(1.0)
 AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
 
@@ -128,32 +126,9 @@ def _holding_duty(t: Throttle, angle: NDArray[np.float64]) -> dict[str, tuple[ob
 
 
 def airflow_torque_nm(throttle: ThrottleLike, angle_deg: ArrayLike) -> NDArray[np.float64]:
-    """Give the torque of the modelled air flow, -D³ dp C_T(angle): it closes.
+    """Give the torque [N m] of the modelled air flow at plate angles [deg], -D³ dp C_T(angle), at most 0: it closes.
 
-    Parameters
-    ----------
-    throttle : Throttle, Preset, str or path-like
-        Its ``bore_mm`` D and ``pressure_drop_kpa`` dp.
-    angle_deg : array_like
-        Plate angles [deg].
-
-    Returns
-    -------
-    ndarray
-        Torque [N m], <= 0, in the shape of `angle_deg`. The table of C_T is a placeholder of plausible shape, to be
-        fitted to a flow bench.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        An angle that is not finite.
-
-    Examples
-    --------
-    >>> from mgdd.throttle import Throttle
-    >>> from mgdd.throttle.characteristics import airflow_torque_nm
-    >>> airflow_torque_nm(Throttle(pressure_drop_kpa=10.0), [0.0, 55.0, 90.0]).round(3).tolist()
-    [-0.0, -0.108, -0.0]
+    The table of C_T is a placeholder of plausible shape, to be fitted to a flow bench.
     """
     throttle = throttle_of(throttle)
     angle = np.asarray(angle_deg, dtype=np.float64)
@@ -169,38 +144,9 @@ def mass_flow_kg_per_s(
     discharge_coefficient: float = 1.0,
     density_kg_per_m3: float = AIR_KG_PER_M3,
 ) -> NDArray[np.float64]:
-    """Give the mass flow of a steady flow bench, C_d A sqrt(2 rho dp).
+    """Give the mass flow [kg/s] through areas [m²] on a steady flow bench, C_d A sqrt(2 rho dp), at drops of few kPa.
 
-    Parameters
-    ----------
-    area_m2 : array_like
-        Opening [m²], >= 0.
-    pressure_drop_kpa : array_like
-        Pressure drop [kPa], >= 0.
-    discharge_coefficient : float
-        C_d [-], above 0 and at most 1.5.
-    density_kg_per_m3 : float
-        Density upstream [kg/m³], > 0; air at 20 °C and 101.325 kPa if left out.
-
-    Returns
-    -------
-    ndarray
-        Mass flow [kg/s]. Incompressible: for drops of a few kPa.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A value outside its domain.
-
-    Notes
-    -----
     Tan (2018) lists C_d and the density of air at 20 °C among the symbols of the throttle; the equation is Bernoulli's.
-
-    Examples
-    --------
-    >>> from mgdd.throttle.characteristics import mass_flow_kg_per_s
-    >>> round(float(mass_flow_kg_per_s(1e-3, pressure_drop_kpa=2.5, discharge_coefficient=0.98)), 4)
-    0.076
     """
     area, drop = np.asarray(area_m2, dtype=np.float64), np.asarray(pressure_drop_kpa, dtype=np.float64)
     for name, values in (("area_m2", area), ("pressure_drop_kpa", drop)):

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mgdd._core.throttle import DemandTracker
 
-__all__ = ["DemandChain"]
-
 _AXES = ("pedal_percent", "speed_rpm")
 
 

@@ -14,32 +14,13 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-__all__ = ["read_duty"]
-
 _SIGNALS = ("supply_v", "airflow_torque_nm")
 
 
 def read_duty(path: str | os.PathLike[str], given: Mapping[str, float]) -> dict[str, Any]:
-    """Read what `mgdd.throttle.simulate` takes: ``time_s`` and ``duty``, and where the file has them the other signals.
+    """Read what `mgdd.throttle.simulate_throttle` takes: ``time_s``, ``duty``, and other signals that the file has.
 
-    Parameters
-    ----------
-    path : path-like
-        Columns by name, evenly sampled.
-    given : mapping of str to float
-        Signals that are constant; a column of that name contradicts them.
-
-    Returns
-    -------
-    dict of str to array or float
-        Keywords of `mgdd.throttle.simulate`.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        A row that the simulation would refuse, by its line.
-    mgdd.errors.ParameterError
-        A signal that is given and in the file.
+    A column of a `given` constant contradicts it.
     """
     table = read_table(path)
     header = table.header

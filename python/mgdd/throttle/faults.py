@@ -9,8 +9,6 @@ from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.results.describe import described
 
-__all__ = ["ThrottleFault", "fault_pair"]
-
 _OF_SENSOR = tuple(kind for kind in _core.throttle.sensor_fault_kinds if kind != "none")
 _SIZED = {
     "offset": "V", "gain": "-", "jammed_at": "deg", "spring_above": "-", "spring_below": "-", "supply_sag": "V",

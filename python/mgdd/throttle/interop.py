@@ -15,8 +15,6 @@ from mgdd.throttle.pseudo_wiener import PseudoWiener
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["to_iosystem"]
-
 # The order of the core's state; angles of motor and gear at plate scale, then of the plate.
 _STATES = (
     *("gear_angle_deg", "gear_speed_deg_per_s", "current_a", "gear_bristle_deg"),

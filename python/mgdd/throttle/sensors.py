@@ -18,8 +18,6 @@ from mgdd.throttle.faults import ThrottleFault, fault_pair
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SensorPair"]
-
 _VOLTS = {
     "first_v": ("V", "first sensor"),
     "second_v": ("V", "second sensor"),

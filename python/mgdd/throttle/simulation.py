@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from mgdd.results.dataset import Dataset
 
-__all__ = ["simulate_throttle", "step_summary"]
-
 _DEFAULT_DURATION_S = 1.0
 _MOST_SAMPLES = 5_000_000
 _MOVED_DEG = 0.01
@@ -147,32 +145,10 @@ def simulate_throttle(
 
 
 def step_summary(run: xr.Dataset) -> dict[str, float]:
-    """Summarize a run as the answer to a step at its first sample.
+    """Summarize a run as the answer to a step at its first sample: start, final and extreme angles [deg].
 
-    Parameters
-    ----------
-    run : xarray.Dataset
-        ``angle_deg`` [deg] over ``time_s`` [s], from `simulate_throttle` or a log.
-
-    Returns
-    -------
-    dict of str to float
-        ``start_angle_deg``, ``final_angle_deg``, ``max_angle_deg`` and ``min_angle_deg`` [deg], and ``t10_s`` and
-        ``t90_s`` [s]: when 10 and 90 percent of the way from start to final are first passed, interpolated between
-        samples; NaN where the plate ends within 0.01 deg of its start.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        No angle or no time in the Dataset, or no sample.
-
-    Examples
-    --------
-    >>> from mgdd.throttle import Throttle, simulate_throttle
-    >>> from mgdd.throttle.simulation import step_summary
-    >>> summary = step_summary(simulate_throttle(Throttle(), 1.0, duration_s=0.3))
-    >>> round(summary["t10_s"], 3), round(summary["t90_s"], 3)
-    (0.019, 0.078)
+    The times t10 and t90 [s] are when 10 and 90 percent of the way are first passed; NaN where the plate ends
+    within 0.01 deg of its start.
     """
     for name in ("time_s", "angle_deg"):
         if name not in run.variables:
