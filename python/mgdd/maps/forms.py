@@ -111,7 +111,13 @@ class MapForms(Result):
         return map_cells(self, ax=ax)
 
     def to_dataset(self) -> xr.Dataset:
-        """Give the map as data, which figures and netCDF take."""
+        """Give the map as data, which figures and netCDF take.
+
+        Returns
+        -------
+        xarray.Dataset
+            The value by its name and every column of the cells, over the axes; ``map`` among the attributes names it.
+        """
         dims, of_value = tuple(self._axes), ("sd", "low", "high")
         variables: dict[str, tuple[Any, ...]] = {
             name: (name, entries, *self._labels[name]) for name, entries in self._axes.items()
@@ -137,7 +143,29 @@ class MapForms(Result):
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset, name: str | None = None, *, source: str | None = None) -> Self:
-        """Make a map of what `to_dataset` gave, or of any variable over one or two axes."""
+        """Make a map of what `to_dataset` gave, or of any variable over one or two axes.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            With units and long names, as every Dataset of mgdd has them.
+        name : str, optional
+            The variable; the map that the Dataset names, if left out.
+        source : str, optional
+            Source of the cells of any other Dataset than a map. If left out: the attribute ``source`` of the variable,
+            where it is one of those of a map, and ``extrapolated`` where the variable ``NAME_extrapolated`` says so;
+            otherwise ``given``. Cells without a value are ``unattainable``.
+
+        Returns
+        -------
+        CalibrationMap
+            The map.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            No such variable, or one without axes or units.
+        """
         own = str(dataset.attrs.get("map", "")) if name is None else name
         if own not in dataset or not 1 <= dataset[own].ndim <= 2:
             have = ", ".join(str(each) for each in dataset.data_vars if 1 <= dataset[each].ndim <= 2) or "none"
