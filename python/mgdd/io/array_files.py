@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,15 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.io.array_table import Columns, Named, Reversed, columns_of
+from mgdd.io.array_table import Columns, Named, Reversed, columns_of, marked
 from mgdd.io.extras import import_extra
-from mgdd.io.netcdf_marks import MARKS, Decoded
 from mgdd.io.watched_file import WatchedFile
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_MISSING = ("_FillValue", "missing_value")
+_MARKS = (*_MISSING, "valid_min", "valid_max", "valid_range", "scale_factor", "add_offset")
+# What stands where nothing was written, by type; of bytes every value is data ("NetCDF Users Guide", fill values).
+_UNWRITTEN = {
+    "f4": 9.969209968386869e36, "f8": 9.969209968386869e36, "i2": -32767, "u2": 65535, "i4": -2147483647,
+    "u4": 4294967295, "i8": -9223372036854775806, "u8": 18446744073709551614,
+}  # fmt: skip
 _LONGEST_MARK = 128  # bytes of an attribute that marks values, sixteen numbers
 
 
@@ -68,7 +74,7 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
             raise ValueError(f"data set {name!r} has {held} of {needed} bytes")
     kinds = [_kinds_of_units(h5py, item) for _, item in found]
     netcdf = "_NCProperties" in content.attrs
-    decoded = [Decoded(item, _marks_of(h5py, item), unwritten=netcdf) for _, item in found]
+    decoded = [_Decoded(item, _marks_of(h5py, item), unwritten=netcdf) for _, item in found]
     units = [
         next(filter(None, (_text(item.attrs[key]) for key in own)), "")
         for (_, item), own in zip(found, kinds, strict=True)
@@ -82,7 +88,7 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
 def _marks_of(h5py: Any, item: Any) -> dict[str, Any]:
     """Give the attributes that say which numbers are missing; as with units, only those of a type that reads safely."""
     numeric, found = (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID), {}
-    for key in MARKS:
+    for key in _MARKS:
         if key in item.attrs:
             own = item.attrs.get_id(key)
             if isinstance(own.get_type(), numeric) and own.get_storage_size() <= _LONGEST_MARK:
@@ -116,7 +122,7 @@ def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     found = []
     for name in sorted(dataset.variables, key=lambda each: each != ANGLE):  # the angle first, as in a text
         variable = dataset[name].variable
-        values = Decoded(variable, variable.attrs, unwritten=True)
+        values = _Decoded(variable, variable.attrs, unwritten=True)
         turned = variable.dims[-1:] == (ANGLE,)
         found.append(Named(str(name), Reversed(values) if turned else values, str(variable.attrs.get("units", ""))))
     return columns_of(found, along=dataset.sizes.get(ANGLE))
@@ -193,3 +199,41 @@ class _ArrowColumn:
             found = self._content.read_row_group(number, columns=[self._name])[self._name]
             self._kept = number, (found.cast("double") if self._cast else found).to_numpy()
         return self._kept[1]
+
+
+class _Decoded:
+    """An array that gives what is missing as NaN, and packed numbers unpacked."""
+
+    def __init__(self, values: Any, marks: Mapping[str, Any], *, unwritten: bool = False) -> None:
+        self._values, self.shape = values, values.shape
+        given = {key: np.ravel(marks[key]) for key in _MARKS if key in marks}
+        least = {"valid_range": 2}
+        self._marks = {
+            key: numbers
+            for key, numbers in given.items()
+            if numbers.dtype.kind in "fiu" and numbers.size >= least.get(key, 1)
+        }
+        usual = _UNWRITTEN.get(f"{values.dtype.kind}{values.dtype.itemsize}")
+        if unwritten and usual is not None:
+            self._marks.setdefault("_FillValue", np.array([usual]))
+        self.dtype = np.dtype(np.float64) if self._marks and values.dtype.kind in "fiu" else values.dtype
+
+    def __getitem__(self, index: Any) -> NDArray[Any]:
+        raw = np.asarray(self._values[index])
+        if not self._marks or raw.dtype.kind not in "fiu":
+            return raw
+        missing = np.isin(raw, [value for key in _MISSING for value in self._of_type(key, raw.dtype)])
+        low, high = self._marks.get("valid_range", [-np.inf, np.inf])[:2]
+        for key, end in (("valid_min", low), ("valid_max", high)):
+            bound = self._marks.get(key, [end])[0]
+            missing |= raw < bound if key == "valid_min" else raw > bound
+        found = marked(raw.astype(np.float64), missing)
+        (scale, *_), (offset, *_) = self._marks.get("scale_factor", [1.0]), self._marks.get("add_offset", [0.0])
+        return found if (scale, offset) == (1.0, 0.0) else found * scale + offset
+
+    def _of_type(self, key: str, dtype: np.dtype[Any]) -> list[Any]:
+        """Return the values of a mark as the array would hold them; one that it cannot hold marks nothing."""
+        with np.errstate(all="ignore"):
+            held = np.asarray(self._marks.get(key, []))
+            cast = held.astype(dtype)
+        return [one for one, given in zip(cast, held, strict=True) if dtype.kind == "f" or one == given]

@@ -9,8 +9,7 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, argument
 from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.optimum import optimize_map
-from mgdd.maps.sweep_columns import sweep_columns
-from mgdd.maps.windows import between
+from mgdd.maps.sweep_columns import between, sweep_columns
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:

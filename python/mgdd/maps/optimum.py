@@ -13,8 +13,7 @@ from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import MapTask, cell_at
-from mgdd.maps.sweep_columns import SweepColumns, sweep_columns
-from mgdd.maps.windows import Parts, between, feasible_parts, range_around
+from mgdd.maps.sweep_columns import Parts, SweepColumns, between, feasible_parts, range_around, sweep_columns
 from mgdd.optimize.optimum import idle_limits, limits_of
 
 if TYPE_CHECKING:

@@ -243,6 +243,6 @@ def fit_of(report: FitReport, model: Any, run: xr.Dataset | None, errors: Iterab
 
 def draw_run(fit: Fit, ax: Any) -> Any:
     """Draw a fit that keeps such a run."""
-    from mgdd.plot.measured import measured_and_model
+    from mgdd.plot.throttle import measured_and_model
 
     return measured_and_model(cast("xr.Dataset", fit.run), ax=ax)

@@ -63,34 +63,7 @@ def calibration_overlay(overlay: xr.Dataset | Result, *, ax: Axes | None = None)
 def wall_heat_profile(profile: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the best reachable RMSE over the wall-heat scale: a flat curve means the traces do not fix it.
 
-    Parameters
-    ----------
-    profile : xarray.Dataset or Result
-        ``rmse_percent`` [% of p_max] over ``wall_heat_scale`` [-], everything else refitted at each scale; a
-        second dimension, for example the trace, gives one line each.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes; the shaded band holds the scales within 10 % of the best RMSE (of all traces together).
-
-    Raises
-    ------
-    DataError
-        A variable is missing, has no unit, or has not one or two dimensions.
-
-    Examples
-    --------
-    >>> from mgdd.plot.calibration import wall_heat_profile
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> profile = labelled_dataset({
-    ...     "wall_heat_scale": ("wall_heat_scale", [0.0, 0.5, 1.0, 2.0]),
-    ...     "rmse_percent": ("wall_heat_scale", [0.30, 0.21, 0.20, 0.33]),
-    ... })
-    >>> wall_heat_profile(profile).get_ylabel()
-    'pressure RMSE, closed cycle [% of p_max]'
+    A second dimension gives a line each; the shaded band holds the scales within 10 % of the best RMSE of all traces.
     """
     profile = require("profile", profile, ("wall_heat_scale", "rmse_percent"), "mgdd.identify.wall_heat_profile")
     rmse = profile["rmse_percent"]
@@ -120,17 +93,16 @@ def _model_name(overlay: xr.Dataset) -> str:
     return f"model, {str(burn).replace('_', ' ').replace('wiebe', 'Wiebe')}" if burn else "model"
 
 
-def tdc_scan(scan: xr.Dataset | Result, possible: tuple[float, float] | None = None, *, ax: Axes | None = None) -> Axes:
+def tdc_scan(scan: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     """Draw the least RMSE over the TDC offset, and the range of offsets that are possible, of `estimate_tdc`."""
-    scan = require("scan", scan, ("tdc_offset_cad", "rmse_percent"), "mgdd.identify.estimate_tdc")
-    if possible is None:
-        require("scan", scan, ("low_cad", "high_cad"), "mgdd.identify.estimate_tdc")
-        possible = float(scan["low_cad"]), float(scan["high_cad"])
+    names = ("tdc_offset_cad", "rmse_percent", "low_cad", "high_cad")
+    scan = require("scan", scan, names, "mgdd.identify.estimate_tdc")
     ax = new_axes(ax, height=4.2)
     lines: list[Line2D] = ax.plot(
         scan["tdc_offset_cad"], scan["rmse_percent"], "o-", color=BLACK, markersize=3, label="calibrated at each offset"
     )
-    span = ax.axvspan(*possible, color=GREY, alpha=0.2, linewidth=0, label="within a quarter of the least")
+    low, high = float(scan["low_cad"]), float(scan["high_cad"])
+    span = ax.axvspan(low, high, color=GREY, alpha=0.2, linewidth=0, label="within a quarter of the least")
     ax.axvline(0.0, color=BLUE, linestyle="--", linewidth=1.0)
     ax.set_ylim(bottom=0.0)
     return finished(ax, scan, "tdc_offset_cad", "rmse_percent", [*lines, span], grid=False)

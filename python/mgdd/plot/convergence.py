@@ -1,4 +1,4 @@
-"""Estimates over cycles: one line per seeker or case, with the band of many seeds around it."""
+"""Estimates over cycles, of seekers and cases with the band of many seeds; errors over the trials of learning."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
 
     from mgdd.results.result import Result
 
+_MARKERS = "osv^D"
 _BAND = ("estimate_low_cad", "estimate_high_cad")
 # Two colours-and-dashes more than the shared style has: a comparison of seekers needs them.
 _STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK))
@@ -52,3 +54,21 @@ def convergence(tracks: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
         handles.append(ax.axhline(best, color=GREY, linewidth=0.9, linestyle=(0, (1, 1)), label=label))
     ax.set_xlim(float(cycle[0]), float(cycle[-1]))
     return finished(ax, tracks, "cycle", "estimate_median_cad", handles)
+
+
+def learning(learned: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
+    """Draw how the error of a repeated task falls from trial to trial, one line per learning law."""
+    learned = require("learned", learned, ("law", "trial", "ca50_error_cad"), "the study seeker-comparison")
+    ax = new_axes(ax)
+    error = learned["ca50_error_cad"].transpose("law", "trial").to_numpy()
+    lines: list[Line2D] = []
+    for index, law in enumerate(learned["law"].to_numpy()):
+        dash, color = LINE_STYLES[index % len(LINE_STYLES)]
+        lines += ax.semilogy(
+            learned["trial"], error[index], linestyle=dash, color=color, marker=_MARKERS[index % len(_MARKERS)],
+            markersize=4, label=str(law),
+        )  # fmt: skip
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter("{x:g}")
+    ax.grid(alpha=0.3, which="both")
+    return finished(ax, learned, "trial", "ca50_error_cad", lines, columns=3, grid=False)

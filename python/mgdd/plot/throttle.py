@@ -84,6 +84,15 @@ def free_run(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def measured_and_model(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
+    """Draw a measured signal and the free run of its model over each other, the `run` of a `mgdd.results.Fit`."""
+    run = require("run", run, ("time_s", "measured", "model"), "mgdd.results.Fit")
+    ax = new_axes(ax)
+    lines: list[Line2D] = ax.plot(run["time_s"], run["measured"], color=BLACK, label="measured")
+    lines += ax.plot(run["time_s"], run["model"], color=BLUE, linestyle="--", label="free run")
+    return finished(ax, run, "time_s", "measured", lines)
+
+
 def _rising(duty: np.ndarray) -> np.ndarray:
     """Mark the samples of a rising duty; where it holds, the last direction counts."""
     slope = np.sign(np.diff(duty, prepend=duty[:1]))

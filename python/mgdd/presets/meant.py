@@ -72,14 +72,14 @@ def engine_of(
     return own, whole.replace(**changes) if changes else whole
 
 
-def throttle_of(given: Any, argument: str = "throttle") -> Throttle:
+def throttle_of(given: Any) -> Throttle:
     """Return the throttle that is meant by one, a preset of one, its name, or its ``.toml`` file."""
     meant = _loaded(given, "throttle")
     if isinstance(meant, Preset):
         return meant.throttle
     if isinstance(meant, Throttle):
         return meant
-    raise _refusal(argument, given, "a Throttle", "throttle")
+    raise _refusal("throttle", given, "a Throttle", "throttle")
 
 
 def throttle_model_of(given: Any) -> Any:

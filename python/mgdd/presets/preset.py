@@ -64,15 +64,6 @@ class Preset(Parameters):
     ------
     ParameterError
         Neither engine nor throttle, or both.
-
-    Examples
-    --------
-    >>> from mgdd import presets
-    >>> preset = presets.load("puma_single")
-    >>> preset.cylinder.bore_mm, preset.point.speed_rpm
-    (86.0, 1500.0)
-    >>> presets.load("P1").throttle.limp_home_deg
-    8.0
     """
 
     name: str

@@ -79,12 +79,6 @@ class FitReport(Result):
     References
     ----------
     Bates and Watts (1988), Nonlinear Regression Analysis and Its Applications, section 2.2.
-
-    Examples
-    --------
-    >>> from mgdd import _core
-    >>> FitReport.from_core(_core.optimize.FitReport()).status
-    'not_run'
     """
 
     names: tuple[str, ...]
@@ -113,31 +107,7 @@ class FitReport(Result):
 
     @classmethod
     def from_core(cls, core_report: _core.optimize.FitReport, data: ArrayLike | None = None) -> FitReport:
-        """Wrap a report of the core.
-
-        Parameters
-        ----------
-        core_report : _core.optimize.FitReport
-            As any fit of the core returns it.
-        data : array_like, shape (n_residuals,), optional
-            What the residual was compared with, in the unit of the residual; gives `nrmse_fit_percent`.
-
-        Returns
-        -------
-        FitReport
-            Independent of `core_report`.
-
-        Raises
-        ------
-        ShapeError
-            `data` is not one value per residual.
-
-        Examples
-        --------
-        >>> from mgdd import _core
-        >>> FitReport.from_core(_core.optimize.FitReport()).success
-        False
-        """
+        """Wrap a report of the core; of the data that its residual was compared with, `nrmse_fit_percent` is made."""
         residual = _frozen(core_report.residual)
         return cls(
             names=tuple(core_report.names),
@@ -231,12 +201,6 @@ class FitReport(Result):
         -------
         str
             The verdict, one line per parameter (value, stderr, bounds, remark), and the findings.
-
-        Examples
-        --------
-        >>> from mgdd import _core
-        >>> print(FitReport.from_core(_core.optimize.FitReport()).summary().splitlines()[0])
-        not_run: the fit has not been run
         """
         rows = [_COLUMNS, *self._lines()]
         widths = [max(len(row[k]) for row in rows) for k in range(len(_COLUMNS))]
@@ -255,13 +219,6 @@ class FitReport(Result):
         -------
         dict
             Arrays become lists; infinite and NaN numbers become None.
-
-        Examples
-        --------
-        >>> import json
-        >>> from mgdd import _core
-        >>> json.loads(json.dumps(FitReport.from_core(_core.optimize.FitReport()).to_dict()))["cost"] is None
-        True
         """
         own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
         plain = {field: to_jsonable(getattr(self, field)) for field in own}

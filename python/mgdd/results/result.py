@@ -39,14 +39,6 @@ class Result:
     ----------
     dataset : xarray.Dataset
         All its data, every variable with unit and long name.
-
-    Examples
-    --------
-    >>> from mgdd.engine import find_optimum
-    >>> from mgdd.results.result import Result
-    >>> best = find_optimum("puma_single")
-    >>> isinstance(best, Result), round(float(best.dataset["soc_cad"]), 1)
-    (True, -5.6)
     """
 
     if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import numpy as np
 from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
-from mgdd.plot.measured import measured_and_model
 from mgdd.plot.style import new_figure, residual_below
+from mgdd.plot.throttle import measured_and_model
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals import nrmse_fit_percent
 from mgdd.signals.metrics import rmse

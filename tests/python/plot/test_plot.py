@@ -15,8 +15,7 @@ from mgdd.guide import FeedForward
 from mgdd.loop import LoopCriteria, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
-from mgdd.plot.convergence import convergence
-from mgdd.plot.learning import learning
+from mgdd.plot.convergence import convergence, learning
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 CAD = np.arange(-120.0, 121.0)
