@@ -36,16 +36,12 @@ def chirp(
 
     Parameters
     ----------
-    duration_s : float
-        Length [s].
+    duration_s, sample_s : float
+        Length and sample time [s].
     offset, amplitude : float
         Mean duty and half the swing [-].
-    low_hz : float
-        First frequency [Hz].
-    high_hz : float
-        Last frequency [Hz].
-    sample_s : float
-        Sample time [s].
+    low_hz, high_hz : float
+        First and last frequency [Hz].
 
     Returns
     -------
@@ -87,18 +83,14 @@ def multisine(
 
     Parameters
     ----------
-    duration_s : float
-        Length [s]; whole periods of the fundamental use it best.
+    duration_s, sample_s : float
+        Length and sample time [s]; whole periods of the fundamental use the length best.
     offset, amplitude : float
         Mean duty and largest swing from it [-].
-    fundamental_hz : float
-        Fundamental of a multisine [Hz].
-    high_hz : float
-        Upper end of the band, of a chirp its last frequency [Hz].
+    fundamental_hz, high_hz : float
+        Fundamental and upper end of the band [Hz].
     harmonics : int
         How many.
-    sample_s : float
-        Sample time [s].
 
     Returns
     -------
@@ -214,8 +206,8 @@ def amplitude_random_steps(
 
     Parameters
     ----------
-    duration_s : float
-        Length [s].
+    duration_s, sample_s : float
+        Length and sample time [s].
     offset, amplitude : float
         Mean duty and largest swing from it [-].
     hold_s : float or (float, float)
@@ -223,8 +215,6 @@ def amplitude_random_steps(
     seed : int, optional
         Of levels and holds. None takes the golden-ratio sequence, level k at ``2 frac(0.618 k) - 1``, which fills
         the swing evenly.
-    sample_s : float
-        Sample time [s].
 
     Returns
     -------
@@ -287,12 +277,10 @@ def staircase(
         Mean duty and half the swing [-].
     rise : float
         Height of a step [-]; the last one may be lower.
-    hold_s : float
-        Time on a step [s].
+    hold_s, sample_s : float
+        Time on a step and sample time [s].
     cycles : int
         How often up and down.
-    sample_s : float
-        Sample time [s].
 
     Returns
     -------
@@ -336,14 +324,12 @@ def triangle(
 
     Parameters
     ----------
-    duration_s : float
-        Length [s].
+    duration_s, sample_s : float
+        Length and sample time [s].
     offset, amplitude : float
         Mean duty and half the swing [-]; starts at `offset`, upwards.
     frequency_hz : float
         Ramps up and down per second [Hz].
-    sample_s : float
-        Sample time [s].
 
     Returns
     -------

@@ -270,3 +270,8 @@ def test_the_known_hashes_are_those_of_the_records_at_hand(name, file):
         pytest.skip(f"{name}/{file} is not at hand")
     assert hashlib.sha256((Path(folder) / name / file).read_bytes()).hexdigest() == ORIGINS[name][file].sha256
     assert ORIGINS[name][file].url.endswith(file)
+
+
+def test_a_set_without_an_address_is_not_fetched():
+    with pytest.raises(ParameterError, match="must be one of cascaded_tanks, emps, wh2009 to be fetched"):
+        fetch("h2df_502")
