@@ -62,8 +62,8 @@ def data(data: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     --------
     >>> from mgdd.plot.data import data
     >>> from mgdd.sweep import sweep
-    >>> data(sweep("puma_single", {"speed_rpm": [1000.0, 2000.0, 3000.0]}, outputs=["p_max_bar"])).get_ylabel()
-    'p_max_bar [bar]'
+    >>> data(sweep("puma_single", {"speed_rpm": [1000.0, 2000.0, 3000.0]}, outputs=["p_max_bar"])).get_ylabel().split()
+    ['p_max_bar', '[bar]']
     """
     data = require("data", data, (), "mgdd.engine.simulate")
     for draw, needed in _FIGURES:

@@ -189,7 +189,7 @@ def test_the_record_says_what_came_from_where() -> None:
     assert float(engine.cylinder.wall_heat_scale) == pytest.approx(0.5, rel=0.03)
     assert engine.recalibrations > 0
     assert (engine.refusals, engine.calibration_status) == (0, "updated")
-    assert 0.7 < engine.check_pressure <= 1.0
+    assert 0.7 < engine.trust <= 1.0
     assert all("units" in table[name].attrs for name in table.variables)
     assert run_seeker(bench, engine, 5).dataset.sizes["cycle"] == 5
     assert engine.history.sizes["cycle"] == 65
