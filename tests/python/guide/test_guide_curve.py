@@ -69,7 +69,7 @@ def test_points_that_make_no_curve_are_refused(inputs: list[float], values: list
         ({"upper": np.inf}, "upper = inf: must be finite"),
         ({"curve": Curve([0.0, 1.0, 2.0], [0.0, 1.0, 2.5])}, "does not bend down"),
         (
-            {"curve": Curve(np.linspace(-30.0, 10.0, 9), [0.0, 2.0, 4.0, 6.0, 8.0, 2.0, 7.0, 4.0, 1.0])},
+            {"curve": Curve(np.linspace(-30, 10, 9), [0.0, 2.0, 4.0, 6.0, 8.0, 2.0, 7.0, 4.0, 1.0])},
             "several maxima",
         ),
         ({"curve": parabola(40.0)}, r"best input at 40.*must be in \[-30, 10\]"),
