@@ -109,7 +109,7 @@ def noisy_records(throttle: Throttle, noise: list[np.random.Generator]) -> dict[
         chirp(DURATION_S, offset=0.15, amplitude=0.18, low_hz=0.3, high_hz=5.0, sample_s=SAMPLE_S),
         amplitude_random_steps(DURATION_S, offset=0.15, amplitude=0.20, hold_s=0.15, sample_s=SAMPLE_S),
     )
-    out = {}
+    out: dict[str, xr.Dataset] = {}
     for name, signal, rng in zip(RECORDS, duties, noise, strict=True):
         time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
         true = simulate_throttle(throttle, duty, time_s=time)["angle_deg"].to_numpy()

@@ -26,10 +26,10 @@ from mgdd.engine import (
     OperatingPoint,
     ThermalNo,
     analyze,
+    check_pressure,
     sensitivities,
     simulate,
     timing_sweep,
-    trust,
 )
 from mgdd.engine.cycle import convergence
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
@@ -173,6 +173,10 @@ def whole_cycles() -> Indicating:
     return Indicating(np.arange(-360.0, 360.0), Cylinder(), speed_rpm=6000.0)
 
 
+def verdict() -> Any:
+    return check_pressure(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144")
+
+
 def indicating() -> Indicating:
     return Indicating(np.arange(-180.0, 181.0), Cylinder(), speed_rpm=6000.0)
 
@@ -202,8 +206,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "engine.Indicating.oscillation": lambda _: indicating().oscillation(np.ones((2, 361))),
     "engine.Indicating.record": lambda _: indicating().record(np.ones((2, 361))),
     "engine.ThermalNo.cycle": lambda _: ThermalNo().cycle(simulate("puma_single"), "puma_single"),
-    "engine.Trust.analysis": lambda _: trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144").analysis,
-    "engine.Trust.dataset": lambda _: trust(datasets.read("hd_diesel_128x144")[1], "hd_diesel_128x144").dataset,
+    "engine.PressureCheck.analysis": lambda _: verdict().analysis,
+    "engine.PressureCheck.dataset": lambda _: verdict().dataset,
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
     "engine.convergence": lambda _: convergence(Cylinder(), POINT),
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),

@@ -110,7 +110,10 @@ void Curve::find_best() noexcept {
   top_ = (*this)(best_);
 }
 
-double Curve::rises_again() const noexcept {
+double Curve::rises_again(double reach) const noexcept {
+  const auto at = [&](double input) {
+    return static_cast<std::ptrdiff_t>(std::clamp((input - first_) * per_step_, 0.0, static_cast<double>(nodes - 1)));
+  };
   const auto highest = std::max_element(values_.begin(), values_.end());
   double lowest = *highest, again = 0.0;
   const auto look = [&](auto from, auto to) {
@@ -121,8 +124,8 @@ double Curve::rises_again() const noexcept {
     }
     lowest = std::min(lowest, low);
   };
-  look(highest, values_.end());
-  look(std::make_reverse_iterator(highest), values_.rend());
+  look(highest, values_.begin() + at(best_ + reach));
+  look(std::make_reverse_iterator(highest), std::make_reverse_iterator(values_.begin() + at(best_ - reach)));
   return again > 0.0 ? again / (*highest - lowest) : 0.0;
 }
 

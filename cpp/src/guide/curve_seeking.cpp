@@ -87,10 +87,10 @@ CurveSeekingSettings checked(CurveSeekingSettings s) {
     throw about("curve", ParameterError("curve does not bend down at its best input, " + text(s.curve.best()) +
                                         ": give a guide whose J has a maximum, or a parabola"));
   }
-  if (const double again = s.curve.rises_again(); again > most_rise) {
+  if (const double again = s.curve.rises_again(s.prior_sd); again > most_rise) {
     throw about(
         "curve",
-        ParameterError("curve has several maxima, it rises again by " + text(100.0 * again) +
+        ParameterError("curve has several maxima near its best input, it rises again by " + text(100.0 * again) +
                        " % of its height: give a guide with one, or a function as guide of GaussianProcessSeeking"));
   }
   if (!(s.curve.best() >= s.space.lower[0] && s.curve.best() <= s.space.upper[0])) {
@@ -331,8 +331,9 @@ void CurveSeeking::begin_at(const Curve& curve, double mean, double sd) noexcept
 }
 
 bool CurveSeeking::usable(const Curve& curve) const noexcept {
-  return curve.curvature(curvature_share * settings_.prior_sd) < 0.0 && curve.rises_again() <= most_rise &&
-         curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0];
+  return curve.curvature(curvature_share * settings_.prior_sd) < 0.0 &&
+         curve.rises_again(settings_.prior_sd) <= most_rise && curve.best() >= settings_.space.lower[0] &&
+         curve.best() <= settings_.space.upper[0];
 }
 
 bool CurveSeeking::believe(const Curve& curve, double sd) noexcept {

@@ -42,7 +42,7 @@ class Dataset(xr.Dataset):  # type: ignore[no-untyped-call]
     >>> run = simulate_throttle("P1", 0.3)
     >>> print(run[["angle_deg"]].summary())
     Dataset over 1001 time_s
-      angle_deg 8 to 50.1 deg
+      angle_deg 8 to 90.0203 deg
     >>> run.plot().get_ylabel()
     'plate angle [deg]'
     """

@@ -67,9 +67,10 @@ TEST(Curve, AMaximumAtAnEndIsNone) {
 
 TEST(Curve, RisesAgainByAsMuchAsItsOtherMaximumStandsOut) {
   const std::vector<double> x{0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
-  EXPECT_LT(Curve(x, std::vector{1.0, 4.0, 6.0, 5.0, 3.0, 2.0, 0.0}).rises_again(), 0.01);
-  EXPECT_NEAR(Curve(x, std::vector{1.0, 4.0, 10.0, 5.0, 0.0, 6.0, 2.0}).rises_again(), 0.6, 0.05);
-  EXPECT_NEAR(Curve(x, std::vector{2.0, 6.0, 0.0, 5.0, 10.0, 4.0, 1.0}).rises_again(), 0.6, 0.05);
+  EXPECT_LT(Curve(x, std::vector{1.0, 4.0, 6.0, 5.0, 3.0, 2.0, 0.0}).rises_again(9.0), 0.01);
+  EXPECT_NEAR(Curve(x, std::vector{1.0, 4.0, 10.0, 5.0, 0.0, 6.0, 2.0}).rises_again(9.0), 0.6, 0.05);
+  EXPECT_NEAR(Curve(x, std::vector{2.0, 6.0, 0.0, 5.0, 10.0, 4.0, 1.0}).rises_again(9.0), 0.6, 0.05);
+  EXPECT_EQ(Curve(x, std::vector{2.0, 6.0, 0.0, 5.0, 10.0, 4.0, 1.0}).rises_again(1.9), 0.0);
 }
 
 TEST(Curve, RefusesWhatIsNoCurveAndStaysWhatItWas) {

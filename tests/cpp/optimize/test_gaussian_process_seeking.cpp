@@ -322,5 +322,25 @@ TEST(GaussianProcessSeeking, FailuresAtRandomKeepItFromNothing) {
   EXPECT_LT(late, 0.1);
 }
 
+// A cycle of five fails wherever it is asked, the first step towards the optimum too: no region is to be left for it.
+TEST(GaussianProcessSeeking, CyclesThatFailAnywhereAreNoRegion) {
+  double loss = 0.0;
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    GaussianProcessSeekingSettings s;
+    s.space.inputs = {{.name = "soc_cad", .lower = -20.0, .upper = 10.0}};
+    s.space.start = scalar_input(1.0);
+    s.seed = seed;
+    GaussianProcessSeeking seeker(s);
+    for (int k = 0; k < 200; ++k) {
+      const auto cycle = static_cast<std::uint64_t>(k);
+      const double off = seeker.ask()[0] + 6.0;
+      loss += 0.08 * off * off / (8.0 * 200.0);
+      const double j[] = {-0.08 * off * off + 0.25 * random::normal(seed, 9, cycle)};
+      seeker.tell({j, {}, k == 1 || random::uniform(seed, 10, cycle) < 0.2});
+    }
+  }
+  EXPECT_LT(loss, 0.5);
+}
+
 }  // namespace
 }  // namespace mgdd::optimize

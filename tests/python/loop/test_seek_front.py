@@ -261,7 +261,7 @@ def test_what_a_plant_or_a_function_does_not_measure_is_named() -> None:
         seek_front(engine(), TWO, {"efficiency": "max", "soot": "min"})
     with pytest.raises(DataError, match="nox_ppm = nan at soc_cad"):
         seek_front(lambda _: {"efficiency": 1.0, "nox_ppm": math.nan}, TWO, WAYS)
-    with pytest.raises(ParameterError, match="must be a Plant, or a function"):
+    with pytest.raises(ParameterError, match="must be a Plant, as VirtualEngine"):
         seek_front(3.0, TWO, WAYS)  # type: ignore[arg-type]
 
 

@@ -330,7 +330,7 @@ def test_a_refused_call_moves_nothing(inputs: Any, settings: dict[str, Any], err
 def test_more_than_eight_inputs_and_no_plant_are_refused() -> None:
     with pytest.raises(Error, match="at most 8 inputs"):
         seek(lambda _: 0.0, {f"x{i}": (0.0, 1.0) for i in range(9)})
-    with pytest.raises(ParameterError, match="must be a Plant, or a function"):
+    with pytest.raises(ParameterError, match="must be a Plant, as VirtualEngine"):
         seek(3.0, TWO)  # type: ignore[arg-type]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pickle
 
@@ -332,7 +333,7 @@ def test_summary_html_and_json_tell_the_same_story():
 def test_defaults_are_those_of_the_core():
     options = _core.optimize.LeastSquaresOptions()
     for name in OPTIONS:
-        assert least_squares.__kwdefaults__[name] == getattr(options, name)
+        assert inspect.signature(least_squares).parameters[name].default == getattr(options, name)
 
 
 @pytest.mark.parametrize(

@@ -171,7 +171,7 @@ def test_each_setting_refuses_by_name_or_bears_its_value(name: str) -> None:
         (lambda: ExtremumSeeking(start=0.0, lower=5.0), "start = 0: must lie in"),
         (lambda: ExtremumSeeking(start=0.0, lower=-0.5, upper=0.5, amplitude=1.0), "room for the perturbation"),
         (lambda: ExtremumSeeking(start=0.0, period=3), "period = 3: must be at least 4"),
-        (lambda: ExtremumSeeking(start=[0, 0, 0], period=40, harmonics=[3, 4, 7]), "sum or difference"),
+        (lambda: ExtremumSeeking(start=[0, 0, 0], period=40, harmonics=[3, 4, 7]), "mix to"),
         (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: ExtremumSeeking(start=0.0, form="median"), "form = .median.*batch"),
         (lambda: ExtremumSeeking(start=[0.0] * 9), "at most 8"),

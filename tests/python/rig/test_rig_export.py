@@ -96,7 +96,7 @@ def test_mf4_is_a_bus_log_for_others(record: Path, tmp_path: Path) -> None:
 
 def test_netcdf(record: Path, tmp_path: Path) -> None:
     files = export_record(record, tmp_path / "run", kind="netcdf")
-    assert [file.name for file in files] == ["controller.nc", "virtual_engine.nc", "events.nc", "frames.nc"]
+    assert [file.name for file in files] == ["controller.nc", "engine_bench.nc", "events.nc", "frames.nc"]
     run = read_record(record)
     for file, data in zip(files, [*run.samples.values(), run.events, run.frames], strict=True):
         with xr.open_dataset(file) as back:

@@ -40,7 +40,7 @@ def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) ->
         "pw_p": {"gain_1_deg_per_duty": 200.0, "radius_1_duty": 0.03},
     }[kind]
     model = PseudoWiener(kind, {"delay_samples": float(delay), "sample_s": 2e-3, **own})
-    signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, step_s=2e-3)
+    signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, sample_s=2e-3)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
     ours = model.simulate(signal, initial_state={"angle_deg": 20.0})["angle_deg"].to_numpy()
     system, start = to_iosystem(model, sample_s=2e-3, start_deg=20.0)

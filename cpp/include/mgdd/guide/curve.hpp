@@ -46,8 +46,8 @@ class Curve {
   double curvature(double reach) const noexcept {
     return ((*this)(best_ - reach) - 2.0 * (*this)(best_) + (*this)(best_ + reach)) / (reach * reach);
   }
-  /// By how much it rises again away from its largest value, as a share of its height; 0 with one maximum.
-  double rises_again() const noexcept;
+  /// By how much it rises again within `reach` of its best input, as a share of its height there; 0 with one maximum.
+  double rises_again(double reach) const noexcept;
   /// Whether the largest value lies inside, not at an end.
   bool has_maximum() const noexcept { return inside_; }
 

@@ -41,18 +41,14 @@ void validate(const DitherSettings& settings, Eigen::Index inputs) {
       refuse_harmonics("n = " + std::to_string(n[i]) +
                        " must be at least 1 and below half of period = " + std::to_string(settings.period));
     }
+    // What J bends makes of two harmonics: their sum, which the window folds back, and their difference.
+    const auto is_own = [&](int mixed) { return mixed == n[i] || settings.period - mixed == n[i]; };
     for (std::size_t j = 0; j < n.size(); ++j) {
-      if (j == i) continue;
-      if (n[i] == n[j]) refuse_harmonics("n = " + std::to_string(n[i]) + " is used twice");
-      if (n[i] == 2 * n[j]) {
-        refuse_harmonics(std::to_string(n[i]) + " is twice " + std::to_string(n[j]) +
-                         ": its curvature would be read as a slope");
-      }
-      for (std::size_t k = j + 1; k < n.size(); ++k) {
-        if (k == i) continue;
-        if (n[i] == n[j] + n[k] || n[i] == std::abs(n[j] - n[k])) {
-          refuse_harmonics(std::to_string(n[i]) + " is the sum or difference of " + std::to_string(n[j]) + " and " +
-                           std::to_string(n[k]));
+      if (j != i && n[i] == n[j]) refuse_harmonics("n = " + std::to_string(n[i]) + " is used twice");
+      for (std::size_t k = 0; k <= j; ++k) {
+        if (is_own(n[j] + n[k]) || n[i] == std::abs(n[j] - n[k])) {
+          refuse_harmonics(std::to_string(n[j]) + " and " + std::to_string(n[k]) + " mix to " + std::to_string(n[i]) +
+                           " over " + std::to_string(settings.period) + " cycles: curvature would be read as a slope");
         }
       }
     }

@@ -34,9 +34,9 @@ constexpr double along_cycles = 100.0;   // without a doubt, then it is worth le
 // Within the bounds, and what may be explored by now.
 Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
   const double wide = growth * (highest_ - lowest_).maxCoeff();
-  double explained = 1.0;  // in full where the guide holds half of the bend
+  double explained = 1.0;  // in full where the guide holds a quarter of the bend
   for (const ProcessModel& model : j_)
-    explained = std::min(explained, 2.0 * model.guide_share());
+    explained = std::min(explained, 4.0 * model.guide_share());
   const double least = !guided() ? 0.0 : limited_.empty() ? guided_reach * explained : side_step();
   const double far = std::max({wide, least, protocol_.steps.any() ? grid().maxCoeff() : 0.0});
   for (Eigen::Index i = 0; i < z.size(); ++i)

@@ -12,6 +12,9 @@ constexpr double failing_quantile = 2.0;  // of the label of a cycle, -1 where i
 constexpr double most_failing = 0.0, wary_failing = -0.5;  // quantile that is asked for, and after a failure
 constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may exceed the least one
 
+constexpr double surest = 0.02;                         // probability: the process of labels promises too much
+constexpr double usual_rate = 0.1, rate_memory = 0.99;  // of cycles that fail anywhere, before any was seen
+
 constexpr int pull_rounds = 2, pull_sweeps = 4;       // the process bends, and limits meet
 constexpr double farthest_pull = 0.3;                 // in ranges, as far as slopes at the estimate may say
 constexpr double inside_edge = 1e-3;                  // scales of a limit, so that rounding leaves it kept
@@ -40,6 +43,20 @@ void GaussianProcessSeeking::judge(double likely, double mean, int point) noexce
   mean_over_[at] = std::max(mean_over_[at], mean);
 }
 
+// Whether cycles fail by their input or anywhere, by how well either foretold this one.
+void GaussianProcessSeeking::watch_failures(const Inputs& z, bool worked) noexcept {
+  if (failures_known()) {
+    candidates_.row(0) = z.transpose();
+    failing_.predict_means(candidates_, 1);
+    const double here = std::clamp(0.5 * (1.0 + failing_.mean(0)), surest, 1.0 - surest);
+    const double rate = (failed_ + 1.0) / (seen_ + 1.0 / usual_rate);
+    anywhere_ += std::log(worked ? (1.0 - rate) / (1.0 - here) : rate / here);
+    anywhere_ = std::clamp(anywhere_, least_anywhere, -least_anywhere);
+  }
+  seen_ = rate_memory * seen_ + 1.0;
+  failed_ = rate_memory * failed_ + (worked ? 0.0 : 1.0);
+}
+
 // A candidate that may fail is out of the question, unless all of them may: as where cycles fail at random.
 void GaussianProcessSeeking::judge_failures(int points) noexcept {
   failing_.predict(candidates_, points);
@@ -60,7 +77,7 @@ void GaussianProcessSeeking::judge_safety(int points, double quantile) noexcept 
   std::fill(over_.begin(), over_.end(), -largest_reading);
   std::fill(mean_over_.begin(), mean_over_.end(), -largest_reading);
   std::fill(credit_.begin(), credit_.end(), 0.0);
-  if (failures_known()) judge_failures(points);
+  if (failures_known() && anywhere_ <= 0.0) judge_failures(points);
   for (std::size_t i = 0; i < limited_.size(); ++i) {
     limited_[i].predict(candidates_, points);
     const double scale = settings_.limits[i].scale;

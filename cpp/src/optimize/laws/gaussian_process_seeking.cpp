@@ -203,6 +203,7 @@ TellStatus GaussianProcessSeeking::tell(const Reading& reading) noexcept {
   } else {
     wary_ = std::min(2 * wary_, most_wary);
   }
+  watch_failures(scaled(applied), worked);
   failing_.record(scaled(applied), worked ? -1.0 : 1.0, scaled(estimate_));
   if (worked) {
     learn(reading, applied);
@@ -339,6 +340,8 @@ void GaussianProcessSeeking::restart() noexcept {
   }
   failing_.forget();
   wary_ = least_wary;
+  seen_ = failed_ = 0.0;
+  anywhere_ = least_anywhere;
   middle_ = good_ = lowest_ = highest_ = scaled(estimate_);
   star_ = held_ = rested_ = since_doubt_ = since_failure_ = 0;
   for (LagWindow& window : windows_)

@@ -127,6 +127,9 @@ class GaussianProcessSeeking {
     v("rested", self.rested_, counts_end);
     v("since_failure", self.since_failure_, counts_end);
     v("wary", self.wary_, counts_end);
+    v("cycles_seen", self.seen_);
+    v("cycles_failed", self.failed_);
+    v("anywhere", self.anywhere_);
     v("expected", self.expected_);
     v("expected_sd", self.expected_sd_);
     v("surprise", self.surprise_);
@@ -149,9 +152,10 @@ class GaussianProcessSeeking {
 
  private:
   static constexpr int far_candidates = 8, near_candidates = 47, candidates = 2 + far_candidates + near_candidates;
-  static constexpr double active_room = 0.05;    // scales of a limit
-  static constexpr std::int64_t least_wary = 2;  // cycles that work, after a failure
-  static constexpr int most_on_their_way = 8;    // inputs whose readings have not come, that are counted on
+  static constexpr double active_room = 0.05;     // scales of a limit
+  static constexpr std::int64_t least_wary = 2;   // cycles that work, after a failure
+  static constexpr double least_anywhere = -3.0;  // a region that fails is to be taken seriously first
+  static constexpr int most_on_their_way = 8;     // inputs whose readings have not come, that are counted on
   Inputs scaled(const Inputs& input) const noexcept;
   Inputs unscaled(const Inputs& z) const noexcept;
   Inputs reachable(Inputs z) const noexcept;
@@ -173,6 +177,7 @@ class GaussianProcessSeeking {
     return failing_.count_above(0.0) > 0 && failing_.count() >= failing_.fewest();
   }
   void judge_failures(int points) noexcept;
+  void watch_failures(const Inputs& z, bool worked) noexcept;
   void judge(double likely, double mean, int point) noexcept;
   void judge_safety(int points, double quantile) noexcept;
   void keep_safe(int points, double quantile) noexcept;
@@ -206,7 +211,9 @@ class GaussianProcessSeeking {
   std::int64_t star_ = 0;    // first readings asked for
   std::int64_t held_ = 0;
   std::int64_t since_failure_ = 0, wary_ = least_wary;  // cycles; so many of them nothing is asked that may fail
-  std::int64_t rested_ = 0;                             // inputs in a row that stayed at the estimate
+  double seen_ = 0.0, failed_ = 0.0;                    // cycles, fading
+  double anywhere_ = least_anywhere;  // logarithm of how much likelier cycles fail anywhere than by their input
+  std::int64_t rested_ = 0;           // inputs in a row that stayed at the estimate
   double expected_ = 0.0, expected_sd_ = 0.0;
   std::vector<double> surprise_;  // running means of squared normalised innovations, of the components
   std::int64_t since_doubt_ = 0, doubts_ = 0;
