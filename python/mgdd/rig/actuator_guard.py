@@ -15,8 +15,6 @@ from mgdd.optimize import Limit
 from mgdd.optimize.optimum import limits_of
 from mgdd.rig.base import AroundPlant
 
-__all__ = ["ActuatorGuard", "GuardedAsk"]
-
 _LOGGED = 10_000
 _GOOD = 32  # points to step back to, the start apart
 _LAGS = 3.0  # so many time constants until a reading shows its input

@@ -9,8 +9,6 @@ from typing import Any, Protocol, Self, runtime_checkable
 from mgdd.errors import RigError
 from mgdd.loop import Measurement, Plant
 
-__all__ = ["AroundPlant", "OpenOnce", "Rig", "SimulatedRig"]
-
 
 @runtime_checkable
 class Rig(Plant, Protocol):

@@ -19,8 +19,6 @@ from mgdd.rig.recorded import RecordedRun, readable_record
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Difference", "Exchange", "RecordingRig", "ReplayRig", "RigRecord"]
-
 _PARTS = ("input", "component", "limit", "value", "noise_free", "applied")
 
 

@@ -25,8 +25,6 @@ from mgdd.rig.recorded import RecordedRun, readable_record, stamped_frames
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["export_record"]
-
 
 def export_record(
     source: str | os.PathLike[str], target: str | os.PathLike[str], *, kind: str | None = None

@@ -12,8 +12,6 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.rig.safety import SafetyGate
 
-__all__ = ["GatedThrottle"]
-
 
 class GatedThrottle:
     """A throttle whose duty passes a safety gate: one `apply` and one `measure` per cycle.

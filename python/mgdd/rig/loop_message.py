@@ -8,8 +8,6 @@ from typing import Any
 
 from mgdd._core.rig import E2eSettings, SignalLayout
 
-__all__ = ["LoopMessage"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class LoopMessage:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["RecordedRun", "read_record", "readable_record", "repair_record", "stamped_frames"]
-
 _LAST_ID = 0x1FFF_FFFF
 _FLAGS = {
     "extended": "29-bit identifier",

@@ -22,8 +22,6 @@ from mgdd.results.labels import to_jsonable
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Recorder"]
-
 _OWN = "time_s"
 
 

@@ -12,8 +12,6 @@ from mgdd._core.rig import Drive
 from mgdd.errors import DataError, RigError, did_you_mean
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
 
-__all__ = ["SafetyChange", "SafetyEnvelope", "SafetyGate", "said_of"]
-
 _KIND = "safety_envelope"
 _CHOICE = "bus_fault_from"
 

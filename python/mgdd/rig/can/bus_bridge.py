@@ -16,8 +16,6 @@ from mgdd.rig.can.python_can import POLL_S, Reception, message_of
 if TYPE_CHECKING:
     import can
 
-__all__ = ["BusBridge"]
-
 _log = logging.getLogger(__name__)
 _LOOK_S = 0.05  # how often a waiting thread looks whether it shall end
 _SEND_ERRORS = 3  # in a row, until the bus counts as gone

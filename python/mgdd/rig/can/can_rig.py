@@ -20,8 +20,6 @@ from mgdd.rig.can.modes import bus_of, may_be_real, require_key
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
 
-__all__ = ["CanRig"]
-
 _SAFE_FRAMES = 5
 _SAFE_PAUSE_S = 0.002
 _LISTEN_CYCLES = 10

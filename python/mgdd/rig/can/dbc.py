@@ -16,8 +16,6 @@ from mgdd.errors import DataError, Error, did_you_mean
 from mgdd.io.extras import import_extra
 from mgdd.io.files import bytes_of, decoded, existing_file
 
-__all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
-
 _LOG = logging.getLogger(__name__)
 
 # What a value table calls a raw value that is no measurement, in words of lower case: of every signal, and of one that

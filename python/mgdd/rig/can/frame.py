@@ -6,8 +6,6 @@ from typing import Any, Protocol
 
 from mgdd._core.rig import Frame
 
-__all__ = ["Bus", "FrameBus", "changed"]
-
 
 class FrameBus(Protocol):
     """What a bridge needs of a bus: a `mgdd.rig.CanTransport`, for example."""

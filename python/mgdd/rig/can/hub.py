@@ -17,8 +17,6 @@ from mgdd.errors import ParameterError, RigError, argument
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
 from mgdd.rig.can.python_can import MOST_BYTES, STILL_S, largest_identifier
 
-__all__ = ["Hub"]
-
 _MOST_TEXT = 1024  # bytes of a frame: of 64 bytes it has some 200
 _TICK_S = 0.005  # of the clock by which the hub knows that it stood still
 _READ = 1 << 18  # bytes that asyncio reads at once: behind a full read there are more

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple, Self
 
 from mgdd.errors import ParameterError, did_you_mean
 
-__all__ = ["BusFault", "Delivery", "FaultInjector", "fault_of"]
-
 KINDS = ("drop", "duplicate", "delay", "reorder", "corrupt", "error", "freeze")
 _KEYS = {"p": float, "id": int, "from_s": float, "until_s": float, "ms": float, "client": int, "class": int}
 _NEEDS = {"delay": "ms", "error": "class", "freeze": "client"}

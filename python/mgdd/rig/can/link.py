@@ -14,8 +14,6 @@ from mgdd.loop import Measurement
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
 
-__all__ = ["Inbox", "Punctual", "Receiver", "Sender", "Taken"]
-
 _JUMPS = 3  # so many show another sender
 _REMEDY = "call arm() or enter the rig again"
 

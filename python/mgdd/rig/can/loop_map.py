@@ -12,8 +12,6 @@ from mgdd.rig.can.mapped import MappedMessage, MappedSignal
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.loop_message import LoopMessage
 
-__all__ = ["LOOP_NAMES", "loop_messages"]
-
 # What a loop reads, by the name of the map.
 LOOP_NAMES: Mapping[str, str] = {
     "sensed_angle_deg": "angle_deg",

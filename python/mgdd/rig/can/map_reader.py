@@ -14,8 +14,6 @@ from mgdd.rig.can.dbc import DbcFile, DbcMessage, DbcSignal, near
 from mgdd.rig.can.mapped import GATE_MODES, MappedMessage, MappedSignal, Raw, StateSignal
 from mgdd.rig.can.toml_table import TomlTable
 
-__all__ = ["MapReader"]
-
 _COMMAND = ("timeout_ms", "e2e", "driven", "safe", "inputs")
 _MEASUREMENT = ("timeout_ms", "e2e", "values", "applied")
 _ENTRY = ("signal", "unit", "scale", "offset")

@@ -12,8 +12,6 @@ from mgdd._core.rig import E2eSettings
 from mgdd.errors import ParameterError
 from mgdd.rig.can.dbc import DbcMessage, DbcSignal
 
-__all__ = ["GATE_MODES", "MappedMessage", "MappedSignal", "StateSignal"]
-
 GATE_MODES: tuple[str, ...] = tuple(_core.rig.safety_states)
 
 Raw = int | float  # an integer; of a float signal the float

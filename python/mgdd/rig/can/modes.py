@@ -13,9 +13,6 @@ from mgdd.rig.can.node import LocalBus
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 
-__all__ = ["BUS_MODES", "MODES", "bus_of", "key_line", "may_be_real", "require_key"]
-
-
 # `simulate`: a node in this process and a virtual clock; `hil`: a node in another process, real time; `dry_run`: a real
 # bus, to which nothing is sent; `replay`: recorded frames through the same checks; `bench`: real hardware, armed.
 MODES = ("simulate", "hil", "dry_run", "replay", "bench")

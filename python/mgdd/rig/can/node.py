@@ -19,8 +19,6 @@ from mgdd.rig.can.hub_faults import fault_of
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
 
-__all__ = ["LocalBus", "TruthLog", "node_of", "parent_watch", "run_node"]
-
 _STEP_POLL_S = 0.1  # how often a waiting node looks for its parent
 _MOST_BEHIND_S = 1.0
 _FAULT_KEYS = {"from_s": float, "until_s": float, "size": float, "sensor": int}

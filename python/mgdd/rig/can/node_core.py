@@ -25,8 +25,6 @@ from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.gated import facts_of
 from mgdd.rig.safety import SafetyEnvelope, SafetyGate
 
-__all__ = ["NodeCore", "NodePlant", "Sampled", "node_plant"]
-
 _LOG = logging.getLogger(__name__)
 _ARMING_FRAMES = 3  # safe commands in a row that arm it
 _OWN = ("command_timeout", "wrong_crc", "wrong_counter")  # values of the node, not of its plant

@@ -13,8 +13,6 @@ from typing import Self
 
 from mgdd.errors import RigError
 
-__all__ = ["Child", "VirtualNode"]
-
 _START_S = 60.0
 _END_S = 5.0
 

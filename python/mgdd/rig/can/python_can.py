@@ -19,21 +19,6 @@ from mgdd.io.extras import import_extra
 if TYPE_CHECKING:
     import can
 
-__all__ = [
-    "LOG_WRITERS",
-    "MOST_BYTES",
-    "POLL_S",
-    "STILL_S",
-    "THIS_HOST",
-    "Reception",
-    "connected",
-    "error_code",
-    "frame_of",
-    "largest_identifier",
-    "message_of",
-    "write_log",
-]
-
 MOST_BYTES = 64  # of a CAN FD frame
 _MOST_STAMP_S = 9e9  # since any epoch, as far as nanoseconds fit into 64 bits
 _ECHO_S = 1.0  # an echo that has not come by then was lost

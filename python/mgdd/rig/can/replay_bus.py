@@ -17,8 +17,6 @@ from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.recorded import stamped_frames
 from mgdd.rig.recorder import Recorder
 
-__all__ = ["RecordedBus", "ReplayBus"]
-
 
 class ReplayBus:
     """Frames of a run, sent and received, as `CanRig` saw them with ``on_frame``.

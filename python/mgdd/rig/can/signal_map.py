@@ -19,8 +19,6 @@ from mgdd.rig.can.map_reader import MapReader
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal, StateSignal
 from mgdd.rig.can.toml_table import TomlTable
 
-__all__ = ["SHIPPED", "SignalMap"]
-
 _BUSES = Path(__file__).parent / "buses"
 SHIPPED = ("etb", "engine", "surrogate")
 _FORMAT = 1

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["SignalsAsExceptions", "held_back", "noted_signals", "undisturbed"]
-
 _CAUGHT = (signal.SIGINT, signal.SIGTERM)
 
 

@@ -10,8 +10,6 @@ from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.files import parsed, read_plain_text
 from mgdd.io.parameters import FORMS, Form, fits
 
-__all__ = ["TomlTable"]
-
 
 class TomlTable:
     """Keys of a table that are taken one by one."""

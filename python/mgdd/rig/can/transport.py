@@ -18,8 +18,6 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.io.extras import import_extra
 from mgdd.rig.can.python_can import THIS_HOST, Reception, connected, error_code, message_of
 
-__all__ = ["CanTransport", "two_senders"]
-
 _QUEUE = 4096  # frames that nobody has read
 _FATAL = frozenset({"bus_off", "error_passive"})
 

@@ -31,8 +31,6 @@ from mgdd.rig.experiment.tasks import IdentifyPlan, SeekPlan, TrackPlan, engine_
 from mgdd.rig.recorded import RecordedRun, readable_record
 from mgdd.rig.safety import SafetyEnvelope
 
-__all__ = ["CheckedExperiment", "LoopChoice", "check_experiment", "chosen_loop", "simulated_plant"]
-
 _SIMULATED = ("simulate", "hil")
 
 

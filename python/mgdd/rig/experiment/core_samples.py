@@ -26,8 +26,6 @@ from mgdd.rig.safety import SafetyGate, said_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["LOOP_TABLE", "LoopSamples", "loop_rows", "replayed", "task_columns"]
-
 LOOP_TABLE = "loop"  # of a record: a row per cycle of the loop
 RUN = _core.rig.safety_states.index("run")
 _MAP_NAMES = {own: name for name, own in LOOP_NAMES.items()}

@@ -32,8 +32,6 @@ from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.safety import said_of
 
-__all__ = ["LEAD_S", "BridgedBus", "SocketBus", "WatchedBus", "track_on_core"]
-
 _ALL_BITS = {False: 0x7FF, True: 0x1FFF_FFFF}
 _FAILED_FRAMES = 3
 _SWITCH_S = 5e-4

@@ -21,8 +21,6 @@ from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.run import run_experiment
 from mgdd.rig.experiment.stand import Cycle
 
-__all__ = ["drive_and_die", "track_and_die"]
-
 _DUTY, _OPEN_DEG, _SAMPLES = 0.3, 40.0, 8
 _PATIENCE_S = 2.0
 _HANGS_S = 60.0

@@ -27,8 +27,6 @@ from mgdd.rig.experiment.settings import (
     TrackTask,
 )
 
-__all__ = ["Experiment"]
-
 _KIND, _FORMAT = "experiment", 1
 _TASK_OF: Mapping[str, type[IdentifyTask | TrackTask | SeekTask]] = {
     "identify": IdentifyTask, "track": TrackTask, "seek": SeekTask,

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["ExperimentResult", "run_experiment"]
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ExperimentResult(Result):

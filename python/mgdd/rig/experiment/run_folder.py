@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["RunFolder", "RunRecord", "versions"]
-
 _INPUTS = "inputs"
 _PACKAGES = ("numpy", "scipy", "xarray", "python-can", "cantools")
 _TABLE = "rig"  # where `RigRecord.read` looks for exchanges

@@ -23,8 +23,6 @@ from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.stand import own_node
 from mgdd.rig.experiment.tasks import throttle_named
 
-__all__ = ["WAYS_OF", "WAYS_TO_DIE", "SelfTest", "run_self_test"]
-
 WAYS_TO_DIE = ("exception", "nan", "sigint", "sigterm", "sigkill", "hang")
 WAYS_OF = {"python": WAYS_TO_DIE, "core": tuple(way for way in WAYS_TO_DIE if way != "nan")}
 LIMIT_S = 0.4

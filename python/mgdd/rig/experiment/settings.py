@@ -18,12 +18,6 @@ from mgdd.loop.engine_guide import KINDS
 from mgdd.loop.seek_choice import SEEKERS
 from mgdd.rig.can.toml_table import TomlTable
 
-__all__ = [
-    "LOOPS", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
-    "SafetySettings", "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "beside",
-    "scaled",
-]  # fmt: skip
-
 PACES = ("step", "real_time")
 LOOPS = ("auto", "core", "python")
 TASKS = ("identify", "track", "seek")

@@ -29,8 +29,6 @@ from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import SafetyGate, said_of
 
-__all__ = ["Cycle", "Stand", "Watched", "guarded", "opened_rig", "own_node"]
-
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 
 

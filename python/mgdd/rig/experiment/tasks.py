@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from mgdd.presets.preset import Preset
     from mgdd.throttle import Throttle
 
-__all__ = ["IdentifyPlan", "Outcome", "SeekPlan", "TrackPlan", "compared", "engine_named", "throttle_named"]
-
 _OF_THE_DUTY = "total_variation"  # the one figure that no angle enters
 _SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
 

@@ -19,8 +19,6 @@ from mgdd.rig.live.record_tail import News
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["EDGES_US", "Line", "LiveData", "Table", "thinned"]
-
 EDGES_US = np.logspace(-1, 7, 65)  # eight bins per decade, as the loop of the core counts
 _MOST_ROWS = 1 << 19
 _MOST_PANELS, _MOST_LINES = 8, 6

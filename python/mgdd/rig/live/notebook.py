@@ -9,8 +9,6 @@ from typing import Self
 from mgdd.io.extras import import_extra
 from mgdd.rig.can.processes import Child
 
-__all__ = ["LivePage", "watch"]
-
 
 class LivePage:
     """A page that is served by another process: `watch` gives it; it ends with `close`, a ``with`` block or Python."""

@@ -19,8 +19,6 @@ from mgdd.io.extras import import_extra
 from mgdd.rig.live.live_data import EDGES_US, Line, LiveData, thinned
 from mgdd.rig.live.sources import Source
 
-__all__ = ["serve"]
-
 _LOG = logging.getLogger(__name__)
 _TICK_MS, _ALIVE_TICKS = (
     500,

@@ -15,8 +15,6 @@ from mgdd.errors import Error
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["News", "RecordTail"]
-
 _HEAD = struct.Struct("<IIBBHIq")  # length, crc32, kind, flags, two numbers, stamp: see docs/rig_record.md
 _FRAME, _NAMES, _SAMPLE, _EVENT = 1, 2, 3, 4
 _NO_PAYLOAD, _LAST_ID = 2 | 32, 0x1FFF_FFFF  # news of a bus error, request of a frame

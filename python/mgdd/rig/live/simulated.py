@@ -21,8 +21,6 @@ from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import SafetyEnvelope, said_of
 
-__all__ = ["simulate"]
-
 _STEPS_DEG, _STEP_S = (20.0, 60.0, 35.0, 70.0, 15.0), 2.0
 _LONGEST_S = 3600.0
 _HOME_S, _PATIENCE_S = 1.0, 20.0

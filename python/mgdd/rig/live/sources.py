@@ -19,8 +19,6 @@ from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.live.live_data import LiveData
 from mgdd.rig.live.record_tail import News, RecordTail
 
-__all__ = ["BusSource", "RecordSource", "Source", "source_of", "writer_of"]
-
 _RECORD = "run.rec"
 _GROWS_S = _PATIENCE_S = 2.0
 _ELSEWHERE = "written by another user or machine: stop it there"
