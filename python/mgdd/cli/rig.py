@@ -20,7 +20,7 @@ from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
-from mgdd.rig.can.signals import noted_signals
+from mgdd.rig.can.processes import noted_signals
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import simulated_plant
 from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test

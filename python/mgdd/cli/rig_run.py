@@ -17,7 +17,7 @@ from mgdd.cli.options import option, refuse_idle
 from mgdd.cli.output import emit, lines, warn, wrote
 from mgdd.cli.progress import Stopped, is_terminal
 from mgdd.rig import CanRig, Experiment, run_experiment
-from mgdd.rig.can.modes import MODES
+from mgdd.rig.can.can_rig import MODES
 from mgdd.rig.experiment import CheckedExperiment, ExperimentResult, check_experiment
 
 if TYPE_CHECKING:

@@ -16,11 +16,10 @@ from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.exchange import RecordingRig, ReplayRig
 from mgdd.rig.experiment import Experiment, run_experiment
 from mgdd.rig.export import export_record
-from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.live.notebook import watch
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.safety import SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import GatedThrottle, SafetyEnvelope, SafetyGate
 
 __all__ = [
     "ActuatorGuard",

@@ -21,17 +21,7 @@ _LAGS = 3.0  # so many time constants until a reading shows its input
 
 
 class GuardedAsk(NamedTuple):
-    """An ask of an optimiser that was not applied as it was.
-
-    Examples
-    --------
-    >>> from mgdd.loop import VirtualEngine
-    >>> from mgdd.rig import ActuatorGuard
-    >>> guard = ActuatorGuard(VirtualEngine(), start={"soc_cad": 0.0}, bounds={"soc_cad": (-12.0, 10.0)})
-    >>> guard.apply({"soc_cad": -40.0})
-    >>> guard.log
-    [GuardedAsk(cycle=0, reason='bounds', name='soc_cad', asked={'soc_cad': -40.0}, applied={'soc_cad': 0.0})]
-    """
+    """An ask of an optimiser that was not applied as it was."""
 
     cycle: int  # of the guard, from 0 on
     reason: str  # not_finite, bounds, limit (these apply the last good point) or rate

@@ -15,14 +15,6 @@ class Rig(Plant, Protocol):
     """A plant behind a connection, used as a context manager; `mgdd.loop.run_seeker` steers it like any other.
 
     A rig that knows of a new operating point before its cycle says so in a property ``operating_point_changes``.
-
-    Examples
-    --------
-    >>> from mgdd.loop import VirtualEngine
-    >>> from mgdd.rig.base import Rig
-    >>> from mgdd.rig import SimulatedRig
-    >>> isinstance(SimulatedRig(VirtualEngine()), Rig), isinstance(VirtualEngine(), Rig)
-    (True, False)
     """
 
     def __enter__(self) -> Self: ...

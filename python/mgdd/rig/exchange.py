@@ -30,27 +30,7 @@ class Exchange(NamedTuple):
 
 
 class RigRecord:
-    """All exchanges with a rig, in their order.
-
-    Parameters
-    ----------
-    input_names, limit_names : sequence of str
-        Of the rig.
-    exchanges : sequence of Exchange
-        What it begins with.
-
-    Examples
-    --------
-    >>> from mgdd.loop import VirtualEngine
-    >>> from mgdd.rig import RecordingRig, SimulatedRig
-    >>> from mgdd.rig.exchange import RigRecord
-    >>> with RecordingRig(SimulatedRig(VirtualEngine())) as rig:
-    ...     rig.apply({"soc_cad": -6.0})
-    ...     measured = rig.measure()
-    >>> record = RigRecord.from_columns(*rig.record.to_columns())
-    >>> len(record), record[0].measurement == measured
-    (1, True)
-    """
+    """All exchanges with a rig, in their order."""
 
     def __init__(
         self, input_names: Sequence[str], limit_names: Sequence[str] = (), exchanges: Sequence[Exchange] = ()
@@ -85,10 +65,7 @@ class RigRecord:
     def from_columns(cls, names: Sequence[str], table: ArrayLike) -> Self:
         """Read what `to_columns` gave, pressure traces apart; what was never there and what was NaN are the same.
 
-        Raises
-        ------
-        mgdd.errors.DataError
-            A column that is none of these, a table of another width, or no input.
+        DataError for a column that is none of these, a table of another width, or no input.
         """
         values = np.asarray(table, np.float64)
         if values.ndim != 2 or values.shape[1] != len(names):
@@ -124,14 +101,9 @@ class RigRecord:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], *, table: str = "rig") -> Self:
-        """Read the exchanges of a record file, as far as it can be read, with a warning where it ends before.
+        """Read the exchanges that a `RecordingRig` gave to a `Recorder`, with a warning where the file ends before.
 
-        Parameters
-        ----------
-        path : path-like
-            File of a `Recorder` that was the sink of a `RecordingRig`.
-        table : str
-            Name of their table; DataError where the record has none of that name.
+        DataError where it has no such table.
         """
         return cls.of_run(readable_record(path), f"{path}", table=table)
 
@@ -274,19 +246,10 @@ class ReplayRig(OpenOnce):
         if not tolerance >= 0.0:
             raise ParameterError.of("tolerance", tolerance, ">= 0")
         self.record, self.tolerance, self.strict = record, tolerance, strict
+        self.input_names, self.limit_names = record.input_names, record.limit_names
         self.differences: list[Difference] = []
         self.sample = 0
         self._asked: dict[str, float] | None = None
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return self.record.input_names
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limited quantities that `measure` reports."""
-        return self.record.limit_names
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Ask for the inputs of the next sample, as `mgdd.loop.Plant.apply`; RigError where the rig is closed."""
@@ -297,10 +260,8 @@ class ReplayRig(OpenOnce):
     def measure(self) -> Measurement:
         """Give the next recorded measurement.
 
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet, the rig is closed, the record is at its end, or another input was asked for.
+        RigError before `apply`, where the rig is closed, at the end of the record, and for another input than the
+        recorded one.
         """
         self._require_open()
         if self._asked is None:

@@ -51,11 +51,13 @@ _LABELS: Mapping[str, tuple[str, str]] = {
     "bus_state": ("-", "state of the bus"),
     "request": ("-", "request to the safety gate"),
 }
-_MODES = tuple(_core.rig.safety_states)
-_REASONS = tuple(_core.rig.safety_reasons)
-_RESULTS = tuple(_core.rig.send_results)
-_BUS_STATES = tuple(_core.rig.bus_states)
-_REQUESTS = tuple(_core.rig.safety_requests)
+_CODES = {
+    "mode": _core.rig.safety_states,
+    "cause": _core.rig.safety_reasons,
+    "send_result": _core.rig.send_results,
+    "bus_state": _core.rig.bus_states,
+    "request": _core.rig.safety_requests,
+}
 _TIMES = {"lateness_us": "lateness", "compute_us": "compute", "age_us": "age", "send_us": "send"}
 
 
@@ -355,11 +357,8 @@ def _dataset(columns: Mapping[str, Any], origin_ns: int) -> xr.Dataset:
     values = dict(columns)
     time_s = (values.pop("deadline_ns") - origin_ns) * 1e-9
     values["sensed_angle_deg"] = values.pop("angle_deg")
-    values["mode"] = np.array(_MODES)[values.pop("state")]
-    values["cause"] = np.array(_REASONS)[values["cause"]]
-    values["send_result"] = np.array(_RESULTS)[values["send_result"]]
-    values["bus_state"] = np.array(_BUS_STATES)[values["bus_state"]]
-    values["request"] = np.array(_REQUESTS)[values["request"]]
+    values["mode"] = values.pop("state")
+    values |= {name: np.array(words)[values[name]] for name, words in _CODES.items()}
     variables: dict[str, Any] = {"time_s": ("time_s", time_s)}
     for name, column in values.items():
         variables[name] = ("time_s", column, *(_LABELS.get(name) or VARIABLES[name]))

@@ -36,41 +36,19 @@ _FLAGS = {
 
 @dataclass(frozen=True, repr=False)
 class RecordedRun(Result):
-    """A run as its record holds it.
+    """A run as its record holds it; every ``time_s`` counts from `started` on the monotonic clock."""
 
-    Attributes
-    ----------
-    run_id : str
-        Of the recorder.
-    started : datetime.datetime
-        When the record began, UTC; every ``time_s`` counts from here on the monotonic clock.
-    config : dict
-        As given to `Recorder`.
-    header : dict
-        All that stands in the header: ``mgdd``, ``config``, ``wall_ns``, ``monotonic_ns``.
-    frames : xarray.Dataset
-        Frames of the bus in order: ``time_s``, ``bus_time_s`` (stamp of the driver from its first one on, NaN where it
-        gave none), ``id``, ``size``, ``channel``, flags, and ``data``, bytes filled up with zeros.
-    samples : dict of str to xarray.Dataset
-        A table each, over ``time_s``; units are those the names end in.
-    events : xarray.Dataset
-        ``time_s``, ``category`` and ``text``.
-    records, unknown, damaged_bytes, ignored_bytes : int
-        Records read; those of a kind of a later version; bytes that a repair could not read; bytes behind the last
-        readable record, 0 in a file that was closed in peace.
-    """
-
-    run_id: str
-    started: dt.datetime
-    config: dict[str, Any]
-    header: dict[str, Any]
-    frames: xr.Dataset
-    samples: dict[str, xr.Dataset]
+    run_id: str  # of the recorder
+    started: dt.datetime  # UTC
+    config: dict[str, Any]  # as given to `Recorder`
+    header: dict[str, Any]  # ``mgdd``, ``config``, ``wall_ns``, ``monotonic_ns``
+    frames: xr.Dataset  # ``bus_time_s`` is the stamp of the driver, from its first one on; ``data`` ends in zeros
+    samples: dict[str, xr.Dataset]  # by table; units are those the names end in
     events: xr.Dataset
-    records: int
-    unknown: int
-    damaged_bytes: int
-    ignored_bytes: int
+    records: int  # that were read
+    unknown: int  # of them, of a kind of a later version
+    damaged_bytes: int  # that a repair could not read
+    ignored_bytes: int  # behind the last readable record; 0 in a file that was closed in peace
 
     @property
     def dataset(self) -> xr.Dataset:

@@ -97,17 +97,10 @@ class Recorder:
             self._writer.write(frame)
 
     def sample(self, table: str, values: Mapping[str, float], *, monotonic_ns: int | None = None) -> None:
-        """Append a row of named numbers.
+        """Append a row of named numbers to a table, NaN where there is none; default now [ns].
 
-        Parameters
-        ----------
-        table : str
-            Which table; the first row makes it.
-        values : mapping of str to float
-            A number per name, NaN where there is none; a name ends in its unit, as ``angle_deg`` does. The first row
-            says the names for all: others are a ParameterError, as is ``time_s``, which a reader adds.
-        monotonic_ns : int, optional
-            When it was taken; default now [ns].
+        The first row makes the table and says the names for all: others are a ParameterError, as is ``time_s``, which a
+        reader adds. A name ends in its unit, as ``angle_deg`` does.
         """
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:

@@ -1,16 +1,19 @@
-"""The safety gate below every controller, and its envelope as a file."""
+"""The safety gate below every controller, its envelope as a file, and a throttle behind it."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from typing import Any, NamedTuple, Self
 
 from mgdd import _core
 from mgdd._core.rig import Drive
-from mgdd.errors import DataError, RigError, did_you_mean
+from mgdd.errors import DataError, ParameterError, RigError, did_you_mean
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
+from mgdd.loop import Measurement, Plant
 
 _KIND = "safety_envelope"
 _CHOICE = "bus_fault_from"
@@ -77,19 +80,7 @@ def _wanted() -> dict[str, Wanted]:
 
 
 class SafetyChange(NamedTuple):
-    """A change of mode of a safety gate, with why, and how often this reason has led to one so far.
-
-    Examples
-    --------
-    >>> from mgdd.rig import SafetyGate
-    >>> gate = SafetyGate()
-    >>> for _ in range(20):
-    ...     gate.observe(good_frames=1, age_s=0.0, sensor_v=(1.5, 3.5), angle_deg=22.5)
-    ...     drive = gate.command(0.0)
-    >>> gate.arm()
-    >>> gate.drain()
-    [SafetyChange(cycle=20, before='init', after='armed', reason='requested', times=1)]
-    """
+    """A change of mode of a safety gate, with why, and how often this reason has led to one so far."""
 
     cycle: int
     before: str
@@ -98,7 +89,7 @@ class SafetyChange(NamedTuple):
     times: int
 
 
-class SafetyGate:
+class SafetyGate(_core.rig.SafetyGate):
     """What a duty passes last before it leaves the machine, whatever controller or optimiser asked for it.
 
     In every cycle: `observe` what is known of it, then `command` the duty of the controller, and send the drive that
@@ -153,7 +144,7 @@ class SafetyGate:
 
     def __init__(self, envelope: SafetyEnvelope | None = None) -> None:
         self._envelope = SafetyEnvelope.load("etb") if envelope is None else envelope
-        self._core = _core.rig.SafetyGate(self._envelope)
+        super().__init__(self._envelope)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (self._envelope, self.state)
@@ -164,101 +155,10 @@ class SafetyGate:
         return self._envelope
 
     @property
-    def mode(self) -> str:
-        """``init``, ``armed``, ``run``, ``limp`` or ``fault``."""
-        return self._core.mode
-
-    @property
-    def reason(self) -> str:
-        """Why that mode was entered."""
-        return self._core.reason
-
-    @property
-    def cause(self) -> str:
-        """What is wrong now, ``none`` if nothing; arming, starting and a reset wait for its end."""
-        return self._core.cause
-
-    @property
-    def drive(self) -> Drive:
-        """The drive of the last cycle."""
-        return self._core.drive
-
-    @property
-    def rms_duty(self) -> float:
-        """RMS duty of the heat model [-]."""
-        return self._core.rms_duty
-
-    @property
-    def cycle(self) -> int:
-        """Cycles so far, missed ones included."""
-        return self._core.cycle
-
-    @property
     def counts(self) -> dict[str, int]:
         """Duties so far that were ``clamped`` or ``slewed``, ``dropped`` changes, and changes of mode by reason."""
-        core = self._core
-        own = {"clamped": core.clamped, "slewed": core.slewed, "dropped": core.dropped}
-        return own | {name: core.count(name) for name in _core.rig.safety_reasons if core.count(name)}
-
-    @property
-    def state(self) -> dict[str, list[float]]:
-        """What a run needs to go on bit for bit, the waiting changes included; setting it restores the run."""
-        return self._core.state
-
-    @state.setter
-    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
-        self._core.state = {name: list(values) for name, values in saved.items()}
-
-    def observe(
-        self,
-        *,
-        good_frames: int = 0,
-        bad_frames: int = 0,
-        age_s: float | None = None,
-        sensor_v: tuple[float, float] | None = None,
-        angle_deg: float | None = None,
-        bus: str = "active",
-        sent: bool = True,
-        missed_deadlines: int = 0,
-        request: str = "none",
-    ) -> None:
-        """Take what is known of this cycle, before the controller runs.
-
-        Parameters
-        ----------
-        good_frames, bad_frames : int
-            Frames that arrived since the last cycle and passed or failed their checks, >= 0.
-        age_s : float, optional
-            Age of the last good one [s]; it grows by a cycle if left out.
-        sensor_v : pair of float, optional
-            Both position sensors [V]; looked at where a good frame arrived.
-        angle_deg : float, optional
-            Angle of the plate [deg]; the same.
-        bus : {"active", "warning", "passive", "off"}
-            Error state of the CAN controller.
-        sent : bool
-            Whether the last command left.
-        missed_deadlines : int
-            Since the last cycle, >= 0.
-        request : {"none", "arm", "run", "stop", "disarm", "reset", "abort"}
-            What the operator asks for, after all checks of the cycle; ignored where it is refused.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A negative count, an unknown name.
-        """
-        self._core.observe(
-            good_frames=good_frames, bad_frames=bad_frames, age_s=age_s, sensor_v=sensor_v, angle_deg=angle_deg,
-            bus=bus, sent=sent, missed_deadlines=missed_deadlines, request=request,
-        )  # fmt: skip
-
-    def command(self, duty: float) -> Drive:
-        """Give the drive that may leave in this cycle for the duty that the controller asks for [-].
-
-        It is limited, or open. NaN is a fault of the controller; without `observe` before it: open, and ``limp``.
-        """
-        return self._core.command(duty)
+        own = {"clamped": self.clamped, "slewed": self.slewed, "dropped": self.dropped}
+        return own | {name: self.count(name) for name in _core.rig.safety_reasons if self.count(name)}
 
     def arm(self) -> None:
         """Go from ``init`` to ``armed``; RigError where something stands against it."""
@@ -285,13 +185,13 @@ class SafetyGate:
         self._request("abort")
 
     def _request(self, name: str) -> None:
-        against = self._core.request(name)
+        against = self.request(name)
         if against != "none":
             raise RigError(f"{name} refused in mode {self.mode!r}: {against}")
 
-    def drain(self) -> list[SafetyChange]:
+    def drain(self) -> list[SafetyChange]:  # type: ignore[override]
         """Take the waiting changes of mode, oldest first; beyond 64 they are ``counts["dropped"]``."""
-        return [SafetyChange(*entry) for entry in self._core.drain()]
+        return [SafetyChange(*entry) for entry in super().drain()]
 
     def __enter__(self) -> Self:
         return self
@@ -312,3 +212,118 @@ def _restored(envelope: SafetyEnvelope, state: Mapping[str, Sequence[float]]) ->
     gate = SafetyGate(envelope)
     gate.state = dict(state)
     return gate
+
+
+class GatedThrottle:
+    """A throttle whose duty passes a safety gate: one `apply` and one `measure` per cycle.
+
+    Parameters
+    ----------
+    plant : mgdd.loop.Plant
+        Takes ``duty`` and, where it can, ``bridge_open``; gives ``first_v``, ``second_v``, ``sensed_angle_deg`` and,
+        where known, ``age_s``: `mgdd.loop.VirtualThrottle`, or a rig. The bridge of a plant without ``bridge_open``
+        opens when its rig is left: there `apply` raises once the gate takes the drive away.
+    gate : SafetyGate, optional
+        With the envelope ``etb`` if left out.
+    shadow : bool
+        The plant does not follow, as in ``dry_run`` and ``replay``: nothing is raised, and the run goes on at zero
+        duty.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A plant with other inputs.
+
+    Examples
+    --------
+    >>> from mgdd.loop import VirtualThrottle
+    >>> from mgdd.rig import GatedThrottle
+    >>> plant = GatedThrottle(VirtualThrottle(inputs=("duty", "bridge_open"), seed=1))
+    >>> start_deg = plant.start()
+    >>> for _ in range(400):
+    ...     plant.apply({"duty": 0.3})
+    ...     measured = plant.measure()
+    >>> measured.applied["duty"], measured.values["angle_deg"] > 20.0
+    (0.3, True)
+    >>> plant.gate.abort()
+    >>> for _ in range(400):
+    ...     plant.apply({"duty": 0.3})
+    ...     measured = plant.measure()
+    >>> measured.applied, abs(measured.values["angle_deg"] - 8.0) < 1.0
+    ({'duty': 0.0, 'bridge_open': 1.0}, True)
+    """
+
+    input_names = ("duty",)
+
+    def __init__(self, plant: Plant, gate: SafetyGate | None = None, *, shadow: bool = False) -> None:
+        if set(plant.input_names) not in ({"duty"}, {"duty", "bridge_open"}):
+            raise ParameterError(f"plant takes {', '.join(plant.input_names)}: must take duty, or duty and bridge_open")
+        self.plant, self.limit_names = plant, plant.limit_names
+        self.gate = SafetyGate() if gate is None else gate
+        self.shadow = shadow
+        self._opens = "bridge_open" in plant.input_names
+        self._values: Mapping[str, float] | None = None
+        self._applied: dict[str, float] | None = None
+
+    def start(self) -> float:
+        """Measure without drive until the gate can be armed, then arm and run it; give the angle measured last [deg].
+
+        RigError where something stands against it after twice the good frames that it needs.
+        """
+        angle_deg = math.nan
+        for _ in range(2 * max(math.ceil(self.gate.envelope.good_frames), 1)):
+            self._send(self._passed(0.0))
+            angle_deg = float(self.measure().values["sensed_angle_deg"])
+        if self.gate.mode == "init":
+            self.gate.arm()
+        self.gate.run()
+        return angle_deg
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Pass the duty of the next cycle through the gate, with what was measured last.
+
+        NaN is a fault of the controller and opens the bridge. Any input but ``duty`` is a ParameterError; a RigError
+        has the reason why the gate takes the drive away from a plant that cannot open its bridge.
+        """
+        if set(inputs) != {"duty"}:
+            raise ParameterError(f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be duty")
+        drive = self._passed(inputs["duty"])
+        if drive.bridge_open and not (self._opens or self.shadow):
+            raise drive_taken(self.gate.mode, self.gate.reason)
+        self._send(drive)
+
+    def measure(self) -> Measurement:
+        """Run one cycle; ``applied`` has what left: the ``duty``, and ``bridge_open`` where the plant takes it."""
+        if self._applied is None:
+            raise RigError("measure() before apply(): apply a duty first")
+        measured = self.plant.measure()
+        self._values = measured.values
+        return replace(measured, applied={**self._applied, **measured.applied})
+
+    def _passed(self, duty: float) -> Drive:
+        self.gate.observe(**facts_of(self._values, self.gate.envelope.cycle_s))
+        return self.gate.command(duty)
+
+    def _send(self, drive: Drive) -> None:
+        self._applied = {"duty": drive.duty}
+        if self._opens:
+            self._applied["bridge_open"] = float(drive.bridge_open)
+        self.plant.apply(self._applied)
+
+
+def facts_of(values: Mapping[str, float] | None, cycle_s: float) -> dict[str, Any]:
+    """Give what measured values of a throttle tell a gate; a measurement is new while its age is below a cycle."""
+    if values is None:
+        return {}
+    age_s = values.get("age_s", 0.0)
+    return {
+        "good_frames": int(age_s < 0.5 * cycle_s),
+        "age_s": age_s,
+        "sensor_v": (values["first_v"], values["second_v"]),
+        "angle_deg": values["sensed_angle_deg"],
+    }
+
+
+def drive_taken(mode: str, reason: str) -> RigError:
+    """Make the error of a run whose gate took the drive away."""
+    return RigError(f"the safety gate went to {mode!r}: {reason}; look for the cause before the next run")

@@ -18,8 +18,8 @@ from bus_node import ETB, LONG_S, commands, is_safe, node, rig_on
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, SignalMap
+from mgdd.rig.can.can_rig import key_line, may_be_real
 from mgdd.rig.can.link import Punctual, Sender
-from mgdd.rig.can.modes import key_line, may_be_real
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.realtime import Frame
 from user_buses import write_bus

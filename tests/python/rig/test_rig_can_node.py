@@ -13,10 +13,10 @@ from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualEngine, VirtualThrottle
 from mgdd.rig import SafetyEnvelope, SignalMap
-from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Inbox, Sender
 from mgdd.rig.can.node import node_of, run_node
 from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.transport import changed
 
 
 class Host:

@@ -13,8 +13,8 @@ from mgdd.errors import DataError, RigError
 from mgdd.loop import Measurement, VirtualThrottle
 from mgdd.rig import CanRig, Recorder, RecordingRig, ReplayRig, SignalMap
 from mgdd.rig.base import Rig
-from mgdd.rig.can.frame import changed
 from mgdd.rig.can.replay_bus import ReplayBus
+from mgdd.rig.can.transport import changed
 from mgdd.rig.exchange import RigRecord
 
 

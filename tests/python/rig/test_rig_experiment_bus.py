@@ -103,7 +103,7 @@ def test_a_dry_run_transmits_nothing_and_computes_everything(tmp_path: Path) -> 
 
 
 def test_a_bench_is_driven_only_armed_and_with_a_key(tmp_path: Path) -> None:
-    from mgdd.rig.can.modes import key_line
+    from mgdd.rig.can.can_rig import key_line
     from mgdd.rig.can.signal_map import SignalMap
 
     key = tmp_path / "key"

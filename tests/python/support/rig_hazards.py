@@ -11,11 +11,11 @@ from mgdd.control import Pid
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import SafetyEnvelope, SafetyGate, SignalMap
-from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.node_core import NodeCore, node_plant
-from mgdd.rig.gated import facts_of
+from mgdd.rig.can.transport import changed
 from mgdd.rig.realtime import Frame
+from mgdd.rig.safety import facts_of
 
 ONSET, OVER = 600, 1500  # samples: the hazard sets in, and ends
 LIMP_HOME_DEG = 8.0

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Self, cast
 
 from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
-from mgdd.rig.can.frame import FrameBus
 from mgdd.rig.can.python_can import POLL_S, Reception, message_of
+from mgdd.rig.can.transport import FrameBus
 
 if TYPE_CHECKING:
     import can
@@ -24,42 +24,11 @@ _SEND_ERRORS = 3  # in a row, until the bus counts as gone
 class BusBridge:
     """Two threads between a python-can bus and a `RingTransport`: one receives, one sends.
 
-    What goes wrong in either of them ends both and tells the loop that the bus is off, so that its gate opens the
-    bridge; `error` says what it was.
-
-    Parameters
-    ----------
-    bus : can.BusABC or CanTransport
-        Any interface of python-can, opened and closed by the caller; nobody else may receive from it meanwhile. Pass
-        ``interface``, ``channel`` and ``ignore_config=True`` when you open it: a configuration file must not choose.
-        A transport of ours costs one more thread on the way in, and looks after its bus: what it raises ends the
-        bridge.
-    transport : RingTransport
-        Of the loop.
-
-    Raises
-    ------
-    mgdd.errors.RigError
-        python-can is not installed.
-
-    Notes
-    -----
-    Python is in the way of every frame: while another thread computes, each frame may wait 5 ms and more for its turn.
-    On Linux a `SocketCanTransport` has no such detour.
-
-    Examples
-    --------
-    >>> import can
-    >>> from mgdd.rig.can.bus_bridge import BusBridge
-    >>> from mgdd.rig.realtime import Frame, RingTransport
-    >>> transport = RingTransport()
-    >>> with can.Bus(interface="virtual", channel="demo", ignore_config=True) as node:
-    ...     with can.Bus(interface="virtual", channel="demo", ignore_config=True) as host, BusBridge(host, transport):
-    ...         node.send(can.Message(arbitration_id=0x121, data=[1, 2], is_extended_id=False))
-    ...         while transport.waiting_for_loop == 0:
-    ...             pass
-    >>> transport.counts["lost"]
-    0
+    The caller opens and closes the bus (any of python-can, or a `CanTransport`, which costs one more thread on the way
+    in, and looks after its bus); nobody else may receive from it meanwhile. What goes wrong in a thread ends both and
+    tells the loop that the bus is off, so that its gate opens the bridge; `error` says what it was. Python is in the
+    way of every frame: while another thread computes, each may wait 5 ms and more. On Linux a `SocketCanTransport` has
+    no such detour.
     """
 
     def __init__(self, bus: can.BusABC | FrameBus, transport: RingTransport) -> None:

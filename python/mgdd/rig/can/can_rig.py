@@ -5,21 +5,27 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 from mgdd._core.rig import Frame
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import ParameterError, RigError, argument
+from mgdd.io.files import read_plain_text
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
-from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.link import Inbox, Punctual, Sender
 from mgdd.rig.can.mapped import MappedMessage
-from mgdd.rig.can.modes import bus_of, may_be_real, require_key
+from mgdd.rig.can.node import LocalBus
+from mgdd.rig.can.processes import SignalsAsExceptions, undisturbed
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
+from mgdd.rig.can.transport import Bus, CanTransport, changed
 
+# `simulate`: a node in this process and a virtual clock; `hil`: a node in another process, real time; `dry_run`: a real
+# bus, to which nothing is sent; `replay`: recorded frames through the same checks; `bench`: real hardware, armed.
+MODES = ("simulate", "hil", "dry_run", "replay", "bench")
+BUS_MODES = ("hil", "dry_run", "bench")
 _SAFE_FRAMES = 5
 _SAFE_PAUSE_S = 0.002
 _LISTEN_CYCLES = 10
@@ -27,6 +33,59 @@ _LISTEN_S = 0.1  # at least
 _ARMING_ROUNDS = 3
 _PEER_CYCLES = 20
 _PEER_S = 1.0  # at least so long for the first valid frame
+
+
+def key_line(signal_map: SignalMap) -> str:
+    """Return the line that a key file must hold: it names this DBC."""
+    return f"arm {signal_map.dbc.file.name} {signal_map.dbc.sha256[:12]}"
+
+
+def may_be_real(mode: str, bus: Bus) -> bool:
+    """Whether what answers may be an actuator: on a bench, and in ``hil`` on a bus that leaves this machine."""
+    return mode == "bench" or (mode == "hil" and bus.shared and not getattr(bus, "stays_here", False))
+
+
+def require_key(
+    signal_map: SignalMap, bus: str, mode: str, *, arm: bool, key_file: str | os.PathLike[str] | None
+) -> None:
+    """Refuse with a RigError to drive what may be real without a person who wants it."""
+    if arm is not True:
+        how = f"{argument('arm', 'True')}, and a {argument('key_file')} or a confirmation"
+        why = "drives real hardware" if mode == "bench" else f"on {bus}, which leaves this machine, may, too"
+        raise RigError(f"mode = {mode!r} {why}: give {how}")
+    line = key_line(signal_map)
+    if key_file is not None:
+        try:
+            said = read_plain_text(key_file).splitlines()
+        except FileNotFoundError as error:
+            raise RigError(
+                f"{key_file}: no such key file: write the line {line!r} into it when the bench is safe"
+            ) from error
+        if line not in said:
+            raise RigError(f"{key_file}: holds no key of this DBC: it must have the line {line!r}")
+        return
+    if not sys.stdin.isatty():
+        raise RigError(f"mode = {mode!r} without a terminal to confirm in: give a {argument('key_file')}")
+    sys.stderr.write(f"{bus} will be driven with {signal_map.file.name}. Emergency stop at hand? Type ARM: ")
+    sys.stderr.flush()
+    if sys.stdin.readline().strip() != "ARM":
+        raise RigError("not confirmed: nothing was sent")
+
+
+def bus_of(mode: str, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
+    """Return the bus of a mode; ParameterError for an unknown one, or a bus or plant that does not go with it."""
+    if mode not in MODES:
+        raise ParameterError.of("mode", mode, f"one of {', '.join(MODES)}")
+    if mode == "simulate":
+        if bus is not None:
+            bound = "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead"
+            raise ParameterError.of("mode", mode, bound)
+        if plant is None:
+            raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
+        return LocalBus(plant, signal_map)
+    if plant is not None or bus is None:
+        raise ParameterError(f"mode = {mode!r}: must have a bus, and no plant: that is in the node")
+    return CanTransport.parse(bus) if isinstance(bus, str) else bus
 
 
 class CanRig:
@@ -92,6 +151,7 @@ class CanRig:
         self.mode = mode
         loaded = signal_map if isinstance(signal_map, SignalMap) else SignalMap.load(signal_map)
         self.map = loaded.with_goals(limits=limits, objective=objective)
+        self.input_names, self.limit_names = self.map.input_names, self.map.limits
         self.bus = bus_of(self.mode, self.map, bus, plant)
         trigger = self.map.measurements[self.map.trigger]
         self.timeout_s = trigger.timeout_s or 0.0 if timeout_s is None else float(timeout_s)
@@ -105,16 +165,6 @@ class CanRig:
         self._punctual = Punctual(self.map, self.bus.name, self.timeout_s)
         self._commands = 0
         self._inbox, self._sender = Inbox(self.map), Sender()
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs, in the order of the map."""
-        return self.map.input_names
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limited quantities that `measure` reports."""
-        return self.map.limits
 
     @property
     def state(self) -> str:
@@ -134,13 +184,9 @@ class CanRig:
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Send the inputs, clamped to the bounds of the map; in ``dry_run`` and ``replay`` nothing is sent.
 
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            A missing, unknown or non-finite input; nothing was sent.
-        mgdd.errors.RigError
-            The rig is not open, or the bus has a fault; behind a node with a clock also a command that comes later than
-            the time limit of the commands allows: call `arm`.
+        ParameterError, and nothing sent, for a missing, unknown or non-finite input. RigError where the rig is not open
+        or the bus has a fault; behind a node with a clock also for a command that comes later than their time limit:
+        call `arm`.
         """
         self._require_open()
         values = checked_inputs(inputs, self.input_names)
@@ -163,11 +209,8 @@ class CanRig:
     def measure(self) -> Measurement:
         """Wait for the next complete measurement after the inputs applied last: NaN for what is missing or too old.
 
-        Raises
-        ------
-        mgdd.errors.RigError
-            Nothing was applied yet, no valid measurement in time or only one that waited too long, a node that does not
-            follow its commands, a fault of the bus.
+        RigError before `apply`, for no valid measurement in time or only one that waited too long, a node that does not
+        follow its commands, and a fault of the bus.
         """
         self._require_open()
         if self._inputs is None:

@@ -88,27 +88,9 @@ class _Client(asyncio.Protocol):
 
 
 class Hub:
-    """A hub for processes of this machine.
+    """A hub for processes of this machine; the bus is as slow as a bit rate [bit/s] says.
 
     A frame is stamped with its arrival: what waited while the hub was stopped is as old as that.
-
-    Parameters
-    ----------
-    host : str
-        Address to listen at.
-    port : int
-        Port; 0 takes a free one.
-    faults : sequence of BusFault
-        What goes wrong.
-    bit_rate : float, optional
-        Bits per second of the simulated bus; without limit if left out.
-    seed : int
-        Of the noise of the faults.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A port or bit rate outside its domain.
     """
 
     def __init__(

@@ -14,10 +14,10 @@ from typing import IO, Any, Self
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Plant, ThrottleFault, VirtualEngine, VirtualThrottle
-from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.hub_faults import fault_of
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import Bus, changed
 
 _STEP_POLL_S = 0.1  # how often a waiting node looks for its parent
 _MOST_BEHIND_S = 1.0
@@ -144,16 +144,9 @@ def run_node(
 ) -> None:
     """Serve an open bus until `keep_on`, asked once per sample and every 0.1 s of waiting, says no.
 
-    However it ends, by an error too, the bridge of a driven plant is opened first, and that is reported and logged.
-
-    Parameters
-    ----------
-    core, bus, log, keep_on
-        The node, its bus, and where every sample is written.
-    step : bool
-        Every complete command brings one sample, and time stands still between; else the node has its own clock.
-    period_s : float, optional
-        Time between two samples [s]; the cycle of the trigger message if left out.
+    With `step` every complete command brings one sample and time stands still between, else the node has its own clock
+    of `period_s`, the cycle of the trigger message if left out. However it ends, by an error too, the bridge of a
+    driven plant is opened first, and that is reported and logged.
     """
     try:
         if step:

@@ -22,8 +22,7 @@ from mgdd.loop import Plant, SurrogatePlant, VirtualEngine, VirtualThrottle
 from mgdd.rig.can.link import Receiver, Sender
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.gated import facts_of
-from mgdd.rig.safety import SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import SafetyEnvelope, SafetyGate, facts_of
 
 _LOG = logging.getLogger(__name__)
 _ARMING_FRAMES = 3  # safe commands in a row that arm it
@@ -44,24 +43,19 @@ class NodePlant(Protocol):
     @property
     def input_names(self) -> tuple[str, ...]:
         """Inputs that commands may carry."""
-        ...
 
     @property
     def sample_s(self) -> float | None:
         """Time in the plant per sample [s]; None: that of the map."""
-        ...
 
     def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...] | None:
         """Give the names of what it measures at some inputs, and take no time; None where only a sample tells."""
-        ...
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
         """Tell a gate what the sensors say, as `mgdd.rig.SafetyGate.observe` takes it; no time passes."""
-        ...
 
     def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
         """Run one sample; None: without drive."""
-        ...
 
 
 class _Throttle:

@@ -11,9 +11,9 @@ from typing import Any, Self
 from mgdd._core.rig import Frame
 from mgdd.errors import RigError
 from mgdd.io.files import existing_file
-from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import Bus, changed
 from mgdd.rig.recorded import stamped_frames
 from mgdd.rig.recorder import Recorder
 
@@ -92,40 +92,15 @@ class RecordedBus:
 
     def __init__(self, bus: Bus, recorder: Recorder) -> None:
         self.bus, self.recorder = bus, recorder
+        self.name, self.shared, self.stays_here = bus.name, bus.shared, bool(getattr(bus, "stays_here", False))
+        self.open, self.close, self.claim = bus.open, bus.close, bus.claim
         # Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
         self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        return self.bus.name
-
-    @property
-    def shared(self) -> bool:
-        """Whether others may be on it."""
-        return self.bus.shared
-
-    @property
-    def stays_here(self) -> bool:
-        """Whether it does not leave this machine, as far as one can tell."""
-        return bool(getattr(self.bus, "stays_here", False))
 
     @property
     def counters(self) -> dict[str, Any]:
         """What the bus counts."""
         return dict(getattr(self.bus, "counters", {}))
-
-    def open(self) -> None:
-        """Connect."""
-        self.bus.open()
-
-    def close(self) -> None:
-        """Disconnect."""
-        self.bus.close()
-
-    def claim(self, keys: set[tuple[int, bool]]) -> None:
-        """Say which identifiers only we send."""
-        self.bus.claim(keys)
 
     def send(self, frame: Frame, *, final: bool = False) -> None:
         """Send a frame; what the bus did not take is not recorded."""

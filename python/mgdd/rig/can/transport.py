@@ -1,4 +1,4 @@
-"""A CAN bus of any interface of python-can, with a receive thread, stamps and counters of our own."""
+"""What a rig needs of a bus, and a bus of any interface of python-can, with a receive thread and counters of ours."""
 
 from __future__ import annotations
 
@@ -10,13 +10,53 @@ import time
 from collections import Counter, deque
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 from urllib.parse import parse_qsl
 
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.io.extras import import_extra
 from mgdd.rig.can.python_can import THIS_HOST, Reception, connected, error_code, message_of
+
+
+class FrameBus(Protocol):
+    """What a bridge needs of a bus: a `mgdd.rig.CanTransport`, for example."""
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame that arrived, or None after the time; RigError for a fault of the bus."""
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame to the bus; RigError where it does not take it."""
+
+
+class Bus(FrameBus, Protocol):
+    """What every bus offers: a `CanTransport`, or a node in the same process."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    @property
+    def shared(self) -> bool:
+        """Whether others may be on it: real time, and real actuators."""
+
+    def open(self) -> None:
+        """Connect."""
+
+    def close(self) -> None:
+        """Disconnect; may be called twice."""
+
+    def claim(self, keys: set[tuple[int, bool]]) -> None:
+        """Say which identifiers only we send: one that arrives is a fault."""
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:
+        """Hand a frame to the bus, with `final` even after a fault."""
+
+
+def changed(frame: Frame, **fields: Any) -> Frame:
+    """Return the frame with other fields: its stamp, its direction, its data."""
+    return Frame(**{**frame.to_dict(), **fields})
+
 
 _QUEUE = 4096  # frames that nobody has read
 _FATAL = frozenset({"bus_off", "error_passive"})
@@ -28,32 +68,7 @@ class CanTransport:
     The configuration files and environment variables of python-can are not read: what is not given here, is not used.
     The thread only stamps frames with their arrival and stores them; whatever ends it, and every fault of the bus, is
     raised by the next call. A frame that is malformed, and our own one that comes back, is left out and counted.
-
-    Parameters
-    ----------
-    interface : str
-        Interface of python-can: ``socketcan``, ``socketcand``, ``virtual``, ``pcan``, ...
-    channel : str or int
-        Channel of the interface, for example ``can0``.
-    options : mapping, optional
-        Further keywords of the interface: ``bitrate``, ``host``, ``port``, ...
-    send_timeout_s : float
-        Longest time to wait for room in the queue of the driver [s].
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        No interface or channel, or a time that is not positive.
-
-    Examples
-    --------
-    >>> from mgdd._core.rig import Frame
-    >>> from mgdd.rig.can.transport import CanTransport
-    >>> with CanTransport("virtual", "doc") as one, CanTransport("virtual", "doc") as other:
-    ...     one.send(Frame(id=0x120, data=bytes(8)))
-    ...     received = other.receive(1.0)
-    >>> hex(received.id), other.counters["received"]
-    ('0x120', 1)
+    `options` are further keywords of the interface; for `send_timeout_s` it waits for room in the queue of the driver.
     """
 
     shared = True  # others may be on the bus
@@ -87,14 +102,7 @@ class CanTransport:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Make a transport, not yet open, of ``INTERFACE:CHANNEL?OPTION=VALUE&...``, as ``socketcan:can0``.
-
-        Examples
-        --------
-        >>> from mgdd.rig.can.transport import CanTransport
-        >>> CanTransport.parse("socketcand:can0?host=127.0.0.1&port=29536").options
-        {'host': '127.0.0.1', 'port': 29536}
-        """
+        """Make a transport, not yet open, of ``INTERFACE:CHANNEL?OPTION=VALUE&...``, as ``socketcan:can0``."""
         place, _, query = text.partition("?")
         interface, _, channel = place.partition(":")
         if not interface or not channel:

@@ -12,8 +12,8 @@ from mgdd.io.files import existing_file
 from mgdd.loop import Plant, VirtualEngine, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.results.describe import described
+from mgdd.rig.can.can_rig import BUS_MODES
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.modes import BUS_MODES
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.experiment import Experiment
@@ -130,40 +130,8 @@ class CheckedExperiment:
 def check_experiment(experiment: Experiment) -> CheckedExperiment:
     """Load and check all that an experiment names; nothing is opened.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        To be run.
-
-    Returns
-    -------
-    CheckedExperiment
-        Ready for `run_experiment`.
-
-    Raises
-    ------
-    FileNotFoundError
-        A file that is not there.
-    ImportError
-        A mode with a bus, without the extra ``can``.
-    mgdd.errors.Error
-        A plant, model, map, envelope, limit or reference that cannot be what the experiment needs; the message names
-        the file of the experiment first.
-
-    Examples
-    --------
-    >>> from mgdd.rig import Experiment
-    >>> from mgdd.rig.experiment import check_experiment
-    >>> text = '''
-    ... kind = "experiment"
-    ... format = 1
-    ... task = "track"
-    ... [track]
-    ... reference = "step:20:60"
-    ... '''
-    >>> checked = check_experiment(Experiment.from_toml(text))
-    >>> checked.plan.samples, checked.to_dict()["transmits"]
-    (1500, False)
+    FileNotFoundError, ImportError for a mode with a bus without the extra ``can``, and each `mgdd.errors.Error` of a
+    plant, model, map, envelope, limit or reference name the file of the experiment first.
     """
     try:
         return _checked(experiment)

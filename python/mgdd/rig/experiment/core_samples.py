@@ -16,8 +16,7 @@ from mgdd.loop import Measurement
 from mgdd.rig.can.loop_map import LOOP_NAMES
 from mgdd.rig.exchange import Exchange, flat
 from mgdd.rig.experiment.checked import CheckedExperiment
-from mgdd.rig.experiment.run_folder import RunRecord
-from mgdd.rig.experiment.stand import Cycle
+from mgdd.rig.experiment.stand import Cycle, RunRecord
 from mgdd.rig.experiment.tasks import Outcome, TrackPlan, compared
 from mgdd.rig.recorded import RecordedRun
 from mgdd.rig.recorder import Recorder

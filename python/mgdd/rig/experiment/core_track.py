@@ -16,21 +16,18 @@ from mgdd._core.rig import Frame, RingTransport, SocketCanTransport
 from mgdd.errors import RigError
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.loop_map import loop_messages
+from mgdd.rig.can.processes import held_back
 from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.can.signals import held_back
-from mgdd.rig.can.transport import two_senders
+from mgdd.rig.can.transport import Bus, changed, two_senders
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.core_samples import LoopSamples
-from mgdd.rig.experiment.run_folder import RunRecord
-from mgdd.rig.experiment.stand import Cycle
+from mgdd.rig.experiment.stand import Cycle, RunRecord
 from mgdd.rig.experiment.tasks import Outcome, TrackPlan
-from mgdd.rig.gated import drive_taken
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
-from mgdd.rig.safety import said_of
+from mgdd.rig.safety import drive_taken, said_of
 
 _ALL_BITS = {False: 0x7FF, True: 0x1FFF_FFFF}
 _FAILED_FRAMES = 3
@@ -46,16 +43,11 @@ class WatchedBus:
     """The bus of a rig, with an eye on the state that the node reports."""
 
     def __init__(self, bus: Bus, signal_map: SignalMap) -> None:
-        self.bus, self._map = bus, signal_map
+        self.bus, self._map, self.name = bus, signal_map, bus.name
         known = signal_map.state
         self._key = None if known is None else signal_map.measurements[known.message].key
         self._in_a_row = 0
         self.state = ""
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        return self.bus.name
 
     @property
     def failed(self) -> bool:

@@ -11,7 +11,7 @@ from typing import Any, Self
 from mgdd.errors import ParameterError
 from mgdd.io.files import parsed, read_plain_text
 from mgdd.results.describe import described
-from mgdd.rig.can.modes import MODES
+from mgdd.rig.can.can_rig import MODES
 from mgdd.rig.can.toml_table import TomlTable
 from mgdd.rig.experiment.settings import (
     PACES,
@@ -96,19 +96,8 @@ class Experiment:
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read an experiment file, checked as far as the file itself goes; `check_experiment` looks at what it names.
 
-        Parameters
-        ----------
-        path : path-like
-            TOML; the page Experiments lists the keys.
-
-        Raises
-        ------
-        FileNotFoundError
-            No such file.
-        mgdd.errors.DataError
-            Not TOML, a missing key.
-        mgdd.errors.ParameterError
-            An unknown key, a value of another form or outside its range.
+        The page Experiments lists the keys. FileNotFoundError; `mgdd.errors.DataError` where it is not TOML or lacks a
+        key; `mgdd.errors.ParameterError` for an unknown key, a value of another form or outside its range.
         """
         return cls.from_toml(read_plain_text(path, only_utf8=True), origin=str(path))
 
@@ -161,16 +150,8 @@ class Experiment:
     ) -> Self:
         """Give the same experiment in another mode; ParameterError where there is no such mode or pace.
 
-        Parameters
-        ----------
-        mode : {"simulate", "hil", "dry_run", "replay", "bench"}
-            The mode.
-        record : path-like, optional
-            The record to replay; as it is if left out.
-        connection : str, optional
-            The bus, as ``socketcan:can0``; as it is if left out.
-        pace : {"step", "real_time"}, optional
-            Of the bus; as it is if left out.
+        The record to replay, the connection of the bus, as ``socketcan:can0``, and its pace, ``step`` or ``real_time``,
+        are as they are if left out.
         """
         for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
             if value not in among:

@@ -2,30 +2,131 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
+import platform
+import shutil
+import sys
 import time
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, argument
+from mgdd import _core
+from mgdd.errors import DataError, ParameterError, RigError, argument
+from mgdd.io.files import write_whole
 from mgdd.results.describe import Row, rows_of
+from mgdd.results.labels import to_jsonable
 from mgdd.results.result import Result
 from mgdd.rig.experiment.checked import CheckedExperiment, LoopChoice, check_experiment
 from mgdd.rig.experiment.core_samples import loop_rows, replayed
 from mgdd.rig.experiment.core_track import track_on_core
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.run_folder import RunFolder, RunRecord, versions
-from mgdd.rig.experiment.stand import Cycle, Stand, Watched, guarded, opened_rig
+from mgdd.rig.experiment.stand import Cycle, RunRecord, Stand, Watched, guarded, opened_rig
 from mgdd.rig.experiment.tasks import Outcome, SeekPlan, TrackPlan
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_INPUTS = "inputs"
+_PACKAGES = ("numpy", "scipy", "xarray", "python-can", "cantools")
+
+
+class RunFolder:
+    """A new or empty folder that takes the files of one run."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            held = sorted(entry.name for entry in self.path.iterdir())
+        except OSError as error:
+            raise RigError(f"run folder {self.path}: {error.strerror or error}; name another one") from error
+        if held:
+            raise RigError(f"run folder {self.path}: holds {held[0]} already; name a new folder, no run is overwritten")
+
+    def discard(self) -> None:
+        """Take back what was written, and the folder where it was made: the run never began."""
+        for entry in self.path.iterdir():
+            if entry.is_dir():
+                shutil.rmtree(entry)
+            else:
+                entry.unlink()
+        for folder in self._made:
+            with contextlib.suppress(OSError):  # another run has come into a folder above
+                folder.rmdir()
+
+    def keep(self, path: Path) -> str:
+        """Copy a file that a run reads, and give its name in the folder; bulk and maps stay where they are.
+
+        A map reads its DBC beside it, a record may be large: both are named by their full path.
+        """
+        is_map = path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
+        if path.suffix == ".rec" or is_map:
+            return str(path.resolve())
+        inputs = self.path / _INPUTS
+        inputs.mkdir(exist_ok=True)
+        name = path.name
+        for number in range(2, 1000):
+            if not (inputs / name).exists():
+                break
+            name = f"{path.stem}_{number}{path.suffix}"
+        self._whole(f"{_INPUTS}/{name}", lambda half: half.write_bytes(path.read_bytes()))
+        return f"{_INPUTS}/{name}"
+
+    def text(self, name: str, text: str) -> None:
+        """Write a text."""
+        self._whole(name, lambda path: path.write_text(text, encoding="utf-8", newline="\n"))
+
+    def json(self, name: str, content: Mapping[str, Any]) -> None:
+        """Write JSON; NaN and infinity as null."""
+        self.text(name, json.dumps(to_jsonable(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def dataset(self, name: str, dataset: xr.Dataset) -> None:
+        """Write netCDF."""
+        self._whole(name, lambda path: dataset.to_netcdf(path, engine="scipy"))
+
+    def figure(self, name: str, figure: Figure) -> None:
+        """Write a PNG."""
+        self._whole(name, lambda path: figure.savefig(path, dpi=150, format="png"))
+
+    def _whole(self, name: str, write: Any) -> None:
+        """Write under another name, and give it its own when it is on the disk."""
+        try:
+            write_whole(self.path / name, write)
+        except OSError as error:
+            raise RigError(
+                f"{self.path / name}: {error.strerror or error}; free some space, or name a folder elsewhere"
+            ) from error
+
+
+def versions() -> dict[str, Any]:
+    """Give time, versions and machine of a run."""
+    found: dict[str, str | None] = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = None
+    return {
+        "begun": datetime.now(UTC).isoformat(timespec="seconds"),
+        "mgdd": _core.__version__,
+        "python": platform.python_version(),
+        "packages": found,
+        "system": platform.platform(),
+        "arguments": sys.argv[1:],
+    }
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import signal
 import subprocess
 import sys
@@ -18,9 +19,13 @@ from typing import Any
 from mgdd.errors import ParameterError, RigError
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import NumbersResult
+from mgdd.rig.can.can_rig import CanRig
+from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import check_experiment
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.stand import own_node
+from mgdd.rig.experiment.run import run_experiment
+from mgdd.rig.experiment.stand import Cycle, own_node
 from mgdd.rig.experiment.tasks import throttle_named
 
 WAYS_TO_DIE = ("exception", "nan", "sigint", "sigterm", "sigkill", "hang")
@@ -38,6 +43,24 @@ mode = "hil"
 [bus]
 pace = "real_time"
 """
+_DUTY, _OPEN_DEG, _SAMPLES = 0.3, 40.0, 8
+_PATIENCE_S = 2.0
+_HANGS_S = 60.0
+_HELD_DEG = 60.0
+_HELD = """
+kind = "experiment"
+format = 1
+task = "track"
+mode = "hil"
+[track]
+reference = "{reference}"
+controller = "pid"
+loop = "core"
+[bus]
+connection = "{connection}"
+pace = "real_time"
+"""
+_DIES = f"import sys; from {__name__} import die; die(*sys.argv[1:])"
 _SIGNALS = {"sigint": signal.SIGINT, "sigterm": signal.SIGTERM, "sigkill": signal.SIGKILL}
 
 
@@ -138,7 +161,7 @@ class _Host:
     def __init__(self, way: str, connection: str, loop: str) -> None:
         self.way = way
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "mgdd.rig.experiment.doomed", way, connection, loop],
+            [sys.executable, "-c", _DIES, way, connection, loop],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         )  # fmt: skip
 
@@ -173,3 +196,88 @@ class _Host:
             _, complaint = self._process.communicate()
             raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'it said nothing'}")
         return line
+
+
+def _drive_and_die(way: str, connection: str) -> None:
+    """Open the plate over a bus and die."""
+    transport = CanTransport.parse(connection)
+    _say("ready")
+    sys.stdin.readline()
+    with CanRig("etb", transport, mode="hil", timeout_s=_PATIENCE_S) as rig:
+        _hold_open(rig, _SAMPLES)
+        _say("open")
+        if way in ("sigint", "sigterm", "sigkill"):
+            _hold_open(rig, None)
+        _say(f"dying {time.monotonic_ns()}")
+        if way == "exception":
+            raise RuntimeError("a mistake in the experiment")
+        if way == "nan":
+            rig.apply({"duty": math.nan})
+        time.sleep(_HANGS_S)
+
+
+def _track_and_die(way: str, connection: str) -> None:
+    """Open the plate by an experiment on the real-time loop of the core, and die."""
+    with TemporaryDirectory(prefix="mgdd-doomed-") as folder:
+        file = Path(folder) / "held.csv"
+        sample_s = SignalMap.load("etb").cycle_s
+        rows = (f"{k * sample_s:.3f},{_HELD_DEG}" for k in range(round(_HANGS_S / sample_s)))
+        file.write_text("\n".join(["time_s,reference_deg", *rows]), encoding="utf-8")
+        text = _HELD.format(reference=file, connection=connection)
+        checked = check_experiment(Experiment.from_toml(text))
+    _say("ready")
+    sys.stdin.readline()
+    ends = time.monotonic() + _HANGS_S
+    while time.monotonic() < ends:
+        try:
+            run_experiment(checked, watch=_Doom(way))
+        except RigError:
+            continue  # a busy machine
+        return  # Ctrl-C keeps what was done, and ends
+
+
+class _Doom:
+    """Says when the plate is open, and dies where the process is to die by itself."""
+
+    def __init__(self, way: str) -> None:
+        self._way, self._held = way, 0
+
+    def __call__(self, cycle: Cycle) -> None:
+        self._held = self._held + 1 if cycle.measured.values["sensed_angle_deg"] > _OPEN_DEG else 0
+        if self._held != _SAMPLES:
+            return
+        _say("open")
+        if self._way not in ("exception", "hang"):
+            return
+        _say(f"dying {time.monotonic_ns()}")
+        if self._way == "exception":
+            raise RuntimeError("a mistake in the experiment")
+        time.sleep(_HANGS_S)
+
+
+def _hold_open(rig: CanRig, samples: int | None) -> None:
+    """Hold the plate open for so many samples in a row; where a busy machine let the node time out, arm it again."""
+    held, ends = 0, time.monotonic() + _HANGS_S
+    while time.monotonic() < ends and (samples is None or held < samples):
+        try:
+            rig.apply({"duty": _DUTY})
+            angle = rig.measure().values["sensed_angle_deg"]
+        except RigError:
+            rig.arm()
+            held = 0
+        else:
+            held = held + 1 if angle > _OPEN_DEG else 0
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def die(way: str, connection: str, loop: str) -> None:
+    """Open a throttle over a bus and die, in the process that does.
+
+    It says ``ready``, waits for a line, says ``open`` when the plate is open, and ``dying`` with the monotonic time
+    [ns] where it dies by itself.
+    """
+    {"python": _drive_and_die, "core": _track_and_die}[loop](way, connection)

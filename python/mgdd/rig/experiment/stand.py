@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from types import TracebackType
+from typing import Any, NamedTuple, Self
 
 from mgdd.errors import RigError
 from mgdd.loop import Measurement, Plant
@@ -17,17 +19,61 @@ from mgdd.optimize import Limit
 from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import AroundPlant, SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.replay_bus import RecordedBus
-from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.can.transport import Bus, CanTransport
 from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
-from mgdd.rig.experiment.run_folder import RunRecord
 from mgdd.rig.experiment.tasks import SeekPlan, compared
-from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
-from mgdd.rig.safety import SafetyGate, said_of
+from mgdd.rig.safety import GatedThrottle, SafetyGate, said_of
+
+_TABLE = "rig"  # where `RigRecord.read` looks for exchanges
+
+
+class RunRecord:
+    """Takes what happens in a run: to a file, if there is one, and to a list of events."""
+
+    def __init__(self, file: Path | None, checked: CheckedExperiment) -> None:
+        self.events: list[str] = []
+        self.began = False
+        header = {"experiment": checked.experiment.to_toml(), **checked.to_dict()}
+        self.recorder = None if file is None else Recorder(file, config=header)
+        self._names: tuple[str, ...] = ()
+        self._missed: set[str] = set()
+
+    def row(self, row: Mapping[str, float]) -> None:
+        """Append an exchange; the first one says the names, what a later one lacks is NaN."""
+        if self.recorder is None:
+            return
+        if not self._names:
+            # What a rig applied may be missing at first: it has its place from the start.
+            late = [name.replace("input.", "applied.", 1) for name in row if name.startswith("input.")]
+            self._names = tuple(dict.fromkeys((*row, *late)))
+        new = sorted(set(row).difference(self._names, self._missed))
+        if new:
+            self._missed.update(new)
+            self.say([f"record: {', '.join(new)} came after the first cycle and has no column"])
+        self.recorder.sample(_TABLE, {name: row.get(name, math.nan) for name in self._names})
+
+    def say(self, events: Iterable[str]) -> None:
+        """Append events."""
+        for event in events:
+            self.events.append(event)
+            if self.recorder is not None:
+                category, _, text = event.partition(": ")
+                self.recorder.event(category, text)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None:
+        if self.recorder is not None:
+            self.began = self.recorder.written > 0
+            self.recorder.__exit__(kind, error, trace)
+
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 

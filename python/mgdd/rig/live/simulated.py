@@ -15,7 +15,7 @@ from mgdd._core.rig import Frame, RingTransport, SignalLayout
 from mgdd.loop import VirtualThrottle
 from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig.can.node import parent_watch
-from mgdd.rig.can.signals import noted_signals
+from mgdd.rig.can.processes import noted_signals
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorder import Recorder
