@@ -8,8 +8,7 @@ core, with its frames, messages and transports, is in `mgdd.rig.realtime`.
 from __future__ import annotations
 
 from mgdd._rooms import furnish as _furnish
-from mgdd.rig.actuator_guard import ActuatorGuard
-from mgdd.rig.base import SimulatedRig
+from mgdd.rig.base import ActuatorGuard, SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap

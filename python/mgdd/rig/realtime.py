@@ -310,12 +310,9 @@ class RealtimeLoop:
     def samples(self) -> xr.Dataset:
         """Take the samples of all cycles since the last call.
 
-        Returns
-        -------
-        xarray.Dataset
-            Along ``time_s``, that of the deadlines from the first sample ever taken: reference, measured numbers (the
-            last good ones), duty asked and duty sent, mode, cause, lateness, compute time and age. What is unknown is
-            NaN. What was not taken in time is missing here and counted in ``report()["dropped_samples"]``.
+        Along ``time_s``, that of the deadlines from the first sample ever taken: reference, measured numbers (the last
+        good ones), duty asked and duty sent, mode, cause, lateness, compute time and age; NaN where unknown. What was
+        not taken in time is counted in ``report()["dropped_samples"]``.
         """
         columns = self.sample_columns()
         if self._origin_ns is None and columns["deadline_ns"].size:
@@ -337,13 +334,10 @@ class RealtimeLoop:
     def report(self) -> dict[str, Any]:
         """Give the account of the loop so far.
 
-        Returns
-        -------
-        dict
-            ``cycles``, ``missed`` deadlines, those of them that ran but ended ``late``, the ``longest_row``;
-            ``lateness_us``, ``compute_us``, ``age_us`` and ``send_us`` with ``count mean p50 p99 p99_9 max`` (quantiles
-            are never too small and at most a third too large; the largest is exact); ``frames`` by verdict, ``bus`` as
-            the transport counts, dropped samples and events, and what the system granted in ``schedule``.
+        ``cycles``, ``missed`` deadlines, those of them that ran but ended ``late``, the ``longest_row``;
+        ``lateness_us``, ``compute_us``, ``age_us`` and ``send_us`` with ``count mean p50 p99 p99_9 max`` (quantiles are
+        never too small and at most a third too large; the largest is exact); ``frames`` by verdict, ``bus`` as the
+        transport counts, dropped samples and events, and what the system granted in ``schedule``.
         """
         return dict(self._core.report())
 

@@ -24,28 +24,11 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
 
     @classmethod
     def load(cls, name: str | os.PathLike[str]) -> SafetyEnvelope:
-        """Read an envelope: a shipped one by its name, or a file.
+        """Read an envelope by its shipped name or the path of a file that `to_toml` wrote.
 
-        Parameters
-        ----------
-        name : str or path
-            ``"etb"`` for the host of a throttle, ``"etb_node"`` for the node that drives its bridge, or the path of a
-            file that `to_toml` wrote.
-
-        Raises
-        ------
-        FileNotFoundError
-            No such file.
-        mgdd.errors.DataError
-            Neither a shipped name nor a file of this kind, a missing key.
-        mgdd.errors.ParameterError
-            An unknown key, another unit, a value outside its domain.
-
-        Examples
-        --------
-        >>> from mgdd.rig import SafetyEnvelope
-        >>> SafetyEnvelope.load("etb") == SafetyEnvelope()
-        True
+        ``"etb"`` is for the host of a throttle, ``"etb_node"`` for the node that drives its bridge. FileNotFoundError;
+        `mgdd.errors.DataError` for neither a shipped name nor a file of this kind, and a missing key;
+        `mgdd.errors.ParameterError` for an unknown key, another unit, a value outside its domain.
         """
         text = os.fspath(name)
         if "." in text or os.sep in text:

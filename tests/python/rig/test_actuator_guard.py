@@ -15,7 +15,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit, Spsa
 from mgdd.rig import ActuatorGuard, SimulatedRig
-from mgdd.rig.actuator_guard import GuardedAsk
+from mgdd.rig.base import GuardedAsk
 
 START = {"soc_cad": 2.0, "rail_bar": 600.0}
 BOUNDS = {"soc_cad": (-12.0, 10.0), "rail_bar": (300.0, 1400.0)}

@@ -18,8 +18,8 @@ from mgdd.control import Pid
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import Experiment, SafetyEnvelope, SignalMap, read_record, run_experiment
-from mgdd.rig.can.loop_map import LOOP_NAMES, loop_messages
 from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.signal_map import LOOP_NAMES, loop_messages
 from mgdd.rig.can.transport import changed
 from mgdd.rig.experiment import check_experiment, core_track
 from mgdd.rig.experiment.core_samples import RUN, LoopSamples

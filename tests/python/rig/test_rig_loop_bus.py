@@ -11,8 +11,8 @@ import pytest
 
 from mgdd.errors import RigError
 from mgdd.rig import Recorder, SignalMap, read_record
-from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.replay_bus import RecordedBus
+from mgdd.rig.can.signal_map import loop_messages
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment import core_track
 from mgdd.rig.experiment.core_track import SocketBus, WatchedBus

@@ -13,8 +13,7 @@ from mgdd.loop import Plant, VirtualEngine, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.results.describe import described
 from mgdd.rig.can.can_rig import BUS_MODES
-from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.signal_map import SignalMap, loop_messages
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import (

@@ -13,7 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError
 from mgdd.loop import Measurement
-from mgdd.rig.can.loop_map import LOOP_NAMES
+from mgdd.rig.can.signal_map import LOOP_NAMES
 from mgdd.rig.exchange import Exchange, flat
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.stand import Cycle, RunRecord

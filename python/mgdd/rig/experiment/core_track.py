@@ -16,10 +16,9 @@ from mgdd._core.rig import Frame, RingTransport, SocketCanTransport
 from mgdd.errors import RigError
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.processes import held_back
 from mgdd.rig.can.replay_bus import RecordedBus
-from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.signal_map import SignalMap, loop_messages
 from mgdd.rig.can.transport import Bus, changed, two_senders
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.core_samples import LoopSamples

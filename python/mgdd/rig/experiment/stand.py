@@ -16,8 +16,7 @@ from typing import Any, NamedTuple, Self
 from mgdd.errors import RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.optimize import Limit
-from mgdd.rig.actuator_guard import ActuatorGuard
-from mgdd.rig.base import AroundPlant, SimulatedRig
+from mgdd.rig.base import ActuatorGuard, AroundPlant, SimulatedRig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.replay_bus import RecordedBus
