@@ -45,6 +45,15 @@ def read_points(
 
     Only columns in `names` need a number in every row, or those in `always` where all are wanted. The unit is that of
     the units row, of the brackets behind a name, or of the ending of the name.
+
+    Parameters
+    ----------
+    path, names, always
+        The file; columns that are wanted, all if left out; columns that must hold numbers in any case.
+    delimiter : str, optional
+        Column separator of a CSV file; found in it if left out.
+    decimal : {".", ","}
+        Decimal mark of a CSV file.
     """
     ending = Path(path).suffix.lower()
     if ending == ".csv":

@@ -88,9 +88,16 @@ class _Client(asyncio.Protocol):
 
 
 class Hub:
-    """A hub for processes of this machine; the bus is as slow as a bit rate [bit/s] says.
+    """A hub for processes of this machine.
 
     A frame is stamped with its arrival: what waited while the hub was stopped is as old as that.
+
+    Parameters
+    ----------
+    host, port, faults, seed
+        Address to listen at, 0 for a free port; what goes wrong on the bus, and the seed of its noise.
+    bit_rate : float, optional
+        Bits per second of the simulated bus; without limit if left out.
     """
 
     def __init__(

@@ -144,9 +144,16 @@ def run_node(
 ) -> None:
     """Serve an open bus until `keep_on`, asked once per sample and every 0.1 s of waiting, says no.
 
-    With `step` every complete command brings one sample and time stands still between, else the node has its own clock
-    of `period_s`, the cycle of the trigger message if left out. However it ends, by an error too, the bridge of a
-    driven plant is opened first, and that is reported and logged.
+    However it ends, by an error too, the bridge of a driven plant is opened first, and that is reported and logged.
+
+    Parameters
+    ----------
+    core, bus, log, keep_on
+        The node, its bus, and where every sample is written.
+    step : bool
+        Every complete command brings one sample, and time stands still between; else the node has its own clock.
+    period_s : float, optional
+        Time between two samples [s]; the cycle of the trigger message if left out.
     """
     try:
         if step:

@@ -150,8 +150,16 @@ class Experiment:
     ) -> Self:
         """Give the same experiment in another mode; ParameterError where there is no such mode or pace.
 
-        The record to replay, the connection of the bus, as ``socketcan:can0``, and its pace, ``step`` or ``real_time``,
-        are as they are if left out.
+        Parameters
+        ----------
+        mode : {"simulate", "hil", "dry_run", "replay", "bench"}
+            The mode.
+        record : path-like, optional
+            The record to replay; as it is if left out.
+        connection : str, optional
+            The bus, as ``socketcan:can0``; as it is if left out.
+        pace : {"step", "real_time"}, optional
+            Of the bus; as it is if left out.
         """
         for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
             if value not in among:
