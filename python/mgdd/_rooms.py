@@ -18,7 +18,11 @@ from mgdd.errors import Error, did_you_mean
 
 # Settings that an argument of this name has, and how they are given.
 _RECORDS = {
-    "cylinder": ("engine", "Cylinder", "cylinder=mgdd.presets.load('puma_single').cylinder.replace({}=...)"),
+    "cylinder": (
+        "engine",
+        "Cylinder",
+        "cylinder=preset.cylinder.replace({}=...), point=preset.point of preset = mgdd.presets.load('puma_single')",
+    ),
     "point": ("engine", "OperatingPoint", "point={{'{}': ...}}"),
     "throttle": ("throttle", "Throttle", "throttle=mgdd.presets.load('P1').throttle.replace({}=...)"),
 }

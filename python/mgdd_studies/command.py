@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> None:
         emit(args, {"studies": [{"name": name, "title": title} for name, title in titles.items()]}, text=text)
         return
     if args.name not in titles:
-        raise ParameterError.of("study", args.name or "", "one of those that --list prints", known=titles)
+        raise ParameterError.of("study", args.name or "", "one of those that `mgdd study --list` prints", known=titles)
     options: dict[str, Any] = {}
     for option, studies in _OPTIONS.items():
         if args.name not in studies:

@@ -37,7 +37,7 @@ def test_list(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("argv", [["no-such-study"], ["no-such-study", "--json"], []])
 def test_an_unknown_name_says_where_the_known_ones_are(capsys: pytest.CaptureFixture[str], argv: list[str]) -> None:
     out, err = run(capsys, *argv, code=2)
-    assert "must be one of those that --list prints" in err
+    assert "must be one of those that `mgdd study --list` prints" in err
     if "--json" in argv:
         error = json.loads(out)["error"]
         assert error["type"] == "ParameterError"

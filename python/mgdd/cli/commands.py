@@ -169,7 +169,7 @@ _ALSO = {
 _OPTIONS = {
     "--method": "--seeker", "--optimizer": "--seeker", "--algorithm": "--seeker", "--bounds": "--input",
     "--x0": "--start", "--iterations": "--cycles", "--options": "--seeker-set", "--constraint": "--limit",
-    "--engine": "--preset", "--format": "--output", "--out": "--output", "--plot": "--figure", "--silent": "--quiet",
+    "--engine": "--preset", "--format": "--output", "--plot": "--figure", "--silent": "--quiet",
     "--rpm": "--speed-rpm", "--unit": "--pressure-unit", "--grid": "--over", "--param": "--set", "--dir": "--folder",
 }
 # fmt: on
@@ -272,6 +272,7 @@ def _fill(parser: Parser, name: str) -> None:
         return
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
     parser.add_argument("-o", "--output", metavar="FILE", help=f"write the result to FILE ({command.endings})")
+    parser.add_argument("--out", dest="output", help=argparse.SUPPRESS)  # else it is one with --outputs
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
     add, run = importlib.import_module(f"mgdd.cli.{command.module}").COMMANDS[name.rpartition(" ")[2]]
     parser.set_defaults(run=run, endings=tuple(re.findall(r"\.[a-z]+", command.endings)))
@@ -283,7 +284,7 @@ def understood(words: Sequence[str], parser: Parser) -> list[str]:
     """Give the words as the parser takes them: `help` behind, options of every command too, a verb with its group."""
     rest, front, named = list(words), list[str](), list[str]()
     while rest and len(named) < 2:
-        if rest[0] in ("-o", "--output"):
+        if rest[0] in ("-o", "--output", "--out"):
             front, rest = front + rest[:2], rest[2:]
         elif rest[0] in ("--json", "--quiet"):
             front.append(rest.pop(0))

@@ -62,6 +62,11 @@ def map_in(args: argparse.Namespace, file: str) -> CalibrationMap:
 
 def grid_table(file: str) -> xr.Dataset:
     """Read a table over a grid of inputs."""
+    if file.endswith(".csv"):
+        raise DataError(
+            f"{file}: a map is made of a table over a grid, which a CSV file does not keep: write it as netCDF, "
+            "mgdd engine sweep or mgdd map predict with -o FILE.nc"
+        )
     data = read_netcdf(file)
     if POINT in data.dims:
         raise DataError(

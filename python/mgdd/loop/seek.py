@@ -276,7 +276,8 @@ def _require_measured(plant: Plant, names: Sequence[str], limits: Sequence[str])
             have = ", ".join(plant.limit_names) or "none"
             raise ParameterError(
                 hinted(
-                    f"{argument('limits')}: {name!r} is not measured by the plant, which has {have}",
+                    f"{argument('limits')}: {name!r} is not measured by the plant, which has {have}: a VirtualEngine "
+                    "measures what its own limits name, a function what it returns beside J",
                     name,
                     plant.limit_names,
                 )

@@ -165,7 +165,7 @@ def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) ->
             text = f"the best {one.name} lies at its {side} bound, {getattr(one, side):.6g}"
             yield Finding("at_bound", (one.name,), text, "widen it where the plant allows that")
     if gain.value <= _SURE * gain.sd:
-        text = f"J is better than at the start by {gain.value:.3g} ± {gain.sd:.2g}, which the noise may be"
+        text = f"the gain of J over the start, {gain.value:.3g} ± {gain.sd:.2g}, may be noise"
         yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
 
 

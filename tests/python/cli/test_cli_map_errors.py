@@ -136,7 +136,7 @@ optimize table.nc BEST --max-loss 0 -> max_loss = 0: must be > 0, in the unit of
 optimize table.nc BEST --sd nox_ppm=1 -> 'nox_ppm' is neither the objective nor limited
 optimize table.nc BEST --sd efficiency_gross=-1 -> sd = -1: must be a number >= 0
 optimize hdf.nc BEST -> only the classic format is read
-optimize bench.csv BEST -> not a netCDF file: it begins with b'speed_rp'; a text table ends in .csv
+optimize bench.csv BEST -> a map is made of a table over a grid, which a CSV file does not keep: write it as netCDF
 optimize tables.nc BEST -> did you mean 'table.nc'?
 optimize table.nc BEST -o best.toml -> the ending must be one of .csv, .json, .nc, .dcm
 optimize table.nc BEST --limit p_max_bar=110 --infeasible keep -o b.dcm -> smooth the map with --fill
