@@ -39,6 +39,18 @@ TEST(Sensors, AFaultThatEndsLeavesAWholeSensor) {
   EXPECT_THROW(validate(backwards), mgdd::ParameterError);
 }
 
+TEST(Sensors, ShortFailureIsForgotten) {
+  SensorSampler sampler(SensorPair{}, sample_s, 1, healthy);
+  for (int k = 0; k < 1800; ++k) {  // 199 samples out of range, then twice as many within
+    EXPECT_FALSE(sampler.step(k % 600 < 199 ? -20.0 : 30.0).fault) << k;
+  }
+  SensorReading r;
+  for (int k = 0; k < 200; ++k)
+    r = sampler.step(-20.0);
+  EXPECT_TRUE(r.fault);
+  EXPECT_TRUE(sampler.step(30.0).fault);  // latched
+}
+
 TEST(Sensors, StepAllocatesNothing) {
   SensorSampler sampler(SensorPair{}, sample_s, 5, first(SensorFaultKind::stuck));
   static_assert(noexcept(sampler.step(0.0)));

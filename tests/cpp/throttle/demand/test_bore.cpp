@@ -71,6 +71,12 @@ TEST(Bore, AreaIsMonotoneContinuousAndStartsAtTheLeak) {
   EXPECT_LT(last, wide - 0.9 * 8e-3 * 60e-3);  // the shaft stays
 }
 
+TEST(Bore, AnglesBeyondTheTravelAreCut) {
+  const PlateOpening plate(ThrottleBore{});
+  EXPECT_EQ(plate.area_m2(-5.0 * deg), plate.area_m2(0.0));
+  EXPECT_EQ(plate.effective_m2(130.0 * deg), plate.effective_m2(90.0 * deg));
+}
+
 TEST(Bore, DischargeIsConstantBelowFiveDegAndLinearBetweenItsKnots) {
   const PlateOpening plate(ThrottleBore{});
   EXPECT_EQ(plate.discharge(0.0), 0.65);
