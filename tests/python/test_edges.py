@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import threading
-import time
 
 import numpy as np
 import pytest
 
-from mgdd import _core, datasets, io, presets
+from mgdd import datasets, io, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, find_optimum, sensitivities, simulate
 from mgdd.engine.cycle import convergence
 from mgdd.errors import ConvergenceError, DataError, ParameterError, ShapeError
@@ -107,24 +105,6 @@ def test_limits_of_several_kinds() -> None:
     assert math.isfinite(late["soc_cad"])
 
 
-def test_gil_is_free_while_the_core_computes() -> None:
-    ticks, stop = [], threading.Event()
-
-    def tick() -> None:
-        while not stop.is_set():
-            ticks.append(time.perf_counter())
-            time.sleep(1e-4)
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    began = time.perf_counter()
-    sensitivities(Cylinder(), POINT, wrt=_core.engine.differentiable_inputs()[:12], step_cad=0.005)
-    ended = time.perf_counter()
-    stop.set()
-    thread.join()
-    assert sum(began < t < ended for t in ticks) >= 5
-
-
 def test_profile_follows_the_fit_and_never_invents_its_range() -> None:
     trace = datasets.read("hd_diesel_128x144")[1:2]
     fit = fit_cylinder(trace, HD, free=["soc_cad", "burn_duration_cad", "fuel_heat_j", "wiebe_m", "wall_heat_scale"])
@@ -172,15 +152,6 @@ def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
     )
     fit = fit_cylinder([shifted], HD)
     assert any(found.code == "doubtful_trace" and "TDC" in found.text for found in fit.findings)
-
-
-def test_a_spike_is_told() -> None:
-    whole = datasets.read("hd_diesel_128x144")[1]
-    pressure = whole["pressure_bar"].values.copy()
-    assert analyze(whole, HD).attrs["warnings"] == ""
-    pressure[100] += 90.0
-    spiked = io.pressure_trace(whole["crank_angle_cad"].values, pressure, name="spiked")
-    assert "spike" in analyze(spiked, HD).attrs["warnings"]
 
 
 def test_best_timing_refuses_a_wrong_limit_before_any_fit() -> None:

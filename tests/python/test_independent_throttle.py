@@ -40,32 +40,6 @@ def test_it_shares_no_code_with_the_package(module: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_below_breakaway_the_plate_stays_and_above_it_leaves(family: str) -> None:
-    body = KINDS[family]
-    for angle_deg, side in ((41.0, 1.0), (3.0, -1.0)):
-        spring, preload = (
-            (body.spring_above, body.preload_above) if side > 0 else (body.spring_below, body.preload_below)
-        )
-        x = math.radians(angle_deg - body.limp_home_deg)
-        hold = (spring * x + side * preload) / body.stall_nm
-        reach = max(body.static_nm, body.coulomb_nm) / body.stall_nm
-        for way in (-1.0, 1.0):
-            still = Bench(body, angle_deg=angle_deg, duty=hold)
-            share = 0.8 if family == "lugre" else 0.97
-            run(still, [hold + s * way * reach for s in (*np.linspace(0.0, share, 300), *[share] * 200)])
-            # Bristles under a share s of their level have let the plate creep by -ln(1 - s) of their deflection; a gap
-            # leaves the plate its own share of the friction.
-            bent = -math.degrees(body.static_nm / body.bristle_nm_per_rad) * math.log(1.0 - share)
-            slack = {"lugre": 1.05 * bent, "backlash": 0.5}.get(family, 0.0)
-            assert abs(still.angle_deg - angle_deg) <= slack + 1e-12, (angle_deg, way)
-            if family == "lugre":
-                assert abs(still.angle_deg - angle_deg) >= 0.9 * bent, (angle_deg, way)
-            away = Bench(body, angle_deg=angle_deg, duty=hold)
-            run(away, [hold + 1.05 * way * reach] * 400)
-            assert way * (away.angle_deg - angle_deg) > 1.0, (angle_deg, way)
-
-
-@pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize(("angle_deg", "speed"), [(70.0, 20.0), (2.0, 15.0), (12.0, -25.0)])
 def test_energy_never_rises_without_input(family: str, angle_deg: float, speed: float) -> None:
     bench = Bench(KINDS[family], angle_deg=angle_deg, speed_rad_per_s=speed)
@@ -104,40 +78,6 @@ def test_the_delay_is_exact(family: str, delay: int) -> None:
     assert np.ptp(prompt) > 10.0
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_without_duty_the_plate_comes_to_rest_at_limp_home(family: str) -> None:
-    body = KINDS[family]
-    for angle_deg in (1.0, 33.0, 84.0):
-        bench = Bench(body, angle_deg=angle_deg)
-        run(bench, [0.0] * 1500)
-        # Friction holds it where the ramp's preload is below the breakaway level, a gap adds its width.
-        slack = body.ramp_deg * body.static_nm / min(body.preload_above, body.preload_below) + 2.0 * body.half_gap_deg
-        assert abs(bench.angle_deg - body.limp_home_deg) <= 1.02 * slack + 0.02, angle_deg
-
-
-def test_a_weak_preload_leaves_the_plate_on_the_edge_of_the_rest_band() -> None:
-    body = replace(BODY, spring_above=0.819, spring_below=0.819, preload_above=0.2, preload_below=0.2)
-    bench = Bench(body, angle_deg=26.0)
-    run(bench, [0.0] * 3000)
-    edge = math.degrees((body.coulomb_nm - 0.2) / 0.819)
-    assert bench.angle_deg - body.limp_home_deg == pytest.approx(edge, abs=0.02)
-
-
-def test_the_free_response_without_friction_is_that_of_second_order() -> None:
-    body = replace(
-        BODY, coulomb_nm=0.0, static_nm=0.0, preload_above=0.0, preload_below=0.0, spring_below=BODY.spring_above,
-        inductance_h=0.0,
-    )  # fmt: skip
-    bench = Bench(body, angle_deg=body.limp_home_deg + 1.8)
-    angle = run(bench, [0.0] * 3000)
-    b = body.viscous + body.motor_nm_per_a**2 / body.resistance_ohm
-    s1, s2 = np.roots([body.inertia_kgm2, b, body.spring_above])
-    t = 1e-3 * np.arange(1, 3001)
-    expected = body.limp_home_deg + 1.8 * (s2 * np.exp(s1 * t) - s1 * np.exp(s2 * t)) / (s2 - s1)
-    # The angle is read before the duty of its sample acts; without inductance the back-EMF is half a substep late.
-    np.testing.assert_allclose(angle[1:], expected[:-1], atol=5e-5)
-
-
 def test_the_current_follows_the_voltage_by_its_time_constant() -> None:
     bench = Bench(BODY, angle_deg=BODY.limp_home_deg)
     run(bench, [0.1] * 2)  # the plate stays: below breakaway
@@ -158,21 +98,6 @@ def test_the_motor_crosses_the_gap_before_the_plate_moves() -> None:
     while bench.lead_deg > -0.95 * body.half_gap_deg:
         bench.sample(-0.09)
         assert abs(bench.angle_deg - rest) < 1e-6, "the plate stays while the motor crosses"
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_mirrored_duty_gives_the_mirrored_angle_and_finer_steps_change_little(family: str) -> None:
-    half = 45.0
-    body = replace(
-        KINDS[family], limp_home_deg=half, spring_below=BODY.spring_above, preload_below=BODY.preload_above
-    )  # fmt: skip
-    duty = [0.31] * 120 + [-0.34] * 160 + [0.0] * 60
-    angle = run(Bench(body, angle_deg=half + 7.0), duty) - half
-    mirrored = run(Bench(body, angle_deg=half - 7.0), [-u for u in duty]) - half
-    np.testing.assert_allclose(mirrored, -angle, atol=1e-9)
-    fine = run(Bench(body, angle_deg=half + 7.0, substeps=80), duty) - half
-    assert np.max(np.abs(fine - angle)) < 0.03
-    assert np.ptp(angle) > 20.0
 
 
 def test_forty_bodies_are_the_same_ones_every_time_and_all_different() -> None:

@@ -2,7 +2,6 @@
 #include "mgdd/common/random.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -67,34 +66,6 @@ std::vector<double> draws(int n, std::uint64_t seed, std::uint64_t stream) {
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] = normal(seed, stream, i);
   return x;
-}
-
-TEST(Normal, HasTheMomentsOfItsLaw) {
-  constexpr int n = 400000;
-  std::array<double, 4> moment{};
-  for (const double x : draws(n, 11, 5)) {
-    double power = 1.0;
-    for (double& m : moment)
-      m += (power *= x) / n;
-  }
-  // Variances of the sample moments: 1, 2, 15, 96.
-  const double unit = 4.0 / std::sqrt(static_cast<double>(n));
-  EXPECT_NEAR(moment[0], 0.0, unit);
-  EXPECT_NEAR(moment[1], 1.0, unit * std::sqrt(2.0));
-  EXPECT_NEAR(moment[2], 0.0, unit * std::sqrt(15.0));
-  EXPECT_NEAR(moment[3], 3.0, unit * std::sqrt(96.0));
-}
-
-TEST(Normal, StaysWithinTheKolmogorovSmirnovDistance) {
-  constexpr int n = 100000;
-  std::vector<double> x = draws(n, 3, 1);
-  std::sort(x.begin(), x.end());
-  double distance = 0.0;
-  for (int i = 0; i < n; ++i) {
-    const double law = 0.5 * std::erfc(-x[static_cast<std::size_t>(i)] / std::sqrt(2.0));
-    distance = std::max({distance, std::abs(law - static_cast<double>(i) / n), std::abs(law - (i + 1.0) / n)});
-  }
-  EXPECT_LT(distance * std::sqrt(static_cast<double>(n)), 1.95);  // exceeded once in a thousand samples
 }
 
 double correlation(const std::vector<double>& a, const std::vector<double>& b, std::size_t shift) {

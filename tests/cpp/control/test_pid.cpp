@@ -3,9 +3,7 @@
 #include "mgdd/control/pid.hpp"
 
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -231,23 +229,6 @@ TEST(Pid, InputsThatAreNotFiniteRepeatTheLastOnes) {
   }
 }
 
-template <class T>
-void goes_on_bit_for_bit() {
-  BasicPid<T> first(lively()), second(lively());
-  for (int k = 0; k < 333; ++k)
-    (void)first.step(T(reference_of(k)), T(measurement_of(k)));
-  restore_state(second, save_state(first));
-  for (int k = 333; k < 900; ++k) {
-    EXPECT_EQ(first.step(T(reference_of(k)), T(measurement_of(k))),
-              second.step(T(reference_of(k)), T(measurement_of(k))));
-  }
-}
-
-TEST(Pid, GoesOnBitForBitAfterARestore) {
-  goes_on_bit_for_bit<double>();
-  goes_on_bit_for_bit<float>();
-}
-
 TEST(Pid, AStateThatTheSettingsDoNotAllowIsRefusedAndChangesNothing) {
   Pid pid(lively());
   (void)pid.step(40.0, 38.0);
@@ -275,27 +256,6 @@ TEST(Pid, NoAllocation) {
   pid.reset(3.0, 4.0, 0.1);
   pid.reset();
   EXPECT_EQ(counter.count(), 0u);
-}
-
-TEST(Pid, ARefusedSettingNamesItself) {
-  const auto refused = [](const std::string& field, const std::function<void(PidSettings&)>& change) {
-    PidSettings s = lively();
-    change(s);
-    try {
-      (void)Pid(s);
-      ADD_FAILURE() << field << " was taken";
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, field);
-    }
-  };
-  refused("sample_s", [](PidSettings& s) { s.sample_s = 0.0; });
-  refused("proportional_above_per_deg", [](PidSettings& s) { s.above.proportional_per_deg = -0.1; });
-  refused("integral_below_per_deg_s", [](PidSettings& s) { s.below.integral_per_deg_s = nan; });
-  refused("ramp_deg", [](PidSettings& s) { s.plate.spring.ramp_deg = 0.0; });
-  refused("kick_width_deg", [](PidSettings& s) { s.kick_width_deg = 0.0; });
-  refused("preload_below", [](PidSettings& s) { s.plate.spring.below.preload = 1.2; });
-  refused("lower", [](PidSettings& s) { s.duty.lower = 0.1; });
-  refused("upper", [](PidSettings& s) { s.duty.lower = s.duty.upper = 0.0; });
 }
 
 TEST(Pid, EveryNumberOfTheSettingsHasOneField) {

@@ -6,12 +6,10 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::control {
@@ -211,19 +209,6 @@ TEST_P(EveryLaw, FloatAgreesWithDouble) {
   }
 }
 
-TEST_P(EveryLaw, GoesOnBitForBitAfterARestoreAndAfterAResetFromTheStart) {
-  SlidingMode first(lively(GetParam())), second(lively(GetParam()));
-  for (int k = 0; k < 333; ++k)
-    (void)first.step(reference_of(k), measurement_of(k));
-  restore_state(second, save_state(first));
-  for (int k = 333; k < 900; ++k)
-    EXPECT_EQ(first.step(reference_of(k), measurement_of(k)), second.step(reference_of(k), measurement_of(k)));
-  first.reset();
-  SlidingMode fresh(lively(GetParam()));
-  for (int k = 0; k < 300; ++k)
-    EXPECT_EQ(first.step(reference_of(k), measurement_of(k)), fresh.step(reference_of(k), measurement_of(k)));
-}
-
 TEST_P(EveryLaw, NoAllocationAndFiniteWhateverComes) {
   SlidingMode controller(lively(GetParam()));
   BasicSlidingMode<float> narrow(lively(GetParam()));
@@ -240,28 +225,6 @@ TEST_P(EveryLaw, NoAllocationAndFiniteWhateverComes) {
 INSTANTIATE_TEST_SUITE_P(SlidingMode, EveryLaw,
                          testing::Values(ReachingLaw::boundary_layer, ReachingLaw::implicit,
                                          ReachingLaw::super_twisting));
-
-TEST(SlidingMode, ARefusedSettingNamesItself) {
-  const auto refused = [](const std::string& field, const std::function<void(SlidingModeSettings&)>& change) {
-    SlidingModeSettings s = lively(ReachingLaw::boundary_layer);
-    change(s);
-    try {
-      (void)SlidingMode(s);
-      ADD_FAILURE() << field << " was taken";
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, field);
-    }
-  };
-  refused("gain_deg_per_s2", [](SlidingModeSettings& s) { s.plate.gain_deg_per_s2 = 0.0; });
-  refused("bandwidth_per_s", [](SlidingModeSettings& s) { s.bandwidth_per_s = nan; });
-  refused("layer_deg", [](SlidingModeSettings& s) { s.layer_deg = 0.0; });
-  refused("switching", [](SlidingModeSettings& s) { s.switching = 1.2; });
-  refused("spring_below_per_deg", [](SlidingModeSettings& s) { s.plate.spring.below.per_deg = -1e-3; });
-  refused("upper", [](SlidingModeSettings& s) { s.duty.lower = s.duty.upper = 0.0; });
-  SlidingModeSettings implicit = lively(ReachingLaw::implicit);
-  implicit.layer_deg = 0.0;
-  EXPECT_NO_THROW((void)SlidingMode(implicit));
-}
 
 }  // namespace
 }  // namespace mgdd::control

@@ -110,31 +110,6 @@ TEST(Batch, LanesGiveTheCyclesOneByOneForEveryLaw) {
   }
 }
 
-TEST(Batch, SharedPointsGiveTheCyclesOneByOneToAMillionth) {
-  std::vector<double> rows;
-  for (const double speed : {900.0, 2600.0}) {
-    for (const double fuel : {6.0, 21.0, 55.0}) {
-      for (int i = 0; i < 83; ++i) {
-        for (const double x : {speed, fuel, -32.0 + 0.5 * i})
-          rows.push_back(x);
-      }
-    }
-  }
-  Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
-  for (const BurnShape shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
-      for (const double scale : {0.0, 0.5, 3.0}) {
-        table.cases.cylinder.burn.burn_shape = shape;
-        table.cases.cylinder.wall_heat.wall_heat_model = wall;
-        table.cases.cylinder.wall_heat.wall_heat_scale = scale;
-        EXPECT_EQ(form_of(table.cases, BatchForm::automatic), BatchForm::shared);
-        EXPECT_LT(difference(run(table.cases, BatchForm::shared), run(table.cases, BatchForm::single)), 1e-6)
-            << name_of(shape) << name_of(wall) << scale;
-      }
-    }
-  }
-}
-
 // Motored cycles have no pressure after a burn, weak ones too little of it: both run in lanes, to the last bit.
 TEST(Batch, CasesOutsideOfTheSharedTablesRunInLanes) {
   std::vector<double> rows;
@@ -195,34 +170,6 @@ TEST(Batch, ManyJobsOnTwoThreadsKeepTheirPlaces) {
   const auto ca50 = static_cast<std::size_t>(found - fields.begin());
   for (std::size_t row = 0; row < timings.size(); ++row)
     EXPECT_NEAR(columns[ca50][row] - timings[row], columns[ca50][0] - timings[0], 1e-9);
-}
-
-TEST(Batch, GeometryValvesAndOptionalInputsMayVaryToo) {
-  const std::vector<std::string> names{"compression_ratio", "ivc_cad", "trapped_mass_g", "burn_duration_cad", "gamma"};
-  Table table(names, {18.2, -140.0, 0.9, 30.0, 1.37,  //
-                      15.0, -140.0, 0.9, 41.5, 1.37,  //
-                      15.0, -121.7, 0.7, 22.0, 1.37,  //
-                      15.0, -121.7, 0.7, 22.0, 1.33});
-  const Columns lanes = run(table.cases, BatchForm::lanes);
-  EXPECT_LT(difference(lanes, run(table.cases, BatchForm::single)), 1e-10);
-  for (std::size_t row = 0; row < 4; ++row) {  // against a cycle of its own
-    Cylinder cylinder;
-    OperatingPoint point;
-    cylinder.geometry.compression_ratio = table.values[5 * row];
-    cylinder.geometry.ivc_cad = table.values[5 * row + 1];
-    cylinder.gas.gamma = table.values[5 * row + 4];
-    point.trapped_mass_g = table.values[5 * row + 2];
-    point.burn_duration_cad = table.values[5 * row + 3];
-    const CycleModel<double> model(cylinder, crank_grid(cylinder));
-    CycleWorkspace<double> work = model.make_workspace();
-    const Charge<double> charge = model.charge(point);
-    model.run(charge, -6.0, work);
-    const Indicators<double> one = model.indicators(charge, -6.0, work);
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-      const double expected = one.*indicator_fields<double>()[i].member;
-      EXPECT_NEAR(lanes[i][row], expected, 1e-10 * std::max(1.0, std::abs(expected)));
-    }
-  }
 }
 
 TEST(Batch, GammaOfTemperatureRunsOneByOne) {
@@ -289,23 +236,6 @@ TEST(Batch, DerivativesInLanesAreThoseOfOneCycle) {
     }
   }
   EXPECT_THROW(differentiate_batch(table.cases, {}, members, {"ivc_cad"}, {}), ParameterError);
-}
-
-TEST(Batch, AnUnphysicalCaseIsNanAloneAndCounted) {
-  Table table({"wall_heat_scale"}, {0.5, 30.0, 0.7});
-  table.cases.point.speed_rpm = 40.0;
-  for (const BatchForm form : {BatchForm::lanes, BatchForm::single}) {
-    BatchSettings settings;
-    settings.form = form;
-    std::size_t failed = 0;
-    const Columns columns = run(table.cases, settings, &failed);
-    EXPECT_EQ(failed, 1U);
-    for (const std::vector<double>& column : columns) {
-      EXPECT_TRUE(std::isfinite(column[0]));
-      EXPECT_TRUE(std::isnan(column[1]));
-      EXPECT_TRUE(std::isfinite(column[2]));
-    }
-  }
 }
 
 TEST(Batch, RefusesBeforeItWritesAndNamesTheCase) {

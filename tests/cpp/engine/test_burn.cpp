@@ -44,18 +44,6 @@ TEST(EngineBurn, AngleInvertsTheFraction) {
   }
 }
 
-TEST(EngineBurn, SlopeIntegratesToOne) {
-  for (const Cylinder& c : laws()) {
-    if (c.burn.wiebe_m < 0.0) continue;  // its slope is infinite at the start
-    const Burn<double> burn(c.burn, -6.3, 31.7);
-    double total = 0.0;
-    for (double a = -20.0; a < 60.0; a += 0.01) {
-      total += 0.01 * burn.slope_at(a + 0.005);
-    }
-    EXPECT_NEAR(total, 1.0, 1e-4);
-  }
-}
-
 TEST(EngineBurn, SlopeIsThatOfTheFraction) {
   Cylinder c;
   c.burn.wiebe_a = 5.3;
@@ -72,15 +60,6 @@ TEST(EngineBurn, SlopeIsThatOfTheFraction) {
       EXPECT_NEAR(burn.slope_at(a), difference, 1e-8) << static_cast<int>(shape) << " at " << a;
     }
   }
-}
-
-TEST(EngineBurn, TriangleByHand) {
-  const Burn<double> burn(Cylinder{}.burn, -6.0, 30.0);
-  EXPECT_NEAR(burn.angle_of(0.5) + 6.0, 15.0, 1e-12);
-  EXPECT_NEAR((burn.angle_of(0.9) - burn.angle_of(0.1)) / 30.0, 1.0 - 2.0 * std::sqrt(0.05), 1e-12);
-  EXPECT_NEAR(1.0 - 2.0 * std::sqrt(0.05), 0.5528, 5e-5);
-  EXPECT_NEAR(burn.angle_of(0.1) + 6.0, 0.2236 * 30.0, 2e-3);
-  EXPECT_NEAR(856.0 * burn.slope_at(9.0 - 1e-9), 57.07, 5e-3);  // 2 E / duration
 }
 
 TEST(EngineBurn, WiebeByHand) {
@@ -111,20 +90,6 @@ TEST(EngineBurn, DoubleWiebeIsTheWeightedSum) {
   c.burn.burn_shape = BurnShape::wiebe;
   const Burn<double> plain(c.burn, -6.0, 20.0);
   EXPECT_DOUBLE_EQ(one.fraction(3.3), plain.fraction(3.3));
-}
-
-TEST(EngineBurn, DurationLaw) {
-  const Cylinder c;
-  OperatingPoint p;
-  EXPECT_DOUBLE_EQ(burn_duration_cad(c.burn, p), 30.0);
-  p.fuel_mg = 40.0;
-  p.speed_rpm = 3000.0;
-  EXPECT_NEAR(burn_duration_cad(c.burn, p), 30.0 * std::pow(2.0, 0.9), 1e-12);
-  p.burn_duration_cad = 17.0;
-  EXPECT_EQ(burn_duration_cad(c.burn, p), 17.0);
-  p = {};
-  p.fuel_mg = 0.0;
-  EXPECT_EQ(burn_duration_cad(c.burn, p), 30.0);
 }
 
 }  // namespace

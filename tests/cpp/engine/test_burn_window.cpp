@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -47,36 +46,6 @@ TEST(EngineBurnWindow, FindsStartAndEndOfATriangle) {
       EXPECT_NEAR(b.start_cad, soc, 3.0) << soc;
       EXPECT_GT(b.start_cad, soc - 1.5) << soc;  // never long before it
       EXPECT_NEAR(b.end_cad, soc + 50.0, 8.0) << soc;
-    }
-  }
-}
-
-// The middle of the net heat with the cylinder's own gamma comes from the burn, wherever it lies.
-TEST(EngineBurnWindow, AnEarlyBurnKeepsItsMiddle) {
-  for (const double soc : {-40.0, -35.0, -12.0}) {
-    EngineCase c(
-        "burn_shape=wiebe wiebe_m=2 burn_duration_cad=55 compression_ratio=10.5 intake_pressure_kpa=80 "
-        "fuel_mg=25 step_cad=0.5 speed_rpm=2000");
-    c.soc_cad = soc;
-    const auto cycle = run(c);
-    OperatingPoint point = c.point;
-    point.trapped_mass_g = mass_of_gas_g(cycle.charge.gas_j_per_k);
-    TraceOptions o;
-    o.gamma_source = AnalysisGamma::cylinder;
-    o.fractions = BurnFractions::gross;
-    o.smoothing = Smoothing::none;
-    const auto a = analyze_trace(cycle.angles(), cycle.pressures_bar(), c.cylinder, point, o);
-    EXPECT_NEAR(a.ca50_cad, cycle.indicators.ca50_cad, 0.3) << soc;
-    EXPECT_TRUE(a.window_found);
-    EXPECT_LT(a.heat_from_cad, soc);
-    EXPECT_GT(a.heat_from_cad, soc - 7.0);
-    o.heat_from_cad = -10.0, o.heat_to_cad = 90.0;
-    const auto late = analyze_trace(cycle.angles(), cycle.pressures_bar(), c.cylinder, point, o);
-    if (soc < -30.0) {
-      EXPECT_GT(late.ca50_cad - a.ca50_cad, 5.0) << "what a window from -10 on makes of it";
-      EXPECT_TRUE(std::any_of(late.warnings.begin(), late.warnings.end(), [](const TraceWarning& w) {
-        return w.kind == "window" && w.text.find("before heat_from_cad = -10") != std::string::npos;
-      }));
     }
   }
 }

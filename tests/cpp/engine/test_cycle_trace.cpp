@@ -4,10 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <numeric>
-
-#include "mgdd/common/error.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -41,19 +38,6 @@ TEST(CycleTrace, AMotoredCycleBurnsNothing) {
   const CycleTrace t = trace_cycle({}, motored, -6.0, 1.0, Integrator::trapezoid);
   EXPECT_EQ(std::accumulate(t.burned_fraction.begin(), t.burned_fraction.end(), 0.0), 0.0);
   EXPECT_EQ(std::accumulate(t.heat_release_j_per_cad.begin(), t.heat_release_j_per_cad.end(), 0.0), 0.0);
-}
-
-TEST(CycleTrace, AScanIsItsCyclesOneByOne) {
-  const std::array<double, 3> timings{-12.0, -6.0, 2.0};
-  const auto rows = scan_timings({}, {}, timings, 1.0, Integrator::trapezoid);
-  ASSERT_EQ(rows.size(), timings.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const CycleTrace one = trace_cycle({}, {}, timings[i], 1.0, Integrator::trapezoid);
-    EXPECT_EQ(rows[i].p_max_bar, one.indicators.p_max_bar);
-    EXPECT_EQ(rows[i].imep_gross_bar, one.indicators.imep_gross_bar);
-  }
-  EXPECT_TRUE(scan_timings({}, {}, {}, 1.0, Integrator::trapezoid).empty());
-  EXPECT_THROW(scan_timings({}, {}, std::array{-6.0, 400.0}, 1.0, Integrator::trapezoid), ParameterError);
 }
 
 }  // namespace

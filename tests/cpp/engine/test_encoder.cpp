@@ -163,19 +163,6 @@ TEST(EngineEncoder, FalseAndLostPulsesOfTheIndexCostNoTurn) {
   EXPECT_LT(error_of(c, found).largest, fine_deg);
 }
 
-TEST(EngineEncoder, MiscountedTurnIsNamedAndTheNextOnesAreRight) {
-  Case c = record(60, 2, 12.0, hall);
-  for (std::size_t k = 0; k < c.time.size(); ++k) {
-    const double a = c.angle[k] - 2160.0;
-    if (a > 100.0 && a < 220.0) c.signal[k] = hall(std::fmod(a, 5.0) / 5.0);  // 24 edges instead of 20
-  }
-  const EncoderAngle found = angle_of(c, {.teeth = 60, .missing_teeth = 2});
-  ASSERT_EQ(found.slipped_deg.size(), 1u);
-  EXPECT_NEAR(found.slipped_deg[0].first, 1800.0, 1e-6);
-  EXPECT_NEAR(found.slipped_deg[0].second, 2160.0, 1e-6);
-  EXPECT_LT(error_of(c, found).largest, 0.2);  // a pitch beside the wrong ones
-}
-
 std::string refusal(const Case& c, const EncoderOptions& o, bool with_index = false) {
   try {
     angle_of(c, o, with_index);
@@ -183,18 +170,6 @@ std::string refusal(const Case& c, const EncoderOptions& o, bool with_index = fa
     return error.what();
   }
   return "";
-}
-
-TEST(EngineEncoder, AnotherWheelIsRefusedByWhatItIs) {
-  EXPECT_NE(refusal(record(36, 1, 8.0, hall), {.teeth = 60, .missing_teeth = 2}).find("teeth = 36, missing_teeth = 1"),
-            std::string::npos);
-  EXPECT_NE(refusal(record(60, 2, 8.0, hall), {.teeth = 60, .missing_teeth = 1}).find("missing_teeth = 2"),
-            std::string::npos);
-  EXPECT_NE(refusal(record(60, 2, 8.0, hall), {.teeth = 58, .missing_teeth = 2}).find("teeth = 60"), std::string::npos);
-  EXPECT_NE(refusal(record(360, 0, 8.0, hall), {.teeth = 720}, true).find("usually 360 edges: say teeth = 360"),
-            std::string::npos);
-  EXPECT_NE(refusal(record(60, 0, 8.0, hall), {.teeth = 60, .missing_teeth = 2}).find("no gap in the teeth returns"),
-            std::string::npos);
 }
 
 TEST(EngineEncoder, BadInputIsRefusedByName) {

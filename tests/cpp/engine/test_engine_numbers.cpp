@@ -3,9 +3,7 @@
 
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -17,7 +15,6 @@
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "mgdd/engine/pressure/trace_check.hpp"
 #include "mgdd/engine/sensitivity.hpp"
-#include "support/names.hpp"
 #include "support/preset_file.hpp"
 
 namespace mgdd::engine {
@@ -49,61 +46,6 @@ TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
   EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
   EXPECT_FALSE(OperatingPoint{}.trapped_mass_g.has_value());
   EXPECT_FALSE(OperatingPoint{}.ivc_temperature_k.has_value());
-}
-
-TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
-  const TraceOptions o;
-  EXPECT_EQ(o.pegging, Pegging::none);
-  EXPECT_EQ(o.pegging_exponent, 1.35);
-  EXPECT_EQ(o.inlet_pressure_kpa, 0.0);
-  EXPECT_EQ(o.gamma_source, AnalysisGamma::constant);
-  EXPECT_EQ(o.gamma, 1.33);
-  EXPECT_EQ(o.gamma_compression, 1.37);
-  EXPECT_EQ(o.gamma_combustion, 1.30);
-  EXPECT_FALSE(o.heat_from_cad || o.heat_to_cad || o.earliest_burn_cad || o.burn_from_cad);
-  EXPECT_EQ(o.smoothing, Smoothing::automatic);
-  EXPECT_EQ(o.smoothing_width_cad, 4.0);
-  EXPECT_EQ(o.smoothing_cutoff_hz, 3000.0);
-  EXPECT_EQ(o.intake_factor, 1.5);
-  EXPECT_FALSE(o.intake_pressure_kpa || o.bmep_bar);
-  EXPECT_FALSE(o.total_at_end);
-  EXPECT_EQ(o.fractions, BurnFractions::net);
-  EXPECT_EQ(NoxProxy{}, (NoxProxy{1900.0, 1200.0, 16000.0}));
-  EXPECT_EQ(NoxModel{}, (NoxModel{NoxProxy{}, NoxMap::affine_log, 0.209, 3.0}));
-  EXPECT_EQ(SoftSensor{}, (SoftSensor{NoxModel{}, 0.01}));
-  EXPECT_EQ(PerformanceTerm{}, (PerformanceTerm{PerformanceSignal::efficiency_percent, 1.0, 1.0, std::nullopt}));
-}
-
-TEST(EngineNumbers, NamesOfTheOptions) {
-  test::expect_names<GammaModel>(
-      {{GammaModel::constant, "constant"}, {GammaModel::linear, "linear"}, {GammaModel::polynomial, "polynomial"}});
-  test::expect_names<BurnShape>(
-      {{BurnShape::triangle, "triangle"}, {BurnShape::wiebe, "wiebe"}, {BurnShape::double_wiebe, "double_wiebe"}});
-  test::expect_names<WallHeatModel>({{WallHeatModel::woschni, "woschni"},
-                                     {WallHeatModel::hohenberg, "hohenberg"},
-                                     {WallHeatModel::eichelberg, "eichelberg"}});
-  test::expect_names<IgnitionModel>({{IgnitionModel::watson, "watson"},
-                                     {IgnitionModel::wolfer, "wolfer"},
-                                     {IgnitionModel::hardenberg_hase, "hardenberg_hase"},
-                                     {IgnitionModel::polynomial, "polynomial"}});
-  test::expect_names<Integrator>({{Integrator::trapezoid, "trapezoid"},
-                                  {Integrator::split, "split"},
-                                  {Integrator::tan2018_lagged, "tan2018_lagged"},
-                                  {Integrator::euler, "euler"}});
-  test::expect_names<Pegging>({{Pegging::none, "none"},
-                               {Pegging::inlet, "inlet"},
-                               {Pegging::two_point, "two_point"},
-                               {Pegging::least_squares, "least_squares"}});
-  test::expect_names<AnalysisGamma>(
-      {{AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}});
-  test::expect_names<PerformanceSignal>({{PerformanceSignal::efficiency_percent, "efficiency_percent"},
-                                         {PerformanceSignal::imep_gross_bar, "imep_gross_bar"},
-                                         {PerformanceSignal::imep_closed_bar, "imep_closed_bar"},
-                                         {PerformanceSignal::nox_ppm, "nox_ppm"},
-                                         {PerformanceSignal::p_max_bar, "p_max_bar"},
-                                         {PerformanceSignal::dp_max_bar_per_cad, "dp_max_bar_per_cad"},
-                                         {PerformanceSignal::t_max_k, "t_max_k"}});
-  test::expect_names<NoxMap>({{NoxMap::affine_log, "affine_log"}, {NoxMap::arrhenius, "arrhenius"}});
 }
 
 // --- what is allowed ------------------------------------------------------------------------------------------

@@ -1,8 +1,6 @@
 // Slider-crank against dead centres, the vector form of the mechanism, and its own slope by quadrature.
 #include "mgdd/engine/geometry.hpp"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 namespace mgdd::engine {
@@ -14,21 +12,6 @@ TEST(EngineGeometry, DeadCentresAreExact) {
   EXPECT_NEAR(g.volume_m3(0.0), g.swept_m3 / 17.2, 1e-18);
   EXPECT_NEAR(g.volume_m3(180.0) / (g.swept_m3 * 18.2 / 17.2), 1.0, 1e-14);
   EXPECT_NEAR(g.volume_m3(180.0) / g.volume_m3(0.0), 18.2, 1e-12);
-}
-
-// Piston pin on the cylinder axis: its height is the crank pin's plus the leg of a right triangle.
-TEST(EngineGeometry, FollowsThePinOfTheMechanism) {
-  const Geometry<double> g{GeometryParameters<double>{}};
-  for (double angle = -180.0; angle <= 180.0; angle += 7.5) {
-    const double phi = angle * std::numbers::pi / 180.0;
-    const double pin = 0.043 * std::cos(phi) + std::sqrt(0.155 * 0.155 - std::pow(0.043 * std::sin(phi), 2));
-    const double travel = 0.155 + 0.043 - pin;
-    EXPECT_NEAR(g.volume_m3(angle), g.clearance_m3 + travel * g.piston_area_m2, 1e-16);
-    EXPECT_NEAR(g.volume_m3(angle), g.volume_m3(-angle), 1e-18);
-    const double area =
-        2.0 * g.piston_area_m2 + std::numbers::pi * 0.086 * (travel + g.clearance_m3 / g.piston_area_m2);
-    EXPECT_NEAR(g.wall_area_m2(g.volume_m3(angle)), area, 1e-12);
-  }
 }
 
 TEST(EngineGeometry, SlopeIntegratesToTheVolume) {

@@ -1,4 +1,4 @@
-// Parabola, ringing intensity and NOx maps against closed forms.
+// Parabola and ringing intensity against closed forms.
 #include "mgdd/engine/indicators.hpp"
 
 #include <array>
@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "mgdd/engine/emissions.hpp"
 #include "support/engine_case.hpp"
 
 namespace mgdd::engine {
@@ -45,19 +44,6 @@ TEST(EngineIndicators, RingingIntensityByHand) {
   const auto i = run(test_support::EngineCase()).indicators;
   const double expected = slope * slope / (2.0 * 1.37 * 107.1515e5) * std::sqrt(1.37 * 287.05 * 1958.72) * 1e-6;
   EXPECT_NEAR(i.ringing_intensity_mw_per_m2, expected, 1e-4 * expected);
-}
-
-TEST(EngineIndicators, BothNoxMapsAgreeInValueAndSlopeAtTheReference) {
-  const NoxProxy nox;
-  EXPECT_DOUBLE_EQ(nox.affine_log_ppm(1900.0), 1200.0);
-  EXPECT_DOUBLE_EQ(nox.arrhenius_ppm(1900.0), 1200.0);
-  const double slope = std::log(nox.affine_log_ppm(1901.0) / nox.affine_log_ppm(1900.0));
-  EXPECT_NEAR(slope, 4.4e-3, 0.05e-3);
-  EXPECT_NEAR(std::log(nox.arrhenius_ppm(1900.01) / nox.arrhenius_ppm(1899.99)) / 0.02, slope, 1e-7);
-  for (double t = 1600.0; t < 2400.0; t += 50.0) {
-    EXPECT_GT(nox.affine_log_ppm(t + 1.0), nox.affine_log_ppm(t));
-    EXPECT_GT(nox.arrhenius_ppm(t + 1.0), nox.arrhenius_ppm(t));
-  }
 }
 
 }  // namespace

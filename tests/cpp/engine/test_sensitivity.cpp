@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "mgdd/common/units.hpp"
 #include "support/engine_case.hpp"
 
@@ -97,42 +96,6 @@ TEST(EngineSensitivity, AgreesWithDifferencesForEveryIntegrator) {
   }
 }
 
-TEST(EngineSensitivity, TimingMovesTheBurnAndNothingBeforeIt) {
-  EngineCase c;
-  for (const auto shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    c.cylinder.burn.burn_shape = shape;
-    const Sensitivities s = sensitivities(c.cylinder, c.point, -6.3, {"soc_cad"});
-    EXPECT_NEAR(s.indicators[0].ca10_cad, 1.0, 1e-9);
-    EXPECT_NEAR(s.indicators[0].ca50_cad, 1.0, 1e-9);
-    EXPECT_NEAR(s.indicators[0].ca90_cad, 1.0, 1e-9);
-    for (std::size_t k = 0; s.angles_cad[k] < -6.3; ++k) {
-      EXPECT_EQ(s.pressure_bar(static_cast<Eigen::Index>(k), 0), 0.0);
-    }
-    EXPECT_LT(s.pressure_bar(140, 0), 0.0);  // a later burn lowers p at TDC
-  }
-}
-
-TEST(EngineSensitivity, FuelAndHeatingValueTradeExactly) {
-  EngineCase c("burn_duration_cad=30");
-  const Sensitivities s =
-      sensitivities(c.cylinder, c.point, -6.3, {"fuel_mg", "lower_heating_value_mj_per_kg", "wall_heat_scale"});
-  for (const auto& field : indicator_fields<double>()) {
-    const double by_fuel = 20.0 * (s.indicators[0].*(field.member));
-    EXPECT_NEAR(by_fuel, 42.8 * (s.indicators[1].*(field.member)), 1e-9 * (1.0 + std::abs(by_fuel)));
-  }
-  EXPECT_GT(s.indicators[2].heat_loss_j, 0.0);
-  EXPECT_LT(s.indicators[2].imep_closed_bar, 0.0);
-}
-
-// Without wall heat the pressure is homogeneous of degree one in intake pressure and fuel (Euler's theorem).
-TEST(EngineSensitivity, AdiabaticPressureIsHomogeneous) {
-  const EngineCase c("wall_heat_scale=0 burn_duration_cad=30");
-  const Sensitivities s = sensitivities(c.cylinder, c.point, -6.3, {"intake_pressure_kpa", "fuel_mg"});
-  EXPECT_NEAR(150.0 * s.indicators[0].imep_gross_bar + 20.0 * s.indicators[1].imep_gross_bar, s.value.imep_gross_bar,
-              1e-10);
-  EXPECT_NEAR(150.0 * s.indicators[0].t_max_k + 20.0 * s.indicators[1].t_max_k, 0.0, 1e-8);
-}
-
 // Naming an optional of the point holds it constant for all inputs, also for those of another pass.
 TEST(EngineSensitivity, NamesAreIndependentOfTheirCompany) {
   const EngineCase c;
@@ -147,46 +110,6 @@ TEST(EngineSensitivity, NamesAreIndependentOfTheirCompany) {
                 1e-9 * (1.0 + std::abs(all.indicators[i].imep_gross_bar)))
         << names[i];
   }
-}
-
-TEST(EngineSensitivity, UnknownInputIsRefusedByName) {
-  const EngineCase c;
-  for (const char* name : {"ivc_cad", "evo_cad", "burn_shape", "soc"}) {
-    try {
-      sensitivities(c.cylinder, c.point, -6.0, {"soc_cad", name});
-      FAIL() << name;
-    } catch (const ParameterError& error) {
-      EXPECT_NE(std::string(error.what()).find(name), std::string::npos);
-      EXPECT_NE(std::string(error.what()).find("wall_heat_scale"), std::string::npos);
-    }
-  }
-  EXPECT_EQ(input_unit("intake_pressure_kpa"), "kPa");
-  EXPECT_THROW(input_unit("evo_cad"), ParameterError);
-}
-
-// What a cycle refuses neither derivatives nor the estimate of convergence let pass.
-TEST(EngineSensitivity, InputsOfACycleAreChecked) {
-  const auto refused = [](const EngineCase& c, const std::string& part) {
-    const auto expect = [&](auto call) {
-      try {
-        call();
-        ADD_FAILURE() << part;
-      } catch (const ParameterError& error) {
-        EXPECT_EQ(std::string(error.what()).find(part), 0U) << error.what();
-      }
-    };
-    expect([&] { sensitivities(c.cylinder, c.point, c.soc_cad, {"fuel_mg"}); });
-    expect([&] { convergence(c.cylinder, c.point, c.soc_cad); });
-  };
-  EngineCase c;
-  c.soc_cad = 21.0;
-  refused(c, "soc_cad = 21");
-  c = {};
-  c.point.speed_rpm = 0.0;
-  refused(c, "speed_rpm = 0");
-  c = {};
-  c.cylinder.wall_heat.wall_heat_scale = -0.5;
-  refused(c, "wall_heat_scale = -0.5");
 }
 
 }  // namespace

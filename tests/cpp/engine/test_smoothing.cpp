@@ -11,7 +11,6 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/pressure/rise_rate.hpp"
-#include "support/engine_case.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -138,20 +137,6 @@ TEST(EngineRiseRate, IsTheSlopeOfTheLineOverTwoDegrees) {
     }
     EXPECT_NEAR(rise_of(x, bump), 1.5 * integral, 5e-3 * integral) << step;
   }
-}
-
-TEST(EngineRiseRate, HardlyDependsOnTheSamplingOfACycle) {
-  Column rates;
-  for (const char* step : {"0.1", "0.2", "0.5", "1"}) {
-    const auto cycle = run(test_support::EngineCase("burn_shape=wiebe burn_duration_cad=20 step_cad=0.1"));
-    const auto stride = static_cast<std::size_t>(std::lround(std::stod(step) / 0.1));
-    Column x, p;
-    for (std::size_t k = 0; k < cycle.angles().size(); k += stride)
-      x.push_back(cycle.angles()[k]), p.push_back(cycle.pressures_bar()[k]);
-    rates.push_back(rise_of(x, p));
-  }
-  for (const double r : rates)
-    EXPECT_NEAR(r / rates.front(), 1.0, 0.01);
 }
 
 }  // namespace

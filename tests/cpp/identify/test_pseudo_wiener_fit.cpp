@@ -12,9 +12,7 @@ namespace mgdd::identify {
 namespace {
 
 using test_support::Signal;
-using throttle::PwP;
 using throttle::PwR;
-using throttle::PwW;
 
 const std::array<double, 5> truth{0.0197, 83597.0, 0.1292, 4.96e-4, 0.0927};  // tau, G, beta, kappa, delta
 
@@ -47,18 +45,6 @@ Signal free_run(const P& p, const Signal& duty, double start_deg) {
 }
 Signal free_run(const throttle::PseudoWiener& p, const Signal& duty, double start_deg) {
   return std::visit([&](const auto& q) { return free_run(q, duty, start_deg); }, p);
-}
-
-TEST(PseudoWienerFit, RecoversEveryParameterOfItsOwnKindExactly) {
-  const Signal duty = test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0);
-  PseudoWienerFitOptions o = one_search();
-  o.search.cost_tolerance = 1e-14;
-  o.search.step_tolerance = 1e-13;
-  const auto fit = fit_pseudo_wiener({{duty, free_run(PwR{}, duty, 8.0)}}, far_start(), o);
-  for (int i = 0; i < 5; ++i) {
-    const double expected = truth[static_cast<std::size_t>(i)];
-    EXPECT_NEAR(fit.report.values[i], expected, 1e-6 * expected) << fit.report.names[static_cast<std::size_t>(i)];
-  }
 }
 
 TEST(PseudoWienerFit, StaysCloseBehindNoiseInductanceAndStribeckFriction) {
@@ -111,52 +97,6 @@ TEST(PseudoWienerFit, SidesAreFittedApartFromOneLog) {
   EXPECT_NEAR(found.below.preload_duty, 0.16, 3e-4);
   EXPECT_NEAR(found.below.spring_duty_per_deg, 3e-3, 3e-5);
   EXPECT_NEAR(found.above.preload_duty, 0.1292, 1e-4);
-}
-
-TEST(PseudoWienerFit, FindsTheDelayByTrying) {
-  PwR late;
-  late.frame.delay_samples = 2;
-  const Signal duty = test_support::chirp(0.15, 0.20, 0.5, 6.0, 4.0);
-  PseudoWienerFitOptions o = one_search();
-  o.delays = {0, 1, 2, 3};
-  const auto fit = fit_pseudo_wiener({{duty, free_run(late, duty, 8.0)}}, PwR{}, o);
-  EXPECT_EQ(throttle::frame_of(fit.model).delay_samples, 2);
-}
-
-// The table of the three kinds on one throttle. Training fits are those of the best of all starts.
-TEST(PseudoWienerFit, RanksTheKindsOnP1) {
-  const auto t = test_support::log_throttle();
-  const auto train = test_support::throttle_log(t, test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0), 0);
-  const auto chirp = test_support::throttle_log(t, test_support::chirp(0.15, 0.18, 0.3, 5.0, 12.0), 1);
-  const auto steps = test_support::throttle_log(t, test_support::golden_steps(12.0), 2);
-  struct Result {
-    double train, chirp, steps, ahead;
-  };
-  const auto judge = [&](const throttle::PseudoWiener& base, const PseudoWienerFitOptions& o) {
-    const auto fit = fit_pseudo_wiener({{train.duty, train.angle_deg}}, base, o);
-    const auto percent = [&](const auto& log) {
-      return test_support::fit_percent(log.angle_deg, free_run(fit.model, log.duty, log.angle_deg[0]));
-    };
-    return Result{percent(train), percent(chirp), percent(steps),
-                  test_support::ahead_rms(chirp, free_run(fit.model, chirp.duty, chirp.angle_deg[0]), 20)};
-  };
-  PseudoWienerFitOptions few;
-  few.starts = 6;
-  const Result r = judge(far_start(), one_search());
-  const Result w = judge(PwW{}, few);
-  const Result p = judge(PwP{}, few);
-  EXPECT_GE(r.train, 99.3);
-  EXPECT_GE(r.chirp, 99.0);
-  EXPECT_GE(r.steps, 96.0);
-  EXPECT_LE(r.ahead, 0.06);
-  EXPECT_GE(w.train, 79.7);
-  EXPECT_GE(p.train, 53.7);
-  EXPECT_LE(w.steps, 75.0);
-  EXPECT_LE(p.steps, 75.0);
-  const double persistence = test_support::ahead_rms(chirp, Signal(chirp.duty.size(), 0.0), 20);
-  EXPECT_NEAR(persistence, 1.548, 0.01);
-  EXPECT_LT(r.ahead, 0.25 * std::min(w.ahead, p.ahead));
-  EXPECT_LT(std::max(w.ahead, p.ahead), 0.75);  // corrected, both are good enough to guide
 }
 
 TEST(PseudoWienerFit, RefusesWhatCannotBeFittedAndSaysWhy) {

@@ -1,6 +1,5 @@
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -145,16 +144,6 @@ TEST(SmoothThrottle, FarStartsReachTheNoiseFloorAndLanesChangeNothing) {
   options.lanes = false;
   const auto alone = fit_smooth_throttle({}, log.record(), {starts[2]}, options);
   EXPECT_EQ(alone.reports[0].cost, fit.reports[2].cost);
-}
-
-TEST(SmoothThrottle, ALogAboveLimpHomeCannotTellThePreloadWidth) {
-  const Log log = make_log(6000, 0.15, 0.2, 45.0, 0.7);
-  const auto fit = fit_smooth_throttle({}, log.record(), {near_truth(7, 0.3), near_truth(8, 0.3)},
-                                       smooth_throttle_options(smooth_plant_example));
-  const optimize::FitReport& best = fit.reports[fit.best];
-  EXPECT_LT(best.rmse, 1.005 * log.noise_deg);
-  EXPECT_NE(std::ranges::find(best.unidentifiable, "preload_width_rad"), best.unidentifiable.end());
-  EXPECT_EQ(std::ranges::find(best.unidentifiable, "friction_width_rad_per_s"), best.unidentifiable.end());
 }
 
 TEST(SmoothThrottle, NamesWrongInputBeforeAnyWork) {

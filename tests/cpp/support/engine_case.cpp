@@ -140,18 +140,6 @@ double best_soc_cad(EngineCase c, std::string_view name) {
   return 0.5 * (low + high);
 }
 
-std::vector<GoldenRow> read_golden() {
-  std::vector<GoldenRow> rows;
-  for (const auto& cells : read_csv(MGDD_TEST_DATA_DIR "/engine_golden.csv")) {
-    if (cells.front() == "settings") continue;
-    const auto at = cells[1].find('@');
-    const double angle =
-        at == std::string::npos ? std::numeric_limits<double>::quiet_NaN() : std::stod(cells[1].substr(at + 1));
-    rows.push_back({cells[0], cells[1].substr(0, at), angle, std::stod(cells[2]), std::stod(cells[3])});
-  }
-  return rows;
-}
-
 std::vector<identify::MeasuredCycle> hd_traces(bool with_mass) {
   const std::string folder = MGDD_PACKAGE_DATA_DIR "/hd_diesel_128x144_";
   const auto conditions = read_csv(folder + "conditions.csv");

@@ -1,5 +1,4 @@
-// A cycle described by words ("fuel_mg=8 integrator=split"), the reference numbers that use them, and the measured
-// traces.
+// A cycle described by words ("fuel_mg=8 integrator=split"), and the measured traces.
 #pragma once
 
 #include <limits>
@@ -48,13 +47,6 @@ Cycle run(const EngineCase& c);
 double best_soc_cad(EngineCase c, std::string_view indicator);
 
 double indicator(const engine::Indicators<double>& of, std::string_view name);
-
-struct GoldenRow {
-  std::string settings, quantity;
-  double at;  ///< the number after @, NaN without one
-  double value, tolerance;
-};
-std::vector<GoldenRow> read_golden();
 
 /// The four measured heavy-duty traces that the package carries, and their engine with a Wiebe burn.
 std::vector<identify::MeasuredCycle> hd_traces(bool with_mass = true);

@@ -16,16 +16,6 @@ using test_support::stepped;
 constexpr Values<double, 9> slide{95.0, 200.0, -37.0, 20.0, 2.0, 0.03, -0.5, -0.02, 3.0};
 constexpr DriveAxis axis{35.0, 0.1};
 
-TEST(DriveAxis, StandsStillBelowStaticFrictionAndDoesNotCreep) {
-  Values<double, 3> state{0.1, 0.0, 0.0};
-  for (int k = 0; k < 1000; ++k)
-    state = stepped(axis, slide, state, 0.5, 1e-3);  // 17.5 N against 22 N
-  EXPECT_EQ(state[0], 0.1);
-  EXPECT_EQ(state[1], 0.0);
-  state = stepped(axis, slide, state, 0.65, 1e-3);  // 22.75 N, and the offset pushes
-  EXPECT_GT(state[1], 0.0);
-}
-
 TEST(DriveAxis, SteadySpeedBalancesTheForces) {
   Values<double, 9> p = slide;
   p[7] = p[8] = 0.0;

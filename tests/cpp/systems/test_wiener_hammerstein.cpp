@@ -71,24 +71,5 @@ TEST(WienerHammerstein, JacobianIsThatOfDifferences) {
   }
 }
 
-TEST(WienerHammerstein, FitFindsTheTruthAgain) {
-  const VectorXd u = signal(3000);
-  const VectorXd y = model.simulate(truth(), u);
-  VectorXd start = truth();
-  start.array() *= 1.0 + 0.03 * signal(start.size()).array();
-  const auto report = fit_wiener_hammerstein(model, start, u, y, 0, {});
-  EXPECT_LT(report.rmse, 1e-6);
-  EXPECT_LT((report.values - truth()).head(6).norm(), 1e-4);
-}
-
-TEST(WienerHammerstein, RefusesWhatItCannotUse) {
-  WienerHammerstein bad = model;
-  bad.n_curve = 3;
-  EXPECT_THROW(bad.validate(), ParameterError);
-  EXPECT_THROW((void)model.simulate(VectorXd::Zero(2), signal(10)), ShapeError);
-  EXPECT_THROW(WienerHammersteinResidual(model, signal(20), signal(20), 10), ShapeError);
-  EXPECT_NO_THROW(WienerHammersteinResidual(model, signal(40), signal(40), 10));
-}
-
 }  // namespace
 }  // namespace mgdd::systems

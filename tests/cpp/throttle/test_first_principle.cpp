@@ -7,7 +7,6 @@
 #include <cmath>
 #include <functional>
 #include <span>
-#include <string>
 #include <string_view>
 
 #include "mgdd/common/error.hpp"
@@ -142,41 +141,6 @@ TEST(FirstPrinciple, ADelayBetweenTwoSamplesIsTheMeanOfBoth) {
   EXPECT_GT(std::abs(one.back() - two.back()), 1e-3);
   for (std::size_t k = 0; k < duty.size(); ++k)
     ASSERT_NEAR(between[k], 0.5 * (one[k] + two[k]), 1e-11) << k;
-}
-
-TEST(FirstPrinciple, TheCurrentOfAStuckPlateRisesAsThatOfACoil) {
-  Groups groups = first_principle_of(asymmetric_throttle());
-  for (const int substeps : {1, 7}) {
-    for (const double lag_s : {3e-4, 1.1e-3, 0.02}) {
-      groups[lag] = lag_s;
-      FirstPrinciple options = options_of(asymmetric_throttle());
-      options.substeps = substeps;
-      const auto model = options.prepare<double>(groups, 1e-3);
-      auto state = model.at_rest(groups[home]);
-      const double held = 0.4 * groups[delta];
-      for (int k = 1; k <= 9; ++k) {
-        model.step(state, held);
-        ASSERT_NEAR(state.torque, held * -std::expm1(-1e-3 * k / lag_s), 1e-12) << lag_s << " at " << k;
-      }
-      EXPECT_EQ(state.speed_deg_per_s, 0.0);
-    }
-  }
-}
-
-// At constant acceleration the positions of a leapfrog are exact whatever the step.
-TEST(FirstPrinciple, ThePositionsOfAFreeFallAreExactAtAnyStep) {
-  const Groups groups{1e9, 5e3, 0.0, 0.0, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 10.0, 0.25, 0.0, 0.0, 0.5, 0.0};
-  FirstPrinciple options;
-  for (const int substeps : {1, 3}) {
-    options.substeps = substeps;
-    const auto model = options.prepare<double>(groups, 2e-3);
-    auto state = model.at_rest(20.0);
-    for (int k = 1; k <= 50; ++k) {
-      model.step(state, 0.3);
-      const double t = 2e-3 * k;
-      ASSERT_NEAR(state.angle_deg, 20.0 + 0.5 * 0.3 * 5e3 * t * t, 1e-6) << substeps;
-    }
-  }
 }
 
 // A stop yields by what presses on it over its stiffness, stores what it gives back, and never pulls.

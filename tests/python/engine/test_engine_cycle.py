@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import threading
-import time
 
 import numpy as np
 import pytest
@@ -253,25 +251,3 @@ def test_sweep_equals_single_cycles():
     assert float(many.nox_affine_log_ppm.sel(soc_cad=-20.0)) == pytest.approx(
         float(sweep.nox_affine_log_ppm.sel(soc_cad=-20.0)) * 500.0 / 1200.0, rel=1e-12
     )
-
-
-def test_a_scan_lets_other_threads_work():
-    timings_cad = np.full(100_000, -6.0)
-    done = threading.Event()
-    ticks = []
-
-    def scan():
-        _core.engine.scan(Cylinder(), OperatingPoint(), timings_cad, 1.0, "trapezoid")
-        done.set()
-
-    worker = threading.Thread(target=scan)
-    begin = time.perf_counter()
-    worker.start()
-    while not done.is_set() and time.perf_counter() - begin < 60.0:
-        ticks.append(time.perf_counter())
-        time.sleep(0.001)
-    worker.join()
-    gaps = np.diff([begin, *ticks])
-    took = time.perf_counter() - begin
-    assert len(ticks) > 20  # with the lock held, one long gap would be all
-    assert gaps.max() < 0.7 * took

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.excitation_check import _signal_of
-from mgdd.signals.excitation import maximum_length_sequence
 
 SIGNALS: dict[str, Callable[..., Any]] = {
     "chirp": signals.chirp,
@@ -101,25 +100,6 @@ def test_a_signal_has_a_thousand_samples_in_a_second(name: str) -> None:
     np.testing.assert_allclose(np.diff(time_s), 1e-3, rtol=1e-9)
     with pytest.raises(ParameterError, match="one period"):
         signals.multisine(5.0, offset=0.0, amplitude=0.2)
-
-
-@pytest.mark.parametrize("register", range(3, 13))
-def test_registers_have_maximum_length(register: int) -> None:
-    bits = 2.0 * maximum_length_sequence(register) - 1.0
-    assert bits.size == 2**register - 1
-    assert bits.sum() == 1.0
-    spectrum = np.fft.fft(bits)
-    autocorrelation = np.fft.ifft(np.abs(spectrum) ** 2).real
-    np.testing.assert_allclose(autocorrelation[1:], -1.0, atol=1e-6 * bits.size)
-
-
-@pytest.mark.parametrize("register", range(13, 17))
-def test_long_registers_pass_every_state_once(register: int) -> None:
-    bits = maximum_length_sequence(register)
-    wrapped = np.r_[bits, bits[:register]]
-    words = sum(wrapped[i : i + bits.size] << i for i in range(register))
-    assert np.unique(words).size == bits.size
-    assert words.min() > 0
 
 
 def test_random_steps_follow_the_golden_ratio_or_a_seed() -> None:

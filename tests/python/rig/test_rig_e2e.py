@@ -1,4 +1,4 @@
-"""Protection of a CAN payload: the vectors of the C++ test, an independent CRC, AUTOSAR profile 2 of cantools."""
+"""Protection of a CAN payload: known bytes, an independent CRC, AUTOSAR profile 2 of cantools."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ODD = E2eSettings(
 BODY = bytes.fromhex("0000112233445566")
 
 
-def test_the_same_bytes_as_the_cpp_test() -> None:
+def test_known_bytes() -> None:
     assert protect(E2eSettings(data_id=0x0120), 5, BODY) == bytes.fromhex("3a05112233445566")
     assert protect(ODD, 9, BODY) == bytes.fromhex("0000912233445554")
 
@@ -110,11 +110,19 @@ def test_settings_are_a_value() -> None:
         ({"crc": "crc16"}, "crc"),
         ({"crc": (0x1D, 256, 0)}, "start of crc"),
         ({"data_id": -1}, "data_id"),
+        ({"data_id": 0x10000}, "data_id"),
         ({"data_id_mode": "high"}, "data_id_mode"),
         ({"data_id_mode": "list"}, "data_id_list"),
         ({"data_id_list": [0] * 16}, "data_id_list"),
         ({"data_id_mode": "list", "data_id_list": [0] * 15}, "data_id_list"),
         ({"size": 1}, "size"),
+        ({"size": 65}, "size"),
+        ({"crc_byte": 8}, "crc_byte"),
+        ({"counter_byte": -1}, "counter_byte"),
+        ({"counter_modulus": 17}, "counter_modulus"),
+        ({"max_step": 16}, "max_step"),
+        ({"bad_until_invalid": 0}, "bad_until_invalid"),
+        ({"good_until_valid": 0}, "good_until_valid"),
         ({"crc_byte": 1}, "counter_byte"),
         ({"counter_place": "byte", "counter_modulus": 257}, "counter_modulus"),
     ],

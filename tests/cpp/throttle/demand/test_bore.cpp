@@ -86,24 +86,6 @@ TEST(Bore, DischargeIsConstantBelowFiveDegAndLinearBetweenItsKnots) {
   EXPECT_NEAR(plate.discharge(90.0 * deg), 0.90, 1e-12);
 }
 
-// Crossley and Cook 1991: choked air flow [g/s] of another engine's throttle. Its polynomial holds in shape only.
-double crossley_cook_g_per_s(double angle_deg) {
-  return 2.821 - 0.05231 * angle_deg + 0.10299 * angle_deg * angle_deg - 0.00063 * std::pow(angle_deg, 3);
-}
-
-TEST(Bore, ARegressionOfAMeasuredThrottleHasTheSameShape) {
-  const double printed[][2] = {{8.0, 8.671}, {20.0, 37.931}, {45.0, 151.613}, {90.0, 373.062}};
-  for (const auto& [angle, flow] : printed)
-    EXPECT_NEAR(crossley_cook_g_per_s(angle) / flow, 1.0, 1e-4);
-  // Choked through the default bore at 1 bar and 298 K, in units of its own flow at 45 deg.
-  const PlateOpening plate(ThrottleBore{});
-  const double own = plate.effective_m2(45.0 * deg), theirs = crossley_cook_g_per_s(45.0);
-  for (double angle = 15.0; angle <= 75.0; angle += 5.0) {
-    const double ratio = plate.effective_m2(angle * deg) / own / (crossley_cook_g_per_s(angle) / theirs);
-    EXPECT_NEAR(ratio, 1.0, 0.25) << angle;
-  }
-}
-
 TEST(Bore, InversesGoRoundFromHalfADegreeToTheOpenEnd) {
   for (const ThrottleBore& bore : {ThrottleBore{}, without_leak()}) {
     const PlateOpening plate(bore);

@@ -6,8 +6,6 @@
 #include <functional>
 #include <limits>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -35,26 +33,6 @@ TEST(PedalMap, TheDefaultIsTheProgressiveFormula) {
   EXPECT_TRUE(std::isnan(map.torque_nm(20.0, nan)));
 }
 
-TEST(PedalMap, MoreTorqueWithMorePedal) {
-  const PedalMap map;
-  for (double speed = 500.0; speed < 7000.0; speed += 211.0) {
-    double last = -1e9;
-    for (double pedal = 0.0; pedal <= 100.0; pedal += 0.5) {
-      EXPECT_GT(map.torque_nm(pedal, speed), last);
-      last = map.torque_nm(pedal, speed);
-    }
-  }
-}
-
-TEST(Demand, FullPedalOfTheDefaultIsWhatTheEngineCanBreathe) {
-  const DemandModel model{DemandChain{}};
-  for (double speed = 800.0; speed <= 6000.0; speed += 100.0) {
-    const Demand demand = model.steady(100.0, speed);
-    EXPECT_LT(demand.pressure_pa / 101325.0, 0.95) << speed;
-    EXPECT_LT(demand.opening_deg, 90.0) << speed;
-  }
-}
-
 TEST(Demand, TorqueComesBackThroughOpeningAndAir) {
   for (const DemandChain& chain : {DemandChain{}, odd_chain()}) {
     const DemandModel model(chain);
@@ -72,23 +50,6 @@ TEST(Demand, TorqueComesBackThroughOpeningAndAir) {
       }
     }
     EXPECT_GT(seen, 400);
-  }
-}
-
-TEST(Demand, OpeningComesBackFromItsAir) {
-  for (const DemandChain& chain : {DemandChain{}, odd_chain()}) {
-    const DemandModel model(chain);
-    const Manifold manifold(chain.air, chain.bore, sample);
-    for (const double ratio : {0.1, 0.4, 0.53, 0.7, 0.9}) {
-      const double pressure = ratio * chain.air.ambient_kpa * 1e3;
-      for (double angle = 0.5; angle <= 89.5; angle += 0.5) {
-        const double air = manifold.throttle_kg_per_s(angle, pressure);
-        EXPECT_NEAR(model.opening_deg(air, pressure, pressure), angle, 1e-6) << ratio;
-      }
-    }
-    // Up to the last ratio, where a share comes from the wanted pressure.
-    const double last = 0.95e3 * chain.air.ambient_kpa;
-    EXPECT_NEAR(model.opening_deg(manifold.throttle_kg_per_s(37.0, last), last, last), 37.0, 1e-6);
   }
 }
 

@@ -21,18 +21,6 @@ static_assert(noexcept(std::declval<DemandTracker&>().step(0.0, 0.0, 0.0)));
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double sample = 1e-3;
 
-TEST(Tracker, StartsAtItsSteadyDemandAndStaysThere) {
-  const DemandModel model(odd_chain());
-  DemandTracker tracker(odd_chain(), sample);
-  const Demand steady = model.steady(33.0, 2100.0);
-  for (int k = 0; k < 500; ++k) {
-    const TrackedDemand out = tracker.step(33.0, 2100.0, steady.pressure_pa);
-    EXPECT_NEAR(out.reference_deg, steady.opening_deg, 1e-9);
-    EXPECT_NEAR(out.torque_nm, steady.torque_nm, 1e-12);
-    EXPECT_NEAR(out.air_kg_per_s, steady.air_kg_per_s, 1e-15);
-  }
-}
-
 TEST(Tracker, WithoutAMeasuredPressureItTakesTheWantedOne) {
   DemandTracker with(odd_chain(), sample), without(odd_chain(), sample);
   for (int k = 0; k < 400; ++k) {
@@ -40,15 +28,6 @@ TEST(Tracker, WithoutAMeasuredPressureItTakesTheWantedOne) {
     const TrackedDemand blind = without.step(pedal, 2600.0, nan);
     const TrackedDemand told = with.step(pedal, 2600.0, blind.pressure_pa);
     EXPECT_EQ(told.reference_deg, blind.reference_deg) << k;
-  }
-}
-
-TEST(Tracker, OpensForTheMeasuredPressure) {
-  DemandTracker tracker(odd_chain(), sample);
-  const Manifold manifold(odd_chain().air, odd_chain().bore, sample);
-  for (const double pressure : {30e3, 62e3, 75e3}) {
-    const TrackedDemand out = tracker.step(40.0, 2500.0, pressure);
-    EXPECT_NEAR(manifold.throttle_kg_per_s(out.opening_deg, pressure) / out.air_kg_per_s, 1.0, 1e-9) << pressure;
   }
 }
 
@@ -73,28 +52,6 @@ TEST(Tracker, TheReferenceKeepsItsRateAndSettlesWithItsFilter) {
     last = out.reference_deg;
   }
   EXPECT_NEAR(last, target, 1e-6 * way);
-}
-
-TEST(Tracker, FillingIsFedForwardSoThatThePressureFollowsItsLag) {
-  // Without rate limit and filter, on the same manifold, the pressure is the wanted one.
-  DemandChain chain = odd_chain();
-  chain.reference.reference_rate_deg_per_s = 1e6;
-  chain.reference.reference_bandwidth_per_s = 1e5;
-  const Manifold manifold(chain.air, chain.bore, sample);
-  const auto worst_of = [&](double share) {
-    chain.reference.filling_share = share;
-    DemandTracker own(chain, sample);
-    Manifold::State state{DemandModel(chain).steady(15.0, 2000.0).pressure_pa};
-    double worst = 0.0;
-    for (int k = 0; k < 1500; ++k) {
-      const TrackedDemand out = own.step(k < 100 ? 15.0 : k < 800 ? 55.0 : 25.0, 2000.0, state.pressure_pa);
-      manifold.step(state, {out.reference_deg, 2000.0});
-      worst = std::fmax(worst, std::fabs(state.pressure_pa - out.pressure_pa));
-    }
-    return worst;
-  };
-  EXPECT_LT(worst_of(1.0), 1000.0);
-  EXPECT_GT(worst_of(0.0), 5000.0);
 }
 
 TEST(Tracker, TakesOverFromAnAngleWithoutABump) {
@@ -136,20 +93,6 @@ TEST(Tracker, HoldsAtStandstillAndBeyondTheTable) {
       }
     }
   }
-}
-
-TEST(Tracker, GoesOnBitForBitAfterARestore) {
-  DemandTracker first(odd_chain(), sample), second(odd_chain(), sample);
-  const auto step = [](DemandTracker& tracker, int k) {
-    return tracker.step(50.0 + 50.0 * std::sin(0.01 * k), 1500.0 + k, 50e3 + 20e3 * std::cos(0.02 * k)).reference_deg;
-  };
-  for (int k = 0; k < 333; ++k)
-    (void)step(first, k);
-  restore_state(second, save_state(first));
-  for (int k = 333; k < 900; ++k)
-    EXPECT_EQ(step(first, k), step(second, k));
-  restore_state(second, save_state(DemandTracker(odd_chain(), sample)));  // one that has seen nothing
-  EXPECT_EQ(second.step(nan, nan, nan).reference_deg, 0.0);
 }
 
 TEST(Tracker, AStateThatCannotBeIsRefusedAndChangesNothing) {

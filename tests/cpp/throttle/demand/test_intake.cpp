@@ -57,49 +57,6 @@ TEST(Intake, TorqueAndItsAirGoRound) {
   EXPECT_NEAR(air / (0.93 * 14.3) * 43.1e6 * 0.37, (100.0 + 11.0 + 12.3) * 3000.0 * M_PI / 30.0, 1e-8);
 }
 
-TEST(Manifold, EmptiesWithItsTimeConstantExactly) {
-  const IntakeAir air = odd_air();
-  ThrottleBore shut = odd_bore(0.0);
-  shut.leak_mm2 = 0.0;
-  for (const double sample : {1e-4, 1e-3, 2e-2}) {
-    const Manifold manifold(air, shut, sample);
-    Manifold::State state{60e3};
-    const int n = static_cast<int>(std::lround(0.2 / sample));
-    for (int i = 0; i < n; ++i)
-      manifold.step(state, {0.0, 1900.0});
-    EXPECT_NEAR(state.pressure_pa, 60e3 * std::exp(-0.2 / air.filling_time_s(1900.0)), 1e-6) << sample;
-  }
-}
-
-TEST(Manifold, FillsInAStraightLineAtStandstillWhileChoked) {
-  const IntakeAir air = odd_air();
-  const Manifold manifold(air, odd_bore(0.0), 1e-3);
-  const double flow = manifold.throttle_kg_per_s(14.0, 10e3);
-  const double rate = air_gas_constant * 323.0 / 2.3e-3 * flow;  // Pa/s
-  Manifold::State state{10e3};
-  int k = 0;
-  for (; state.pressure_pa < 0.5 * 96.4e3; ++k) {
-    EXPECT_NEAR(state.pressure_pa, 10e3 + rate * 1e-3 * k, 1e-7);
-    manifold.step(state, {14.0, 0.0});
-  }
-  EXPECT_GT(k, 20);
-}
-
-TEST(Manifold, AHeldThrottleEndsWhereBothFlowsAreEqual) {
-  const Manifold manifold(odd_air(), odd_bore(0.1), 1e-3);
-  for (const double angle : {2.0, 9.0, 30.0, 88.0}) {
-    for (const double start : {5e3, 60e3, 130e3}) {
-      Manifold::State state{start};
-      ManifoldFlows flows;
-      for (int i = 0; i < 4000; ++i)
-        flows = manifold.flows(state, {angle, 2600.0});
-      EXPECT_NEAR(flows.throttle_kg_per_s, flows.cylinder_kg_per_s, 1e-12);
-      EXPECT_NEAR(state.pressure_pa, manifold.steady_pa({angle, 2600.0}), 1e-4) << angle;
-    }
-  }
-  EXPECT_NEAR(manifold.steady_pa({20.0, 0.0}), 96.4e3, 1e-6);
-}
-
 /// The same manifold as an ODE, its derivative written from the printed equations.
 struct FillingOde {
   static constexpr int n_parameters = 1, n_states = 1, n_inputs = 2;  // parameter: not used
@@ -139,19 +96,6 @@ TEST(Manifold, AgreesWithRungeKuttaOfThePrintedEquations) {
     worst = std::fmax(worst, std::fabs(state.pressure_pa - reference[0]));
   }
   EXPECT_LT(worst, 60.0);  // Pa
-}
-
-TEST(Manifold, MassIsConserved) {
-  const IntakeAir air = odd_air();
-  const Manifold manifold(air, odd_bore(0.1), 1e-3);
-  Manifold::State state{31e3};
-  double stored = 0.0;
-  for (int k = 0; k < 2500; ++k) {
-    const ManifoldFlows flows = manifold.flows(state, {k < 900 ? 82.0 : 4.0, 900.0 + 2.0 * k});
-    stored += 1e-3 * (flows.throttle_kg_per_s - flows.cylinder_kg_per_s);
-  }
-  const double mass = (state.pressure_pa - 31e3) * 2.3e-3 / (air_gas_constant * 323.0);
-  EXPECT_NEAR(stored, mass, 1e-15);
 }
 
 TEST(Manifold, FlowsOfASampleAreTheMeanOfItsFlows) {
