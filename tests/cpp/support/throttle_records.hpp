@@ -41,15 +41,6 @@ inline Signal chirp(double offset, double amplitude, double f0_hz, double f1_hz,
   return u;
 }
 
-inline Signal golden_steps(double duration_s) {
-  Signal u(static_cast<std::size_t>(std::lround(duration_s * 1000.0)));
-  for (std::size_t k = 0; k < u.size(); ++k) {
-    const double z = 0.6180339887 * static_cast<double>(k / 150);
-    u[k] = 0.15 + 0.20 * (2.0 * (z - std::floor(z)) - 1.0);
-  }
-  return u;
-}
-
 /// N(0, 0.03 deg) and 90/4096 deg quantisation.
 inline Signal sensed(const Signal& angle_deg, unsigned seed, double sigma_deg = 0.03) {
   std::mt19937 bits(seed);
@@ -81,17 +72,6 @@ inline double fit_percent(const Signal& measured, const Signal& model) {
     spread += (measured[k] - mean) * (measured[k] - mean);
   }
   return 100.0 * (1.0 - std::sqrt(error / spread));
-}
-
-/// RMS of y_measured(k) + sim(k + horizon) - sim(k) against the true angle.
-inline double ahead_rms(const ThrottleLog& log, const Signal& model, std::size_t horizon) {
-  double sum = 0.0;
-  const std::size_t n = model.size() - horizon;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double e = log.angle_deg[k] + model[k + horizon] - model[k] - log.true_deg[k + horizon];
-    sum += e * e;
-  }
-  return std::sqrt(sum / static_cast<double>(n));
 }
 
 }  // namespace mgdd::test_support
