@@ -15,7 +15,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 TOUR = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
 PACKAGE_FILES = re.compile(
     r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|report/templates/[^/]+\.(html|css)"
-    r"|data/([^/]+/)*[^/]+\.(csv|txt)|rig/(can/buses|envelopes)/[^/]+\.(dbc|toml)|.*\.pyc)"
+    r"|data/([^/]+/)*[^/]+\.(csv|txt|toml)|rig/(can/buses|envelopes)/[^/]+\.(dbc|toml)|.*\.pyc)"
     r"|mgdd_studies/(.*\.pyc?|py\.typed)|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
 )
 HEAVY = {"scipy", "xarray", "pandas", "matplotlib", "rich", "jinja2", "pooch", "packaging"}
