@@ -116,7 +116,7 @@ double Curve::rises_again(double reach) const noexcept {
   };
   const auto highest = std::max_element(values_.begin(), values_.end());
   double lowest = *highest, again = 0.0;
-  const auto look = [&](auto from, auto to) {
+  const auto look = [&](const auto& from, const auto& to) {
     double low = *highest;
     for (auto value = from; value != to; ++value) {
       low = std::min(low, *value);
