@@ -38,7 +38,7 @@ def pressure_levels(
             f"{'' if even else ', in uneven steps'}: record whole cycles"
         )
     bar = bar[:, :samples]
-    # A cycle ends where the next begins: the rise from one to the other is no sound, and taken off along the cycle.
+    # A cycle ends where the next begins: the rise from one to the other is not sound, and is taken off along it.
     rise = np.append(np.diff(bar[:, 0]), 0.0)
     periodic = bar - rise[:, None] * (np.arange(samples) / samples)
     lines = np.fft.rfft(periodic, axis=1)[:, 1 : (samples + 1) // 2] / samples

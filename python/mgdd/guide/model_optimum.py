@@ -51,7 +51,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
     Raises
     ------
     mgdd.errors.ParameterError
-        A setting outside its domain; what is asked for a point that is no operating point.
+        A setting outside its domain; what is asked for a point that is not an operating point.
 
     References
     ----------

@@ -300,7 +300,7 @@ def tune(
     ------
     ParameterError
         Noise, curvature or a specification that is not positive; a negative uncertainty; SPSA behind a delayed sensor;
-        a matrix of curvatures that is no maximum or minimum.
+        a matrix of curvatures that is neither that of a maximum nor of a minimum.
     ShapeError
         Not one number per input.
 

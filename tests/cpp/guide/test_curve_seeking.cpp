@@ -49,7 +49,7 @@ TEST(CurveSeeking, ArrivesWithinFiveCyclesWhereverTheGuideStands) {
       for (std::size_t k = 6; k < path.size(); ++k)
         ASSERT_NEAR(path[k], -6.0, 0.6) << "guide " << best << " start " << start << " cycle " << k;
       EXPECT_NEAR(path.back(), -6.0, 0.35) << "guide " << best << " start " << start;
-      EXPECT_FALSE(seeker.handed_over()) << "no noise is no reason to give the guide up";
+      EXPECT_FALSE(seeker.handed_over()) << "without noise the guide is kept";
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mgdd/common/random.hpp"
@@ -340,6 +341,17 @@ TEST(GaussianProcessSeeking, CyclesThatFailAnywhereAreNoRegion) {
     }
   }
   EXPECT_LT(loss, 0.5);
+}
+
+TEST(GaussianProcessSeeking, WhatIsKnownOfFailuresIsRestoredWithinItsBounds) {
+  GaussianProcessSeeking seeker(two_inputs(3));
+  const StateColumns kept = save_state(seeker);
+  for (const auto& [name, value] : {std::pair{"anywhere", 3.5}, {"cycles_seen", -10.0}, {"cycles_failed", 0.5}}) {
+    StateColumns broken = kept;
+    broken[name] = {value};
+    EXPECT_THROW(restore_state(seeker, broken), ParameterError) << name;
+    EXPECT_EQ(save_state(seeker), kept) << name;
+  }
 }
 
 }  // namespace

@@ -120,7 +120,7 @@ TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
 }
 
 TEST(Steps, OfTwoBesideALimitTheOneThatKeepsItIsSet) {
-  Input coarse{"a", -1.0, 1.1}, fine{"b"};  // between them 1.1 is no step of a
+  Input coarse{"a", -1.0, 1.1}, fine{"b"};  // 1.1 is not a step of a
   coarse.step = 0.5;
   fine.step = 0.1;
   const Steps steps = steps_of({coarse, fine, Input{"c"}});

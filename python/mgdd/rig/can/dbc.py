@@ -18,7 +18,7 @@ from mgdd.io.files import bytes_of, decoded, existing_file
 
 _LOG = logging.getLogger(__name__)
 
-# What a value table calls a raw value that is no measurement, in words of lower case: of every signal, and of one that
+# What a value table calls a raw value that is not a measurement, in lower case: of every signal, and of one that
 # carries a quantity: a switch or a state machine may well be in the state "error".
 _NO_VALUE = (
     r"s ?n ?a|n ?a|(?:not|no) ?(?:avail(?:able)?|valid|present|defined|supported|value|data|signal|measurement|info)|"

@@ -18,6 +18,7 @@
 #include <tuple>
 #include <vector>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/record.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/ask_tell/seeker.hpp"
@@ -111,6 +112,9 @@ class GaussianProcessSeeking {
   void require_usable() const {
     require_within_space("estimate", estimate_, settings_.space);
     require_within_space("applied", applied_, settings_.space);
+    require_in(closed(0.0, 1e12), "cycles_seen", seen_);
+    require_in(closed(0.0, seen_), "cycles_failed", failed_);
+    require_in(closed(least_anywhere, -least_anywhere), "anywhere", anywhere_);
   }
 
   template <class Self, class V>
