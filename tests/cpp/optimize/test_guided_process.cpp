@@ -195,7 +195,7 @@ TEST(GuidedProcess, AGuideOfALimitIsNotFollowedFartherThanItWasRead) {
       const Inputs x = seeker.ask(), range = seeker.settings().space.upper - seeker.settings().space.lower;
       const double wide = ((highest - lowest).cwiseQuotient(range)).maxCoeff();
       const double beyond = (x - highest).cwiseMax(lowest - x).cwiseQuotient(range).maxCoeff();
-      ASSERT_LE(beyond, std::max(0.05, 0.4 * wide) + 1e-9) << k;
+      ASSERT_LE(beyond, std::max(0.1, 0.4 * wide) + 1e-9) << k;
       lowest = lowest.cwiseMin(x);
       highest = highest.cwiseMax(x);
       const double j[] = {-lost(x)}, limits[] = {200.0 * std::exp(-0.1 * (x[0] - 4.0))};

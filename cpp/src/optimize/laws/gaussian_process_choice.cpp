@@ -24,7 +24,6 @@ constexpr std::int64_t resting = 40;                    // inputs at the estimat
 constexpr double turned = -0.7;                         // what a first step is multiplied by after a failure
 constexpr std::int64_t most_turns = 6;                  // for them; then inputs that cannot move are left alone
 constexpr double worth_noise = 1e-12;                   // of J, at least
-constexpr double limited_step = 0.5;                    // of the first step where there are limits
 constexpr double along_edges = 4.0;                     // sd of J that reading it along limits is worth
 constexpr double along_readings = 10.0;  // of the fewest, until it is worth that: early sd promise too much
 constexpr double along_cycles = 100.0;   // without a doubt, then it is worth less and less
@@ -47,10 +46,6 @@ Inputs GaussianProcessSeeking::reachable(Inputs z) const noexcept {
 
 Inputs GaussianProcessSeeking::grid() const noexcept {
   return protocol_.steps.size.cwiseQuotient(settings_.space.upper - settings_.space.lower);
-}
-
-double GaussianProcessSeeking::side_step() const noexcept {
-  return settings_.first_step * (limited_.empty() ? 1.0 : limited_step);
 }
 
 // Standard normal, another one for each stream and index of this cycle.

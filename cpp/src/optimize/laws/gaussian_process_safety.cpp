@@ -15,6 +15,9 @@ constexpr double failing_room = 0.8, wary_room = 0.5;      // by which it may ex
 constexpr double surest = 0.02;                         // probability: the process of labels promises too much
 constexpr double usual_rate = 0.1, rate_memory = 0.99;  // of cycles that fail anywhere, before any was seen
 
+constexpr double rise_of_limit = 1.2;  // scales per range: sd of its slope before readings, 0.4 of 3 bends
+constexpr double rises_in_room = 2.0, least_step = 0.25;  // sd that a first step leaves room for; of the whole step
+
 constexpr int pull_rounds = 2, pull_sweeps = 4;       // the process bends, and limits meet
 constexpr double farthest_pull = 0.3;                 // in ranges, as far as slopes at the estimate may say
 constexpr double inside_edge = 1e-3;                  // scales of a limit, so that rounding leaves it kept
@@ -23,6 +26,18 @@ constexpr double slope_step = 0.01, at_bound = 1e-3;  // ranges
 constexpr int multiplier_sweeps = 60;
 
 }  // namespace
+
+// The first step, shorter where the readings so far leave a limit little room; half of it before any reading.
+double GaussianProcessSeeking::side_step() const noexcept {
+  const double whole = rises_in_room * rise_of_limit * settings_.first_step;
+  double room = limited_.empty() ? whole : unlimited;
+  for (std::size_t i = 0; i < limited_.size(); ++i) {
+    const Limit& limit = settings_.limits[i];
+    const double known = (limit.upper - limit.margin - limited_[i].highest()) / limit.scale;
+    room = std::min(room, limited_[i].count() > 0 ? known : 0.5 * whole);
+  }
+  return settings_.first_step * std::clamp(room / whole, least_step, 1.0);
+}
 
 // By what quantiles of few readings exceed normal ones.
 double GaussianProcessSeeking::student(const ProcessModel& model) const noexcept {

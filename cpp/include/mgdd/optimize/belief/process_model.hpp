@@ -66,6 +66,7 @@ class ProcessModel {
                const Inputs& about) noexcept;
   /// Least value among the kept readings, outliers left out; the largest where all are outliers.
   double lowest() const noexcept;
+  double highest() const noexcept { return count_ > 0 ? values_.head(count_).maxCoeff() : 0.0; }
   /// Every kept reading as `told` by another measure; the numbers begin anew.
   template <class F>
   void retell(const F& told) noexcept {
