@@ -1,4 +1,4 @@
-// Laws of the virtual bench: it is the cycle model, its sensors are their closed forms, its chance has its statistics.
+// Laws of the virtual bench: its sensors are their closed forms, its chance has its statistics.
 #include "mgdd/loop/virtual_engine.hpp"
 
 #include <algorithm>
@@ -23,20 +23,6 @@ engine::Indicators<double> cycle_of(const engine::Cylinder& cylinder, const engi
   const engine::Charge<double> charge = model.charge(point);
   model.run(charge, soc, work);
   return model.indicators(charge, soc, work);
-}
-
-TEST(VirtualEngine, WithoutChanceItIsTheCycleModel) {
-  VirtualEngine bench(quiet_bench());
-  for (const double soc : {-20.0, -6.0, 3.5}) {
-    const BenchCycle c = bench.step(soc);
-    const auto expected = cycle_of({}, {}, soc);
-    for (const auto& field : engine::indicator_fields<double>())
-      EXPECT_EQ(c.indicators.*(field.member), expected.*(field.member)) << field.name;
-    EXPECT_EQ(c.soc_cad, soc);
-    EXPECT_DOUBLE_EQ(c.j, 100.0 * expected.efficiency_gross - 0.004 * c.nox_true_ppm);
-    EXPECT_EQ(c.j, c.components[0] + c.components[1]);
-  }
-  EXPECT_EQ(bench.cycle(), 3);
 }
 
 TEST(VirtualEngine, SensorsStartSteadyAndAnswerAStepInClosedForm) {

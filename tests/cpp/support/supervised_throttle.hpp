@@ -4,9 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <numbers>
-#include <vector>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/control/supervisor.hpp"
@@ -64,13 +62,6 @@ class SupervisedLoop {
     acting_ = order;
     return {k_++, reference_deg, last_.angle_deg, last_.speed_deg_per_s, order};
   }
-  control::SupervisorReason acknowledge() {
-    const auto stands = supervisor.acknowledge();
-    if (stands == control::SupervisorReason::none) controller.reset();
-    if (stands == control::SupervisorReason::none) acting_.bridge_open = false;
-    return stands;
-  }
-
   Controller controller;
   control::ThrottleSupervisor supervisor;
   loop::VirtualThrottle plant;
