@@ -92,6 +92,20 @@ TEST(CurveFilter, IsWhatADirectIntegralGives) {
   EXPECT_NEAR(filter.spread(), sd, 0.15 * sd);
 }
 
+TEST(CurveFilter, MirroredReadingsGiveTheMirroredPlace) {
+  const Curve parabola = Curve::parabola(-0.05, 0.0, 50.0);
+  CurveFilter left(settings_on(-20.0, 20.0), parabola), right(left);
+  for (int k = 0; k < 12; ++k) {
+    const double x = k % 3 == 0 ? 5.0 : k % 3 == 1 ? -1.0 : 8.0;
+    const double j = -0.025 * (x - 7.0) * (x - 7.0) + 0.1 * (k % 2);
+    right.learn(x, j);
+    left.learn(-x, j);
+  }
+  EXPECT_NEAR(left.mean(), -right.mean(), 1e-9);
+  EXPECT_NEAR(left.spread(), right.spread(), 1e-9);
+  EXPECT_GT(right.mean(), 5.0);
+}
+
 TEST(CurveFilter, ALagIsPartOfTheHypotheses) {
   CurveFilterSettings settings = settings_on(-30.0, 10.0);
   settings.lag_cycles = 7.0;
