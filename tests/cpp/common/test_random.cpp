@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <utility>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -59,33 +57,6 @@ TEST(NormalQuantile, InvertsTheDistributionFunctionInEveryBranch) {
     EXPECT_NEAR(normal_quantile(1.0 - p), -normal_quantile(p), 1e-14);
   for (const double p : {0.0, 1.0, -1.0, 2.0, std::numeric_limits<double>::quiet_NaN()})
     EXPECT_TRUE(std::isnan(normal_quantile(p))) << p;
-}
-
-std::vector<double> draws(int n, std::uint64_t seed, std::uint64_t stream) {
-  std::vector<double> x(static_cast<std::size_t>(n));
-  for (std::size_t i = 0; i < x.size(); ++i)
-    x[i] = normal(seed, stream, i);
-  return x;
-}
-
-double correlation(const std::vector<double>& a, const std::vector<double>& b, std::size_t shift) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i + shift < a.size(); ++i)
-    sum += a[i] * b[i + shift];
-  return sum / static_cast<double>(a.size() - shift);
-}
-
-TEST(Normal, StreamsSeedsAndNeighboursAreUncorrelated) {
-  constexpr int n = 100000;
-  const double limit = 4.0 / std::sqrt(static_cast<double>(n));
-  const std::vector<double> x = draws(n, 9, 0);
-  for (const std::size_t shift : {1u, 2u, 10u})
-    EXPECT_LT(std::abs(correlation(x, x, shift)), limit) << shift;
-  for (const auto& [seed, stream] : {std::pair{9, 1}, std::pair{9, 2}, std::pair{10, 0}, std::pair{8, 0}}) {
-    const auto y = draws(n, static_cast<std::uint64_t>(seed), static_cast<std::uint64_t>(stream));
-    EXPECT_LT(std::abs(correlation(x, y, 0)), limit) << seed << " " << stream;
-    EXPECT_LT(std::abs(correlation(x, y, 1)), limit) << seed << " " << stream;
-  }
 }
 
 TEST(Normal, HasTheSameBitsOnEveryMachine) {

@@ -1,8 +1,6 @@
 // Numbers as text, names of enumerators, exact units and the error tree.
-#include <array>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 
 #include <gtest/gtest.h>
 
@@ -99,11 +97,6 @@ TEST(CommonText, UnitsOfTheFieldAreExact) {
   EXPECT_EQ(units::pa_per_bar * units::m3_per_l, 100.0);  // bar L = 100 J
   EXPECT_EQ(units::pa_per_kpa * units::m3_per_l, 1.0);    // kPa L = 1 J
   EXPECT_EQ(units::rad_per_deg * 180.0, std::numbers::pi);
-}
-
-TEST(CommonText, OneRootForEveryError) {
-  static_assert(std::is_base_of_v<Error, ParameterError> && std::is_base_of_v<Error, ShapeError>);
-  static_assert(std::is_base_of_v<Error, DataError> && std::is_base_of_v<Error, ConvergenceError>);
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// PID of a plate: laws of each part, anti-windup, no steady error, a takeover without a bump, mirrored plants, both
-// scalars, a restart bit for bit, no allocation.
+// PID of a plate: laws of each part, anti-windup, no steady error, mirrored plants, both scalars.
 #include "mgdd/control/pid.hpp"
 
 #include <cmath>
@@ -8,9 +7,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include "mgdd/common/error.hpp"
-#include "support/no_alloc.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -174,22 +170,6 @@ TEST(Pid, TheIntegralKeepsToItsWindowAndItsLimit) {
   EXPECT_EQ(pid.integral(), -0.12);
 }
 
-TEST(Pid, ATakeoverHasNoBumpAndAResetForgetsEverything) {
-  const PidSettings s = lively();
-  Pid pid(s);
-  for (int k = 0; k < 300; ++k)
-    (void)pid.step(reference_of(k), measurement_of(k));
-  pid.reset(42.0, 41.6, 0.21);
-  EXPECT_EQ(pid.duty(), 0.21);
-  EXPECT_NEAR(pid.step(42.0, 41.6), 0.21, 0.9 * 0.4 * 1e-3 + 1e-12);
-  pid.reset(42.0, nan, 0.4);  // refused
-  EXPECT_NEAR(pid.duty(), 0.21, 1e-3);
-  pid.reset();
-  Pid fresh(s);
-  for (int k = 0; k < 300; ++k)
-    EXPECT_EQ(pid.step(reference_of(k), measurement_of(k)), fresh.step(reference_of(k), measurement_of(k)));
-}
-
 TEST(Pid, AMirroredPlantIsDrivenByTheMirroredDuty) {
   PidSettings s = lively();
   s.plate.spring.limp_home_deg = 32.0;
@@ -227,35 +207,6 @@ TEST(Pid, InputsThatAreNotFiniteRepeatTheLastOnes) {
     EXPECT_TRUE(std::isfinite(duty));
     (void)other.step(nan, nan);
   }
-}
-
-TEST(Pid, AStateThatTheSettingsDoNotAllowIsRefusedAndChangesNothing) {
-  Pid pid(lively());
-  (void)pid.step(40.0, 38.0);
-  const StateColumns before = save_state(pid);
-  StateColumns bad = before;
-  bad["integral"] = {0.31};
-  EXPECT_THROW(restore_state(pid, bad), ParameterError);
-  bad = before;
-  bad["duty"] = {1.5};
-  EXPECT_THROW(restore_state(pid, bad), ParameterError);
-  bad = before;
-  bad.erase("measurement_rate");
-  EXPECT_THROW(restore_state(pid, bad), ParameterError);
-  EXPECT_EQ(save_state(pid), before);
-}
-
-TEST(Pid, NoAllocation) {
-  Pid pid(lively());
-  BasicPid<float> narrow(lively());
-  const test_support::AllocationCounter counter;
-  for (int k = 0; k < 1000; ++k) {
-    (void)pid.step(reference_of(k), measurement_of(k));
-    (void)narrow.step(static_cast<float>(reference_of(k)), static_cast<float>(measurement_of(k)));
-  }
-  pid.reset(3.0, 4.0, 0.1);
-  pid.reset();
-  EXPECT_EQ(counter.count(), 0u);
 }
 
 TEST(Pid, EveryNumberOfTheSettingsHasOneField) {

@@ -1,14 +1,12 @@
 // Supervisor of a throttle controller on made-up samples: transparent while all is well, one law per fault, times of
-// debouncing, what stays until acknowledged, a restart bit for bit, no allocation.
+// debouncing, what stays until acknowledged, no allocation.
 #include "mgdd/control/supervisor.hpp"
 
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
 #include "support/supervisor_samples.hpp"
 
@@ -255,34 +253,6 @@ TEST(Supervisor, TimesAreSecondsAtAnySampleTime) {
   }
 }
 
-TEST(Supervisor, GoesOnBitForBitFromAnySampleOfAFaultyRun) {
-  ThrottleSupervisor first(lively());
-  for (int k = 0; k < 900; ++k) {
-    ThrottleSupervisor second(lively());
-    restore_state(second, save_state(first));
-    EXPECT_EQ(second.order().mode, first.order().mode);
-    SupervisorInputs in = at(30.0 + 5.0 * std::sin(0.03 * k), k % 90 == 3 ? nan : 32.0);
-    if (k % 70 < 6) in.angle_deg[1] = nan;
-    if (k > 400) in.supply_v = 8.0;
-    if (k > 600) in.age_s = 1e-3 * (k - 600);
-    if (k > 700) in = at(11.2);
-    for (ThrottleSupervisor* s : {&first, &second}) {
-      (void)s->observe(in);
-      (void)s->decide(0.15 + 0.1 * std::sin(0.05 * k));
-      if (k == 800) {
-        EXPECT_EQ(s->acknowledge(), Reason::none);
-      }
-    }
-    ASSERT_EQ(save_state(first), save_state(second)) << k;
-  }
-  StateColumns bad = save_state(first);
-  bad["reason"] = {99.0};
-  EXPECT_THROW(restore_state(first, bad), ParameterError);
-  bad = save_state(first);
-  bad["duty"] = {1.5};
-  EXPECT_THROW(restore_state(first, bad), ParameterError);
-}
-
 TEST(Supervisor, NoAllocation) {
   ThrottleSupervisor s(lively());
   const test_support::AllocationCounter counter;
@@ -292,37 +262,6 @@ TEST(Supervisor, NoAllocation) {
     (void)s.acknowledge();
   }
   EXPECT_EQ(counter.count(), 0u);
-}
-
-TEST(Supervisor, EveryBadSettingIsNamedAndEveryNameHasAValue) {
-  for (const auto& field : supervisor_fields()) {
-    SupervisorSettings s = lively();
-    field.in(s) = nan;
-    try {
-      validate(s);
-      ADD_FAILURE() << field.info.name;
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, field.info.name);
-    }
-  }
-  const auto refuses = [](auto change, const std::string& field) {
-    SupervisorSettings s = lively();
-    change(s);
-    try {
-      const ThrottleSupervisor made(s);
-      ADD_FAILURE() << field;
-    } catch (const ParameterError& error) {
-      EXPECT_EQ(error.field, field);
-    }
-  };
-  refuses([](auto& s) { s.plate.open_deg = 0.5; }, "open_deg");
-  refuses([](auto& s) { s.limited_open_deg = 85.0; }, "limited_open_deg");
-  refuses([](auto& s) { s.plate.spring.limp_home_deg = 0.0; }, "limp_home_deg");
-  refuses([](auto& s) { s.supply_lost_v = 9.5; }, "supply_lost_v");
-  refuses([](auto& s) { s.late_s = 0.03; }, "late_s");
-  EXPECT_EQ(names<SupervisorMode>().size(), 4u);
-  EXPECT_EQ(names<SupervisorReason>().size(), 14u);
-  EXPECT_EQ(names<ReturnTest>().size(), 4u);
 }
 
 // Wrong for 19 ms of every 20: never for 20 ms in a row.

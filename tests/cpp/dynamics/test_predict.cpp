@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <span>
 #include <vector>
 
 #include "mgdd/dynamics/predict.hpp"
@@ -109,35 +108,6 @@ TEST(Predict, SlopesToEverySampleAreExact) {
       EXPECT_EQ(slopes[k * n + i], 0.0) << "no input acts before its time";
     }
   }
-}
-
-template <class Model64, class Model32>
-void expect_float_follows(const Model64& wide, const Model32& narrow) {
-  const auto state = moving(wide);
-  std::array<double, horizon> y{};
-  std::array<std::array<double, 3>, horizon> slope{};
-  predict<3>(wide, state, moves, lengths, y, slope);
-  std::array<float, horizon> y32{};
-  std::array<std::array<float, 3>, horizon> slope32{};
-  const test_support::AllocationCounter counter;
-  predict<3>(narrow, lifted<Model32>(state), std::array<float, 3>{0.42F, 0.21F, 0.3F}, lengths, y32, slope32);
-  EXPECT_EQ(counter.count(), 0U);
-  for (std::size_t k = 0; k < horizon; ++k) {
-    EXPECT_NEAR(static_cast<double>(y32[k]), y[k], 1e-3);
-    for (std::size_t m = 0; m < 3; ++m)
-      EXPECT_NEAR(static_cast<double>(slope32[k][m]), slope[k][m], 1e-3 * (1.0 + std::abs(slope[k][m])));
-  }
-}
-
-TEST(Predict, FloatFollowsDouble) {
-  PwR p;
-  p.frame.sample_s = 2e-3;
-  expect_float_follows(throttle::PwRModel(p), throttle::BasicPwRModel<float>(throttle::lift<float>(p)));
-  const auto values = throttle::first_principle_of(throttle::Throttle{});
-  FirstPrinciple::Groups<float> narrow{};
-  for (std::size_t i = 0; i < narrow.size(); ++i)
-    narrow[i] = static_cast<float>(values[i]);
-  expect_float_follows(FirstPrinciple{}.prepare(values, 2e-3), FirstPrinciple{}.prepare(narrow, 2e-3));
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// The gas of a cycle: from a mass, from p, V and T at IVC, from the intake; by hand, and against the stated masses of
-// the measured traces.
+// The gas of a cycle: from a mass, from p, V and T at IVC, from the intake; by hand.
 #include "mgdd/engine/charge.hpp"
 
 #include <cmath>
@@ -7,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "support/engine_case.hpp"
 
 namespace mgdd::engine {
@@ -56,29 +54,6 @@ TEST(EngineCharge, ThePressureOfALateStartIsCarriedBackToIvc) {
     EXPECT_NEAR(ivc_pressure<double>(angle, pressure, g, ivc), 1.7 * miss, 1e-12);
     EXPECT_LT(std::abs(miss - 1.0), 0.011);
   }
-}
-
-// The stated masses of the four measured traces are those of 345 to 360 K at IVC; the default takes 313 + 40 K.
-TEST(EngineCharge, MeasuredTracesStateMassesOfThreeHundredFiftyKelvin) {
-  const engine::Cylinder cylinder = test_support::hd_cylinder();
-  const double expected_k[] = {344.6, 353.6, 359.5, 359.0};
-  const auto stated = test_support::hd_traces(), open = test_support::hd_traces(false);
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Geometry<double> g(cylinder.geometry);
-    const double pv =
-        ivc_pressure<double>(stated[i].angle_cad, stated[i].pressure_bar, g, -143.0) * 1e5 * g.volume_m3(-143.0);
-    const double stated_g = stated[i].point.trapped_mass_g.value_or(0.0);
-    EXPECT_NEAR(pv / gas_of_mass_j_per_k(stated_g), expected_k[i], 0.1);
-    const auto a = analyze_trace(open[i].angle_cad, open[i].pressure_bar, cylinder, open[i].point, {});
-    EXPECT_NEAR(a.trapped_mass_g * 353.0, mass_of_gas_g(pv), 1e-9);
-    EXPECT_EQ(a.mass_source, "p, V, T at IVC with T = 353 K, the intake temperature + 40 K");
-    EXPECT_NEAR(a.trapped_mass_g / stated_g, 1.0, 0.03);
-  }
-  OperatingPoint warm = open[0].point;
-  warm.ivc_temperature_k = 390.0;
-  const auto a = analyze_trace(open[0].angle_cad, open[0].pressure_bar, cylinder, warm, {});
-  EXPECT_EQ(a.mass_source, "p, V, T at IVC with T = 390 K");
-  EXPECT_NEAR(a.temperature_k.front(), 390.0, 2.5);
 }
 
 }  // namespace

@@ -5,14 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include "mgdd/common/error.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -161,38 +157,6 @@ TEST(EngineEncoder, FalseAndLostPulsesOfTheIndexCostNoTurn) {
   const EncoderAngle found = angle_of(c, {.teeth = 360}, true);
   EXPECT_EQ(found.lost_marks, 2u);
   EXPECT_LT(error_of(c, found).largest, fine_deg);
-}
-
-std::string refusal(const Case& c, const EncoderOptions& o, bool with_index = false) {
-  try {
-    angle_of(c, o, with_index);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
-TEST(EngineEncoder, BadInputIsRefusedByName) {
-  const Case c = record(60, 2, 4.0, hall);
-  EXPECT_NE(refusal(c, {.teeth = 1}).find("teeth = 1: must be in [2, 36000]"), std::string::npos);
-  EXPECT_NE(refusal(c, {.teeth = 60, .missing_teeth = 30}).find("missing_teeth = 30"), std::string::npos);
-  EXPECT_NE(refusal(c, {.teeth = 60, .missing_teeth = 2}, true).find("the gap or the index"), std::string::npos);
-  EXPECT_NE(refusal(c, {.teeth = 3600}).find("edges are less than a turn"), std::string::npos);
-  EXPECT_NE(
-      refusal(record(60, 2, 1.2, hall), {.teeth = 60, .missing_teeth = 2}).find("two are needed: record more turns"),
-      std::string::npos);
-  Case flat = c;
-  std::ranges::fill(flat.signal, 2.5);
-  EXPECT_NE(refusal(flat, {.teeth = 60}).find("signal stands at 2.5"), std::string::npos);
-  Case holed = c;
-  holed.signal[100] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(refusal(holed, {.teeth = 60}).find("signal[100] = nan"), std::string::npos);
-  Case back = c;
-  back.time[50] = back.time[49];
-  EXPECT_NE(refusal(back, {.teeth = 60}).find("time_s[50]"), std::string::npos);
-  Case shorter = c;
-  shorter.signal.pop_back();
-  EXPECT_NE(refusal(shorter, {.teeth = 60}).find("equally long"), std::string::npos);
 }
 
 TEST(EngineEncoder, EvenAnglesKeepACubicAndARinging) {

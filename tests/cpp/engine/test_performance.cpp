@@ -24,13 +24,6 @@ static_assert(noexcept(std::declval<const Performance&>().components(std::declva
                                                                      std::span<double>())));
 static_assert(std::is_trivially_copyable_v<Performance>);
 
-TEST(Performance, IsEfficiencyUnlessToldOtherwise) {
-  EXPECT_EQ(Performance().value(example()), 56.0);
-  EXPECT_EQ(efficiency_only(), Performance());
-  EXPECT_EQ(Performance().size(), 1u);
-  EXPECT_FALSE(Performance().uses(nox_ppm));
-}
-
 TEST(Performance, EverySignalReachesItsTerm) {
   const PerformanceSignals s = example();
   for (std::size_t i = 0; i < performance_signal_count; ++i) {

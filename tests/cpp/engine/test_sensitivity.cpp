@@ -73,20 +73,6 @@ void compare(const EngineCase& c, const std::string& what) {
   }
 }
 
-TEST(EngineSensitivity, AgreesWithDifferencesForEveryInputAndLaw) {
-  for (const auto shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    for (const auto gamma : {GammaModel::constant, GammaModel::linear, GammaModel::polynomial}) {
-      for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg, WallHeatModel::eichelberg}) {
-        EngineCase c = smooth();
-        c.cylinder.burn.burn_shape = shape;
-        c.cylinder.gas.gamma_model = gamma;
-        c.cylinder.wall_heat.wall_heat_model = wall;
-        compare(c, std::string(name_of(shape)) + " " + std::string(name_of(gamma)));
-      }
-    }
-  }
-}
-
 TEST(EngineSensitivity, AgreesWithDifferencesForEveryIntegrator) {
   for (const auto integrator : {Integrator::split, Integrator::tan2018_lagged, Integrator::euler}) {
     EngineCase c = smooth();

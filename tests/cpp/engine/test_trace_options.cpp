@@ -1,5 +1,4 @@
-// Options of the analysis: which values belong to their domains, and the names of the choices.
-#include "mgdd/common/enum_names.hpp"
+// Options of the analysis: which values belong to their domains.
 #include "mgdd/engine/pressure/trace_options.hpp"
 
 #include <functional>
@@ -24,10 +23,6 @@ std::string refused(const std::function<void(TraceOptions&)>& change) {
     return error.field.empty() ? error.what() : error.field;
   }
   return "";
-}
-
-TEST(EngineTraceOptions, TheDefaultsAreAllowed) {
-  EXPECT_EQ(refused([](TraceOptions&) {}), "");
 }
 
 TEST(EngineTraceOptions, OpenBoundsAreRefusedAndWhatLiesInsideIsNot) {
@@ -69,12 +64,6 @@ TEST(EngineTraceOptions, AWindowHasTwoEnds) {
     const std::string told = refused([&](TraceOptions& o) { (from ? o.heat_from_cad : o.heat_to_cad) = 10.0; });
     EXPECT_NE(told.find("given together"), std::string::npos);
   }
-}
-
-TEST(EngineTraceOptions, NamesComeBack) {
-  for (const char* name : {"automatic", "none", "savitzky_golay", "low_pass", "angle_window"})
-    EXPECT_EQ(name_of(parse_name<Smoothing>("smoothing", name)), name);
-  EXPECT_THROW(parse_name<Smoothing>("smoothing", "wavelet"), ParameterError);
 }
 
 }  // namespace

@@ -11,13 +11,6 @@ namespace {
 using test_support::Cycle;
 using test_support::EngineCase;
 
-// By hand: 2.28 x 8.6 m/s, and 3.24e-3 x 0.9 x 320 K x 1.5 on top while combustion lifts the pressure.
-TEST(EngineWallHeat, WoschniVelocityGrowsWithThePressureOfCombustionOnly) {
-  EXPECT_DOUBLE_EQ(woschni_velocity(2.28, 3.24e-3, 8.6, 0.9, 320.0, 0.0), 19.608);
-  EXPECT_DOUBLE_EQ(woschni_velocity(2.28, 3.24e-3, 8.6, 0.9, 320.0, -0.4), 19.608);
-  EXPECT_NEAR(woschni_velocity(2.28, 3.24e-3, 8.6, 0.9, 320.0, 1.5), 19.608 + 1.39968, 1e-12);
-}
-
 TEST(EngineWallHeat, LossOfAGivenTraceIsTheCyclesOwn) {
   for (const char* model : {"wall_heat_model=woschni", "wall_heat_model=hohenberg", "wall_heat_model=eichelberg"}) {
     const Cycle c = run(EngineCase(model));

@@ -92,28 +92,6 @@ TEST(CurveFilter, IsWhatADirectIntegralGives) {
   EXPECT_NEAR(filter.spread(), sd, 0.15 * sd);
 }
 
-std::vector<double> means_of(double offset, double unit_of_j, double shift) {
-  CurveFilter filter(settings_on(-30.0 + shift, 10.0 + shift), skewed_curve(-2.0 + shift, unit_of_j));
-  std::vector<double> out;
-  for (int k = 0; k < 30; ++k) {
-    const double x = (k % 2 == 0 ? -12.0 : -4.0) - 0.1 * k;
-    const double j = 1.1 * skewed(x + 9.0) + 0.2 * random::normal(3, 1, static_cast<std::uint64_t>(k));
-    filter.learn(x + shift, offset + unit_of_j * j);
-    out.push_back(filter.mean() - shift);
-    out.push_back(filter.stated_sd());
-  }
-  return out;
-}
-
-TEST(CurveFilter, KnowsNoLevelNoUnitAndNoOrigin) {
-  const std::vector<double> plain = means_of(0.0, 1.0, 0.0);
-  for (const std::vector<double>& other :
-       {means_of(1e6, 1.0, 0.0), means_of(0.0, 1e-3, 0.0), means_of(0.0, 1.0, 90.0)}) {
-    for (std::size_t i = 0; i < plain.size(); ++i)
-      EXPECT_NEAR(other[i], plain[i], 1e-5) << i;
-  }
-}
-
 TEST(CurveFilter, MirroredReadingsGiveTheMirroredPlace) {
   const Curve parabola = Curve::parabola(-0.05, 0.0, 50.0);
   CurveFilter left(settings_on(-20.0, 20.0), parabola), right(left);

@@ -165,17 +165,6 @@ TEST(CurveSeeking, TrustSaysHowSteepTheGuideIsBesideThePlant) {
   }
 }
 
-TEST(CurveSeeking, LearnsFromWhatWasReallyApplied) {
-  CurveSeeking seeker(guided(3.0, 3.0));
-  for (int k = 0; k < 150; ++k) {
-    const double applied[] = {std::max(seeker.ask()[0], -2.5)};
-    const double j[] = {engine_like(applied[0] + 6.0)};
-    ASSERT_EQ(seeker.tell({j, {}, false, applied}), TellStatus::accepted);
-  }
-  EXPECT_LE(seeker.estimate()[0], -2.0);
-  EXPECT_GE(seeker.estimate()[0], -30.0);
-}
-
 TEST(CurveSeeking, TakesNoMemoryAndNeverThrows) {
   for (const double delay : {0.0, 5.0}) {
     CurveSeekingSettings settings = guided(3.0, 3.0);

@@ -79,7 +79,6 @@ TEST(FeedForward, FollowsAPointThatDriftsThroughAFilterWithoutATestOrARestart) {
   EXPECT_NEAR(drifting.estimate()[0] - before, -(9.0 - 4.36), 0.1);
 }
 
-// A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.
 TEST(FeedForward, AskTellAndOfferAreNoexceptAndDoNotAllocate) {
   for (auto& [name, any] : every_seeker(space_at(scalar_input(8.0), 40.0), 0.25, 3)) {
     SCOPED_TRACE(name);

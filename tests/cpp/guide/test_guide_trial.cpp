@@ -145,20 +145,5 @@ TEST(FeedForward, AMisfiredCycleOfATestIsMeasuredAgain) {
   EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.1);
 }
 
-TEST(FeedForward, LearnsFromWhatThePlantApplied) {
-  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.curvature_spread = 0.0, .noise_sd = 0.01});
-  seeker.offer(at(-4.2), GuideCause::new_point);
-  seeker.offer(at(-10.7), GuideCause::new_point);
-  for (int k = 0; k < 400; ++k) {
-    const double x[] = {std::max(seeker.ask()[0], -6.0)};
-    const double j[] = {quadratic(x[0] + 9.5)};
-    ASSERT_EQ(seeker.tell({j, {}, false, x}), TellStatus::accepted);
-    if (k == 1) {
-      EXPECT_NEAR(seeker.path().trust().value(), 5.3 / 6.5, 0.02);
-    }
-  }
-  EXPECT_GE(seeker.estimate()[0], -7.01);
-}
-
 }  // namespace
 }  // namespace mgdd::guide

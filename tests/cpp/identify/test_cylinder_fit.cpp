@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -75,43 +74,6 @@ TEST(IdentifyFit, WallHeatTradesWithFuelHeat) {
     EXPECT_GT(correlation, 0.72);
     EXPECT_LT(correlation, 0.935);
   }
-}
-
-TEST(IdentifyFit, BadInputIsRefusedByNameAndChangesNothing) {
-  const Plant plant;
-  const auto start = estimates(plant.traces, plant.start());
-  const auto refuses = [&](const std::function<void(std::vector<MeasuredCycle>&, std::vector<LoadBurn>&,
-                                                    std::vector<std::string>&, engine::Cylinder&)>& spoil,
-                           const std::string& part) {
-    auto traces = plant.traces;
-    auto burns = start;
-    auto free = burn_names;
-    auto c = plant.start();
-    spoil(traces, burns, free, c);
-    try {
-      fit_cylinder(traces, c, burns, free, {});
-      ADD_FAILURE() << part;
-    } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-    }
-  };
-  refuses([](auto&, auto&, auto& free, auto&) { free = {"soc"}; }, "'soc'");
-  refuses([](auto&, auto&, auto& free, auto&) { free = {"ivc_cad"}; }, "'ivc_cad'");
-  refuses([](auto&, auto&, auto& free, auto&) { free = {"soc_cad", "soc_cad"}; }, "named twice");
-  refuses([](auto&, auto&, auto& free, auto&) { free.clear(); }, "free is empty");
-  refuses([](auto& t, auto&, auto&, auto&) { t.clear(); }, "traces is empty");
-  refuses([](auto&, auto& b, auto&, auto&) { b.pop_back(); }, "start has 1");
-  refuses([](auto&, auto& b, auto&, auto&) { b[0].fuel_heat_j = -1.0; }, "fuel_heat_j[at 14]");
-  refuses([](auto&, auto& b, auto&, auto&) { b[0].soc_cad = std::nan(""); }, "soc_cad[at 14]");
-  refuses([](auto& t, auto&, auto&, auto&) { t[1].pressure_bar[3] = std::nan(""); }, "pressure_bar[3]");
-  refuses([](auto& t, auto&, auto&, auto&) { t[1].pressure_bar[3] = -0.2; }, "peg it");
-  refuses([](auto& t, auto&, auto&, auto&) { t[0].point.speed_rpm = -1.0; }, "speed_rpm = -1");
-  refuses([](auto&, auto&, auto&, auto& c) { c.geometry.bore_mm = -86.0; }, "bore_mm = -86");
-  refuses([](auto&, auto&, auto&, auto& c) { c.geometry.ivc_cad = -100.0; }, "cut it to the closed part");
-  EXPECT_TRUE(fit(plant.traces, plant.start(), burn_names).report.success());
-  CylinderFitOptions options;
-  options.step_cad = 0.0;
-  EXPECT_THROW(fit_cylinder(plant.traces, plant.start(), start, burn_names, options), ParameterError);
 }
 
 TEST(IdentifyFit, ABoundNarrowsTheSearchOfOneTraceOrOfAll) {

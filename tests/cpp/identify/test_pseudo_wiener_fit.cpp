@@ -1,9 +1,6 @@
 // Identification of pseudo-Wiener models: exact recovery, unmodelled dynamics, coverage, ranking of the three kinds.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-
 #include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
 #include "support/throttle_records.hpp"
@@ -59,26 +56,6 @@ TEST(PseudoWienerFit, StaysCloseBehindNoiseInductanceAndStribeckFriction) {
   EXPECT_GE(test_support::fit_percent(log.angle_deg, free_run(fit.model, log.duty, log.angle_deg[0])), 98.0);
 }
 
-TEST(PseudoWienerFit, IntervalsCoverTheTruth) {
-  const Signal duty = test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0);
-  const Signal clean = free_run(PwR{}, duty, 8.0);
-  std::array<int, 5> covered{};
-  for (unsigned seed = 0; seed < 60; ++seed) {
-    std::mt19937 bits(seed);
-    std::normal_distribution<double> noise(0.0, 0.05);
-    Signal noisy = clean;
-    for (std::size_t k = 1; k < noisy.size(); ++k)
-      noisy[k] += noise(bits);
-    const auto fit = fit_pseudo_wiener({{duty, noisy}}, PwR{}, one_search());
-    for (int i = 0; i < 5; ++i) {
-      const double off = std::abs(fit.report.values[i] - truth[static_cast<std::size_t>(i)]);
-      covered[static_cast<std::size_t>(i)] += off <= 1.96 * fit.report.standard_error[i] ? 1 : 0;
-    }
-  }
-  for (const int count : covered)
-    EXPECT_GE(count, 50);
-}
-
 TEST(PseudoWienerFit, SidesAreFittedApartFromOneLog) {
   PwR two;
   two.below.preload_duty = 0.16;
@@ -97,31 +74,6 @@ TEST(PseudoWienerFit, SidesAreFittedApartFromOneLog) {
   EXPECT_NEAR(found.below.preload_duty, 0.16, 3e-4);
   EXPECT_NEAR(found.below.spring_duty_per_deg, 3e-3, 3e-5);
   EXPECT_NEAR(found.above.preload_duty, 0.1292, 1e-4);
-}
-
-TEST(PseudoWienerFit, RefusesWhatCannotBeFittedAndSaysWhy) {
-  const Signal duty(100, 0.1);
-  const Signal angle(100, 20.0);
-  const auto message = [](auto&& call) -> std::string {
-    try {
-      call();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_EQ(message([&] { static_cast<void>(fit_pseudo_wiener({}, PwR{}, {})); }),
-            "records is empty: a fit needs at least one log");
-  EXPECT_NE(message([&] { static_cast<void>(fit_pseudo_wiener({{duty, Signal(99, 1.0)}}, PwR{}, {})); }).find("99"),
-            std::string::npos);
-  EXPECT_NE(message([&] {
-              static_cast<void>(fit_pseudo_wiener({{Signal(100, 1.5), angle}}, PwR{}, {}));
-            }).find("records[0], sample 0"),
-            std::string::npos);
-  PseudoWienerFitOptions o;
-  o.free = {"mass"};
-  EXPECT_EQ(message([&] { static_cast<void>(fit_pseudo_wiener({{duty, angle}}, PwR{}, o)); }),
-            "free: 'mass' is not a parameter of pw_r");
 }
 
 }  // namespace

@@ -1,9 +1,7 @@
-// On-line update of PW-R: tracks a change of the supply, rests without excitation, gates hold, state survives a
-// restart.
+// On-line update of PW-R: tracks a change of the supply, rests without excitation, gates hold.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/dynamics/observer.hpp"
@@ -101,28 +99,6 @@ TEST(RecursivePwR, EstimatesStayInsideTheirBounds) {
     static_cast<void>(online.update(k % 7 < 3 ? 1.0 : -1.0, 45.0 + 30.0 * std::sin(0.3 * k) * std::sin(0.0171 * k)));
   EXPECT_NO_THROW(online.model().validate());
   EXPECT_LE(online.above().covariance().trace(), online.above().settings().start_variance.sum() * (1.0 + 1e-12));
-}
-
-TEST(RecursivePwR, ARestartGoesOnBitForBit) {
-  const auto log = supply_step(4.0, 2.0);
-  RecursivePwR whole(RecursivePwRSettings{});
-  RecursivePwR first(RecursivePwRSettings{});
-  for (std::size_t k = 0; k < 2003; ++k) {
-    static_cast<void>(whole.update(log.duty[k], log.angle_deg[k]));
-    static_cast<void>(first.update(log.duty[k], log.angle_deg[k]));
-  }
-  RecursivePwR second(RecursivePwRSettings{});
-  const StateColumns saved = save_state(first);
-  restore_state(second, saved);
-  for (std::size_t k = 2003; k < log.duty.size(); ++k) {
-    static_cast<void>(whole.update(log.duty[k], log.angle_deg[k]));
-    static_cast<void>(second.update(log.duty[k], log.angle_deg[k]));
-  }
-  EXPECT_EQ(save_state(whole), save_state(second));
-  StateColumns broken = saved;
-  broken["above_estimate"][1] = 1e9;
-  EXPECT_THROW(restore_state(second, broken), ParameterError);
-  EXPECT_EQ(save_state(whole), save_state(second));
 }
 
 TEST(WindowPwR, TracksAStepOfTheSupply) {
@@ -281,38 +257,6 @@ TEST(RecursiveRealTime, NothingIsAllocated) {
   EXPECT_EQ(counter.count(), 0u);
   static_assert(noexcept(rls.update(0.0, 0.0)) && noexcept(window.update(0.0, 0.0)) && noexcept(window.iterate()) &&
                 noexcept(gradient.update(0.0, 0.0)) && noexcept(observer.update(0.0, 0.0)));
-}
-
-TEST(RecursiveLeastSquares, FindsALineAndCapsItsTrace) {
-  optimize::RecursiveSettings<2> s;
-  s.start_variance.setConstant(100.0);
-  s.forgetting = 0.98;
-  s.trace_cap = 1.0;
-  optimize::RecursiveLeastSquares<2> rls(s);
-  for (int k = 0; k < 400; ++k)
-    ASSERT_TRUE(rls.update({1.0, 0.1 * (k % 17)}, 2.0 - 0.3 * (k % 17)));
-  EXPECT_NEAR(rls.estimate()[0], 2.0, 1e-5);
-  EXPECT_NEAR(rls.estimate()[1], -3.0, 1e-5);
-  for (int k = 0; k < 5000; ++k)
-    ASSERT_TRUE(rls.update({0.0, 0.0}, 0.0));
-  EXPECT_LE(rls.covariance().trace(), 200.0 * (1.0 + 1e-12));
-  const auto before = rls.estimate();
-  EXPECT_FALSE(rls.update({1.0, 0.0}, std::nan("")));
-  EXPECT_EQ(rls.estimate(), before);
-  for (const double extreme : {1e200, 1e308}) {  // the squares overflow
-    const auto covariance = rls.covariance();
-    const auto updates = rls.updates();
-    EXPECT_FALSE(rls.update({extreme, -extreme}, 1.0));
-    EXPECT_EQ(rls.estimate(), before);
-    EXPECT_EQ(rls.covariance(), covariance);
-    EXPECT_EQ(rls.updates(), updates);
-  }
-  s.forgetting = 0.5;
-  EXPECT_NO_THROW(optimize::RecursiveLeastSquares<2>{s});
-  s.forgetting = 0.49;
-  EXPECT_THROW(optimize::RecursiveLeastSquares<2>{s}, ParameterError);
-  s.forgetting = 1.5;
-  EXPECT_THROW(optimize::RecursiveLeastSquares<2>{s}, ParameterError);
 }
 
 }  // namespace

@@ -116,23 +116,6 @@ TEST(OutputError, SensitivitiesAgreeWithCentralDifferences) {
   EXPECT_LT(largest_difference_error(residual, residual.start()), 1e-8);
 }
 
-TEST(OutputError, AnyNumberOfUnknownsGivesTheSameColumns) {
-  // One to six free columns pass through different dual widths; a column never depends on its neighbours.
-  auto record = pendulum_record(3, 100);
-  record.free_start = {0, 1};
-  OutputError all(Rk4<Pendulum>{}, pendulum_truth, std::vector<std::size_t>{0, 1, 2, 3}, std::vector{record});
-  VectorXd r(all.n_residuals());
-  MatrixXd j(all.n_residuals(), 6);
-  ASSERT_TRUE(all(all.start(), r, &j));
-  record.free_start = {};
-  for (std::size_t p = 0; p < 4; ++p) {
-    OutputError one(Rk4<Pendulum>{}, pendulum_truth, std::vector<std::size_t>{p}, std::vector{record});
-    MatrixXd single(one.n_residuals(), 1);
-    ASSERT_TRUE(one(one.start(), r, &single));
-    EXPECT_LT((single.col(0) - j.col(static_cast<Eigen::Index>(p))).norm(), 1e-13 * single.norm());
-  }
-}
-
 TEST(OutputError, ALinearLagMatchesItsClosedFormAndStartsWhereItsParameterSays) {
   const SimulationRecord record{.dt_s = 0.01,
                                 .input = std::vector<double>(200, 1.0),
@@ -163,23 +146,6 @@ TEST(OutputError, ARecordWithoutUnknownsLeavesNoStaleRows) {
   ASSERT_TRUE(residual(residual.start(), r, &j));
   EXPECT_EQ(j.topRows(60), MatrixXd::Zero(60, 1));
   EXPECT_EQ(j(60, 0), 1.0);
-}
-
-TEST(OutputError, AUsersFunctorIsFittedByLeastSquares) {
-  auto record = pendulum_record(4, 1500, 0.01);
-  record.start = {record.output[0], 0.0};
-  record.free_start = {0, 1};
-  record.sigma = 0.01;
-  OutputError residual(Rk4<Pendulum>{}, {2.0, 0.2, 1.0, 0.0}, std::vector<std::size_t>{0, 1, 2, 3},
-                       std::vector{record});
-  const std::vector<optimize::Parameter> unknowns{{"gain", 0.1, 20.0, true},      {"damping", 0.01, 5.0, true},
-                                                  {"stiffness", 0.1, 20.0, true}, {"offset", -1.0, 1.0},
-                                                  {"angle_0", -3.0, 3.0},         {"rate_0", -3.0, 3.0}};
-  const auto fit = optimize::LeastSquares(unknowns, residual.n_residuals()).solve(residual, residual.start());
-  ASSERT_TRUE(fit.success()) << fit.brief();
-  EXPECT_NEAR(fit.rmse, 1.0, 0.05);
-  for (Eigen::Index i = 0; i < 4; ++i)
-    EXPECT_NEAR(fit.values[i], pendulum_truth[static_cast<std::size_t>(i)], 4.0 * fit.standard_error[i]);
 }
 
 TEST(OutputError, EvaluatesWithoutTheHeapAndRefusesAnEscape) {

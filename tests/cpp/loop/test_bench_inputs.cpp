@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "mgdd/engine/recirculation.hpp"
 #include "mgdd/loop/engine_loop.hpp"
 #include "mgdd/loop/virtual_engine.hpp"
@@ -29,20 +28,6 @@ BenchSettings steering(std::vector<BenchInput> inputs, BenchSettings s = quiet_b
 
 BenchCycle step(VirtualEngine& bench, const std::vector<double>& inputs) {
   return bench.step(inputs);
-}
-
-TEST(BenchInputs, LeftAloneTheyChangeNoBit) {
-  BenchSettings s;
-  s.misfire_probability = 0.05;
-  s.wall_heat_drift_per_kcycle = 0.2;
-  s.limits = {"p_max_bar", "nox_fast_ppm"};
-  s.schedule[0].point.burn_duration_cad = 41.0;
-  VirtualEngine plain(s), further(steering({soc_cad, egr, intake_pressure_kpa, burn_duration_cad}, s));
-  for (int k = 0; k < 60; ++k) {
-    const double soc = test_support::wandering_soc_cad(k);
-    ASSERT_EQ(bits_of(plain.step(soc)), bits_of(further.step(soc))) << k;
-  }
-  EXPECT_EQ(further.settings().inputs.size(), 4u);
 }
 
 // Exhaust of a cycle mixed into the charge of the next until nothing changes, element by element.
@@ -167,28 +152,6 @@ TEST(BenchInputs, WhatFindsNoOxygenDoesNotBurn) {
   EXPECT_DOUBLE_EQ(
       starved.indicators.efficiency_gross,
       starved.indicators.work_gross_j / (20.0 * bench.settings().cylinder.gas.lower_heating_value_mj_per_kg));
-}
-
-TEST(BenchInputs, ALoopOfTheCoreSteersThemAll) {
-  const BenchSettings s = steering({soc_cad, egr, intake_pressure_kpa}, BenchSettings{});
-  optimize::SpsaSettings o;
-  o.space.start = Eigen::Vector3d(-15.0, 0.2, 160.0);
-  o.space.lower = Eigen::Vector3d(-25.0, 0.0, 120.0);
-  o.space.upper = Eigen::Vector3d(10.0, 0.4, 220.0);
-  o.perturbation = Eigen::Vector3d(2.0, 0.02, 5.0);
-  o.step_max = Eigen::Vector3d(2.0, 0.02, 5.0);
-  const optimize::Spsa begun(o);
-  VirtualEngine bench(s), twin(s);
-  optimize::Spsa seeker = begun, other = begun;
-  for (int k = 0; k < 80; ++k) {
-    const LoopCycle cycle = loop_step(bench, seeker);
-    const optimize::Inputs asked = other.ask();
-    const BenchCycle c = twin.step({asked.data(), 3});
-    other.tell({c.component_values(), {}, false, {c.applied.data(), 3}});
-    ASSERT_EQ(bits_of(c), bits_of(cycle.bench));
-  }
-  EXPECT_FALSE(side_by_side(bench, bench));
-  EXPECT_THROW(VirtualEngineLanes({bench}), ParameterError);
 }
 
 }  // namespace

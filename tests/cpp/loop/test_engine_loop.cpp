@@ -48,20 +48,6 @@ TEST(EngineLoop, AStepAllocatesNothing) {
   EXPECT_EQ(counter.count(), 0u);
 }
 
-TEST(EngineLoop, ASeekerThatDoesNotFitIsRefused) {
-  const VirtualEngine bench(rich_bench());
-  optimize::ExtremumSeekingSettings s = batch(-12.0);
-  EXPECT_THROW(require_match(bench, optimize::ExtremumSeeking(s)), ParameterError);  // no limits
-  s.limits = {{.name = "cov_imep_percent", .upper = 5.0}, {.name = "p_max_bar", .upper = 95.0}};
-  EXPECT_THROW(require_match(bench, optimize::ExtremumSeeking(s)), ParameterError);  // other order
-  std::swap(s.limits[0], s.limits[1]);
-  EXPECT_NO_THROW(require_match(bench, optimize::ExtremumSeeking(s)));
-  s.components.resize(3);
-  EXPECT_THROW(require_match(bench, optimize::ExtremumSeeking(s)), ParameterError);
-  s.components.resize(2);
-  EXPECT_NO_THROW(require_match(bench, optimize::ExtremumSeeking(s)));
-}
-
 LoopCycle cycle_at(double estimate_cad, double limit_value = 0.0, bool misfire = false) {
   LoopCycle c;
   c.estimate_cad = estimate_cad;

@@ -165,20 +165,6 @@ TEST(GuidedThrottle, ATorqueStepBehindAMoveIsBroughtBackByTheLearningForm) {
   EXPECT_LE(farthest_plain, 1.2);
 }
 
-TEST(GuidedThrottle, FollowsASineFourTimesAsWellAsAnOrdinaryPid) {
-  control::PidSettings pid;
-  pid.above = pid.below = {4.0 / 90.0, 50.0 / 90.0, 0.05 / 90.0};
-  pid.plate.spring = plate_of(preset(1)).spring;
-  pid.kick = pid.dead_band_deg = pid.rate_s_per_deg = pid.plate.friction = 0.0;
-  pid.integral_window_deg = 1e3;
-  for (const auto& [mean, amplitude] : {std::pair{40.0, 10.0}, std::pair{10.0, 8.0}}) {
-    const ThrottleScenario s = sine_scenario(mean, amplitude);
-    const double ordinary = judged(control::Pid(pid), preset(1), s, 0.2).mse_deg2;
-    EXPECT_GT(ordinary, 4.0 * judged(GuidedPredictive(plain()), preset(1), s, 0.2).mse_deg2);
-    EXPECT_GT(ordinary, 40.0 * judged(GuidedPredictive(learning(1)), preset(1), s, 0.2).mse_deg2);
-  }
-}
-
 TEST(GuidedThrottle, AnExtraDelayCostsWhatItMustAndIsForgottenOnceTold) {
   const ThrottleScenario s = step_scenario(20.0, 60.0, 800);
   double last = 0.0;

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -42,28 +41,6 @@ MonteCarloPlan small_plan() {
 bool same(const LoopSummary& a, const LoopSummary& b) {  // bit for bit, NaN included
   // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): eight bytes each, no padding
   return std::memcmp(&a, &b, sizeof(LoopSummary)) == 0;
-}
-
-TEST(MonteCarlo, IsTheSameLoopsOnAnyNumberOfThreads) {
-  MonteCarloPlan plan = small_plan();
-  plan.threads = 1;
-  const MonteCarloResult one = monte_carlo(plan, {});
-  plan.threads = 5;
-  const MonteCarloResult five = monte_carlo(plan, {});
-  ASSERT_EQ(one.loops.size(), 12u);
-  for (std::size_t i = 0; i < one.loops.size(); ++i) {
-    EXPECT_TRUE(one.finished[i]);
-    EXPECT_TRUE(same(one.loops[i], five.loops[i])) << i;
-  }
-  // ... and each is the loop that one would run alone: bench 1, seeker 1 (SPSA), seed 4.
-  VirtualEngine bench = plan.benches[1];
-  bench.reset(4);
-  auto spsa = std::get<optimize::Spsa>(plan.seekers[1]);
-  spsa.reseed(4);
-  LoopStatistics alone(with_limits_of(plan.criteria[1], spsa), plan.cycles);
-  for (int k = 0; k < plan.cycles; ++k)
-    alone.add(loop_step(bench, spsa));
-  EXPECT_TRUE(same(alone.summary(), one.loops[11]));
 }
 
 MonteCarloPlan wide_plan() {  // three operating points, the last with a gamma of temperature
@@ -126,25 +103,6 @@ TEST(MonteCarlo, AFewLoopsHaveTheBitsOfSingleOnes) {
   EXPECT_EQ(form_of_loops(15, LoopForm::lanes), LoopForm::lanes);
   EXPECT_EQ(form_of_loops(16, LoopForm::automatic), LoopForm::lanes);
   EXPECT_THROW(static_cast<void>(form_of_loops(16, LoopForm::shared)), ParameterError);
-}
-
-TEST(MonteCarlo, StopsEarlyAndKeepsWhatIsFinished) {
-  MonteCarloPlan plan = small_plan();
-  plan.seeds.assign(5000, 1);
-  MonteCarloResult r;
-  std::ptrdiff_t done = 0;
-  for (int wait = 2; done == 0 && wait < 2000; wait *= 2) {  // under a sanitizer two looks may be too soon
-    std::atomic<int> looks{0};
-    r = monte_carlo(plan, [&] { return ++looks >= wait; });
-    done = std::count(r.finished.begin(), r.finished.end(), true);
-  }
-  EXPECT_GT(done, 0);
-  EXPECT_LT(done, static_cast<std::ptrdiff_t>(r.finished.size()));
-  plan = small_plan();
-  plan.form = LoopForm::lanes;
-  const MonteCarloResult first = monte_carlo(plan, {});
-  for (std::size_t i = 0; i < 3; ++i)
-    EXPECT_TRUE(!r.finished[i] || same(r.loops[i], first.loops[1])) << i;  // every seed of the long plan is 1
 }
 
 TEST(MonteCarlo, AnExceptionOfTheStopCallbackEndsTheLoops) {

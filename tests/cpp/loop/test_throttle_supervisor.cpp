@@ -36,23 +36,5 @@ TEST(ThrottleSupervisorLoop, NoFalseAlarmOnAHundredPlantsOfEachPresetWithNoiseAn
   }
 }
 
-TEST(ThrottleSupervisorLoop, WithoutAFaultItChangesNoBit) {
-  for (const TunedSet& tuned : tuned_sets) {
-    const Throttle t = preset(tuned.preset);
-    with_both_controllers(tuned, [&](auto controller) {
-      SupervisedLoop loop(controller, supervisor_of(t), plant_of(t, 10.0, 7));
-      VirtualThrottle alone(plant_of(t, 10.0, 7));
-      double measured = 10.0, acting = 0.0;
-      for (int k = 0; k < 3000; ++k) {
-        const double computed = controller.step(driving_deg(k), measured);
-        const VirtualThrottleSample now = alone.step({acting, t.supply_v, 0.0});
-        acting = computed;
-        measured = now.sensed.angle_deg;
-        ASSERT_EQ(loop.step(driving_deg(k)).angle_deg, now.angle_deg) << k;
-      }
-    });
-  }
-}
-
 }  // namespace
 }  // namespace mgdd::loop

@@ -1,4 +1,4 @@
-// Laws of the virtual bench: it is the cycle model, its sensors are their closed forms, its chance has its statistics.
+// Laws of the virtual bench: its sensors are their closed forms, its chance has its statistics.
 #include "mgdd/loop/virtual_engine.hpp"
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 
 #include "support/bench_case.hpp"
 #include "support/engine_case.hpp"
+#include "support/no_alloc.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -23,20 +24,6 @@ engine::Indicators<double> cycle_of(const engine::Cylinder& cylinder, const engi
   const engine::Charge<double> charge = model.charge(point);
   model.run(charge, soc, work);
   return model.indicators(charge, soc, work);
-}
-
-TEST(VirtualEngine, WithoutChanceItIsTheCycleModel) {
-  VirtualEngine bench(quiet_bench());
-  for (const double soc : {-20.0, -6.0, 3.5}) {
-    const BenchCycle c = bench.step(soc);
-    const auto expected = cycle_of({}, {}, soc);
-    for (const auto& field : engine::indicator_fields<double>())
-      EXPECT_EQ(c.indicators.*(field.member), expected.*(field.member)) << field.name;
-    EXPECT_EQ(c.soc_cad, soc);
-    EXPECT_DOUBLE_EQ(c.j, 100.0 * expected.efficiency_gross - 0.004 * c.nox_true_ppm);
-    EXPECT_EQ(c.j, c.components[0] + c.components[1]);
-  }
-  EXPECT_EQ(bench.cycle(), 3);
 }
 
 TEST(VirtualEngine, SensorsStartSteadyAndAnswerAStepInClosedForm) {
@@ -268,6 +255,60 @@ TEST(VirtualEngine, AnImpossibleCycleIsFlaggedAndRepeatsTheLastValue) {
   EXPECT_EQ(c.j, last.j);
   EXPECT_EQ(c.nox_true_ppm, last.nox_true_ppm);
   EXPECT_TRUE(std::isnan(c.indicators.imep_gross_bar));
+}
+
+// --- real time ------------------------------------------------------------------------------------------------
+
+static_assert(noexcept(std::declval<VirtualEngine&>().step(0.0)));
+static_assert(noexcept(std::declval<VirtualEngine&>().reset(0)));
+
+BenchSettings eventful() {
+  BenchSettings s;
+  s.performance = engine::efficiency_and_nox();
+  s.nox_sensor = NoxSensor::soft_corrected;
+  s.misfire_probability = 0.03;
+  s.soc_drift_cad_per_kcycle = 1.0;
+  s.wall_heat_drift_per_kcycle = 0.2;
+  s.limits = {"p_max_bar", std::string(cov_imep_name)};
+  engine::OperatingPoint fast;
+  fast.speed_rpm = 2000.0;
+  s.schedule = {{0, {}}, {90, fast}};
+  s.seed = 7;
+  return s;
+}
+
+TEST(VirtualEngine, AllocatesNothingWithAnyOption) {
+  int combinations = 0;
+  for (const NoxSensor sensor : {NoxSensor::none, NoxSensor::analyser, NoxSensor::fast, NoxSensor::soft,
+                                 NoxSensor::soft_corrected, NoxSensor::true_value}) {
+    for (const bool delayed : {false, true}) {
+      for (const double chance : {0.0, 1.0}) {
+        for (const double drift : {0.0, 1.0}) {
+          for (const auto shape : {engine::BurnShape::triangle, engine::BurnShape::double_wiebe}) {
+            BenchSettings s = eventful();
+            if (sensor == NoxSensor::none) s.performance = engine::efficiency_only();
+            s.nox_sensor = sensor;
+            s.delay_whole_objective = delayed;
+            s.soc_scatter_cad *= chance;
+            s.efficiency_noise_percent *= chance;
+            s.misfire_probability = 0.3 * chance;
+            s.soc_drift_cad_per_kcycle = s.wall_heat_drift_per_kcycle = drift;
+            s.cylinder.burn.burn_shape = shape;
+            s.schedule.back().cycle = 2;
+            VirtualEngine bench(s);
+            const test_support::AllocationCounter counter;
+            for (int k = 0; k < 6; ++k) {
+              bench.step(-60.0 + 20.0 * k);
+              if (k == 4) bench.reset(3);
+            }
+            EXPECT_EQ(counter.count(), 0u) << name_of(sensor);
+            ++combinations;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(combinations, 96);
 }
 
 }  // namespace

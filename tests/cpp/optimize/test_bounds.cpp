@@ -2,29 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "support/reference_algebra.hpp"
-
 namespace mgdd::optimize {
 namespace {
-
-TEST(LeastSquares, BoundsHoldTheSolutionOfTheReducedProblem) {
-  const MatrixXd a = random_matrix(6, 20, 3);
-  const VectorXd b = a * vector({2.0, -1.0, 0.5});
-  std::vector<Parameter> parameters = named(3);
-  parameters[0].upper = 1.0;
-  const FitReport fit = LeastSquares(parameters, 20).solve(Linear{a, b}, vector({-5.0, 0.0, 0.0}));
-  const MatrixXd rest = a.rightCols(2);
-  const MatrixXd inverse = test_support::inverse(test_support::gram(rest));
-  const VectorXd expected = test_support::product(inverse, test_support::product(rest.transpose(), b - a.col(0)));
-  EXPECT_TRUE(fit.success()) << fit.brief();
-  EXPECT_EQ(fit.values[0], 1.0);
-  EXPECT_LT((fit.values.tail(2) - expected).norm(), 1e-9);
-  EXPECT_EQ(fit.bounds_active, Eigen::Vector3i(1, 0, 0));
-  EXPECT_EQ(fit.unidentifiable, std::vector<std::string>{"p0"});
-  EXPECT_TRUE(std::isnan(fit.standard_error[0]));
-  const MatrixXd reduced = inverse * (2.0 * fit.cost / (20 - 2));
-  EXPECT_LT((fit.covariance.bottomRightCorner(2, 2) - reduced).norm(), 1e-12);
-}
 
 // With almost no damping one step solves a linear problem, also when it meets a bound on the way.
 TEST(LeastSquares, OtherParametersAreSolvedAgainAfterAClip) {

@@ -89,23 +89,6 @@ TEST(ClampedPlant, TheEstimateGoesOnWhenTheClampIsGone) {
   }
 }
 
-// An actuator with an offset follows all the same: the best request lies beside the best input, and nothing runs away.
-TEST(ClampedPlant, AnOffsetOrAResolutionIsNotAClamp) {
-  for (auto& [name, any] : every_seeker(space_at(scalar_input(-6.0), 30.0), 0.25, 1)) {
-    SCOPED_TRACE(name);
-    std::visit(
-        [&](auto& seeker) {
-          for (int k = 0; k < 3000; ++k) {
-            const double applied = std::round((seeker.ask()[0] - 1.5) / 0.2) * 0.2;
-            const double j[] = {quadratic(applied - 3.0)};
-            ASSERT_EQ(seeker.tell({j, {}, false, {&applied, 1}}), TellStatus::accepted);
-          }
-          EXPECT_NEAR(seeker.estimate()[0], name == "golden_section" ? 3.0 : 4.5, 1.6);
-        },
-        any);
-  }
-}
-
 // Both halves of a difference are clamped differently: the slope is that of the applied inputs, exactly.
 TEST(ClampedPlant, SlopesOfAStraightLineAreExact) {
   const auto line = [](const Inputs& x) { return 5.0 + 0.75 * x[0]; };

@@ -13,21 +13,6 @@ DitherSettings window(int period, std::vector<int> harmonics) {
           .harmonics = std::move(harmonics)};
 }
 
-TEST(Dither, HarmonicsAreOrthogonalOverTheWindow) {
-  const Dither dither(window(40, {4, 5, 7}), {ComponentLag{}});
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      double product = 0.0, mean = 0.0;
-      for (int phase = 0; phase < 40; ++phase) {
-        product += dither.perturbation(phase, i) * dither.demodulation(phase, 0, k);
-        mean += dither.perturbation(phase, i);
-      }
-      EXPECT_NEAR(product, i == k ? 20.0 : 0.0, 1e-12);
-      EXPECT_NEAR(mean, 0.0, 1e-12);
-    }
-  }
-}
-
 TEST(Dither, SensorResponseIsThatOfTheDiscreteLag) {
   const auto degrees = [](double delay, double lag, int period) {
     return std::fmod(sensor_response({delay, lag}, 1, period).phase_rad * 180.0 / pi, 360.0);
@@ -115,8 +100,6 @@ TEST(Dither, EachComponentIsTurnedBackByItsOwnPhase) {
     EXPECT_LT((seeker.gradient() - truth).norm(), form == MeanRemoval::batch ? 1e-9 : 10.0);
   }
 }
-
-// --- refusals -----------------------------------------------------------------------------------------------
 
 }  // namespace
 }  // namespace mgdd::optimize

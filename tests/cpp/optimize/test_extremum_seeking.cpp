@@ -1,4 +1,4 @@
-// Laws of averaging for the sinusoidal dither, then the cycle counts and errors they predict for the default engine.
+// Laws of averaging for the sinusoidal dither, rates, restarts.
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
@@ -62,34 +62,6 @@ TEST(ExtremumSeeking, BiasOfAThirdOrderMapDependsOnTheAmplitudeOnly) {
         EXPECT_NEAR(mean_of(path, 2000, 3000), -amplitude * amplitude * third / (8.0 * bend), 0.005);
       }
     }
-  }
-}
-
-TEST(ExtremumSeeking, AConstantAddedToJChangesNothing) {
-  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average, MeanRemoval::washout}) {
-    ExtremumSeekingSettings s = plain_seeking(8.0);
-    s.form = form;
-    s.rate = Inputs{};
-    ExtremumSeeking plain(s), lifted(s);
-    const auto j = [](double x) { return quadratic(x); };
-    const std::vector<double> a = search(plain, j, 1000, 0.25, 3);
-    const std::vector<double> b = search(lifted, [&](double x) { return j(x) + 1e6; }, 1000, 0.25, 3);
-    for (std::size_t k = 0; k < a.size(); ++k)
-      ASSERT_NEAR(a[k], b[k], 1e-6) << name_of(form) << " cycle " << k;
-  }
-}
-
-// --- figures of the default engine --------------------------------------------------------------------------
-
-TEST(ExtremumSeeking, NoiseMakesTheErrorThatAveragingPredicts) {
-  for (const double sigma : {0.25, 0.5}) {
-    double square = 0.0;
-    for (std::uint64_t seed = 0; seed < 20; ++seed) {
-      ExtremumSeeking seeker(plain_seeking(0.0));
-      square += std::pow(rms_of(search(seeker, quadratic, 2400, sigma, seed), 400, 2400), 2) / 20.0;
-    }
-    const double expected = sigma / (std::abs(bend) * std::sqrt(40.0));
-    EXPECT_NEAR(std::sqrt(square) / expected, 1.0, 0.15) << "sigma " << sigma;
   }
 }
 
@@ -186,8 +158,6 @@ TEST(ExtremumSeeking, ARestartHoldsTheEstimateAsTheStartDoes) {
     }
   }
 }
-
-// --- settings -----------------------------------------------------------------------------------------------
 
 }  // namespace
 }  // namespace mgdd::optimize

@@ -1,62 +1,10 @@
-// Gains that a seeker makes of its first readings: the same path in every unit of J, and sense on any curvature.
+// The bend that a seeker reads off its first readings, late, missing and uneven ones too.
 #include "mgdd/optimize/watch/first_readings.hpp"
-
-#include <optional>
 
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
 namespace {
-
-/// Every seeker whose gain can be left open, with it left open.
-std::vector<std::pair<std::string, Seeker>> own_gains(const SearchSpace& space, std::uint64_t seed) {
-  auto out = every_seeker(space, 0.0, seed, {}, std::nullopt);
-  std::erase_if(out, [](const auto& one) { return one.first == "golden_section"; });
-  return out;
-}
-
-SearchSpace from(double start) {
-  return {scalar_input(start), scalar_input(-25.0), scalar_input(20.0)};
-}
-
-std::vector<double> path_of(Seeker& any, double curvature, double noise_sd, double unit, int cycles,
-                            std::uint64_t seed) {
-  return std::visit(
-      [&](auto& seeker) {
-        std::vector<double> path{seeker.estimate()[0]};
-        for (int k = 0; k < cycles; ++k) {
-          const double noise = noise_sd * random::normal(seed, 7, static_cast<std::uint64_t>(k));
-          cycle_of(seeker, [&](const Inputs& x) {
-            return unit * (3.0 + noise + 0.5 * curvature * (x[0] + 5.5) * (x[0] + 5.5));
-          });
-          path.push_back(seeker.estimate()[0]);
-        }
-        return path;
-      },
-      any);
-}
-
-TEST(FirstReadings, EverySeekerArrivesAndStaysOnGentleAndOnSharpCurves) {
-  for (const double curvature : {0.01, 0.051, 0.3, 1.0, 5.0}) {
-    const std::size_t count = own_gains(from(-12.0), 1).size();
-    for (std::size_t i = 0; i < count; ++i) {
-      int arrived = 0;
-      double square = 0.0;
-      std::string name;
-      for (std::uint64_t seed = 0; seed < 40; ++seed) {
-        auto all = own_gains(from(-12.0), seed);
-        name = all[i].first;
-        const std::vector<double> path = path_of(all[i].second, -curvature, 0.3, 1.0, 2000, seed);
-        if (first_within(path, 1.0, -5.5) >= 0) ++arrived;
-        for (std::size_t k = 1200; k < 2000; ++k)
-          square += (path[k] + 5.5) * (path[k] + 5.5) / (40.0 * 800.0);
-      }
-      EXPECT_GE(arrived, 38) << name << ", curvature " << curvature;
-      EXPECT_LE(0.5 * curvature * square, name == "gradient_descent" ? 0.15 : 0.07)
-          << name << ", curvature " << curvature;
-    }
-  }
-}
 
 double bend_of(FirstReadings& first, double slope, double curvature, double noise_sd, double drift, std::uint64_t seed,
                std::int64_t late = 0) {

@@ -71,17 +71,6 @@ TEST(GoldenSection, ADrawCutsBothEnds) {
   EXPECT_LT(seeker.upper(), 10.0 * 0.9);
 }
 
-TEST(GoldenSection, FollowsASlowDriftAndForgetsAtARestart) {
-  GoldenSection seeker(between(-30.0, 30.0, 0.05));
-  search(seeker, quadratic, 300, 0.05, 2);
-  EXPECT_NEAR(seeker.estimate()[0], 0.0, 0.6);
-  seeker.restart();
-  EXPECT_FALSE(seeker.converged());
-  EXPECT_EQ(seeker.lower(), -30.0);
-  search(seeker, [](double x) { return quadratic(x - 12.0); }, 300, 0.05, 3);
-  EXPECT_NEAR(seeker.estimate()[0], 12.0, 0.6);
-}
-
 TEST(GoldenSection, ABrokenLimitDecidesBeforeJ) {
   GoldenSectionSettings s = between(-30.0, 10.0);
   s.limits = {{"p_max_bar", 100.0}};

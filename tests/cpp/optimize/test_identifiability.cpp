@@ -8,30 +8,6 @@
 namespace mgdd::optimize {
 namespace {
 
-TEST(LeastSquares, ExactCollinearityIsNamedWithItsDirection) {
-  MatrixXd a = random_matrix(9, 25, 4);
-  a.col(2) = -2.0 * a.col(0);
-  const VectorXd b = random_matrix(10, 25, 1);
-  const FitReport fit = fit_linear(a, b);
-  EXPECT_TRUE(fit.success()) << fit.brief();
-  EXPECT_EQ(fit.unidentifiable, (std::vector<std::string>{"p0", "p2"}));
-  ASSERT_EQ(fit.null_directions.cols(), 1);
-  EXPECT_LT((a * fit.null_directions.col(0)).norm(), 1e-12);
-  EXPECT_NEAR(fit.null_directions(0, 0), 1.0, 1e-12);
-  EXPECT_NEAR(fit.null_directions(2, 0), 0.5, 1e-12);
-  EXPECT_EQ(fit.standard_error[0], infinity);
-  EXPECT_EQ(fit.standard_error[2], infinity);
-  EXPECT_NEAR(fit.correlation(0, 2), 1.0, 1e-9);
-  // The other two are determined, with the stderr of the problem that has the column once.
-  MatrixXd once(25, 3);
-  once << a.col(0), a.col(1), a.col(3);
-  const FitReport reduced = fit_linear(once, b);
-  EXPECT_NEAR(fit.standard_error[1], reduced.standard_error[1], 1e-12);
-  EXPECT_NEAR(fit.standard_error[3], reduced.standard_error[2], 1e-12);
-  ASSERT_EQ(fit.findings.size(), 1u);
-  EXPECT_NE(fit.findings[0].find("(p0 +1, p2 +0.5)"), std::string::npos) << fit.findings[0];
-}
-
 TEST(LeastSquares, SeveralNullDirectionsAreToldApart) {
   MatrixXd a = random_matrix(17, 25, 5);
   a.col(1).setZero();

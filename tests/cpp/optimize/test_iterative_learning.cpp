@@ -7,17 +7,13 @@
 #include <Eigen/Core>
 
 #include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
-#include "support/reference_algebra.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using test_support::largest_singular_value, test_support::product, test_support::spectral_radius;
 
 using Column = std::vector<double>;
 
@@ -63,34 +59,12 @@ VectorXd run(IterativeLearning& learner, const Plant& plant) {
   return as_vector(error);
 }
 
-// --- fact 28 of the specification: h = [1, 0.5] ------------------------------------------------------------
-// --- every law against its own lifted matrices -------------------------------------------------------------
-// L and Q are read off the learner itself, so this ties what it does to what it reports.
-struct Lifted {
-  MatrixXd g, q, l;
-
-  MatrixXd input_map() const { return q - product(l, g); }
-  MatrixXd error_map() const { return product(product(g, input_map()), test_support::inverse(g)); }
-  Lifted(const LearningSettings& settings, const Column& h) {
-    const auto n = static_cast<Index>(settings.initial.size());
-    g = q = l = MatrixXd::Zero(n, n);
-    for (Index k = 0; k < n; ++k) {
-      g.col(k) = -as_vector(Plant{h, VectorXd::Zero(n)}.error(as_column(VectorXd::Unit(n, k))));
-      LearningSettings unit = settings;
-      unit.initial = as_column(VectorXd::Unit(n, k));
-      q.col(k) = next(unit, VectorXd::Zero(n));
-      unit.initial = Column(settings.initial.size(), 0.0);
-      l.col(k) = next(unit, VectorXd::Unit(n, k));  // Q L
-    }
-  }
-
-  static VectorXd next(const LearningSettings& settings, const VectorXd& error) {
-    IterativeLearning learner(settings);
-    learner.ask();
-    learner.tell(as_column(error));
-    return as_vector(learner.ask());
-  }
-};
+VectorXd next(const LearningSettings& settings, const VectorXd& error) {
+  IterativeLearning learner(settings);
+  learner.ask();
+  learner.tell(as_column(error));
+  return as_vector(learner.ask());
+}
 
 std::vector<LearningSettings> every_law() {
   const LearningSettings base{.initial = Column(12, 0.0), .impulse_response = {0.9, 0.4, -0.1}, .guard = false};
@@ -106,28 +80,12 @@ std::vector<LearningSettings> every_law() {
   return laws;
 }
 
-TEST(IterativeLearning, ReportAgreesWithTheMatricesOfTheLaw) {
-  for (const LearningSettings& settings : every_law()) {
-    const Lifted m(settings, settings.impulse_response);
-    const Index n = m.g.rows();
-    const ConvergenceReport report = IterativeLearning(settings).convergence();
-    EXPECT_NEAR(report.sigma_max, largest_singular_value(m.error_map()), 1e-10) << report.sentence;
-    if (!report.radius_is_exact || settings.law == LearningLaw::norm_optimal) {
-      EXPECT_NEAR(report.spectral_radius, spectral_radius(m.input_map()), 1e-10) << report.sentence;
-    }
-    ASSERT_TRUE(report.asymptotic);
-    const MatrixXd id = MatrixXd::Identity(n, n);
-    const MatrixXd limit = id - product(m.g, test_support::solved(id - m.input_map(), m.l));
-    EXPECT_LT((report.limit_error_map - limit).norm(), 1e-10) << report.sentence;
-  }
-}
-
 // Closed forms of one update with relative degree 1; errors before the window are zero, behind it the last one.
 TEST(IterativeLearning, LawsReadTheErrorAsPrinted) {
   const VectorXd e{{7.0, 1.0, -2.0, 4.0, 3.0}};
   const LearningSettings base{.initial = {0.1, 0.2, 0.3, 0.4, 0.5}, .relative_degree = 1};
   const auto expect = [&](const LearningSettings& settings, const Column& change) {
-    const VectorXd u = Lifted::next(settings, e);
+    const VectorXd u = next(settings, e);
     for (std::size_t t = 0; t < 4; ++t) {
       EXPECT_NEAR(u[static_cast<Index>(t)], base.initial[t] + change[t], 1e-15) << name_of(settings.law) << t;
     }
@@ -194,8 +152,6 @@ TEST(IterativeLearning, GuardFreezesAfterTwoRisesAndReturnsToTheBestTrial) {
   }
 }
 
-// --- refusals: wrong, then right ---------------------------------------------------------------------------
-// --- saved and resumed -------------------------------------------------------------------------------------
 // --- what a real-time loop relies on -----------------------------------------------------------------------
 static_assert(noexcept(std::declval<IterativeLearning&>().ask()));
 static_assert(noexcept(std::declval<IterativeLearning&>().try_tell(std::declval<std::span<const double>>())));

@@ -4,10 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
-#include <string>
 
 namespace mgdd::optimize {
 namespace {
@@ -60,21 +58,6 @@ TEST(MultiStart, KeepsTheOrderOfItsStartsOnAnyNumberOfThreads) {
       EXPECT_EQ(fit.reports[i].cost, 20.0 - static_cast<double>(i));
     EXPECT_EQ(fit.best, 11U);
   }
-}
-
-TEST(MultiStart, HandsBackTheExceptionOfTheFirstStartThatFails) {
-  const std::vector<Eigen::VectorXd> starts(5, Eigen::VectorXd::Zero(1));
-  std::atomic<int> calls{0};
-  const auto fail = [&](const Eigen::VectorXd&) -> FitReport {
-    throw ConvergenceError("start " + std::to_string(calls++));
-  };
-  try {
-    multi_start(starts, fail);
-    FAIL();
-  } catch (const ConvergenceError& error) {
-    EXPECT_STREQ(error.what(), "start 0");
-  }
-  EXPECT_THROW(multi_start({}, fail), ShapeError);
 }
 
 }  // namespace

@@ -130,6 +130,7 @@ TEST(RecursiveLeastSquares, SettingsAndStatesHaveTheirBounds) {
     }
   };
   refused([](auto& s) { s.forgetting = 1.001; }, "forgetting = 1.001");
+  refused([](auto& s) { s.forgetting = 0.49; }, "forgetting = 0.49");
   refused([](auto& s) { s.trace_cap = 0.9; }, "trace_cap = 0.9");
   refused([](auto& s) { s.lower[1] = 0.1, s.upper[1] = 0.0; }, "lower[1] = 0.1: must be <= upper");
   refused([](auto& s) { s.upper[2] = 0.8; }, "start[2] = 0.9");

@@ -1,4 +1,4 @@
-// SPSA: a gradient without bias from two measurements in any dimension, and its averaged, blocking, one-measurement and
+// SPSA: a gradient without bias from two measurements in any dimension, and its averaged, blocking and
 // second-order variants.
 #include "support/seeker_case.hpp"
 
@@ -79,34 +79,6 @@ TEST(Spsa, AveragingDividesTheVarianceOfTheGradient) {
   EXPECT_NEAR(variance[0] / variance[1], 4.0, 0.4);
 }
 
-TEST(Spsa, EveryFormFindsTheOptimumOfTwoToFiveInputs) {
-  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order}) {
-    for (const bool blocking : {false, true}) {
-      for (Eigen::Index n = 2; n <= 5; ++n) {
-        double worst = 0.0;
-        for (std::uint64_t seed = 0; seed < 10; ++seed) {
-          SpsaSettings s;
-          s.space = space_at(somewhere(n));
-          s.form = form;
-          s.averaging = 2;
-          s.blocking = blocking;
-          s.noise_sd = 0.1;
-          s.seed = seed;
-          Spsa seeker(s);
-          for (int k = 0; k < 12'000; ++k) {
-            cycle_of(seeker, [&](const Inputs& x) {
-              return 56.0 + 0.5 * x.dot(bowl(n) * x) + 0.1 * random::normal(seed, 8, static_cast<std::uint64_t>(k));
-            });
-          }
-          worst = std::max(worst, seeker.estimate().cwiseAbs().maxCoeff());
-          EXPECT_TRUE(blocking || seeker.blocked() == 0);
-        }
-        EXPECT_LT(worst, 1.0) << name_of(form) << (blocking ? " blocking, " : ", ") << n << " inputs";
-      }
-    }
-  }
-}
-
 TEST(Spsa, SecondOrderLearnsTheHessian) {
   for (Eigen::Index n = 1; n <= 5; ++n) {
     SpsaSettings s = frozen(n);
@@ -118,22 +90,6 @@ TEST(Spsa, SecondOrderLearnsTheHessian) {
       cycle_of(seeker, [&](const Inputs& x) { return 0.5 * x.dot(bowl(n) * x); });
     EXPECT_LT((seeker.hessian() - bowl(n)).cwiseAbs().maxCoeff(), 0.004) << n << " inputs";
   }
-}
-
-TEST(Spsa, FirstOrderFiguresOfTheDefaultEngine) {
-  double cycles = 0.0, square = 0.0;
-  for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    SpsaSettings s;
-    s.space = space_at(scalar_input(12.0));
-    s.curvature = bend;
-    s.seed = seed;
-    Spsa seeker(s);
-    const std::vector<double> path = search(seeker, quadratic, 2000, 0.25, seed);
-    cycles += first_within(path, 1.0) / 200.0;
-    square += path.back() * path.back() / 200.0;
-  }
-  EXPECT_NEAR(cycles, 58.0, 8.0);
-  EXPECT_NEAR(std::sqrt(square), 0.42, 0.07);
 }
 
 TEST(Spsa, BlockingRefusesAStepThatMakesJWorse) {

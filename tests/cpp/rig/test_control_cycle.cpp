@@ -57,24 +57,6 @@ TEST(ControlCycle, RequestsAreFollowedInTheirOrderOnePerCycle) {
   EXPECT_FALSE(rig.cycle.pop_event(event));
 }
 
-TEST(ControlCycle, SilenceOfTheNodeOpensTheBridge) {
-  Rig rig({.initial_reference_deg = 40.0});
-  rig.drive();
-  rig.turns(100);
-  EXPECT_FALSE(rig.open());
-  rig.answers = false;
-  rig.turns(8);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::limp);
-  EXPECT_EQ(rig.cycle.reason(), SafetyReason::stale);
-  EXPECT_EQ(rig.cycle.cause(), SafetyReason::stale);
-  EXPECT_TRUE(rig.commanded && rig.open());
-  rig.turns(600);
-  EXPECT_NEAR(rig.node.last.angle_deg, rig.node.throttle.settings().start_deg, 1.0);
-  rig.answers = true;
-  rig.turns(50);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::limp);  // until the operator resets
-}
-
 TEST(ControlCycle, ThreeMissedDeadlinesInARowOpenTheBridgeAndTwoDoNot) {
   Rig rig({.initial_reference_deg = 40.0});
   rig.drive();

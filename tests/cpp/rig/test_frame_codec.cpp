@@ -9,7 +9,6 @@
 #include <string>
 
 #include "mgdd/common/error.hpp"
-#include "support/no_alloc.hpp"
 #include "support/throttle_on_bus.hpp"
 
 namespace mgdd::rig {
@@ -200,15 +199,6 @@ TEST(FrameCodec, AMissingSignedNumberIsTold) {
   }
 }
 
-TEST(FrameCodec, ACommandMayHaveSeveralFixedNumbers) {
-  FrameCodecSettings s = bus_messages();
-  s.command.signals.push_back({Commanded::fixed, intel(56, 8, 1.0), 200.0});
-  FrameCodec codec(s);
-  Frame frame;
-  ASSERT_TRUE(codec.write({}, 0.0, frame));
-  EXPECT_EQ(frame.data[7], 200);
-}
-
 TEST(FrameCodec, ACommandMayBeLongAndExtended) {
   FrameCodecSettings s = bus_messages();
   s.command = {.id = 0x120, .extended = true, .size = 12, .signals = {{Commanded::duty, intel(80, 16, 0.00005, true)}}};
@@ -236,20 +226,6 @@ TEST(FrameCodec, OneNumberMayNameAShortAndALongIdentifier) {
   sensors.id = 0x121;
   EXPECT_EQ(codec.read(sensors, m), FrameVerdict::good);
   EXPECT_EQ(codec.read(node.status(now), m), FrameVerdict::waiting);
-}
-
-TEST(FrameCodec, AllocatesNothing) {
-  ThrottleOnBus node;
-  FrameCodec codec(bus_messages());
-  Measurements m;
-  Frame frame;
-  const test_support::AllocationCounter counter;
-  for (int i = 0; i < 5; ++i) {
-    (void)codec.read(node.sensors(now), m);
-    (void)codec.read(node.status(now), m);
-    (void)codec.write({}, 0.0, frame);
-  }
-  EXPECT_EQ(counter.count(), 0u);
 }
 
 }  // namespace

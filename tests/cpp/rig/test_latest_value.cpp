@@ -9,8 +9,6 @@
 #include <cstdint>
 #include <thread>
 
-#include "support/no_alloc.hpp"
-
 namespace mgdd::rig {
 namespace {
 
@@ -60,14 +58,6 @@ TEST(LatestValue, TwoThreadsNeverTearOrGoBack) {
   }
   EXPECT_EQ(torn, 0u);
   EXPECT_EQ(back, 0u);
-}
-
-TEST(LatestValue, AllocatesNothing) {
-  LatestValue<Wide> slot;
-  const test_support::AllocationCounter counter;
-  slot.write(wide(3));
-  EXPECT_EQ(slot.read()[0], 3u);
-  EXPECT_EQ(counter.count(), 0u);
 }
 
 }  // namespace

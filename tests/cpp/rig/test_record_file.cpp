@@ -4,7 +4,6 @@
 #include <csignal>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -221,32 +220,6 @@ TEST_F(RecordFile, WhatIsNoRecordIsRefusedAndUntouched) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1) << "no temporary file is left";
 }
 
-TEST_F(RecordFile, NothingIsOverwritten) {
-  write_all();
-  const Bytes before = bytes_of(path_);
-  EXPECT_THROW((RecordWriter{path_, header}), RigError);
-  EXPECT_EQ(bytes_of(path_), before);
-  EXPECT_THROW((RecordWriter{(folder_ / "no" / "run.rec").string(), header}), RigError);
-}
-
-TEST_F(RecordFile, RefusedCallsChangeNothing) {
-  RecordWriter writer(path_, header);
-  const std::uint64_t size = writer.size();
-  const std::vector<std::string> twice{"a", "a"}, none{}, empty{""};
-  for (const auto& columns : {twice, none, empty})
-    EXPECT_THROW(writer.add_table("t", columns, 0), ParameterError);
-  EXPECT_FALSE(writer.write_sample(0, 0, std::array{1.0})) << "no such table";
-  EXPECT_NE(std::string(writer.failure().what()).find("a number per column"), std::string::npos);
-  EXPECT_EQ(writer.refused(), 1u);
-  EXPECT_THROW(static_cast<void>(writer.write_event(0, "", "text")), ParameterError);
-  EXPECT_THROW(static_cast<void>(writer.write_event(0, "note", std::string(largest_body, ' '))), ParameterError);
-  EXPECT_EQ(writer.size(), size);
-  EXPECT_EQ(writer.written(), 0u);
-  writer.close();
-  EXPECT_FALSE(writer.write(frame_of(1)));
-  EXPECT_NE(std::string(writer.failure().what()).find("closed"), std::string::npos);
-}
-
 TEST_F(RecordFile, FramesAndSamplesWithoutAllocation) {
   RecordWriter writer(path_, header);
   const std::vector<std::string> columns{"a", "b"};
@@ -273,28 +246,6 @@ int in_child(Work work) {
   int status = 0;
   ::waitpid(child, &status, 0);
   return status;
-}
-
-TEST_F(RecordFile, AFullDiskLeavesWholeRecordsAndRecovers) {
-  const int status = in_child([this] {
-    std::signal(SIGXFSZ, SIG_IGN);
-    RecordWriter writer(path_, header);
-    const rlimit narrow{.rlim_cur = 1000, .rlim_max = RLIM_INFINITY};
-    if (::setrlimit(RLIMIT_FSIZE, &narrow) != 0) ::_exit(2);
-    int i = 0;
-    while (writer.write(frame_of(i)))
-      ++i;
-    const bool told = std::string(writer.failure().what()).find("stays readable") != std::string::npos;
-    if (!told || writer.refused() != 1 || read(path_).frames.size() != static_cast<std::size_t>(i)) ::_exit(3);
-    const rlimit wide{.rlim_cur = RLIM_INFINITY, .rlim_max = RLIM_INFINITY};
-    if (::setrlimit(RLIMIT_FSIZE, &wide) != 0) ::_exit(4);
-    if (!writer.write_event(1, "note", "there is room again")) ::_exit(5);
-  });
-  ASSERT_EQ(status, 0) << "exit code " << WEXITSTATUS(status);
-  const RecordColumns all = read(path_);
-  EXPECT_EQ(all.ignored_bytes, 0u);
-  EXPECT_EQ(all.events.size(), 1u);
-  EXPECT_GT(all.frames.size(), 5u);
 }
 
 TEST_F(RecordFile, AHeaderThatDoesNotFitLeavesNoFile) {

@@ -8,7 +8,6 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/rig/monotonic_clock.hpp"
-#include "support/no_alloc.hpp"
 
 namespace mgdd::rig {
 namespace {
@@ -118,19 +117,6 @@ TEST(RingTransport, TwoThreadsEchoEveryFrame) {
     std::this_thread::yield();
   }
   EXPECT_EQ(wrong, 0u);
-}
-
-TEST(RingTransport, AllocatesNothing) {
-  RingTransport bus(4, 4);
-  Frame frame = numbered(1, 1);
-  const test_support::AllocationCounter counter;
-  for (int i = 0; i < 6; ++i) {
-    bus.feed(frame);
-    bus.send(frame);
-  }
-  while (bus.receive(frame) || bus.take(frame)) {
-  }
-  EXPECT_EQ(counter.count(), 0u);
 }
 
 }  // namespace

@@ -46,15 +46,6 @@ TEST(SafetyHazards, ASilentBusGrowsOldByItself) {
   EXPECT_EQ(leaves_after(gate, silent), 3);
 }
 
-TEST(SafetyHazards, AShortGapEndsByItself) {
-  SafetyGate gate = running();
-  const SafetyFacts silent;
-  for (int k = 0; k < 6; ++k)
-    EXPECT_EQ(cycle(gate, silent).duty, 0.125);
-  EXPECT_EQ(cycle(gate, healthy(), 0.15625).duty, 0.15625);
-  EXPECT_EQ(gate.state(), SafetyState::run);
-}
-
 TEST(SafetyHazards, BadFramesInARowLimpAndAGoodOneStartsAnew) {
   SafetyGate gate = running();
   SafetyFacts bad = healthy();

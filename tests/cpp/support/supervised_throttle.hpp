@@ -1,19 +1,70 @@
-// A controller under a supervisor on the virtual throttle, and the driving of a healthy one: steps up to 80 deg, small
-// steps, sines, both stops, limp-home crossed, with noise and air.
+// The tuned sets of the design study under a supervisor on the virtual throttle, and the driving of a healthy one:
+// steps up to 80 deg, small steps, sines, both stops, limp-home crossed, with noise and air.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <numbers>
-#include <vector>
 
 #include "mgdd/common/random.hpp"
+#include "mgdd/common/units.hpp"
+#include "mgdd/control/pid.hpp"
+#include "mgdd/control/sliding_mode.hpp"
 #include "mgdd/control/supervisor.hpp"
 #include "mgdd/loop/virtual_throttle.hpp"
-#include "support/tuned_throttle.hpp"
+#include "mgdd/throttle/throttle.hpp"
+#include "support/throttle_presets.hpp"
 
 namespace mgdd::test_support {
+
+using control::PidSettings;
+using control::ReachingLaw;
+using control::SlidingModeSettings;
+using throttle::Throttle;
+
+/// Kp, Ki, Kd in duty % per travel %, kick per Coulomb friction, its width, integral window, dead band, rate and
+/// friction feed-forward per their values in the model.
+using PidRow = std::array<double, 9>;
+inline PidSettings pid_of(const control::Plate& g, const PidRow& row) {
+  PidSettings s;
+  s.above = s.below = {row[0] / 90.0, row[1] / 90.0, row[2] / 90.0};
+  s.plate = g;
+  s.kick = row[3] * g.friction;
+  s.kick_width_deg = row[4];
+  s.integral_window_deg = row[5];
+  s.dead_band_deg = row[6];
+  s.rate_s_per_deg = row[7] / (g.time_constant_s * g.gain_deg_per_s2);
+  s.plate.friction = row[8] * g.friction;
+  return s;
+}
+
+/// Switching duty, layer [rad], integral, bandwidth, pole of the reference, friction feed-forward, integral layers.
+using SlidingRow = std::array<double, 7>;
+inline SlidingModeSettings sliding_mode_of(const control::Plate& g, const SlidingRow& row, ReachingLaw law) {
+  SlidingModeSettings s;
+  s.reaching = law;
+  s.plate = g;
+  s.switching = row[0];
+  s.layer_deg = row[1] / units::rad_per_deg;
+  s.integral_per_s = row[2];
+  s.bandwidth_per_s = row[3];
+  s.reference_pole_per_s = row[4];
+  s.plate.friction = row[5] * g.friction;
+  s.integral_layers = row[6];
+  return s;
+}
+
+struct TunedSet {
+  int preset;
+  PidRow pid;
+  SlidingRow sliding;
+};
+inline constexpr std::array<TunedSet, 3> tuned_sets{{
+    {1, {11.5, 117.0, 0.132, 1.3, 0.019, 2.0, 0.1, 0.57, 0.65}, {0.793, 0.0604, 3.03, 136.0, 170.0, 0.82, 3.0}},
+    {2, {11.0, 49.4, 0.117, 1.3, 0.216, 2.0, 0.0, 0.55, 0.99}, {0.238, 0.0248, 4.46, 85.0, 147.0, 1.2, 1.0}},
+    {3, {15.8, 15.0, 0.147, 1.3, 0.097, 1.0, 0.0, 1.3, 1.3}, {0.855, 0.0564, 21.2, 119.0, 185.0, 1.2, 0.5}},
+}};
 
 inline control::SupervisorSettings supervisor_of(const Throttle& t) {
   control::SupervisorSettings s;
@@ -64,13 +115,6 @@ class SupervisedLoop {
     acting_ = order;
     return {k_++, reference_deg, last_.angle_deg, last_.speed_deg_per_s, order};
   }
-  control::SupervisorReason acknowledge() {
-    const auto stands = supervisor.acknowledge();
-    if (stands == control::SupervisorReason::none) controller.reset();
-    if (stands == control::SupervisorReason::none) acting_.bridge_open = false;
-    return stands;
-  }
-
   Controller controller;
   control::ThrottleSupervisor supervisor;
   loop::VirtualThrottle plant;

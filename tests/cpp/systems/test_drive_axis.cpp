@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/identify/free_run_fit.hpp"
-#include "support/no_alloc.hpp"
 #include "support/stepped.hpp"
 
 namespace mgdd::systems {
@@ -65,14 +64,6 @@ TEST(DriveAxis, SensitivitiesAreThoseOfDifferences) {
     const double slope = (run(up) - run(down)) / (2.0 * h);
     EXPECT_NEAR(state[0].grad[i], slope, 1e-5 * std::abs(slope) + 1e-10) << "parameter " << i;
   }
-}
-
-TEST(DriveAxis, StepAllocatesNothing) {
-  Values<double, 3> state{0.0, 0.0, 0.0};
-  const test_support::AllocationCounter counter;
-  for (int k = 0; k < 100; ++k)
-    state = stepped(axis, slide, state, k % 2 == 0 ? 3.0 : -3.0, 1e-3);
-  EXPECT_EQ(counter.count(), 0U);
 }
 
 TEST(DriveAxis, FitNamesWhatItDoesNotKnow) {

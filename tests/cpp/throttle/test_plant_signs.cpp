@@ -1,21 +1,17 @@
-// When a column of inputs acts and what the columns of a run show, on a throttle without symmetry.
+// When a column of inputs acts, on a throttle without symmetry.
 #include <gtest/gtest.h>
 
 #include <vector>
 
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
-#include "support/throttle_case.hpp"
 
 namespace mgdd::throttle {
 namespace {
 
 using test::asymmetric_throttle;
-using test::DrivenThrottle;
 
 constexpr double start_deg = 40.0;
-
-// --- columns --------------------------------------------------------------------------------------------------
 
 // The inputs of sample k act from k to k + 1, in one run and in many.
 TEST(PlantSigns, AColumnActsFromItsOwnSampleOn) {
@@ -52,26 +48,6 @@ TEST(PlantSigns, AColumnActsFromItsOwnSampleOn) {
   expect_change({duty, volts, other}, -1.0, "airflow_torque_nm");
   const std::vector<double> own(n, p.supply_v), none(n, 0.0);
   EXPECT_EQ(runs({duty}), runs({duty, own, none})) << "left out: the parameter's supply and no extra torque";
-}
-
-TEST(PlantSigns, ColumnsShowThePlateInDegrees) {
-  Throttle p = asymmetric_throttle();
-  p.backlash = Backlash::compliance;
-  const std::vector<double> duty{0.9, 0.9, -0.4, -0.4, 0.2};
-  std::vector<double> angle(5), speed(5), current(5);
-  ThrottleState state = at_rest(start_deg);
-  simulate(ThrottlePlant(p), {.duty = duty}, 20, state,
-           {.angle_deg = angle, .speed_deg_per_s = speed, .current_a = current});
-  DrivenThrottle t(p, start_deg);
-  for (std::size_t k = 0; k < 5; ++k) {
-    EXPECT_NEAR(angle[k], t.angle_deg(), 1e-12);
-    EXPECT_NEAR(speed[k], test::deg(t.state.plate_speed_rad_per_s), 1e-9);
-    EXPECT_EQ(current[k], t.state.current_a);
-    if (k < 4) t.go(duty[k], 20e-4);
-  }
-  EXPECT_EQ(state.plate_angle_rad, t.state.plate_angle_rad) << "the state stands at the last sample";
-  EXPECT_EQ(state.current_a, t.state.current_a);
-  EXPECT_NE(state.angle_rad, state.plate_angle_rad);
 }
 
 }  // namespace

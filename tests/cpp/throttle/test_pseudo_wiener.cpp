@@ -1,18 +1,15 @@
-// Pseudo-Wiener models: delays, sensitivities, lanes, real time. Their equations stand in test_pw_*_equations.cpp.
+// Pseudo-Wiener models: delays, sensitivities, lanes. Their equations stand in test_pw_*_equations.cpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "mgdd/dynamics/predict.hpp"
 #include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
-#include "support/no_alloc.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::throttle {
 namespace {
 
-using test_support::AllocationCounter;
 using test_support::Signal;
 
 template <class P>
@@ -76,38 +73,6 @@ PwR smooth_pw_r() {
   PwR p;
   p.friction = Friction::tanh;
   return p;
-}
-
-template <class P>
-void expect_exact_move_slopes(const P& p) {
-  const auto model = model_of(p);
-  auto state = model.at_rest(30.0, 0.2);
-  for (int i = 0; i < 50; ++i)
-    model.step(state, 0.3);
-  const std::array<double, 3> moves{0.35, 0.1, 0.3};
-  const std::array<int, 3> lengths{8, 12, 20};
-  std::vector<double> y(40), up(40), down(40);
-  std::vector<std::array<double, 3>> slope(40), ignored(40);
-  dynamics::predict<3>(model, state, moves, lengths, y, slope);
-  for (std::size_t m = 0; m < 3; ++m) {
-    auto plus = moves;
-    auto minus = moves;
-    plus[m] += 1e-6;
-    minus[m] -= 1e-6;
-    dynamics::predict<3>(model, state, plus, lengths, up, ignored);
-    dynamics::predict<3>(model, state, minus, lengths, down, ignored);
-    for (std::size_t k = 0; k < 40; ++k)
-      ASSERT_NEAR(slope[k][m], (up[k] - down[k]) / 2e-6, 1e-4 * (1.0 + std::abs(slope[k][m]))) << m << " " << k;
-  }
-  EXPECT_GT(std::abs(slope[39][0]), 0.0);
-}
-
-TEST(PseudoWienerPrediction, SlopesAlongTheMovesAreExact) {
-  expect_exact_move_slopes(PwR{});
-  expect_exact_move_slopes(smooth_pw_r());
-  expect_exact_move_slopes(some_pw_w());
-  expect_exact_move_slopes(some_pw_p());
-  expect_exact_move_slopes(some_pw_p(8));
 }
 
 template <class P>
@@ -184,55 +149,6 @@ static_assert(cannot_throw<PwRModel> && cannot_throw<PwWModel> && cannot_throw<P
 static_assert(cannot_throw<BasicPwRModel<Dual<5>>> && cannot_throw<BasicPwWModel<Dual<5>>> &&
               cannot_throw<BasicPwPModel<Dual<5>>>);
 static_assert(cannot_throw<BasicPwRModel<Lanes<4>>>);
-
-template <class T, class P>
-std::size_t allocations(const P& p) {
-  const AllocationCounter counter;
-  const auto model = model_of(lift<T>(p));
-  auto state = model.at_rest(T(20.0), T(0.1));
-  for (int k = 0; k < 50; ++k) {
-    model.step(state, T(0.3));
-    model.correct(state, T(21.0), {});
-  }
-  volatile double sink = 0.0;  // NOLINT(misc-const-correctness): written on double
-  if constexpr (std::is_same_v<T, double>) sink = model.output(state);
-  static_cast<void>(sink);
-  return counter.count();
-}
-
-TEST(PseudoWienerRealTime, NothingIsAllocatedInAnyKindAndOption) {
-  int variants = 0;
-  const auto count = [&](const auto& p) {
-    EXPECT_EQ((allocations<double>(p)), 0u);
-    EXPECT_EQ((allocations<Dual<5>>(p)), 0u);
-    EXPECT_EQ((allocations<Lanes<4>>(p)), 0u);
-    ++variants;
-  };
-  for (const double delay : {0.0, 2.5, 5.0}) {
-    for (const auto friction : {Friction::coulomb, Friction::tanh}) {
-      for (const auto switching : {Switching::predicted, Switching::measured}) {
-        PwR p;
-        p.frame.delay_samples = delay;
-        p.friction = friction;
-        p.switching = switching;
-        count(p);
-      }
-    }
-    for (const auto start : {LagStart::rest, LagStart::inverse_map}) {
-      PwW w = some_pw_w();
-      w.frame.delay_samples = delay;
-      w.lag_start = start;
-      count(w);
-      for (const int plays : {1, 8}) {
-        PwP p = some_pw_p(plays);
-        p.frame.delay_samples = delay;
-        p.lag_start = start;
-        count(p);
-      }
-    }
-  }
-  EXPECT_EQ(variants, 30);
-}
 
 }  // namespace
 }  // namespace mgdd::throttle

@@ -1,9 +1,6 @@
-// Numbers, bounds, scalars and the variant of the pseudo-Wiener models: nothing is exchanged and nothing is lost.
+// Numbers and bounds of the pseudo-Wiener models: nothing is exchanged and nothing is lost.
 #include <gtest/gtest.h>
 
-#include "mgdd/dynamics/simulate.hpp"
-
-#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -19,7 +16,6 @@ namespace {
 using test::asymmetric_pw_p;
 using test::asymmetric_pw_r;
 using test::asymmetric_pw_w;
-using test_support::Signal;
 
 template <class P>
 void expect_bounds(const P& good, PseudoWienerKind kind) {
@@ -103,69 +99,6 @@ TEST(PseudoWienerNumbers, SettingsOutsideTheirBoundsAreNamed) {
     refused(ObserverGains{}, [member = member](ObserverGains& a) { a.*member = -0.1; }, std::string(name) + " = -0.1");
     refused(ObserverGains{}, [member = member](ObserverGains& a) { a.*member = 2e4; }, std::string(name) + " = 20000");
   }
-}
-
-TEST(PseudoWienerVariant, IsWhatItHolds) {
-  const std::array<PseudoWiener, 3> each{asymmetric_pw_r(), asymmetric_pw_w(), asymmetric_pw_p()};
-  const std::array<PseudoWienerKind, 3> kinds{PseudoWienerKind::pw_r, PseudoWienerKind::pw_w, PseudoWienerKind::pw_p};
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(kind_of(each[i]), kinds[i]);
-    EXPECT_EQ(frame_of(each[i]).delay_samples, 2);
-    EXPECT_EQ(prepare(each[i]).index(), i);
-    EXPECT_EQ(names<PseudoWienerKind>()[i].first, kinds[i]);
-  }
-}
-
-// Lifted to another scalar nothing is lost or exchanged.
-TEST(PseudoWienerLift, KeepsEveryNumberAndState) {
-  const auto expect_same_run = [](const auto& p) {
-    const auto plain = model_of(p);
-    const auto dual = model_of(lift<Dual<2>>(p));
-    auto s = plain.at_rest(30.0, 0.1);
-    for (int k = 0; k < 40; ++k)
-      plain.step(s, 0.4 * std::sin(0.3 * k));
-    auto d = dynamics::lifted<std::remove_const_t<decltype(dual)>>(s);
-    for (int k = 0; k < 60; ++k) {
-      plain.step(s, -0.35 + 0.01 * k);
-      dual.step(d, Dual<2>(-0.35 + 0.01 * k));
-      ASSERT_NEAR(dual.output(d).value, plain.output(s), 1e-10) << k;
-    }
-  };
-  for (const Switching switching : {Switching::predicted, Switching::measured}) {
-    for (const Friction friction : {Friction::coulomb, Friction::tanh}) {
-      PwR p = asymmetric_pw_r();
-      p.switching = switching;
-      p.friction = friction;
-      expect_same_run(p);
-    }
-  }
-  for (const LagStart start : {LagStart::rest, LagStart::inverse_map}) {
-    PwW w = asymmetric_pw_w();
-    w.lag_start = start;
-    expect_same_run(w);
-    PwP p = asymmetric_pw_p();
-    p.lag_start = start;
-    expect_same_run(p);
-  }
-}
-
-TEST(PseudoWienerPrediction, EntryJIsTheAngleAfterDutyJ) {
-  const auto model = model_of(asymmetric_pw_r());
-  const auto start = model.at_rest(30.0, 0.1);
-  const Signal duty{0.3, -0.2, 0.4, 0.1, 0.35};
-  Signal ahead(5), run(5);
-  auto later = start;
-  for (std::size_t k = 0; k < 5; ++k) {
-    model.step(later, duty[k]);
-    ahead[k] = model.output(later);
-  }
-  auto s = start;
-  dynamics::simulate(model, s, std::span<const double>(duty), std::span<double>(run));
-  EXPECT_EQ(run[0], model.output(start));
-  for (std::size_t k = 0; k + 1 < 5; ++k)
-    EXPECT_EQ(run[k + 1], ahead[k]);
-  EXPECT_EQ(model.output(s), run[4]) << "the state ends at the last sample";
-  EXPECT_NE(ahead[4], ahead[3]);
 }
 
 }  // namespace

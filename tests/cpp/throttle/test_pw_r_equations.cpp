@@ -1,8 +1,6 @@
 // PW-R against its equations, written once more, with parameters that differ from their defaults and from side to side.
 #include <gtest/gtest.h>
 
-#include "mgdd/dynamics/simulate.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,7 +18,6 @@ namespace {
 
 using test::asymmetric_pw_r;
 using test::asymmetric_throttle;
-using test_support::Signal;
 
 double draw(std::uint64_t index, double low, double high) {
   return low + (high - low) * random::uniform(17, 3, index);
@@ -47,29 +44,6 @@ TEST(PwRGroups, EachSideHasItsOwnSpring) {
   EXPECT_EQ(p.frame.closed_deg, 1.5);
   EXPECT_EQ(p.frame.open_deg, 86.0);
   EXPECT_EQ(p.ramp_deg, 0.4);
-}
-
-TEST(PwRGroups, RunAsThePlantDoesOnBothSides) {
-  Throttle t = asymmetric_throttle();
-  t.inductance_mh = t.dead_band = t.pressure_drop_kpa = 0.0;  // what the groups do not hold
-  const Signal duty = test_support::chirp(0.04, 0.23, 0.5, 5.0, 4.0);
-  PwR p = pw_r_of(t);
-  p.frame.substeps = 10;
-  Signal plant(duty.size()), model(duty.size());
-  ThrottleState state = at_rest(25.0);
-  simulate(ThrottlePlant(t), {.duty = duty}, 10, state, {.angle_deg = plant});
-  const PwRModel prepared(p);
-  PwRState start = prepared.at_rest(25.0, 0.0);
-  dynamics::simulate(prepared, start, std::span<const double>(duty), std::span<double>(model));
-  double worst = 0.0;
-  for (std::size_t k = 0; k < duty.size(); ++k)
-    worst = std::max(worst, std::abs(plant[k] - model[k]));
-  EXPECT_LT(worst, 1e-6);
-  const auto [low, high] = std::minmax_element(plant.begin(), plant.end());
-  EXPECT_LT(*low, 9.0);
-  EXPECT_GT(*high, 30.0);
-  EXPECT_GT(*low, t.closed_deg);
-  EXPECT_LT(*high, t.open_deg);
 }
 
 // --- PW-R -----------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Signals in the bits of a payload: the vectors of the C++ test, and cantools on random layouts."""
+"""Signals in the bits of a payload: known bytes, and cantools on random layouts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mgdd._core.rig import SignalLayout, check_message
 from mgdd.errors import ParameterError, ShapeError
 
-KNOWN = [  # by hand from the bit charts of the DBC convention; tests/cpp/rig/test_signal_codec.cpp holds the same list
+KNOWN = [  # by hand from the bit charts of the DBC convention
     ({"start": 0, "length": 16, "scale": 0.01}, 81.92, "0020"),
     ({"start": 4, "length": 12}, 0xABC, "c0ab"),
     ({"start": 3, "length": 12, "byte_order": "big_endian"}, 0xABC, "0abc"),

@@ -1,5 +1,4 @@
-// Open area of a throttle plate: numbers of an independent program, exact geometry by quadrature, monotone and
-// continuous, closed with its leak; the regression of Crossley and Cook as a second opinion; both inverses.
+// Open area of a throttle plate: exact geometry by quadrature, monotone and continuous, closed with its leak.
 #include "mgdd/throttle/demand/bore.hpp"
 
 #include <algorithm>
@@ -35,14 +34,6 @@ double shadow_area_m2(const ThrottleBore& bore, double angle_deg) {
     area += 2.0 * (chord - shadow) * 2.0 * radius / n;
   }
   return area;
-}
-
-TEST(Bore, NumbersOfAnIndependentProgram) {
-  const PlateOpening plate(without_leak());
-  const double expected[][2] = {{2.0, 12.081},  {5.0, 36.622},   {10.0, 94.458},  {20.0, 271.83},
-                                {30.0, 526.66}, {45.0, 1036.12}, {60.0, 1663.86}, {80.0, 2348.86}};
-  for (const auto& [angle, mm2] : expected)
-    EXPECT_NEAR(plate.area_m2(angle * deg) * 1e6 / mm2, 1.0, 1e-4) << angle;
 }
 
 TEST(Bore, AreaIsThatOfTheShadows) {
@@ -84,19 +75,6 @@ TEST(Bore, DischargeIsConstantBelowFiveDegAndLinearBetweenItsKnots) {
   EXPECT_NEAR(plate.discharge(12.5 * deg), 0.70, 1e-12);
   EXPECT_NEAR(plate.discharge(45.0 * deg), 0.85, 1e-12);
   EXPECT_NEAR(plate.discharge(90.0 * deg), 0.90, 1e-12);
-}
-
-TEST(Bore, InversesGoRoundFromHalfADegreeToTheOpenEnd) {
-  for (const ThrottleBore& bore : {ThrottleBore{}, without_leak()}) {
-    const PlateOpening plate(bore);
-    for (double angle = 0.5; angle <= 89.5; angle += 0.25)
-      EXPECT_NEAR(plate.angle_of_effective_rad(plate.effective_m2(angle * deg)) / deg, angle, 1e-6);
-    for (double angle = 0.5; angle <= 76.0; angle += 0.25)  // beyond, the shaft alone is in the way
-      EXPECT_NEAR(plate.angle_of_area_rad(plate.area_m2(angle * deg)) / deg, angle, 1e-6);
-    EXPECT_EQ(plate.angle_of_effective_rad(0.0), 0.0);
-    EXPECT_NEAR(plate.angle_of_effective_rad(1.0) / deg, 90.0, 1e-12);
-    EXPECT_NEAR(plate.angle_of_area_rad(1.0) / deg, 90.0, 1e-12);
-  }
 }
 
 }  // namespace

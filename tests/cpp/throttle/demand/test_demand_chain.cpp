@@ -127,14 +127,7 @@ TEST(DemandChain, ARefusedParameterNamesItself) {
       EXPECT_EQ(error.field, field);
     }
   };
-  refused("displacement_l", [](DemandChain& c) { c.air.displacement_l = 0.0; });
-  refused("manifold_temperature_k", [](DemandChain& c) { c.air.manifold_temperature_k = 20.0; });
-  refused("indicated_efficiency", [](DemandChain& c) { c.torque.indicated_efficiency = nan; });
-  refused("shaft_mm", [](DemandChain& c) { c.bore.shaft_mm = 52.0; });
-  refused("plate_closed_deg", [](DemandChain& c) { c.bore.plate_closed_deg = 80.0; });
   refused("discharge_45", [](DemandChain& c) { c.bore.discharge_45 = 0.7; });
-  refused("filling_share", [](DemandChain& c) { c.reference.filling_share = -0.1; });
-  refused("reference_rate_deg_per_s", [](DemandChain& c) { c.reference.reference_rate_deg_per_s = 0.0; });
   refused("pedal_percent", [](DemandChain& c) { c.pedal_map.pedal_percent = {0.0}; });
   refused("pedal_percent[7]", [](DemandChain& c) { c.pedal_map.pedal_percent[7] = 101.0; });
   refused("speed_rpm[0]", [](DemandChain& c) { c.pedal_map.speed_rpm[0] = 0.0; });

@@ -1,12 +1,10 @@
-// The reference of the plate sample by sample: bumpless start, rate and filter, filling fed forward, takeover, repeated
-// inputs, restart bit for bit, no allocation.
+// The reference of the plate sample by sample: rate and filter, repeated inputs, no allocation.
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include <gtest/gtest.h>
 
-#include "mgdd/common/error.hpp"
 #include "mgdd/throttle/demand/demand_chain.hpp"
 #include "support/demand_case.hpp"
 #include "support/no_alloc.hpp"
@@ -54,21 +52,6 @@ TEST(Tracker, TheReferenceKeepsItsRateAndSettlesWithItsFilter) {
   EXPECT_NEAR(last, target, 1e-6 * way);
 }
 
-TEST(Tracker, TakesOverFromAnAngleWithoutABump) {
-  DemandTracker tracker(odd_chain(), sample);
-  tracker.take_over(41.0);
-  EXPECT_EQ(tracker.step(nan, nan, nan).reference_deg, 41.0);
-  double last = 41.0;
-  for (int k = 0; k < 1000; ++k) {
-    const double now = tracker.step(10.0, 1500.0, nan).reference_deg;
-    EXPECT_LE(std::fabs(now - last), 0.8 + 1e-12);
-    last = now;
-  }
-  EXPECT_NEAR(last, DemandModel(odd_chain()).steady(10.0, 1500.0).opening_deg, 1e-6);
-  tracker.take_over(nan);
-  EXPECT_NEAR(tracker.step(10.0, 1500.0, nan).reference_deg, last, 1e-9);
-}
-
 TEST(Tracker, InputsThatAreNotFiniteRepeatTheLastOnes) {
   DemandTracker tracker(odd_chain(), sample), other(odd_chain(), sample);
   EXPECT_EQ(tracker.step(nan, 1500.0, 40e3).reference_deg, 0.0);
@@ -93,22 +76,6 @@ TEST(Tracker, HoldsAtStandstillAndBeyondTheTable) {
       }
     }
   }
-}
-
-TEST(Tracker, AStateThatCannotBeIsRefusedAndChangesNothing) {
-  DemandTracker tracker(odd_chain(), sample);
-  (void)tracker.step(40.0, 1800.0, 50e3);
-  const StateColumns before = save_state(tracker);
-  StateColumns bad = before;
-  bad["reference_deg"] = {90.5};
-  EXPECT_THROW(restore_state(tracker, bad), ParameterError);
-  bad = before;
-  bad["limited_deg"] = {};
-  EXPECT_THROW(restore_state(tracker, bad), ParameterError);
-  bad = before;
-  bad["wanted_pa"] = {-1.0};
-  EXPECT_THROW(restore_state(tracker, bad), ParameterError);
-  EXPECT_EQ(save_state(tracker), before);
 }
 
 TEST(Tracker, ResetForgetsEverything) {

@@ -1,5 +1,5 @@
-// Air between throttle and torque: the engine point of an independent program, speed density, filling of the manifold
-// (exact time constant, straight filling, conserved mass, Runge-Kutta as a second opinion), torque and its air.
+// Air between throttle and torque: speed density, filling of the manifold (emptying exactly, Runge-Kutta as a second
+// opinion), torque and its air.
 #include "mgdd/throttle/demand/intake.hpp"
 
 #include <cmath>
@@ -21,17 +21,6 @@ static_assert(noexcept(std::declval<const Manifold&>().flows(std::declval<Manifo
 
 using test_support::odd_air;
 using test_support::odd_bore;
-
-TEST(Intake, TheEnginePointOfAnIndependentProgram) {
-  const IntakeAir air;
-  const double flow = air.pumping_kg_per_s_pa(2000.0) * 40e3;
-  EXPECT_NEAR(flow / 12.736e-3, 1.0, 1e-4);
-  EXPECT_NEAR(air.filling_time_s(2000.0) / 0.1059, 1.0, 5e-4);  // printed with four digits
-  EXPECT_NEAR(air.filling_time_s(2000.0), 120.0 * 3e-3 / (0.85 * 2e-3 * 2000.0), 1e-15);
-  const double effective_m2 = flow / (flow_per_area(air.ambient()) * choked_flow);
-  EXPECT_NEAR(effective_m2 * 1e6 / 53.70, 1.0, 1e-4);
-  EXPECT_NEAR(orifice_flow(effective_m2, air.ambient(), {40e3, 310.0}).kg_per_s, flow, 1e-15);
-}
 
 TEST(Intake, SpeedDensityIsTheGasInTheDisplacedVolume) {
   const IntakeAir air = odd_air();

@@ -1,4 +1,4 @@
-// Flow through an orifice: choking, the straight part, reversed flow, slopes; numbers of an independent program.
+// Flow through an orifice: choking, the straight part, reversed flow, slopes.
 #include "mgdd/throttle/demand/orifice.hpp"
 
 #include <cmath>
@@ -50,12 +50,6 @@ TEST(Orifice, SlopesAreThoseOfTheFlow) {
     EXPECT_NEAR(flow(down).per_downstream_pa, wanted, 1e-12) << down;
     EXPECT_LE(flow(down).per_downstream_pa, 0.0);
   }
-}
-
-TEST(Orifice, NumbersOfAnIndependentProgram) {
-  const GasState up{101325.0, 293.15};
-  EXPECT_NEAR(orifice_flow(1e-4, up, {0.3 * 101325.0, 310.0}).kg_per_s / 0.023917, 1.0, 1e-4);
-  EXPECT_NEAR(orifice_flow(1e-4, up, {0.9 * 101325.0, 310.0}).kg_per_s / 0.014761, 1.0, 1e-4);
 }
 
 TEST(Orifice, FlowIsChokedBelowTheCriticalRatioAndFallsAboveIt) {
