@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.io.files import Stamp
-from mgdd.io.read_limits import ReadLimits
+from mgdd.io.files import require_free
 from mgdd.io.table import Table
 
 if TYPE_CHECKING:
@@ -117,7 +116,7 @@ class ArrayTable(Table):
     """Columns of a binary file; those of several rasters differ in length, also where few `window` rows are read."""
 
     columns: tuple[Column, ...]
-    stamp: Stamp | None = None
+    file: Path | None = None  # that the columns are read from
     window: tuple[int, int | None] = (0, None)
 
     @property
@@ -142,7 +141,7 @@ class ArrayTable(Table):
             sizes = ", ".join(f"{self.called(index)} has {self.columns[index].size}" for index in indices)
             raise DataError(f"{self.source}: columns of different rasters, {sizes}: name columns of one")
         rows = self._rows_of(columns[0]) if columns else 0
-        self._require_room(sum(rows * column.values.dtype.itemsize for column in columns), 8 * rows * len(columns))
+        self._require_room(8 * rows * len(columns))
         out = np.empty((len(columns), rows))
         # Columns that stand side by side are read in one go: a file is read by rows.
         runs = itertools.groupby(enumerate(columns), lambda each: (id(each[1].values), each[1].number - each[0]))
@@ -161,35 +160,24 @@ class ArrayTable(Table):
     def loaded(self) -> ArrayTable:
         """Return the table with all of its arrays in memory."""
         arrays = {id(column.values): column.values for column in self.columns}
-        claimed = sum(math.prod(each.shape) * each.dtype.itemsize for each in arrays.values())
-        self._require_room(claimed, claimed)
+        self._require_room(sum(math.prod(each.shape) * each.dtype.itemsize for each in arrays.values()))
         with self._reading():
             held = {
                 key: _complete(np.asarray(each[(slice(None),) * len(each.shape)]), each.shape)
                 for key, each in arrays.items()
             }
         columns = tuple(each._replace(values=held[id(each.values)]) for each in self.columns)
-        return replace(self, columns=columns, stamp=None)
+        return replace(self, columns=columns, file=None)
 
     def _rows_of(self, column: Column) -> int:
         return len(range(*slice(*self.window).indices(column.size)))
 
-    def _require_room(self, claimed: int, needed: int) -> None:
-        """Refuse bytes that are more than the size of the file lets believe, or than this machine has room for."""
-        if self.stamp is not None:
-            limits = ReadLimits.of(self.stamp.file)
-            limits.require(claimed, "what is asked of it")
-            limits.require_free(needed)
+    def _require_room(self, needed: int) -> None:
+        if self.file is not None:
+            require_free(self.file, needed)
 
-    @contextlib.contextmanager
-    def _reading(self) -> Iterator[None]:
-        if self.stamp is None:
-            yield
-            return
-        self.stamp.require_same()
-        with naming_damage(self.stamp.file):
-            yield
-        self.stamp.require_same()
+    def _reading(self) -> contextlib.AbstractContextManager[None]:
+        return contextlib.nullcontext() if self.file is None else naming_damage(self.file)
 
 
 def _complete(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
@@ -208,9 +196,4 @@ def naming_damage(file: Path) -> Iterator[None]:
         raise
     except Exception as error:  # of another library: any class
         text = f"{type(error).__name__} {error}".strip()
-        raise damaged(file, text) from error
-
-
-def damaged(file: Path, text: str) -> DataError:
-    """Make the error of a file of which a library says what is wrong."""
-    return DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again")
+        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error

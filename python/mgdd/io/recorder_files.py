@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
-import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.io.array_table import Columns, Named, Samples, columns_of, marked
 from mgdd.io.extras import import_extra
-from mgdd.io.watched_file import WatchedFile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +23,7 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of a TDMS file until the stack closes it."""
     nptdms = import_extra("nptdms", "formats", "a TDMS file")
     # Not by its path: an index beside it may be of another record.
-    content = stack.enter_context(nptdms.TdmsFile.open(WatchedFile(stack.enter_context(file.open("rb")))))
+    content = stack.enter_context(nptdms.TdmsFile.open(stack.enter_context(file.open("rb"))))
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
@@ -69,21 +66,20 @@ def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of an MDF file, each group with its time, until the stack closes it."""
     asammdf = import_extra("asammdf", "mdf", "an MDF file")
     found: list[Named] = []
-    stream = WatchedFile(_finished(file, stack))
-    content = stack.enter_context(asammdf.MDF(stream))  # not by its path: in large blocks it believes every size then
+    stream = stack.enter_context(file.open("rb"))
+    # One that its recorder did not finish by its path: asammdf does so, in a copy.
+    content = stack.enter_context(asammdf.MDF(stream if stream.peek(1).startswith(b"MDF ") else file))
     for number, group in enumerate(content.groups):
         own = _channels(content, number)
         count = group.channel_group.cycles_nr
         if not own or not count:
             continue
-        master = _master(content, number, stream)
+        master = _master(content, number)
         if not _has_time(found, count, master):
             found.append(Named(f"time {number}" if found else "time", Samples(count, np.float64, master), "s"))
         for k in own:
             channel, get = group.channels[k], partial(_samples, content, number)
-            read = (
-                partial(_part_of, partial(get, k)) if _virtual(content, channel) else partial(_records, stream, get, k)
-            )
+            read = partial(_part_of, partial(get, k)) if _virtual(content, channel) else partial(_records, get, k)
             first = read(0, 1)
             if first.ndim == 1:
                 unit = str(content.get_channel_unit(group=number, index=k))
@@ -94,21 +90,11 @@ def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     return columns_of(found)
 
 
-def _finished(file: Path, stack: contextlib.ExitStack) -> IO[bytes]:
-    """Open a file; of one that its recorder did not finish a copy, in which asammdf does so."""
-    stream = stack.enter_context(file.open("rb"))
-    if stream.peek(1).startswith(b"MDF "):
-        return stream
-    copy = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
-    shutil.copyfileobj(stream, copy)
-    return copy
-
-
-def _master(content: Any, number: int, stream: WatchedFile) -> Callable[[int, int], NDArray[Any]]:
+def _master(content: Any, number: int) -> Callable[[int, int], NDArray[Any]]:
     at = content.masters_db.get(number)
     if at is None or _virtual(content, content.groups[number].channels[at]):
         return partial(_part_of, partial(content.get_master, number))
-    return partial(_records, stream, content.get_master, number)
+    return partial(_records, content.get_master, number)
 
 
 def _virtual(content: Any, channel: Any) -> bool:
@@ -129,8 +115,7 @@ def _samples(content: Any, group: int, index: int, *, bits: bool = False, **part
     return found
 
 
-def _records(stream: WatchedFile, read: Callable[..., NDArray[Any]], index: int, start: int, stop: int) -> NDArray[Any]:
-    stream.forget()
+def _records(read: Callable[..., NDArray[Any]], index: int, start: int, stop: int) -> NDArray[Any]:
     return read(index, record_offset=start, record_count=stop - start)
 
 

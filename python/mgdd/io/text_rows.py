@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
-from mgdd.io.files import Stamp, decoded
+from mgdd.io.files import decoded
 from mgdd.io.row_text import Rows
 from mgdd.io.table import TextTable, check_text_options, require_width, text_table
 
@@ -20,7 +20,7 @@ class TextRows:
 
     def __init__(self, file: Path, stream: IO[bytes], *, delimiter: str | None = None, decimal: str = ".") -> None:
         check_text_options(delimiter, decimal)
-        self._stream, self._stamp, self._line = stream, Stamp.of(file), 1
+        self._stream, self._source, self._line = stream, str(file), 1
         stream.seek(0)
         self._head = text_table(str(file), self._block(), delimiter=delimiter, decimal=decimal)
         self._rows, self._first, self._start = self._head.rows, int(self._head.lines[0]), 0
@@ -51,13 +51,11 @@ class TextRows:
 
     def _block(self) -> str:
         """Read on to an end of a line; nothing at the end of the file."""
-        self._stamp.require_same()
         raw = self._stream.read(_BLOCK)
         if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and self._line == 1:
             raw += self._stream.read()  # an end of a line is of two bytes there
         elif raw and b"\0" not in raw:  # of a binary file the end of a line may be far
             raw += self._stream.readline(_LONGEST_LINE)
-        self._stamp.require_same()
-        text = decoded(raw, str(self._stamp.file), line=self._line)
+        text = decoded(raw, self._source, line=self._line)
         self._line += Rows.of(text).line_count
         return text

@@ -244,20 +244,6 @@ def test_a_letter_that_is_damaged_far_down(tmp_path: Path) -> None:
         list(chunks)
 
 
-@pytest.mark.parametrize("form", ["text", "hdf5", "npy", "parquet", "tdms", "mdf", "netcdf3"])
-def test_a_file_that_changes_between_chunks(form: str, tmp_path: Path) -> None:
-    file = tmp_path / "record"
-    FORMS[form](file, stacked(CAD, 0.0), {"angle": "deg"})
-    columns = (0, 1) if form == "npy" else ("angle", "pcyl")
-    chunks = pressure_chunks(file, cycles=10, angle_column=columns[0], pressure_column=columns[1])
-    first = next(chunks)
-    with file.open("ab") as stream:
-        stream.write(b"\n1,2")
-    with pytest.raises(DataError, match=r"record: changed while it was read, from \d+ to \d+ bytes: read it again"):
-        next(chunks)
-    np.testing.assert_array_equal(first["pressure_bar"], cycles_at(CAD, 0.0)[:10])
-
-
 def test_an_angle_that_slips_from_chunk_to_chunk_is_doubted(tmp_path: Path) -> None:
     slip = np.repeat(np.linspace(0.0, 1.0, COUNT), CAD.size)
     degrees = np.tile(CAD, COUNT)

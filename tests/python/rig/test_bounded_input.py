@@ -178,13 +178,6 @@ def test_a_word_of_any_length_and_a_number_of_any_size(name: str, form: str, tmp
     assert any(said) or name == "points"  # whose columns may be called anything
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TEXTS)
-@pytest.mark.parametrize("form", FORMS)
-def test_every_word_of_any_length_and_every_number_of_any_size(name: str, form: str, tmp_path: Path) -> None:
-    assert any(swell(name, tmp_path, *FORMS[form], most=100)) or name == "points"
-
-
 # --- the parts that do it -----------------------------------------------------------------------------------
 def test_nesting_is_counted_in_levels() -> None:
     assert parsed("[" * 64 + "]" * 64, "a", "JSON") is not None
