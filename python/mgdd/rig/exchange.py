@@ -19,6 +19,7 @@ from mgdd.rig.recorded import RecordedRun, readable_record
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+TABLE = "rig"  # of a record, with a row per exchange
 _PARTS = ("input", "component", "limit", "value", "noise_free", "applied")
 
 
@@ -100,24 +101,24 @@ class RigRecord:
         return record
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], *, table: str = "rig") -> Self:
+    def read(cls, path: str | os.PathLike[str]) -> Self:
         """Read the exchanges that a `RecordingRig` gave to a `Recorder`, with a warning where the file ends before.
 
         DataError where it has no such table.
         """
-        return cls.of_run(readable_record(path), f"{path}", table=table)
+        return cls.of_run(readable_record(path), f"{path}")
 
     @classmethod
-    def of_run(cls, run: RecordedRun, origin: str, *, table: str = "rig") -> Self:
+    def of_run(cls, run: RecordedRun, origin: str) -> Self:
         """Take the exchanges of a record that was read."""
         samples = run.samples
-        if table not in samples:
-            raise DataError(f"{origin}: has no table {table!r}: it has {', '.join(samples) or 'none'}")
-        columns = samples[table].data_vars
+        if TABLE not in samples:
+            raise DataError(f"{origin}: has no table {TABLE!r}: it has {', '.join(samples) or 'none'}")
+        columns = samples[TABLE].data_vars
         try:
             return cls.from_columns([str(name) for name in columns], np.column_stack([*columns.values()]))
         except DataError as error:
-            raise error.reworded(f"{origin}: table {table!r}: {error}") from error
+            raise error.reworded(f"{origin}: table {TABLE!r}: {error}") from error
 
 
 def flat(exchange: Exchange) -> dict[str, float]:

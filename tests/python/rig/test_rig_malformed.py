@@ -163,30 +163,6 @@ def test_a_message_of_a_driver_that_is_not_a_frame(message: can.Message) -> None
         assert bridge.error is None
 
 
-def test_own_frames_of_a_bus_that_hears_itself_are_left_out() -> None:
-    pytest.importorskip("msgpack")
-    where = "udp_multicast:239.74.163.2?port=43117&hop_limit=0"  # it does not leave this machine
-    try:
-        CanTransport.parse(where).open()
-    except RigError as error:
-        pytest.skip(f"no multicast here: {error}")
-    own = Frame(id=0x120, data=b"\x01")
-    with CanTransport.parse(where) as one, CanTransport.parse(where) as other:
-        one.claim({(0x120, False)})
-        one.send(own)
-        assert [frame.data for frame in received(other, 1)] == [b"\x01"]
-        other.send(Frame(id=0x121, data=b"\x02"))
-        assert [frame.data for frame in received(one, 1)] == [b"\x02"]
-        assert (one.counters["own"], one.counters["received"]) == (1, 1)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stream:  # a datagram of somebody else
-            stream.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-            stream.sendto(b"hello", ("239.74.163.2", 43117))
-        other.send(own)  # the same bytes from another node are no echo
-        with pytest.raises(RigError, match="two nodes have one identifier"):
-            received(one, 1)
-        assert one.counters["malformed"] == 1
-
-
 def test_a_driver_that_gives_back_what_we_sent() -> None:
     with CanTransport("virtual", "echo", options={"receive_own_messages": True}) as bus:
         bus.claim({(0x120, False)})

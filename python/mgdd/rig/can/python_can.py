@@ -6,7 +6,7 @@ import errno
 import logging
 import socket
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 64  # of a CAN FD frame
 _MOST_STAMP_S = 9e9  # since any epoch, as far as nanoseconds fit into 64 bits
-_ECHO_S = 1.0  # an echo that has not come by then was lost
 _GREETING_S = 2.0
 _GREETINGS = 5
 POLL_S = 0.01  # longest wait for a frame
@@ -79,10 +78,6 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
         monotonic_ns=monotonic_ns,
         bus_ns=round(stamp_s * 1e9),
     )
-
-
-def _content(message: can.Message) -> tuple[Any, ...]:
-    return message.arbitration_id, message.is_extended_id, message.is_remote_frame, message.dlc, bytes(message.data)
 
 
 _HINTS = {
@@ -157,14 +152,8 @@ class Reception:
         module = str(bus.__class__.__module__)  # of python-can, or of another one
         self._interface = module.split(".")[2] if module.startswith("can.interfaces.") else ""
         self._has_our_clock = _has_our_clock(bus, self._interface)
-        self._sent: deque[tuple[float, tuple[Any, ...]]] = deque()  # appended and taken by one thread each
         self._empty_ns = time.monotonic_ns()
         self.counts: Counter[str] = Counter()  # what was left out: ``malformed`` and ``own``
-
-    def sending(self, message: can.Message) -> None:
-        """Note a message that will be sent: a bus that hears itself and does not say so brings it back once at most."""
-        if self._interface == "udp_multicast":
-            self._sent.append((time.monotonic(), _content(message)))
 
     def receive(self, timeout_s: float = POLL_S) -> Frame | None:
         """Give the next frame; None where none came, or what came is left out."""
@@ -175,7 +164,8 @@ class Reception:
             message = self._next(timeout_s)
         if message is None:
             return None
-        if self._is_own(message):
+        # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
+        if not message.is_rx and self._interface != "socketcan":
             self.counts["own"] += 1
             return None
         try:
@@ -183,22 +173,6 @@ class Reception:
         except DataError:
             self.counts["malformed"] += 1
             return None
-
-    def _is_own(self, message: can.Message) -> bool:
-        if self._sent and self._is_echo(message):
-            return True
-        # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
-        return not message.is_rx and self._interface != "socketcan"
-
-    def _is_echo(self, message: can.Message) -> bool:
-        """Whether it is one of ours; what was sent before it will not come any more."""
-        oldest_s, content = time.monotonic() - _ECHO_S, _content(message)
-        while self._sent and self._sent[0][0] < oldest_s:
-            self._sent.popleft()
-        place = next((k for k, (_, sent) in enumerate(list(self._sent)) if sent == content), None)
-        for _ in range(0 if place is None else place + 1):
-            self._sent.popleft()
-        return place is not None
 
     def _arrival_ns(self, stamp_s: float) -> int:
         now_ns = time.monotonic_ns()
