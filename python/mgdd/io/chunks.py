@@ -6,7 +6,6 @@ import inspect
 import itertools
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -86,7 +85,7 @@ def pressure_chunks(path: str | os.PathLike[str], *, cycles: int = 200, **option
         raise ParameterError.of("cycles", cycles, "a whole number >= 1")
     given = inspect.signature(read_pressure).bind(path, **options)
     given.apply_defaults()
-    how = Reading(**{each.name: given.arguments[each.name] for each in fields(Reading)})
+    how = Reading.of(given.arguments)
     text = {name: given.arguments[name] for name in TEXT}
     return _chunks(existing_file(path), int(cycles), how, text, options)
 
