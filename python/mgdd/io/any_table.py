@@ -24,7 +24,6 @@ from mgdd.io.files import bytes_of, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
 from mgdd.io.row_text import parse_number
 from mgdd.io.table import Table, TextTable, read_table, text_table
-from mgdd.io.text_rows import TextRows
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -87,28 +86,6 @@ def open_table(
         if sheet is not None and (form is None or not isinstance(table, TextTable)):
             raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
         yield _of_rows(table) if cycle_per_row else table
-
-
-@contextlib.contextmanager
-def open_parts(
-    path: str | os.PathLike[str],
-    *,
-    delimiter: str | None = None,
-    decimal: str = ".",
-    sheet: str | None = None,
-    cycle_per_row: bool = False,
-) -> Iterator[Callable[[int, int], Table]]:
-    """Open a file as `open_table` does, and give what makes a table of some of its rows; text is read as far as asked.
-
-    The rows of a text that are asked for begin at or behind those asked for before.
-    """
-    file = existing_file(path)
-    if _form_of(file) is None and sheet is None and not cycle_per_row:
-        with file.open("rb") as stream:
-            yield TextRows(file, stream, delimiter=delimiter, decimal=decimal).part
-        return
-    with open_table(file, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
-        yield table.part
 
 
 def _of_rows(table: Table) -> ArrayTable:

@@ -136,32 +136,21 @@ def of_parquet(file: Path, stack: contextlib.ExitStack) -> Columns:
 
 
 class _ArrowColumn:
-    """A column of a Parquet file, read by groups of rows; the last one is kept for rows that follow."""
+    """A column of a Parquet file."""
 
     def __init__(self, content: Any, field: Any) -> None:
         self._content, self._name = content, field.name
-        meta = content.metadata
-        self._ends = np.cumsum([meta.row_group(k).num_rows for k in range(meta.num_row_groups)], dtype=np.int64)
-        self.shape = (meta.num_rows,)
+        self.shape = (content.metadata.num_rows,)
         self._cast = str(field.type).startswith(("decimal", "bool"))  # else objects, where cells are empty
         try:
             self.dtype = np.dtype(float if self._cast else field.type.to_pandas_dtype())
         except (NotImplementedError, TypeError):
             self.dtype = np.dtype(object)
-        self._kept: tuple[int, NDArray[Any]] = (-1, np.empty(0))
 
-    def __getitem__(self, index: tuple[slice]) -> NDArray[Any]:
-        start, stop, _ = index[0].indices(self.shape[0])
-        first, last = (int(np.searchsorted(self._ends, at, side="right")) for at in (start, max(stop - 1, start)))
-        begin = int(self._ends[first - 1]) if first else 0
-        parts = [self._group(k) for k in range(first, min(last + 1, self._ends.size))]
-        return np.concatenate(parts)[start - begin : stop - begin]
-
-    def _group(self, number: int) -> NDArray[Any]:
-        if self._kept[0] != number:
-            found = self._content.read_row_group(number, columns=[self._name])[self._name]
-            self._kept = number, (found.cast("double") if self._cast else found).to_numpy()
-        return self._kept[1]
+    def __getitem__(self, _: Any) -> NDArray[Any]:
+        found = self._content.read(columns=[self._name])[self._name]
+        values: NDArray[Any] = (found.cast("double") if self._cast else found).to_numpy()
+        return values
 
 
 class _Decoded:

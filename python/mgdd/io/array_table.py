@@ -32,14 +32,13 @@ class Named(NamedTuple):
 
 
 class Samples:
-    """A vector that a function reads from a first sample to one behind the last."""
+    """A vector that a function reads, where it is asked for."""
 
-    def __init__(self, length: int, dtype: DTypeLike, read: Callable[[int, int], Any]) -> None:
+    def __init__(self, length: int, dtype: DTypeLike, read: Callable[[], Any]) -> None:
         self.shape, self.dtype, self._read = (length,), np.dtype(dtype), read
 
-    def __getitem__(self, index: tuple[slice]) -> Any:
-        start, stop, _ = index[0].indices(self.shape[0])
-        return self._read(start, stop)
+    def __getitem__(self, _: Any) -> Any:
+        return self._read()
 
 
 class Reversed:
@@ -76,10 +75,10 @@ class Column(NamedTuple):
         """Return the number of samples."""
         return int(self.values.shape[self.along])
 
-    def block(self, rows: slice, count: int) -> NDArray[Any]:
+    def block(self, count: int) -> NDArray[Any]:
         """Read this column and those behind it, as rows."""
         index: list[Any] = [0] * len(self.values.shape)
-        index[self.along] = rows
+        index[self.along] = slice(None)
         if self.across is None:
             return np.asarray(self.values[tuple(index)])[None]
         index[self.across] = slice(self.number, self.number + count)
@@ -113,11 +112,10 @@ def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
 
 @dataclass(frozen=True)
 class ArrayTable(Table):
-    """Columns of a binary file; those of several rasters differ in length, also where few `window` rows are read."""
+    """Columns of a binary file; those of several rasters differ in length."""
 
     columns: tuple[Column, ...]
     file: Path | None = None  # that the columns are read from
-    window: tuple[int, int | None] = (0, None)
 
     @property
     def width(self) -> int:
@@ -126,12 +124,12 @@ class ArrayTable(Table):
 
     @property
     def height(self) -> int:
-        """Return the number of rows of the first column in the window."""
-        return self._rows_of(self.columns[0])
+        """Return the number of rows of the first column."""
+        return self.columns[0].size
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
-        """Return the number of rows that each column has in the file."""
+        """Return the number of rows of each column."""
         return tuple(column.size for column in self.columns)
 
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
@@ -140,7 +138,7 @@ class ArrayTable(Table):
         if len({column.size for column in columns}) > 1:
             sizes = ", ".join(f"{self.called(index)} has {self.columns[index].size}" for index in indices)
             raise DataError(f"{self.source}: columns of different rasters, {sizes}: name columns of one")
-        rows = self._rows_of(columns[0]) if columns else 0
+        rows = columns[0].size if columns else 0
         self._require_room(8 * rows * len(columns))
         out = np.empty((len(columns), rows))
         # Columns that stand side by side are read in one go: a file is read by rows.
@@ -150,12 +148,8 @@ class ArrayTable(Table):
             count = 1 + len(others)
             with self._reading():
                 place = out[at : at + count]
-                place[:] = _complete(first.block(slice(*self.window), count), place.shape)
+                place[:] = _complete(first.block(count), place.shape)
         return out
-
-    def part(self, start: int, stop: int) -> ArrayTable:
-        """Return the table of some rows, counted in the file; nothing is read."""
-        return replace(self, window=(start, stop))
 
     def loaded(self) -> ArrayTable:
         """Return the table with all of its arrays in memory."""
@@ -168,9 +162,6 @@ class ArrayTable(Table):
             }
         columns = tuple(each._replace(values=held[id(each.values)]) for each in self.columns)
         return replace(self, columns=columns, file=None)
-
-    def _rows_of(self, column: Column) -> int:
-        return len(range(*slice(*self.window).indices(column.size)))
 
     def _require_room(self, needed: int) -> None:
         if self.file is not None:

@@ -15,7 +15,7 @@ import pytest
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure, read_throttle_log
-from mgdd.io.any_table import open_parts, read_any_table
+from mgdd.io.any_table import read_any_table
 from mgdd.io.array_table import ArrayTable, Named, Samples, columns_of
 from table_files import WITHOUT_UNITS, WRITERS
 
@@ -328,30 +328,6 @@ def test_a_unit_of_hdf5_that_is_no_text_is_not_read(tmp_path: Path) -> None:
     assert read_any_table(tmp_path / "a.h5").units == ("bar", "bar", "bar", "", "")
 
 
-@pytest.mark.parametrize("version", ["3.30", "4.10"])
-def test_what_stands_in_no_record_of_mdf_is_the_same_in_parts(version: str, tmp_path: Path) -> None:
-    """A group without times, times that are counted, and a channel that is: asammdf counts them in each part anew."""
-    asammdf = pytest.importorskip("asammdf")
-    with asammdf.MDF(version=version) as content:
-        content.append([asammdf.Signal(samples=LOG["duty"], timestamps=TIME, name="duty")])
-        file = Path(content.save(tmp_path / "a"))
-        master, duty = (channel.address for channel in content.groups[0].channels)
-    raw = file.read_bytes()
-    # The type of the times (none, counted) and of the channel, with the row that is counted then.
-    damage = [(master + 24, b"\0", 0), (master + 188, bytes(4), 0)]
-    if version >= "4":
-        damage = [(master + 88, b"\0", 0), (master + 88, b"\3", 0), (duty + 88, b"\6", 1)]
-    for at, part_of_head, row in damage:
-        end = at + len(part_of_head)
-        assert raw[at:end] != part_of_head
-        file.write_bytes(raw[:at] + part_of_head + raw[end:])
-        table = read_any_table(file)
-        assert np.diff(table.numbers(row)[:3]).tolist() == [1.0, 1.0]
-        with open_parts(file) as part:
-            for k in range(table.width):
-                np.testing.assert_array_equal(part(7, 12).numbers(k), table.numbers(k)[7:12])
-
-
 def test_what_matlab_wrote_is_read_as_far_as_scipy_reads_it() -> None:
     """Objects, functions, strings and tables of MATLAB stand in the files of SciPy's own tests."""
     import scipy.io.matlab
@@ -395,7 +371,7 @@ def test_an_unfinalised_bus_log_of_a_vehicle() -> None:
 
 def test_fewer_numbers_than_a_file_told_are_refused(tmp_path: Path) -> None:
     """NumPy would repeat one number in all rows."""
-    columns = columns_of([Named("v", Samples(5, float, lambda *_: np.ones(1)))])
+    columns = columns_of([Named("v", Samples(5, float, lambda: np.ones(1)))])
     table = ArrayTable("a", ("v",), None, (columns[0][2],), tmp_path / "a")
     for read in (table.loaded, lambda: table.numbers(0)):
         with pytest.raises(DataError, match=r"numbers where \((1, )?5,?\) are said to be"):

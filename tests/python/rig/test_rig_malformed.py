@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hub_thread import bus_of, running_hub
-from mgdd.errors import DataError, RigError
+from mgdd.errors import DataError
 from mgdd.loop import VirtualEngine
 from mgdd.rig import CanRig
 from mgdd.rig.can.bus_bridge import BusBridge
