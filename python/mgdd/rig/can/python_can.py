@@ -26,8 +26,6 @@ _GREETINGS = 5
 POLL_S = 0.01  # longest wait for a frame
 STILL_S = 0.03  # without a look at the bus: by then a receiver of commands every 5 ms has let go by itself
 THIS_HOST = ("localhost", "127.0.0.1", "::1")
-_OF_THE_WIRE = ("socketcand", "udp_multicast")  # interfaces that parse what a stranger may have written
-_TEXT = "_SocketCanDaemonBus__receive_buffer"
 LOG_WRITERS = MappingProxyType({"blf": "BLFWriter", "asc": "ASCWriter", "log": "CanutilsLogWriter"})
 
 
@@ -158,10 +156,10 @@ class Reception:
     def receive(self, timeout_s: float = POLL_S) -> Frame | None:
         """Give the next frame; None where none came, or what came is left out."""
         looked_ns = time.monotonic_ns()
-        message = self._next(0.0)
+        message = self._bus.recv(0.0)
         if message is None:
             self._empty_ns = looked_ns
-            message = self._next(timeout_s)
+            message = self._bus.recv(timeout_s)
         if message is None:
             return None
         # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
@@ -180,17 +178,6 @@ class Reception:
             waited_ns = (time.time() - stamp_s) * 1e9 - 1e3  # stamps are exact to 1 us
             return now_ns - round(max(0.0, min(waited_ns, float(now_ns))))
         return now_ns if now_ns - self._empty_ns <= STILL_S * 1e9 else self._empty_ns
-
-    def _next(self, timeout_s: float) -> can.Message | None:
-        try:
-            return self._bus.recv(timeout_s)
-        except Exception as error:
-            if self._interface not in _OF_THE_WIRE or isinstance(error.__cause__, OSError | None):
-                raise
-            self.counts["malformed"] += 1
-            if hasattr(self._bus, _TEXT):  # python-can would parse it again, for ever
-                setattr(self._bus, _TEXT, "")
-            return None
 
 
 def _has_our_clock(bus: Any, interface: str) -> bool:
