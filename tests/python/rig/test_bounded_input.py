@@ -127,7 +127,6 @@ def test_shipped_names_of_any_length(read: Callable[[str], Any], name: str) -> N
 
 HOSTILE = {
     "empty": b"",
-    "blank": b" \n\n",
     "NUL": b"a,b\0\n1,2\n",
     "no encoding": b"a,b\n1,\x81\x9d\n",
     "UTF-16 without a mark": "a,b\n1,2\n".encode("utf-16-le"),
@@ -135,13 +134,10 @@ HOSTILE = {
     "one letter": LETTERS.encode(),
     "one number": DIGITS.encode(),
     "one cell a line": b"1\n" * 20_000,
-    "lists": b"[" * 100_000,
     "lists in JSON": b'{"kind": ' + b"[" * 100_000,
     "objects": b'{"a":' * 100_000,
-    "lists in TOML": b"a = " + b"[" * 100_000,
     "tables in TOML": b"a = " + b"{a = " * 3000,
     "dotted keys": b"a." * 3000 + b"a = 1\n",
-    "dotted table": b"[" + b"a." * 3000 + b"a]\n",
     "closed lists": b"a = " + b"[" * 400 + b"]" * 400,
 }
 
