@@ -46,21 +46,14 @@ _READERS: dict[str, Callable[[Path, contextlib.ExitStack], Columns]] = {
 }  # fmt: skip
 
 
-def read_any_table(
-    path: str | os.PathLike[str],
-    *,
-    delimiter: str | None = None,
-    decimal: str = ".",
-    sheet: str | None = None,
-    cycle_per_row: bool = False,
-) -> Table:
+def read_any_table(path: str | os.PathLike[str], **how: Any) -> Table:
     """Read the columns of a file by its content, whatever its name.
 
     Text (also with a preamble, as of LabVIEW or INCA), MATLAB 4 to 7.3, HDF5 and netCDF, TDMS, MDF 3 and 4, Parquet,
     NPY and NPZ, XLSX. ``delimiter`` and ``decimal`` are those of `read_table`, for text; ``sheet`` names one of a
     workbook, else it is the one with the most numbers; ``cycle_per_row`` makes a column of each row.
     """
-    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
+    with open_table(path, **how) as table:
         return table.loaded()
 
 
