@@ -37,9 +37,6 @@ def log_text(mark: str, units: str, end: str = "") -> str:
         (";", "s;-;%;"),
         (";", "s;-;%"),
         (",", "s,-,%,"),
-        (" ", "s - % "),
-        (" ", "  % "),
-        ("   ", "s   -      %"),
     ],
 )
 def test_an_empty_unit_leaves_the_others_where_they_are(mark: str, units: str, tmp_path: Path) -> None:

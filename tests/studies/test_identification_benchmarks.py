@@ -20,7 +20,12 @@ from mgdd.results.labels import labelled_dataset
 from mgdd_studies import run_study
 from mgdd_studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd_studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
-from mgdd_studies.benchmarks.wiener_hammerstein import WienerHammersteinFit, fit_linear, fit_wiener_hammerstein
+from mgdd_studies.benchmarks.wiener_hammerstein import (
+    LinearApproximation,
+    WienerHammersteinFit,
+    fit_linear,
+    fit_wiener_hammerstein,
+)
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {
@@ -180,6 +185,12 @@ def test_ctrl_c_leaves_the_fit_so_far(monkeypatch: pytest.MonkeyPatch, name: str
 def test_a_model_reads_what_its_fit_wrote(name: str) -> None:
     fit = FITS[name][1]()
     assert type(fit.model).from_toml(fit.to_toml()).to_toml() == fit.model.to_toml()
+
+
+def test_a_linear_approximation_comes_back() -> None:
+    poles = {"numerator": np.array([0.5, 0.1]), "denominator": np.array([1.0, -1 / 3])}
+    model = LinearApproximation(**poles, input_mean=0.1, output_mean=1.0, rmse=0.2)
+    assert LinearApproximation.from_toml(model.to_toml()).to_toml() == model.to_toml()
 
 
 @pytest.mark.parametrize("name", FITS)

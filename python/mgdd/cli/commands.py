@@ -131,7 +131,7 @@ COMMANDS = {
         "mgdd-runs/first", "rig_records"),
     "rig hub": Command(
         "join processes of this machine by a bus of the socketcand protocol, until Ctrl-C or its parent ends",
-        "--port 29536 --fault drop:p=0.01 --bit-rate 500000", "rig"),
+        "--port 29536 --fault drop:p=0.01", "rig"),
     "rig node": Command(
         "serve a virtual throttle or engine bench behind a bus, until Ctrl-C or its parent ends",
         "--map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv", "rig"),

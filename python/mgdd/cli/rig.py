@@ -25,7 +25,7 @@ from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.checked import simulated_plant
 from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test
 
-_HUB = Options(Hub, "host", "bit_rate", "seed")
+_HUB = Options(Hub, "host", "seed")
 _NODE, _PLANT = Options(run_node, "step"), Options(node_of, "seed")
 _SELF_TEST = Options(run_self_test, "loop")
 _FAILED = 1

@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import presets
 from mgdd.cli.from_library import Options, as_option
 from mgdd.cli.options import option
-from mgdd.cli.output import emit, warn
+from mgdd.cli.output import emit
 from mgdd.cli.ranges import assignments
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.io import read_throttle_log
@@ -36,10 +36,8 @@ _DEFAULT_PRESET = "P1"
 
 
 def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
-    """Read a log as the options of `LOG` say, and say what was left out of it."""
-    log = read_throttle_log(file, **LOG.given(args))
-    warn(*log.attrs["warnings"].splitlines(), of=file)
-    return log
+    """Read a log as the options of `LOG` say."""
+    return read_throttle_log(file, **LOG.given(args))
 
 
 def add_preset(group: Any, name: str) -> None:

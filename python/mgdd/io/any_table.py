@@ -18,14 +18,12 @@ import numpy as np
 from mgdd.errors import DataError, argument, did_you_mean
 from mgdd.io.array_files import of_hdf5, of_matlab, of_netcdf, of_numpy, of_parquet
 from mgdd.io.array_table import ArrayTable, Columns, Named, columns_of, naming_damage
-from mgdd.io.bounded_reader import open_bounded
 from mgdd.io.column_names import heading
 from mgdd.io.extras import import_extra
-from mgdd.io.files import Stamp, bytes_of, existing_file, read_plain_text
+from mgdd.io.files import bytes_of, existing_file, read_plain_text
 from mgdd.io.recorder_files import of_mdf, of_tdms
 from mgdd.io.row_text import parse_number
 from mgdd.io.table import Table, TextTable, read_table, text_table
-from mgdd.io.text_rows import TextRows
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -41,7 +39,6 @@ _STARTS = {
     b"TDSm": "TDMS", b"MDF ": "MDF", b"UnFinMF": "MDF", b"PAR1": "Parquet", b"PK\x03\x04": "XLSX or NPZ",
 }  # fmt: skip
 _SPREAD = 16  # columns of a sheet for each that has a cell
-_PLAIN = ("netCDF 3", "NumPy")  # mapped as they stand on the disk, neither compressed nor sparse
 # Columns may be read from a file that stays open as long as the stack.
 _READERS: dict[str, Callable[[Path, contextlib.ExitStack], Columns]] = {
     "HDF5": of_hdf5, "MATLAB": of_matlab, "netCDF 3": of_netcdf, "NumPy": of_numpy, "TDMS": of_tdms, "MDF": of_mdf,
@@ -49,21 +46,14 @@ _READERS: dict[str, Callable[[Path, contextlib.ExitStack], Columns]] = {
 }  # fmt: skip
 
 
-def read_any_table(
-    path: str | os.PathLike[str],
-    *,
-    delimiter: str | None = None,
-    decimal: str = ".",
-    sheet: str | None = None,
-    cycle_per_row: bool = False,
-) -> Table:
+def read_any_table(path: str | os.PathLike[str], **how: Any) -> Table:
     """Read the columns of a file by its content, whatever its name.
 
     Text (also with a preamble, as of LabVIEW or INCA), MATLAB 4 to 7.3, HDF5 and netCDF, TDMS, MDF 3 and 4, Parquet,
     NPY and NPZ, XLSX. ``delimiter`` and ``decimal`` are those of `read_table`, for text; ``sheet`` names one of a
     workbook, else it is the one with the most numbers; ``cycle_per_row`` makes a column of each row.
     """
-    with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
+    with open_table(path, **how) as table:
         return table.loaded()
 
 
@@ -80,38 +70,15 @@ def open_table(
     file = existing_file(path)
     form = _form_of(file)
     with contextlib.ExitStack() as stack:
-        stamp = Stamp.of(file)
         if form is None:
             table: Table = read_table(path, delimiter=delimiter, decimal=decimal)
         else:
             with naming_damage(file):
                 found = _opened(form, file, stack, sheet=sheet, without_side_blocks=True)
-                table = _table_of(file, stamp, found) if isinstance(found, list) else text_table(*found, delimiter="\t")
+                table = _table_of(file, found) if isinstance(found, list) else text_table(*found, delimiter="\t")
         if sheet is not None and (form is None or not isinstance(table, TextTable)):
             raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
         yield _of_rows(table) if cycle_per_row else table
-
-
-@contextlib.contextmanager
-def open_parts(
-    path: str | os.PathLike[str],
-    *,
-    delimiter: str | None = None,
-    decimal: str = ".",
-    sheet: str | None = None,
-    cycle_per_row: bool = False,
-) -> Iterator[Callable[[int, int], Table]]:
-    """Open a file as `open_table` does, and give what makes a table of some of its rows; text is read as far as asked.
-
-    The rows of a text that are asked for begin at or behind those asked for before.
-    """
-    file = existing_file(path)
-    if _form_of(file) is None and sheet is None and not cycle_per_row:
-        with file.open("rb") as stream:
-            yield TextRows(file, stream, delimiter=delimiter, decimal=decimal).part
-        return
-    with open_table(file, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
-        yield table.part
 
 
 def _of_rows(table: Table) -> ArrayTable:
@@ -133,12 +100,12 @@ def _unnamed(row: NDArray[np.float64]) -> Named:
     return Named("", row)
 
 
-def _table_of(file: Path, stamp: Stamp, columns: Columns) -> ArrayTable:
+def _table_of(file: Path, columns: Columns) -> ArrayTable:
     if not columns:
         raise DataError(f"{file}: no column of numbers")
     names, units, values = zip(*columns, strict=True)
     header = names if any(names) else None
-    return ArrayTable(str(file), header, units if any(units) else None, values, stamp)
+    return ArrayTable(str(file), header, units if any(units) else None, values, file)
 
 
 def format_of(path: str | os.PathLike[str]) -> str:
@@ -174,14 +141,7 @@ def _form_of(file: Path) -> str | None:
     return found
 
 
-def _opened(form: str, file: Path, stack: contextlib.ExitStack, **of_sheet: Any) -> Columns | tuple[str, str]:
-    """Open a file as `read_format` does, in a process with limits where it may claim more than it has."""
-    if form in _PLAIN:
-        return read_format(form, file, stack)
-    return stack.enter_context(open_bounded(file, form, **of_sheet))
-
-
-def read_format(
+def _opened(
     form: str,
     file: Path,
     stack: contextlib.ExitStack,

@@ -13,7 +13,6 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.array_table import Columns, Named, Reversed, columns_of, marked
 from mgdd.io.extras import import_extra
-from mgdd.io.watched_file import WatchedFile
 from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
@@ -26,7 +25,6 @@ _UNWRITTEN = {
     "f4": 9.969209968386869e36, "f8": 9.969209968386869e36, "i2": -32767, "u2": 65535, "i4": -2147483647,
     "u4": 4294967295, "i8": -9223372036854775806, "u8": 18446744073709551614,
 }  # fmt: skip
-_LONGEST_MARK = 128  # bytes of an attribute that marks values, sixteen numbers
 
 
 def of_matlab(file: Path, _: contextlib.ExitStack) -> Columns:
@@ -63,60 +61,25 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
             found.append((name.replace("/", "."), item))
 
     content.visititems(visit)
-    for name, item in found:
-        if item.external or item.is_virtual:
-            raise DataError(
-                f"{file}: the numbers of data set {name!r} stand in other files: those are not read; copy them into "
-                "one, as h5repack does"
-            )
-        needed, held = item.size * item.id.get_type().get_size(), item.id.get_storage_size()
-        if item.id.get_offset() is not None and held < needed:  # the library would give whatever is in memory
-            raise ValueError(f"data set {name!r} has {held} of {needed} bytes")
-    kinds = [_kinds_of_units(h5py, item) for _, item in found]
     netcdf = "_NCProperties" in content.attrs
-    decoded = [_Decoded(item, _marks_of(h5py, item), unwritten=netcdf) for _, item in found]
-    units = [
-        next(filter(None, (_text(item.attrs[key]) for key in own)), "")
-        for (_, item), own in zip(found, kinds, strict=True)
-    ]
-    return columns_of(
-        Named(name, Reversed(values) if matlab else values, unit)
-        for (name, _), values, unit in zip(found, decoded, units, strict=True)
-    )
-
-
-def _marks_of(h5py: Any, item: Any) -> dict[str, Any]:
-    """Give the attributes that say which numbers are missing; as with units, only those of a type that reads safely."""
-    numeric, found = (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID), {}
-    for key in _MARKS:
-        if key in item.attrs:
-            own = item.attrs.get_id(key)
-            if isinstance(own.get_type(), numeric) and own.get_storage_size() <= _LONGEST_MARK:
-                found[key] = item.attrs[key]
-    return found
-
-
-def _kinds_of_units(h5py: Any, item: Any) -> dict[str, Any]:
-    """Give the types of units that are texts; one that is damaged to a list of numbers would end the process."""
-    kinds = {key: item.attrs.get_id(key).get_type() for key in ("units", "unit") if key in item.attrs}
-    return {key: kind for key, kind in kinds.items() if isinstance(kind, h5py.h5t.TypeStringID)}
+    columns = []
+    for name, item in found:
+        values = _Decoded(item, item.attrs, unwritten=netcdf)
+        unit = next(filter(None, (_text(item.attrs.get(key)) for key in ("units", "unit"))), "")
+        columns.append(Named(name, Reversed(values) if matlab else values, unit))
+    return columns_of(columns)
 
 
 def _text(value: Any) -> str:
-    if not np.size(value) or getattr(value, "shape", ()) is None:  # as netCDF 4 writes an empty text
-        return ""
-    text = np.ravel(value)[0]
-    return text.decode() if isinstance(text, bytes) else str(text)
+    """Give the text of an attribute; none of what is empty or no text."""
+    first = next(iter(np.ravel(value)), "")
+    return first.decode() if isinstance(first, bytes) else first if isinstance(first, str) else ""
 
 
 def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the variables of a netCDF 3 file until the stack closes it."""
     import xarray as xr
-    from scipy.io import netcdf_file
 
-    # First so: by its path SciPy makes room for whatever length stands in the head.
-    with file.open("rb") as stream, netcdf_file(WatchedFile(stream), mmap=True):
-        pass
     raw: dict[str, Any] = {"mask_and_scale": False, "decode_times": False}
     dataset = stack.enter_context(xr.open_dataset(file, engine="scipy", **raw))
     found = []
@@ -173,32 +136,21 @@ def of_parquet(file: Path, stack: contextlib.ExitStack) -> Columns:
 
 
 class _ArrowColumn:
-    """A column of a Parquet file, read by groups of rows; the last one is kept for rows that follow."""
+    """A column of a Parquet file."""
 
     def __init__(self, content: Any, field: Any) -> None:
         self._content, self._name = content, field.name
-        meta = content.metadata
-        self._ends = np.cumsum([meta.row_group(k).num_rows for k in range(meta.num_row_groups)], dtype=np.int64)
-        self.shape = (meta.num_rows,)
+        self.shape = (content.metadata.num_rows,)
         self._cast = str(field.type).startswith(("decimal", "bool"))  # else objects, where cells are empty
         try:
             self.dtype = np.dtype(float if self._cast else field.type.to_pandas_dtype())
         except (NotImplementedError, TypeError):
             self.dtype = np.dtype(object)
-        self._kept: tuple[int, NDArray[Any]] = (-1, np.empty(0))
 
-    def __getitem__(self, index: tuple[slice]) -> NDArray[Any]:
-        start, stop, _ = index[0].indices(self.shape[0])
-        first, last = (int(np.searchsorted(self._ends, at, side="right")) for at in (start, max(stop - 1, start)))
-        begin = int(self._ends[first - 1]) if first else 0
-        parts = [self._group(k) for k in range(first, min(last + 1, self._ends.size))]
-        return np.concatenate(parts)[start - begin : stop - begin]
-
-    def _group(self, number: int) -> NDArray[Any]:
-        if self._kept[0] != number:
-            found = self._content.read_row_group(number, columns=[self._name])[self._name]
-            self._kept = number, (found.cast("double") if self._cast else found).to_numpy()
-        return self._kept[1]
+    def __getitem__(self, _: Any) -> NDArray[Any]:
+        found = self._content.read(columns=[self._name])[self._name]
+        values: NDArray[Any] = (found.cast("double") if self._cast else found).to_numpy()
+        return values
 
 
 class _Decoded:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.io.files import Stamp
-from mgdd.io.read_limits import ReadLimits
+from mgdd.io.files import require_free
 from mgdd.io.table import Table
 
 if TYPE_CHECKING:
@@ -33,14 +32,13 @@ class Named(NamedTuple):
 
 
 class Samples:
-    """A vector that a function reads from a first sample to one behind the last."""
+    """A vector that a function reads, where it is asked for."""
 
-    def __init__(self, length: int, dtype: DTypeLike, read: Callable[[int, int], Any]) -> None:
+    def __init__(self, length: int, dtype: DTypeLike, read: Callable[[], Any]) -> None:
         self.shape, self.dtype, self._read = (length,), np.dtype(dtype), read
 
-    def __getitem__(self, index: tuple[slice]) -> Any:
-        start, stop, _ = index[0].indices(self.shape[0])
-        return self._read(start, stop)
+    def __getitem__(self, _: Any) -> Any:
+        return self._read()
 
 
 class Reversed:
@@ -77,10 +75,10 @@ class Column(NamedTuple):
         """Return the number of samples."""
         return int(self.values.shape[self.along])
 
-    def block(self, rows: slice, count: int) -> NDArray[Any]:
+    def block(self, count: int) -> NDArray[Any]:
         """Read this column and those behind it, as rows."""
         index: list[Any] = [0] * len(self.values.shape)
-        index[self.along] = rows
+        index[self.along] = slice(None)
         if self.across is None:
             return np.asarray(self.values[tuple(index)])[None]
         index[self.across] = slice(self.number, self.number + count)
@@ -114,11 +112,10 @@ def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
 
 @dataclass(frozen=True)
 class ArrayTable(Table):
-    """Columns of a binary file; those of several rasters differ in length, also where few `window` rows are read."""
+    """Columns of a binary file; those of several rasters differ in length."""
 
     columns: tuple[Column, ...]
-    stamp: Stamp | None = None
-    window: tuple[int, int | None] = (0, None)
+    file: Path | None = None  # that the columns are read from
 
     @property
     def width(self) -> int:
@@ -127,12 +124,12 @@ class ArrayTable(Table):
 
     @property
     def height(self) -> int:
-        """Return the number of rows of the first column in the window."""
-        return self._rows_of(self.columns[0])
+        """Return the number of rows of the first column."""
+        return self.columns[0].size
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
-        """Return the number of rows that each column has in the file."""
+        """Return the number of rows of each column."""
         return tuple(column.size for column in self.columns)
 
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
@@ -141,8 +138,8 @@ class ArrayTable(Table):
         if len({column.size for column in columns}) > 1:
             sizes = ", ".join(f"{self.called(index)} has {self.columns[index].size}" for index in indices)
             raise DataError(f"{self.source}: columns of different rasters, {sizes}: name columns of one")
-        rows = self._rows_of(columns[0]) if columns else 0
-        self._require_room(sum(rows * column.values.dtype.itemsize for column in columns), 8 * rows * len(columns))
+        rows = columns[0].size if columns else 0
+        self._require_room(8 * rows * len(columns))
         out = np.empty((len(columns), rows))
         # Columns that stand side by side are read in one go: a file is read by rows.
         runs = itertools.groupby(enumerate(columns), lambda each: (id(each[1].values), each[1].number - each[0]))
@@ -151,45 +148,27 @@ class ArrayTable(Table):
             count = 1 + len(others)
             with self._reading():
                 place = out[at : at + count]
-                place[:] = _complete(first.block(slice(*self.window), count), place.shape)
+                place[:] = _complete(first.block(count), place.shape)
         return out
-
-    def part(self, start: int, stop: int) -> ArrayTable:
-        """Return the table of some rows, counted in the file; nothing is read."""
-        return replace(self, window=(start, stop))
 
     def loaded(self) -> ArrayTable:
         """Return the table with all of its arrays in memory."""
         arrays = {id(column.values): column.values for column in self.columns}
-        claimed = sum(math.prod(each.shape) * each.dtype.itemsize for each in arrays.values())
-        self._require_room(claimed, claimed)
+        self._require_room(sum(math.prod(each.shape) * each.dtype.itemsize for each in arrays.values()))
         with self._reading():
             held = {
                 key: _complete(np.asarray(each[(slice(None),) * len(each.shape)]), each.shape)
                 for key, each in arrays.items()
             }
         columns = tuple(each._replace(values=held[id(each.values)]) for each in self.columns)
-        return replace(self, columns=columns, stamp=None)
+        return replace(self, columns=columns, file=None)
 
-    def _rows_of(self, column: Column) -> int:
-        return len(range(*slice(*self.window).indices(column.size)))
+    def _require_room(self, needed: int) -> None:
+        if self.file is not None:
+            require_free(self.file, needed)
 
-    def _require_room(self, claimed: int, needed: int) -> None:
-        """Refuse bytes that are more than the size of the file lets believe, or than this machine has room for."""
-        if self.stamp is not None:
-            limits = ReadLimits.of(self.stamp.file)
-            limits.require(claimed, "what is asked of it")
-            limits.require_free(needed)
-
-    @contextlib.contextmanager
-    def _reading(self) -> Iterator[None]:
-        if self.stamp is None:
-            yield
-            return
-        self.stamp.require_same()
-        with naming_damage(self.stamp.file):
-            yield
-        self.stamp.require_same()
+    def _reading(self) -> contextlib.AbstractContextManager[None]:
+        return contextlib.nullcontext() if self.file is None else naming_damage(self.file)
 
 
 def _complete(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
@@ -208,9 +187,4 @@ def naming_damage(file: Path) -> Iterator[None]:
         raise
     except Exception as error:  # of another library: any class
         text = f"{type(error).__name__} {error}".strip()
-        raise damaged(file, text) from error
-
-
-def damaged(file: Path, text: str) -> DataError:
-    """Make the error of a file of which a library says what is wrong."""
-    return DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again")
+        raise DataError(f"{file}: cannot be read ({text}): the file was cut off or damaged; write it again") from error

@@ -113,21 +113,7 @@ def read(
     >>> float(bench["pressure_bar"].max()), bench["torque"].attrs["source"]
     (60.0, "column 'torque [Nm]'")
     """
-    how = Reading(
-        angle_column=angle_column,
-        pressure_column=pressure_column,
-        angle_unit=angle_unit,
-        pressure_unit=pressure_unit,
-        firing_tdc_deg=firing_tdc_deg,
-        before_tdc=before_tdc,
-        tdc_offset_cad=tdc_offset_cad,
-        angle_step_deg=angle_step_deg,
-        angle_start_deg=angle_start_deg,
-        speed_rpm=speed_rpm,
-        gain_bar_per_v=gain_bar_per_v,
-        offset_bar=offset_bar,
-        encoder=encoder,
-    )
+    how = Reading.of(locals())
     with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet, cycle_per_row=cycle_per_row) as table:
         return bench_record(table, layout_of(table, how), channels, name=Path(path).name)
 

@@ -12,20 +12,16 @@ import re
 import stat
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from mgdd._arguments import shown
 from mgdd.errors import DataError, ParameterError, did_you_mean
-from mgdd.io.read_limits import ReadLimits
 
 # Letters of more than one byte as UTF-8 has them; in older encodings they would be pairs as "Ã¤" or "Â°".
 _UTF8 = re.compile(rb"[\xc2-\xdf][\x80-\xbf]|[\xe0-\xef][\x80-\xbf]{2}|[\xf0-\xf4][\x80-\xbf]{3}")
-_SPECIAL = {stat.S_ISFIFO: "a pipe", stat.S_ISCHR: "a device", stat.S_ISBLK: "a device", stat.S_ISSOCK: "a socket"}
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-_BLOCK = 1 << 20  # bytes that are looked at before a whole file is in memory
-_WHOLE = 1 << 24  # bytes; less is read at once, whatever it holds
+_MB = 1 << 20
 _DEEPEST = 64  # levels
 _WIDEST = 64  # bits of a whole number, with or without a sign
 
@@ -41,22 +37,17 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
         raise ParameterError(f"path = {shown(path)}: must be {bound}", field="path", value=path, bound=bound)
     file = Path(path)
     try:
-        status = file.stat()
+        mode = file.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
         pass
     except (OSError, ValueError) as error:  # ValueError: what cannot be handed to the system at all
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise ParameterError.of("path", str(file), f"one that can be looked up ({why}): give another") from error
     else:
-        mode = status.st_mode
         if stat.S_ISDIR(mode):
             raise ParameterError.of("path", str(file), "a file, and this is a folder: name a file in it")
         if not stat.S_ISREG(mode):
-            what = next((name for is_one, name in _SPECIAL.items() if is_one(mode)), "no plain file")
-            raise ParameterError.of("path", str(file), f"a plain file, and this is {what}: write its content to one")
-        if not status.st_size and _gives_bytes(file):
-            what = "a plain file, and this one of the running system has no size: copy it to one"
-            raise ParameterError.of("path", str(file), what)
+            raise ParameterError.of("path", str(file), "a plain file, no pipe or device: write its content to one")
         return file
     near = ""
     with contextlib.suppress(OSError):  # no such folder either, or one that must not be listed
@@ -64,67 +55,29 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     raise FileNotFoundError(errno.ENOENT, f"no such file: {near or 'check the path'}", str(file))
 
 
-def _gives_bytes(file: Path) -> bool:
-    """Whether a file gives bytes beyond its size, or would do so later, as those of /proc do."""
-    try:
-        number = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    except OSError:
-        return False  # who reads it says why
-    try:
-        return bool(os.read(number, 1))
-    except OSError:
-        return True
-    finally:
-        os.close(number)
-
-
-@dataclass(frozen=True)
-class Stamp:
-    """Size and time of a file that is read in parts, which must not change meanwhile."""
-
-    file: Path
-    size: int
-    written_ns: int
-
-    @classmethod
-    def of(cls, file: Path) -> Stamp:
-        """Look at a file."""
-        now = file.stat()
-        return cls(file, now.st_size, now.st_mtime_ns)
-
-    def require_same(self) -> None:
-        """Raise a DataError where the file is another one by now."""
-        try:
-            now = Stamp.of(self.file)
-        except OSError as error:
-            raise DataError(f"{self.file}: gone while it was read ({error.strerror}): read it again") from error
-        if now != self:
-            sizes = f", from {self.size} to {now.size} bytes" if now.size != self.size else ""
-            raise DataError(f"{self.file}: changed while it was read{sizes}: read it again once it is complete")
-
-
 def read_plain_text(path: str | os.PathLike[str], *, only_utf8: bool = False) -> str:
     """Read a text file that `existing_file` finds and `decoded` takes."""
     file = existing_file(path)
-    if file.stat().st_size > _WHOLE:
-        with file.open("rb") as stream:
-            # A file with holes, as any binary one, is none of text: seen before it is in memory.
-            if not stream.read(2).startswith(_UTF16):
-                while block := stream.read(_BLOCK):
-                    if b"\0" in block:
-                        raise _binary(str(file))
     return decoded(bytes_of(file), str(file), only_utf8=only_utf8)
 
 
 def bytes_of(file: Path) -> bytes:
-    """Read a file as far as its size says, in memory that this machine has."""
-    limits = ReadLimits.of(file)
-    limits.require_free(limits.size)
-    with file.open("rb") as stream:
-        content = stream.read(limits.size + 1)
-    if len(content) > limits.size:
-        raise DataError(f"{file}: gives more than the {limits.size} bytes of its size: read it once it is complete")
-    return content
+    """Read a file, in memory that this machine has."""
+    require_free(file, file.stat().st_size)
+    return file.read_bytes()
+
+
+def require_free(file: Path, needed: int) -> None:
+    """Refuse so many bytes, where they would fill the memory of the machine."""
+    try:
+        most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # no such question on Windows
+        return
+    if needed > most // 2:
+        raise DataError(
+            f"{file}: {-(-needed // _MB)} MB of numbers, and this machine has {most // _MB} MB: read fewer columns, or "
+            "a record of pressure in parts by mgdd.io.pressure_chunks"
+        )
 
 
 def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) -> str:

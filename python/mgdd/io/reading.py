@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,6 +34,11 @@ class Reading:
     gain_bar_per_v: float | None
     offset_bar: float | None
     encoder: Encoder | None = None
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Self:
+        """Take the fields out of the arguments of a reader."""
+        return cls(**{each.name: given[each.name] for each in fields(cls)})
 
     def __post_init__(self) -> None:
         if self.pressure_unit is not None:

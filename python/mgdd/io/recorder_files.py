@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
-import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.io.array_table import Columns, Named, Samples, columns_of, marked
 from mgdd.io.extras import import_extra
-from mgdd.io.watched_file import WatchedFile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +23,7 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of a TDMS file until the stack closes it."""
     nptdms = import_extra("nptdms", "formats", "a TDMS file")
     # Not by its path: an index beside it may be of another record.
-    content = stack.enter_context(nptdms.TdmsFile.open(WatchedFile(stack.enter_context(file.open("rb")))))
+    content = stack.enter_context(nptdms.TdmsFile.open(stack.enter_context(file.open("rb"))))
     if content.file_status.incomplete_final_segment:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
@@ -37,11 +34,11 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
         name = channel.name if names[channel.name] == 1 else f"{channel.group_name}.{channel.name}"
         clock = _clock(channel.properties)
         if clock and count and not any(each.values.shape == (count,) and each.unit == "s" for each in found):
-            time = Samples(count, np.float64, partial(_ticks, *clock))
+            time = Samples(count, np.float64, partial(_ticks, *clock, count))
             plain = not found and "time" not in names
             found.append(Named("time" if plain else f"time ({name})", time, "s"))
         unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
-        found.append(Named(name, Samples(count, channel.dtype, partial(_sliced, channel)), str(unit)))
+        found.append(Named(name, Samples(count, channel.dtype, partial(channel.__getitem__, slice(None))), str(unit)))
     return columns_of(found)
 
 
@@ -52,63 +49,35 @@ def _clock(properties: Mapping[str, Any]) -> tuple[float, float] | None:
     return (start, step) if np.isfinite(start) and np.isfinite(step) and step > 0.0 else None
 
 
-def _ticks(start_s: float, step_s: float, start: int, stop: int) -> NDArray[Any]:
-    return start_s + step_s * np.arange(start, stop)
-
-
-def _part_of(whole: Callable[[], NDArray[Any]], start: int, stop: int) -> NDArray[Any]:
-    return whole()[start:stop]
-
-
-def _sliced(values: Any, start: int, stop: int) -> NDArray[Any]:
-    found: NDArray[Any] = values[start:stop]
-    return found
+def _ticks(start_s: float, step_s: float, count: int) -> NDArray[Any]:
+    return start_s + step_s * np.arange(count)
 
 
 def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of an MDF file, each group with its time, until the stack closes it."""
     asammdf = import_extra("asammdf", "mdf", "an MDF file")
     found: list[Named] = []
-    stream = WatchedFile(_finished(file, stack))
-    content = stack.enter_context(asammdf.MDF(stream))  # not by its path: in large blocks it believes every size then
+    stream = stack.enter_context(file.open("rb"))
+    # One that its recorder did not finish by its path: asammdf does so, in a copy.
+    content = stack.enter_context(asammdf.MDF(stream if stream.peek(1).startswith(b"MDF ") else file))
     for number, group in enumerate(content.groups):
         own = _channels(content, number)
         count = group.channel_group.cycles_nr
         if not own or not count:
             continue
-        master = _master(content, number, stream)
+        master = partial(content.get_master, number)
         if not _has_time(found, count, master):
             found.append(Named(f"time {number}" if found else "time", Samples(count, np.float64, master), "s"))
         for k in own:
-            channel, get = group.channels[k], partial(_samples, content, number)
-            read = (
-                partial(_part_of, partial(get, k)) if _virtual(content, channel) else partial(_records, stream, get, k)
-            )
-            first = read(0, 1)
+            read = partial(_samples, content, number, k)
+            first = read(record_offset=0, record_count=1)
             if first.ndim == 1:
                 unit = str(content.get_channel_unit(group=number, index=k))
-                found.append(Named(channel.name, Samples(count, first.dtype, read), unit))
+                found.append(Named(group.channels[k].name, Samples(count, first.dtype, read), unit))
             else:
                 whole = content.select([(None, number, k)], validate=False)[0]
-                found.append(Named(whole.name, marked(whole.samples, get(k, bits=True)), whole.unit))
+                found.append(Named(whole.name, marked(whole.samples, read(bits=True)), whole.unit))
     return columns_of(found)
-
-
-def _finished(file: Path, stack: contextlib.ExitStack) -> IO[bytes]:
-    """Open a file; of one that its recorder did not finish a copy, in which asammdf does so."""
-    stream = stack.enter_context(file.open("rb"))
-    if stream.peek(1).startswith(b"MDF "):
-        return stream
-    copy = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
-    shutil.copyfileobj(stream, copy)
-    return copy
-
-
-def _master(content: Any, number: int, stream: WatchedFile) -> Callable[[int, int], NDArray[Any]]:
-    at = content.masters_db.get(number)
-    if at is None or _virtual(content, content.groups[number].channels[at]):
-        return partial(_part_of, partial(content.get_master, number))
-    return partial(_records, stream, content.get_master, number)
 
 
 def _virtual(content: Any, channel: Any) -> bool:
@@ -116,10 +85,10 @@ def _virtual(content: Any, channel: Any) -> bool:
     return bool(channel.channel_type in (3, 6) if content.version >= "4" else not channel.bit_count)
 
 
-def _has_time(found: list[Named], count: int, master: Callable[[int, int], NDArray[Any]]) -> bool:
+def _has_time(found: list[Named], count: int, master: Callable[[], NDArray[Any]]) -> bool:
     """Whether a column of seconds holds these times already."""
     times = [each.values for each in found if each.unit == "s" and each.values.shape == (count,)]
-    return bool(times) and any(np.array_equal(each[(slice(None),)], master(0, count)) for each in times)
+    return bool(times) and any(np.array_equal(each[...], master()) for each in times)
 
 
 def _samples(content: Any, group: int, index: int, *, bits: bool = False, **part: int) -> NDArray[Any]:
@@ -127,11 +96,6 @@ def _samples(content: Any, group: int, index: int, *, bits: bool = False, **part
     values, invalid = content.get(group=group, index=index, samples_only=True, ignore_invalidation_bits=True, **part)
     found: NDArray[Any] = invalid if bits else values if values.dtype.names else marked(values, invalid)
     return found
-
-
-def _records(stream: WatchedFile, read: Callable[..., NDArray[Any]], index: int, start: int, stop: int) -> NDArray[Any]:
-    stream.forget()
-    return read(index, record_offset=start, record_count=stop - start)
 
 
 def _channels(content: Any, number: int) -> list[int]:

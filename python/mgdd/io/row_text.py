@@ -56,15 +56,6 @@ class Rows:
     def __iter__(self) -> Iterator[tuple[int, str]]:
         return map(self.__getitem__, range(len(self)))
 
-    def whole_line(self, index: int) -> str:
-        """Return a row with the blanks around it, which may stand for cells."""
-        begin, end = int(self.begin[index]), int(self.end[index])
-        while begin and self.raw[begin - 1 : begin] in b" \t":
-            begin -= 1
-        while end < len(self.raw) and self.raw[end : end + 1] in b" \t":
-            end += 1
-        return self._text(begin, end)
-
     def part(self, start: int, stop: int | None = None) -> Rows:
         """Return some of the rows."""
         own = slice(start, stop)

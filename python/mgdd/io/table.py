@@ -92,10 +92,6 @@ class Table(ABC):
         """Return the cells of the first row below the header as text; None where a file has no lines."""
         return None
 
-    @abstractmethod
-    def part(self, start: int, stop: int) -> Table:
-        """Return the table of some rows, which are read when a column of them is asked for."""
-
     def loaded(self) -> Table:
         """Return the table in memory, for when its file is closed."""
         return self

@@ -70,39 +70,19 @@ def names_and_units(
 def units_filled(
     source: str, content: Rows, heads: Sequence[tuple[str, ...]], mark: str | None, width: int
 ) -> list[tuple[str, ...]]:
-    """Give a row of units below the names an empty cell for each column without one, also where blanks separate."""
+    """Give a row of units below the names an empty cell for each column behind the last that has one."""
     made = list(heads)
     for at in range(1, len(heads)):
         cells = heads[at]
         if not (len(heads[at - 1]) == width > len(cells) and spells_units(cells)):
             continue
-        found = (
-            (*cells, *("",) * (width - len(cells)))
-            if mark is not None
-            else _below(content.whole_line(at - 1), content.whole_line(at), width)
-        )
-        if found is None:
+        if mark is None:
             raise DataError(
                 f"{source}, line {content.line[at]}: {len(cells)} units below {width} names, and blanks do not tell "
                 "which column has none: write - for its unit"
             )
-        made[at] = found
+        made[at] = (*cells, *("",) * (width - len(cells)))
     return made
-
-
-def _below(names: str, units: str, width: int) -> tuple[str, ...] | None:
-    """Give the unit below each name where one blank separates cells, or where columns are aligned at one side."""
-    cells = units.split(" ")
-    if len(cells) == len(names.split(" ")) == width:
-        return tuple(cells)
-    places = [(word.start(), word.end()) for word in re.finditer(r"\S+", names)]
-    out = [""] * width
-    for word in re.finditer(r"\S+", units):
-        own = [at for at, (start, end) in enumerate(places) if word.start() == start or word.end() == end]
-        if len(own) != 1:
-            return None
-        out[own[0]] = word[0]
-    return tuple(out)
 
 
 def spells_units(cells: Sequence[str]) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -66,30 +65,6 @@ def in_arrays(name: str, text: str | None) -> str:
     if name == "sample_s":
         return f"mgdd.io.throttle_log(..., sample_s={value})"
     return units.get((name, value)) or columns.get(name) or f"mgdd.io.read_throttle_log(..., {name}={text or '...'})"
-
-
-def without_gaps(
-    columns: dict[str, NDArray[np.float64]], place: Place
-) -> tuple[dict[str, NDArray[np.float64]], Place, str]:
-    """Keep the longest part of a log between gaps of its time, and say so; `check_samples` refuses what stays short.
-
-    A model runs on from sample to sample: over a gap it would take samples for neighbours that are none.
-    """
-    time = columns["time_s"]
-    if time.size < MIN_SAMPLES or not (np.isfinite(time).all() and np.all(np.diff(time) > 0.0)):
-        return columns, place, ""
-    gaps, usual = _gaps(time)
-    edges = [0, *gaps, time.size]
-    first, end = max(itertools.pairwise(edges), key=lambda part: part[1] - part[0])
-    short = end - first < MIN_SAMPLES or time[end - 1] - time[first] < MIN_DURATION_S
-    if not gaps or short or not STEP_S[0] <= usual <= STEP_S[1]:
-        return columns, place, ""
-    note = (
-        f"{len(gaps)} gap(s) in the time, the first from {time[gaps[0] - 1]:.6g} to {time[gaps[0]]:.6g} s: kept are "
-        f"the {end - first} samples from {time[first]:.6g} to {time[end - 1]:.6g} s, the longest part without one, of "
-        f"{time.size}"
-    )
-    return {name: values[first:end] for name, values in columns.items()}, place.only(np.arange(first, end)), note
 
 
 def _gaps(time: NDArray[np.float64]) -> tuple[list[int], float]:

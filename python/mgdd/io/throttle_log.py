@@ -14,7 +14,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError, argument, taken
 from mgdd.io.any_table import open_table
 from mgdd.io.column_names import check_choice, spelled_unit, unit_text
 from mgdd.io.table import Place, Table
-from mgdd.io.throttle_checks import check_even, check_samples, check_signals, in_arrays, without_gaps
+from mgdd.io.throttle_checks import check_even, check_samples, check_signals, in_arrays
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -61,8 +61,7 @@ def throttle_log(
     Returns
     -------
     xarray.Dataset
-        ``duty`` and ``angle_deg`` over ``time_s``; ``attrs["warnings"]`` says what was left out: of a log with gaps in
-        its time the longest part without one is kept.
+        ``duty`` and ``angle_deg`` over ``time_s``.
 
     Raises
     ------
@@ -142,8 +141,7 @@ def read_throttle_log(
     Returns
     -------
     xarray.Dataset
-        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name,
-        ``attrs["warnings"]`` what was left out, as in `throttle_log`.
+        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name.
 
     Raises
     ------
@@ -276,7 +274,6 @@ def _checked(
             raise ShapeError(
                 f"{place.source}: {key} has {values.size} samples, time {size}: columns must be equally long"
             )
-    columns, place, note = without_gaps(columns, place)
     check_samples(columns, place)
     if sample_s is None:
         check_even(columns["time_s"], place)
@@ -291,7 +288,7 @@ def _checked(
         travel_deg=travel_deg,
     )
     variables = {key: ("time_s", values) for key, values in columns.items()}
-    return labelled_dataset(variables, attrs={"file": name, "warnings": note})
+    return labelled_dataset(variables, attrs={"file": name})
 
 
 def _resampled(

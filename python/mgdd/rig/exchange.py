@@ -17,8 +17,9 @@ from mgdd.rig.base import AroundPlant, OpenOnce, Rig
 from mgdd.rig.recorded import RecordedRun, readable_record
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+TABLE = "rig"  # of a record, with a row per exchange
 _PARTS = ("input", "component", "limit", "value", "noise_free", "applied")
 
 
@@ -48,24 +49,13 @@ class RigRecord:
         """Add an exchange at the end."""
         self._exchanges.append(exchange)
 
-    def to_columns(self) -> tuple[list[str], NDArray[np.float64]]:
-        """Give names and a table with a row per exchange, NaN where it has no such number.
-
-        The names are ``misfire``, and ``input.NAME``, ``component.NUMBER``, ``limit.NAME``, ``value.NAME``,
-        ``noise_free.NAME``, ``applied.NAME``.
-        """
-        rows = [flat(exchange) for exchange in self._exchanges]
-        names = list(dict.fromkeys(name for row in rows for name in row))
-        own = [*(f"input.{name}" for name in self.input_names), *(f"limit.{name}" for name in self.limit_names)]
-        names = [*(name for name in own if name not in names), *names]
-        table = np.array([[row.get(name, math.nan) for name in names] for row in rows], np.float64)
-        return names, table.reshape(len(rows), len(names))
-
     @classmethod
     def from_columns(cls, names: Sequence[str], table: ArrayLike) -> Self:
-        """Read what `to_columns` gave, pressure traces apart; what was never there and what was NaN are the same.
+        """Read a table with a row per exchange, NaN where it has no such number; pressure traces apart.
 
-        DataError for a column that is none of these, a table of another width, or no input.
+        The names are ``misfire``, and ``input.NAME``, ``component.NUMBER``, ``limit.NAME``, ``value.NAME``,
+        ``noise_free.NAME``, ``applied.NAME``. DataError for a column that is none of these, a table of another width,
+        or no input.
         """
         values = np.asarray(table, np.float64)
         if values.ndim != 2 or values.shape[1] != len(names):
@@ -100,24 +90,24 @@ class RigRecord:
         return record
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], *, table: str = "rig") -> Self:
+    def read(cls, path: str | os.PathLike[str]) -> Self:
         """Read the exchanges that a `RecordingRig` gave to a `Recorder`, with a warning where the file ends before.
 
         DataError where it has no such table.
         """
-        return cls.of_run(readable_record(path), f"{path}", table=table)
+        return cls.of_run(readable_record(path), f"{path}")
 
     @classmethod
-    def of_run(cls, run: RecordedRun, origin: str, *, table: str = "rig") -> Self:
+    def of_run(cls, run: RecordedRun, origin: str) -> Self:
         """Take the exchanges of a record that was read."""
         samples = run.samples
-        if table not in samples:
-            raise DataError(f"{origin}: has no table {table!r}: it has {', '.join(samples) or 'none'}")
-        columns = samples[table].data_vars
+        if TABLE not in samples:
+            raise DataError(f"{origin}: has no table {TABLE!r}: it has {', '.join(samples) or 'none'}")
+        columns = samples[TABLE].data_vars
         try:
             return cls.from_columns([str(name) for name in columns], np.column_stack([*columns.values()]))
         except DataError as error:
-            raise error.reworded(f"{origin}: table {table!r}: {error}") from error
+            raise error.reworded(f"{origin}: table {TABLE!r}: {error}") from error
 
 
 def flat(exchange: Exchange) -> dict[str, float]:

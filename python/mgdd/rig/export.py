@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import os
 import re
-import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ import numpy as np
 from mgdd.errors import Error, ParameterError, RigError
 from mgdd.io.binary_files import write_netcdf, write_parquet
 from mgdd.io.extras import import_extra
-from mgdd.io.files import existing_file
+from mgdd.io.files import existing_file, write_whole
 from mgdd.results.labels import label_of
 from mgdd.rig.can.python_can import LOG_WRITERS, write_log
 from mgdd.rig.recorded import RecordedRun, readable_record, stamped_frames
@@ -82,32 +82,28 @@ def export_record(
     if chosen in _TABLE_WRITERS:
         if whole.exists():
             raise RigError(f"{whole} exists already: name a new folder")
-        return _write_beside(whole, lambda folder: _write_tables(chosen, folder, readable_record(record)))
-    if chosen == "mf4":
-        return _write_beside(whole, lambda file: _write_mf4(file, readable_record(record)))
-    return _write_beside(whole, lambda file: write_log(chosen, file, stamped_frames(record)))
+        with _naming(whole), tempfile.TemporaryDirectory(dir=whole.parent) as beside:
+            made = Path(beside) / whole.name
+            _write_tables(chosen, made, readable_record(record))
+            made.rename(whole)
+        return sorted(whole.iterdir())
+    with _naming(whole):
+        if chosen == "mf4":
+            write_whole(whole, lambda file: _write_mf4(file, readable_record(record)))
+        else:
+            write_whole(whole, lambda file: write_log(chosen, file, stamped_frames(record)))
+    return [whole]
 
 
-def _write_beside(target: Path, write: Callable[[Path], None]) -> list[Path]:
-    """Write under a name of its own and rename when complete: nobody finds half a file."""
-    beside = target.with_name(f"{target.stem}.writing{target.suffix}")
-    _remove(beside)
+@contextlib.contextmanager
+def _naming(target: Path) -> Iterator[None]:
+    """Name the target in what the system says of it."""
     try:
-        write(beside)
-        beside.replace(target)
-    except BaseException as error:
-        _remove(beside)
-        if isinstance(error, OSError) and not isinstance(error, Error):
-            raise RigError(f"{target}: {error.strerror or error}; nothing was written, name another place") from error
-        raise
-    return sorted(target.iterdir()) if target.is_dir() else [target]
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+        yield
+    except OSError as error:
+        if isinstance(error, Error):
+            raise
+        raise RigError(f"{target}: {error.strerror or error}; nothing was written, name another place") from error
 
 
 def _write_tables(kind: str, folder: Path, run: RecordedRun) -> None:

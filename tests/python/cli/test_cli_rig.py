@@ -61,7 +61,6 @@ def test_a_hub_says_its_bus_and_at_the_end_its_counts() -> None:
     [
         (["hub", "--fault", "dropp:p=1"], "fault = 'dropp': must be one of drop"),
         (["hub", "--port", "70000"], "port = 70000: must be in [0, 65535]"),
-        (["hub", "--bit-rate", "1"], "bit_rate = 1: must be in [1e3, 1e8] bit/s"),
         (["node", "--bus", BUS], "nobody answers there"),
         (["node", "--bus", "can0"], "bus = 'can0': must be INTERFACE:CHANNEL"),
         (["hub", "--fault", "drop:q=1"], "with keys p, id, from_s, until_s, ms, client, class"),

@@ -26,7 +26,7 @@ COUNT = 31
 def record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Fired cycles with two that do not burn, and one whose level is off; too long to be read at once."""
     monkeypatch.setattr("mgdd.io.chunks._ROWS", 1000)
-    monkeypatch.setattr("mgdd.io.text_rows._BLOCK", 5000)
+    monkeypatch.setattr("mgdd.io.chunks._BLOCK", 5000)
     fuel = [0.0 if k in (4, 25) else 20.0 + 0.3 * (k % 7) for k in range(COUNT)]
     runs = [simulate("puma_single", {"fuel_mg": mg}, soc_cad=-5.0) for mg in fuel]
     pressure = np.array([run["pressure_bar"] for run in runs])

@@ -10,7 +10,7 @@ import pytest
 
 from mgdd.errors import DataError
 from mgdd.io import pressure_trace, read, read_pressure, read_throttle_log, throttle_log
-from mgdd.io.any_table import open_parts, read_any_table
+from mgdd.io.any_table import read_any_table
 
 ANGLE = np.arange(-180.0, 181.0)
 BAR = 1.0 + 50.0 * np.exp(-((ANGLE / 30.0) ** 2))
@@ -79,8 +79,6 @@ def test_an_invalid_sample_is_nan_and_no_pressure(form: str, tmp_path: Path) -> 
     table = read_any_table(tmp_path / "marked")
     for name in ("pcyl", "whole"):
         np.testing.assert_array_equal(np.isnan(table.numbers(table.index(name))), BAD, err_msg=name)
-    with open_parts(tmp_path / "marked") as part:  # the marks belong to the rows that are read
-        np.testing.assert_array_equal(np.isnan(part(70, 90).numbers(table.index("pcyl"))), BAD[70:90])
     for reader in (read_pressure, read):
         with pytest.raises(DataError, match="nan"):
             reader(tmp_path / "marked", **NAMES)

@@ -2,45 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mgdd import datasets
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ShapeError
 from mgdd.io import pressure_trace, read_pressure, write_csv
 from mgdd.io.column_names import heading
 from mgdd.io.pressure_checks import to_bar
 from mgdd.results.labels import ANGLE, check_labels
+from pressure_files import BAR, CLOSED, CYCLES, FULL, ONE, RUN, Write
 
 Array = NDArray[np.float64]
-MEASURED = datasets.read("hd_diesel_128x144")
-CLOSED, BAR = MEASURED[1][ANGLE].to_numpy(), MEASURED[1]["pressure_bar"].to_numpy()
-# Five whole cycles: the measured closed part of one load, each 1 % higher than the last, gas exchange at 2 bar and,
-# later, 2.2 bar, so that neither cycles nor halves of them look alike.
-FULL = np.arange(-360.0, 360.0, 0.5)
-ONE = np.where(CLOSED[0] > FULL, 2.0, np.where(CLOSED[-1] < FULL, 2.2, np.interp(FULL, CLOSED, BAR)))
-CYCLES = ONE * (1.0 + 0.01 * np.arange(5))[:, None]
-RUN = np.arange(0.0, 3600.0, 0.5)
-Write = Callable[..., Path]
-
-
-@pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def to_file(columns: Sequence[Any], header: str = "", name: str = "bench.csv") -> Path:
-        rows = [",".join(map(repr, row)) for row in np.column_stack(columns).tolist()]
-        path = tmp_path / name
-        path.write_text("\n".join([header, *rows] if header else rows) + "\n", encoding="utf-8")
-        return path
-
-    return to_file
 
 
 def simulated() -> tuple[Array, Array]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,34 +15,18 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io import read, read_pressure
 from mgdd.io.wrong_channel import no_angle, no_pressure
 from mgdd.results.labels import ANGLE, check_labels
+from pressure_files import CLOSED, CYCLES, FULL, ONE, RUN, Write
 from table_files import WITHOUT_UNITS, WRITERS
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 Array = NDArray[np.float64]
-MEASURED = datasets.read("hd_diesel_128x144")[1]
-CLOSED, BAR = MEASURED[ANGLE].to_numpy(), MEASURED["pressure_bar"].to_numpy()
-# Five cycles of a cylinder that differ, a second one that fires 240 degrees later at 8 % less, and other channels.
-FULL = np.arange(-360.0, 360.0, 0.5)
-ONE = np.where(CLOSED[0] > FULL, 2.0, np.where(CLOSED[-1] < FULL, 2.2, np.interp(FULL, CLOSED, BAR)))
-FIRST = (ONE * (1.0 + 0.01 * np.arange(5))[:, None]).ravel()
+# Beside the first cylinder a second one that fires 240 degrees later at 8 % less, and other channels.
+FIRST = CYCLES.ravel()
 SECOND = 0.92 * np.roll(FIRST, 480)
-RUN = np.arange(0.0, 3600.0, 0.5)
 MANIFOLD = 141.0 + 3.0 * np.sin(np.deg2rad(RUN) * 1.5) + 0.001 * RUN
 TORQUE = 210.0 + 40.0 * np.cos(np.deg2rad(RUN)) - 0.002 * RUN
 WHOLE = {"CAD": RUN, "p1": 100.0 * FIRST, "p2": 100.0 * SECOND, "p_intake": MANIFOLD, "torque": TORQUE}
 UNITS = {"CAD": "deg", "p1": "kPa", "p2": "kPa", "p_intake": "kPa", "torque": "Nm"}
-Write = Callable[..., Path]
-
-
-@pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def to_file(columns: Sequence[Any], header: str = "", name: str = "bench.csv") -> Path:
-        rows = [",".join(map(repr, row)) for row in np.column_stack(columns).tolist()]
-        path = tmp_path / name
-        path.write_text("\n".join([header, *rows] if header else rows) + "\n", encoding="utf-8")
-        return path
-
-    return to_file
 
 
 def whole(write: Write, name: str = "bench.csv") -> Path:

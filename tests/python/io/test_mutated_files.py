@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import re
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -17,9 +15,6 @@ import numpy as np
 import pytest
 
 from file_mutants import judged, mutant_of_bytes, mutant_of_text
-from fuzz_binary import BINARY
-from fuzz_files import TEXT
-from fuzz_others import OTHERS
 from map_cases import timing_table
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
@@ -30,7 +25,7 @@ from mgdd.results.units import attribute_units
 from mgdd.throttle import PseudoWiener
 from sample_files import CONDITIONS, SAMPLES, SLOW, sample_file
 
-FEW, MANY = 250, 5000
+FEW = 250
 
 
 # --- what stands in a file, by readers of their own ---------------------------------------------------------
@@ -219,12 +214,6 @@ def test_a_mutant_is_refused_or_read_as_it_stands(form: str, tmp_path: Path) -> 
     assert seen["read"] > FEW / 50
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("form", GOOD)
-def test_many_mutants_are_refused_or_read_as_they_stand(form: str, tmp_path: Path) -> None:
-    assert min(survey(form, tmp_path, MANY, 10_000).values()) > 0
-
-
 # --- every reader -------------------------------------------------------------------------------------------
 def survey_any(name: str, folder: Path, count: int, first_seed: int) -> Counter[str]:
     path, seen = sample_file(name, folder), Counter[str]()
@@ -242,24 +231,3 @@ def survey_any(name: str, folder: Path, count: int, first_seed: int) -> Counter[
 @pytest.mark.parametrize("name", [name for name in SAMPLES if name not in SLOW])
 def test_a_mutant_of_any_file_is_refused_with_an_error_of_mgdd(name: str, tmp_path: Path) -> None:
     assert survey_any(name, tmp_path, 40, 0)["refused"] > 0
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*not readable and left out")
-@pytest.mark.filterwarnings("ignore:.*does not name the axis")
-@pytest.mark.parametrize("name", SAMPLES)
-def test_many_mutants_of_any_file_are_refused_with_an_error_of_mgdd(name: str, tmp_path: Path) -> None:
-    assert survey_any(name, tmp_path, 100 if name in SLOW else 1500, 10_000)["refused"] > 0
-
-
-# --- random files -------------------------------------------------------------------------------------------
-TOOL = Path(__file__).parents[3] / "tools/fuzz_readers.py"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("form", [*TEXT, *BINARY, *OTHERS])
-def test_random_files_of_a_format_are_read_as_written_and_refused_where_damaged(form: str) -> None:
-    command = [sys.executable, str(TOOL), form, "--seed", "1", "--cases", *map(str, range(8))]
-    ended = subprocess.run(command, capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert "whole read" in ended.stdout

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from file_mutants import judged, mutant_of_bytes
 from mgdd.rig import read_record, repair_record
@@ -104,8 +103,3 @@ def survey_records(folder: Path, count: int, first_seed: int) -> Counter[str]:
 def test_a_damaged_record_is_read_up_to_its_damage_and_repaired_behind_it(tmp_path: Path) -> None:
     seen = survey_records(tmp_path, 25, 0)
     assert min(seen["read"], seen["refused"]) > 5
-
-
-@pytest.mark.slow
-def test_many_damaged_records(tmp_path: Path) -> None:
-    assert min(survey_records(tmp_path, 1500, 10_000).values()) > 0

@@ -28,9 +28,6 @@ from mgdd.surrogate import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.surrogate import EngineSurrogate
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate_throttle
-from mgdd_studies.benchmarks.drive_axis import DriveModel
-from mgdd_studies.benchmarks.two_tanks import TwoTanksModel
-from mgdd_studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
 
 TIME = 1e-3 * np.arange(300)
 DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))
@@ -237,29 +234,6 @@ def test_an_ode_model_comes_back_with_its_functions() -> None:
     xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
     with pytest.raises(ParameterError, match="output = _first_state: text was written with second; give that function"):
         OdeModel.from_toml(model.to_toml(), derivative=lag)
-
-
-def test_benchmark_models_come_back() -> None:
-    drive = DriveModel(parameters={"mass_kg": 95.0, "coulomb_n": 20.0, "stribeck_n": 1 / 3}, force_n_per_v=35.1)
-    inputs = {"time_s": TIME, "drive_v": 3.0 * DUTY, "pump_v": 2.0 + DUTY, "input_v": DUTY}
-    xr.testing.assert_identical(drive.simulate(inputs), DriveModel.from_toml(drive.to_toml()).simulate(inputs))
-    names = _core.systems.TwoTanks.parameter_names
-    tanks = TwoTanksModel(
-        parameters=dict(zip(names, (0.05, 0.05, 0.5, 0.05, 0.5, -0.1, 9.0, 0.4, 1.0), strict=True)), lower_brim_v=8.0
-    )
-    slow = {**inputs, "time_s": 4.0 * np.arange(TIME.size)}
-    runs = [m.simulate(slow, initial_state=[1.0, 2.0]) for m in (tanks, TwoTanksModel.from_toml(tanks.to_toml()))]
-    xr.testing.assert_identical(*runs)
-    linear = LinearApproximation(
-        numerator=np.array([0.5, 0.1]), denominator=np.array([1.0, -1 / 3]), input_mean=0.1, output_mean=1.0, rmse=0.2
-    )
-    circuit = WienerHammersteinModel(
-        first_order=1, last_order=1, n_curve=4, lower=-1.0, upper=1.0,
-        values=np.r_[-0.5, 0.5, -0.5, 0.5, -3.0, -1.0, 1.0, 1 / 3],
-    )  # fmt: skip
-    for model in (linear, circuit):
-        again = type(model).from_toml(model.to_toml())
-        xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
 
 
 @pytest.fixture(scope="module")

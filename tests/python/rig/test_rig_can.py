@@ -35,7 +35,7 @@ def test_nothing_is_sent_because_an_argument_was_forgotten() -> None:
             CanRig("etb")
         with pytest.raises(ParameterError, match="mode = 'hil': must have a bus, and no plant"):
             CanRig("etb", plant=VirtualThrottle(), mode="hil")
-        with pytest.raises(ParameterError, match="mode = 'real': must be one of simulate, hil, dry_run, replay, bench"):
+        with pytest.raises(ParameterError, match="mode = 'real': must be one of simulate, hil, dry_run, bench"):
             CanRig("etb", "virtual:forgotten", mode="real")
         with pytest.raises(ParameterError, match="timeout_s = 0: must be > 0 s"):
             CanRig("etb", "virtual:forgotten", mode="hil", timeout_s=0.0)

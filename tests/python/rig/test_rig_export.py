@@ -66,7 +66,7 @@ def test_logs_of_frames(record: Path, tmp_path: Path, kind: str, reader: str) ->
     run = read_record(record)
     if kind == "log":  # the one that keeps the wall clock to the microsecond
         assert stamps[0] == pytest.approx(run.started.timestamp() + float(run.frames["time_s"][0]), abs=1e-5)
-    assert list(tmp_path.glob("*.writing*")) == []
+    assert list(tmp_path.glob(".*.part")) == []
 
 
 def test_mf4_holds_everything(record: Path, tmp_path: Path) -> None:
@@ -178,4 +178,4 @@ def test_an_old_file_stays_when_the_new_one_fails(
     with pytest.raises(OSError, match="No space left"):
         export_record(record, target)
     assert target.read_text() == "yesterday"
-    assert list(tmp_path.glob("*.writing*")) == []
+    assert list(tmp_path.glob(".*.part")) == []

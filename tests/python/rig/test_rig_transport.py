@@ -294,35 +294,14 @@ def wait_until_through(hub: Any, frames: int) -> None:
         time.sleep(0.001)
 
 
-def exchange(faults: list[str], count: int = 200, **settings: Any) -> tuple[list[int], Any]:
-    with running_hub(faults, **settings) as hub:
+def exchange(faults: list[str], count: int = 200, seed: int = 0) -> tuple[list[int], Any]:
+    with running_hub(faults, seed=seed) as hub:
         with two_on(hub) as (one, other):
             for number in range(count):
                 one.send(frame(number))
             wait_until_through(hub, count)
             got = numbers(other, 3 * count)
         return got, hub
-
-
-def test_the_hub_drops_duplicates_reorders_and_corrupts_as_told() -> None:
-    everything = list(range(200))
-    got, hub = exchange(["drop:p=0.2"], seed=3)
-    assert sorted(set(got)) == got
-    assert 10 < hub.counts["drop"] == 200 - len(got) < 90
-    again, _ = exchange(["drop:p=0.2"], seed=3)
-    assert again == got
-    got, hub = exchange(["duplicate:p=0.1"], seed=1)
-    assert (sorted(set(got)), len(got)) == (everything, 200 + hub.counts["duplicate"])
-    got, hub = exchange(["reorder:p=0.1"], seed=1)
-    assert got != everything
-    assert set(everything) - set(got) <= {199}  # one that waits for a successor
-    assert max(abs(number - place) for place, number in enumerate(got)) == 1
-    got, hub = exchange(["corrupt:p=0.1"], seed=1)
-    assert sum(a != b for a, b in zip(got, everything, strict=True)) == hub.counts["corrupt"] > 5
-    got, _ = exchange(["drop:id=0x121"])
-    assert got == everything
-    got, _ = exchange(["drop:from_s=3600"])
-    assert got == everything
 
 
 Heard = list[tuple[int, bytes, bool]]
@@ -398,36 +377,29 @@ def test_faults_of_one_frame_add_up() -> None:
     }  # fmt: skip
 
 
-def test_the_hub_delays_and_has_a_bit_rate() -> None:
-    for faults, settings, least in [(["delay:ms=120"], {}, 0.12), ([], {"bit_rate": 10e3}, 10 * 111 / 10e3)]:
-        with running_hub(faults, **settings) as hub, two_on(hub) as (one, other):
-            begin = time.monotonic()
-            for number in range(10):
-                one.send(frame(number))
-            assert numbers(other, 10, 2.0) == list(range(10))
-            assert time.monotonic() - begin >= least
+def test_the_hub_drops_by_chance_and_its_seed() -> None:
+    got, hub = exchange(["drop:p=0.2"], seed=3)
+    assert sorted(set(got)) == got
+    assert 10 < hub.counts["drop"] == 200 - len(got) < 90
+    assert exchange(["drop:p=0.2"], seed=3)[0] == got
+    assert exchange(["drop:from_s=3600"])[0] == list(range(200))
 
 
-def test_a_bus_that_is_too_slow_loses_frames_and_says_so() -> None:
-    began = time.monotonic()
-    got, hub = exchange([], bit_rate=5e3, count=300)
-    per_second = 5e3 / 133  # bits of each; a frame waits a second at most
-    assert got == sorted(got)
-    assert len(got) + hub.counts["overload"] == 300
-    assert per_second - 2 < len(got) < min(300, per_second * (time.monotonic() - began) + 2)
+def test_the_hub_delays() -> None:
+    with running_hub(["delay:ms=120"]) as hub, two_on(hub) as (one, other):
+        begin = time.monotonic()
+        for number in range(10):
+            one.send(frame(number))
+        assert numbers(other, 10, 2.0) == list(range(10))
+        assert time.monotonic() - begin >= 0.12
 
 
-def test_the_hub_reports_bus_errors_and_freezes_a_client() -> None:
+def test_the_hub_reports_bus_errors() -> None:
     with running_hub(["error:class=0x40,id=0x7ff"]) as hub, two_on(hub) as (one, other):
         one.send(frame(1, 0x7FF))
         for client in (one, other):  # the sender stands on the same wire
             with pytest.raises(RigError, match="0x40: bus_off"):
                 client.receive(2.0)
-    with running_hub(["freeze:client=1"]) as hub, two_on(hub) as (one, two), CanTransport.parse(bus_of(hub)) as three:
-        one.send(frame(1))
-        two.send(frame(2))
-        assert numbers(three, 2, 1.0) == [2]
-        assert numbers(one, 1, 0.1) == []
 
 
 @pytest.mark.parametrize(

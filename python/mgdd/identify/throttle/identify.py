@@ -208,8 +208,7 @@ def identify_throttle(
     if limp_home_deg is None:
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    gaps = [Finding("gap", (), note) for note in str(log.attrs.get("warnings", "")).splitlines()]
-    findings = unique((*own, *gaps, *_carried_over(fit.train, tested), *read, *stops, *asked))
+    findings = unique((*own, *_carried_over(fit.train, tested), *read, *stops, *asked))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 

@@ -100,9 +100,7 @@ class _PythonCan:
         return self._reception.receive(timeout_s)
 
     def send(self, frame: Frame) -> None:
-        message = message_of(frame)
-        self._reception.sending(message)
-        self._bus.send(message)
+        self._bus.send(message_of(frame))
 
 
 def _end(transport: RingTransport, stop: threading.Event, threads: list[threading.Thread]) -> None:

@@ -23,7 +23,7 @@ from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import Bus, CanTransport, changed
 
 # `simulate`: a node in this process and a virtual clock; `hil`: a node in another process, real time; `dry_run`: a real
-# bus, to which nothing is sent; `replay`: recorded frames through the same checks; `bench`: real hardware, armed.
+# bus, to which nothing is sent; `replay`: a record in place of a bus; `bench`: real hardware, armed.
 MODES = ("simulate", "hil", "dry_run", "replay", "bench")
 BUS_MODES = ("hil", "dry_run", "bench")
 _SAFE_FRAMES = 5
@@ -74,11 +74,11 @@ def require_key(
 
 def bus_of(mode: str, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
     """Return the bus of a mode; ParameterError for an unknown one, or a bus or plant that does not go with it."""
-    if mode not in MODES:
-        raise ParameterError.of("mode", mode, f"one of {', '.join(MODES)}")
+    if mode not in ("simulate", *BUS_MODES):
+        raise ParameterError.of("mode", mode, f"one of simulate, {', '.join(BUS_MODES)}")
     if mode == "simulate":
         if bus is not None:
-            bound = "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead"
+            bound = "said for a bus: 'hil', 'dry_run' or 'bench'; 'simulate' takes a plant instead"
             raise ParameterError.of("mode", mode, bound)
         if plant is None:
             raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
@@ -105,7 +105,7 @@ class CanRig:
     plant : mgdd.loop.Plant, optional
         Of the mode ``simulate``: what the node in this process drives.
     mode : str
-        ``simulate``, ``hil``, ``dry_run``, ``replay`` or ``bench``, as the page *Experiments over CAN* says.
+        ``simulate``, ``hil``, ``dry_run`` or ``bench``, as the page *Experiments over CAN* says.
     limits, objective : optional
         Instead of those of the map, as in `SignalMap.with_goals`.
     timeout_s : float, optional
@@ -182,7 +182,7 @@ class CanRig:
         }
 
     def apply(self, inputs: Mapping[str, float]) -> None:
-        """Send the inputs, clamped to the bounds of the map; in ``dry_run`` and ``replay`` nothing is sent.
+        """Send the inputs, clamped to the bounds of the map; in ``dry_run`` nothing is sent.
 
         ParameterError, and nothing sent, for a missing, unknown or non-finite input. RigError where the rig is not open
         or the bus has a fault; behind a node with a clock also for a command that comes later than their time limit:
@@ -202,9 +202,6 @@ class CanRig:
         for message in self.map.commands.values():
             self._send(message, {name: clamped[name] for name in message.signals})
         self._punctual.commanded()
-        if self.mode == "replay":  # what came before the recorded command is older than this one
-            self._take_all()
-            self._inbox.skip()
 
     def measure(self) -> Measurement:
         """Wait for the next complete measurement after the inputs applied last: NaN for what is missing or too old.
@@ -229,8 +226,6 @@ class CanRig:
     def arm(self) -> None:
         """Send safe frames until the node is ready to be driven; RigError where it is silent or stays failed."""
         self._require_open()
-        if self.mode == "replay":
-            return
         self._take_all()
         self._inbox.skip()  # what waited says nothing of now
         self._punctual.armed_again()
@@ -313,7 +308,7 @@ class CanRig:
 
     @property
     def _sends(self) -> bool:
-        return self.mode not in ("dry_run", "replay")
+        return self.mode != "dry_run"
 
     def _require_open(self) -> None:
         if not self._is_open:
@@ -333,9 +328,9 @@ class CanRig:
 
     def _send(self, message: MappedMessage, values: Mapping[str, float]) -> None:
         payloads = message.payloads(values, message.driven)
-        if self.mode == "dry_run":
+        if not self._sends:
             return
-        self._has_sent = self._sends
+        self._has_sent = True
         self._hand_over(self._sender.frames(message, payloads))
         self._commands += 1
 

@@ -34,17 +34,7 @@ _WORDS = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöüß])|[A-ZÄÖÜ]?[a-zäöüß]+|0
 _IS_NO_VALUE = re.compile(rf"(?:(?:{_FILLERS}) )*(?:(?:{_NO_VALUE}) (?:(?:{_FILLERS}) )*)+")
 _IS_WRONG = re.compile(rf"(?:(?:{_FILLERS}) )*(?:(?:{_NO_VALUE}|{_WRONG}) (?:(?:{_FILLERS}) )*)+")
 _MOST_SAID = 200  # letters of what the parser says: it may quote half a file
-
-# What the parser would allocate or count without a bound, looked for outside of texts in quotes and comments.
-_QUOTED = re.compile(r'"(?:\\"|[^"])*?"|//[^\n]*')
-_MESSAGE = re.compile(r"(?<![A-Za-z_])BO_\s([^:;]*):\s*([-+]?\d[^\s:]*)")
-_SIGNAL = re.compile(r"(?<![A-Za-z_])SG_\s([^:;]*):\s*([-+]?\d+)\s*\|\s*([-+]?\d+)\s*@")
-_RANGES = re.compile(r"(?<![A-Za-z_])SG_MUL_VAL_\s[^;]*")
-_RANGE = re.compile(r"(\d+)\s*-\s*(\d+)")
-_LONG_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d{41,}|\d+\.?\d*[eE][-+]?\d{4,})")
-_QUOTED_NUMBER = re.compile(r'"\s*[-+\d._]+[eE][-+]?[\d_]{4,}\s*"')
-_BYTES, _BITS, _BRANCHES = 64, 64, 1 << 16  # of a CAN FD frame, of a signal, and values of all multiplexers together
-_PARTS_BYTES = 1785  # of a message in several frames, SAE J1939-21
+_BYTES, _BITS = 64, 64  # of a CAN FD frame, of a signal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +113,6 @@ class DbcFile:
         file = existing_file(path)
         content = bytes_of(file)
         text = decoded(content, str(file))
-        _require_bounded(file, text)
         try:
             logging.getLogger("cantools").setLevel(logging.ERROR)  # of one identifier twice we speak ourselves
             database = cantools.database.load_string(text, database_format="dbc", strict=False)
@@ -161,29 +150,6 @@ class DbcFile:
                 )
             return message
         raise DataError(f"{self.file.name} has no message {name!r}: {near(name, self.messages)}")
-
-
-def _require_bounded(file: Path, text: str) -> None:
-    """Refuse what no frame can carry before the parser makes room for it."""
-    plain = _QUOTED.sub('""', text)
-    if number := _LONG_NUMBER.search(plain) or _QUOTED_NUMBER.search(text):
-        raise DataError(f"{file}: the number {number[0]} is beyond all signals: correct it")
-    for name, size in _MESSAGE.findall(plain):
-        if "SG_" not in name and (not re.fullmatch(r"\d{1,4}", size) or int(size) > _PARTS_BYTES):
-            raise DataError(
-                f"{file}: message {name.strip()} has {size} bytes: a message has 0 to {_PARTS_BYTES}; correct it"
-            )
-    for name, start, length in _SIGNAL.findall(plain):
-        if max(int(length), int(start) + 1) > 8 * _PARTS_BYTES:
-            raise DataError(
-                f"{file}: signal {name.strip()} has {length} bits from bit {start}: a message has up to "
-                f"{8 * _PARTS_BYTES}; correct it"
-            )
-    branches = 0
-    for ranges in _RANGES.findall(plain):
-        branches += sum(max(0, int(last) - int(first) + 1) for first, last in _RANGE.findall(ranges))
-    if branches > _BRANCHES:
-        raise DataError(f"{file}: SG_MUL_VAL_ names {branches} values: at most {_BRANCHES} are read; narrow the ranges")
 
 
 def _taken_twice(messages: Sequence[Any]) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """A bus without a kernel: a TCP server of the socketcand protocol (raw mode) that passes frames between processes.
 
-Everything that one client sends, all the others get, in order. Real buses lose, change and delay frames, and have a bit
-rate: the hub does so when asked.
+Everything that one client sends, all the others get, in order. Real buses lose, change and delay frames: the hub does
+so when asked.
 """
 
 from __future__ import annotations
@@ -21,11 +21,7 @@ _MOST_TEXT = 1024  # bytes of a frame: of 64 bytes it has some 200
 _TICK_S = 0.005  # of the clock by which the hub knows that it stood still
 _READ = 1 << 18  # bytes that asyncio reads at once: behind a full read there are more
 _JOIN_S = 0.02  # python-can does not expect a frame in one packet with the last "ok"
-_MOST_WAITING_S = 1.0  # of a frame before a bus with a bit rate: then it is lost
 _MOST_WAITING = 1 << 20  # bytes that a client has not read: then it is put out
-_OVERHEAD_BITS = 47  # of a standard frame; stuff bits come on top
-_EXTENDED_BITS = 67
-_STUFFING = 1.2
 
 
 class _Client(asyncio.Protocol):
@@ -96,8 +92,6 @@ class Hub:
     ----------
     host, port, faults, seed
         Address to listen at, 0 for a free port; what goes wrong on the bus, and the seed of its noise.
-    bit_rate : float, optional
-        Bits per second of the simulated bus; without limit if left out.
     """
 
     def __init__(
@@ -106,21 +100,17 @@ class Hub:
         port: int = 0,
         *,
         faults: Sequence[BusFault] = (),
-        bit_rate: float | None = None,
         seed: int = 0,
     ) -> None:
         if not 0 <= port < 65536:
             raise ParameterError.of("port", port, "in [0, 65535]")
-        if bit_rate is not None and not 1e3 <= bit_rate <= 1e8:
-            raise ParameterError.of("bit_rate", bit_rate, "in [1e3, 1e8] bit/s")
         self.host, self.port = host, port
-        self.frames = self.malformed = self._overload = 0
-        self._rate = bit_rate
+        self.frames = self.malformed = 0
         self._injector = FaultInjector(faults, seed)
         self.connections: set[_Client] = set()
         self._clients: list[_Client] = []
         self._joined = 0
-        self._free_s = self._start_s = 0.0
+        self._start_s = 0.0
         self._ticked_s = self._looked_s = time.monotonic()
 
     async def run(self, on_ready: Callable[[Hub], None], stop: asyncio.Event) -> None:
@@ -149,9 +139,8 @@ class Hub:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames taken, malformed ones, lost because the bus was too slow, and how often each fault struck."""
-        own = {"frames": self.frames, "malformed": self.malformed, "overload": self._overload}
-        return {**own, **self._injector.counts}
+        """Frames taken, malformed ones, and how often each fault struck."""
+        return {"frames": self.frames, "malformed": self.malformed, **self._injector.counts}
 
     def arrival_s(self) -> float:
         """Return since when bytes that are read now may have waited; now, unless the hub stood still [s]."""
@@ -193,27 +182,12 @@ class Hub:
         if self._injector.frozen(sender.number, now):
             return
         for delivery in self._injector.deliver(Delivery(sender, identifier, data, extended=width > 3), now):
-            waiting_s = self._queueing_s(delivery, now)
-            if waiting_s > _MOST_WAITING_S:
-                self._overload += 1
-                continue
-            late = delivery.late_s + waiting_s
-            text = _text(delivery, arrived_s + late)
+            text = _text(delivery, arrived_s + delivery.late_s)
             but = None if delivery.error_class else delivery.sender
-            if late > 0.0:
-                asyncio.get_running_loop().call_later(late, self._write, but, text)
+            if delivery.late_s > 0.0:
+                asyncio.get_running_loop().call_later(delivery.late_s, self._write, but, text)
             else:
                 self._write(but, text)
-
-    def _queueing_s(self, frame: Delivery, now: float) -> float:
-        """Wait of a frame behind those before it, and its own time on the wire [s]."""
-        if self._rate is None:
-            return 0.0
-        bits = ((_EXTENDED_BITS if frame.extended else _OVERHEAD_BITS) + 8 * len(frame.data)) * _STUFFING
-        free_s = max(self._free_s, now) + bits / self._rate
-        if free_s - now <= _MOST_WAITING_S:
-            self._free_s = free_s
-        return free_s - now
 
     def _write(self, but: _Client | None, text: bytes) -> None:
         now = time.monotonic() - self._start_s

@@ -6,7 +6,7 @@ import errno
 import logging
 import socket
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -21,14 +21,11 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 64  # of a CAN FD frame
 _MOST_STAMP_S = 9e9  # since any epoch, as far as nanoseconds fit into 64 bits
-_ECHO_S = 1.0  # an echo that has not come by then was lost
 _GREETING_S = 2.0
 _GREETINGS = 5
 POLL_S = 0.01  # longest wait for a frame
 STILL_S = 0.03  # without a look at the bus: by then a receiver of commands every 5 ms has let go by itself
 THIS_HOST = ("localhost", "127.0.0.1", "::1")
-_OF_THE_WIRE = ("socketcand", "udp_multicast")  # interfaces that parse what a stranger may have written
-_TEXT = "_SocketCanDaemonBus__receive_buffer"
 LOG_WRITERS = MappingProxyType({"blf": "BLFWriter", "asc": "ASCWriter", "log": "CanutilsLogWriter"})
 
 
@@ -79,10 +76,6 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
         monotonic_ns=monotonic_ns,
         bus_ns=round(stamp_s * 1e9),
     )
-
-
-def _content(message: can.Message) -> tuple[Any, ...]:
-    return message.arbitration_id, message.is_extended_id, message.is_remote_frame, message.dlc, bytes(message.data)
 
 
 _HINTS = {
@@ -157,25 +150,20 @@ class Reception:
         module = str(bus.__class__.__module__)  # of python-can, or of another one
         self._interface = module.split(".")[2] if module.startswith("can.interfaces.") else ""
         self._has_our_clock = _has_our_clock(bus, self._interface)
-        self._sent: deque[tuple[float, tuple[Any, ...]]] = deque()  # appended and taken by one thread each
         self._empty_ns = time.monotonic_ns()
         self.counts: Counter[str] = Counter()  # what was left out: ``malformed`` and ``own``
-
-    def sending(self, message: can.Message) -> None:
-        """Note a message that will be sent: a bus that hears itself and does not say so brings it back once at most."""
-        if self._interface == "udp_multicast":
-            self._sent.append((time.monotonic(), _content(message)))
 
     def receive(self, timeout_s: float = POLL_S) -> Frame | None:
         """Give the next frame; None where none came, or what came is left out."""
         looked_ns = time.monotonic_ns()
-        message = self._next(0.0)
+        message = self._bus.recv(0.0)
         if message is None:
             self._empty_ns = looked_ns
-            message = self._next(timeout_s)
+            message = self._bus.recv(timeout_s)
         if message is None:
             return None
-        if self._is_own(message):
+        # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
+        if not message.is_rx and self._interface != "socketcan":
             self.counts["own"] += 1
             return None
         try:
@@ -184,39 +172,12 @@ class Reception:
             self.counts["malformed"] += 1
             return None
 
-    def _is_own(self, message: can.Message) -> bool:
-        if self._sent and self._is_echo(message):
-            return True
-        # SocketCAN calls so what any process of this machine has sent, and gives nothing back to who sent it.
-        return not message.is_rx and self._interface != "socketcan"
-
-    def _is_echo(self, message: can.Message) -> bool:
-        """Whether it is one of ours; what was sent before it will not come any more."""
-        oldest_s, content = time.monotonic() - _ECHO_S, _content(message)
-        while self._sent and self._sent[0][0] < oldest_s:
-            self._sent.popleft()
-        place = next((k for k, (_, sent) in enumerate(list(self._sent)) if sent == content), None)
-        for _ in range(0 if place is None else place + 1):
-            self._sent.popleft()
-        return place is not None
-
     def _arrival_ns(self, stamp_s: float) -> int:
         now_ns = time.monotonic_ns()
         if self._has_our_clock and stamp_s > 0.0:
             waited_ns = (time.time() - stamp_s) * 1e9 - 1e3  # stamps are exact to 1 us
             return now_ns - round(max(0.0, min(waited_ns, float(now_ns))))
         return now_ns if now_ns - self._empty_ns <= STILL_S * 1e9 else self._empty_ns
-
-    def _next(self, timeout_s: float) -> can.Message | None:
-        try:
-            return self._bus.recv(timeout_s)
-        except Exception as error:
-            if self._interface not in _OF_THE_WIRE or isinstance(error.__cause__, OSError | None):
-                raise
-            self.counts["malformed"] += 1
-            if hasattr(self._bus, _TEXT):  # python-can would parse it again, for ever
-                setattr(self._bus, _TEXT, "")
-            return None
 
 
 def _has_our_clock(bus: Any, interface: str) -> bool:

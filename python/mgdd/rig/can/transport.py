@@ -174,8 +174,6 @@ class CanTransport:
         bus = self._open_bus(final=final)
         can, message = import_extra("can", "can", "a CAN bus"), message_of(frame)
         until, pause = time.monotonic() + self.send_timeout_s, 1e-4
-        if self._reception is not None:
-            self._reception.sending(message)
         while True:
             try:
                 bus.send(message)

@@ -21,13 +21,11 @@ from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.replay_bus import RecordedBus
 from mgdd.rig.can.transport import Bus, CanTransport
-from mgdd.rig.exchange import RecordingRig, ReplayRig, RigRecord
+from mgdd.rig.exchange import TABLE, RecordingRig, ReplayRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment, simulated_plant
 from mgdd.rig.experiment.tasks import SeekPlan, compared
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import GatedThrottle, SafetyGate, said_of
-
-_TABLE = "rig"  # where `RigRecord.read` looks for exchanges
 
 
 class RunRecord:
@@ -53,7 +51,7 @@ class RunRecord:
         if new:
             self._missed.update(new)
             self.say([f"record: {', '.join(new)} came after the first cycle and has no column"])
-        self.recorder.sample(_TABLE, {name: row.get(name, math.nan) for name in self._names})
+        self.recorder.sample(TABLE, {name: row.get(name, math.nan) for name in self._names})
 
     def say(self, events: Iterable[str]) -> None:
         """Append events."""

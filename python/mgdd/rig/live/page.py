@@ -20,10 +20,8 @@ from mgdd.rig.live.live_data import EDGES_US, Line, LiveData, thinned
 from mgdd.rig.live.sources import Source
 
 _LOG = logging.getLogger(__name__)
-_TICK_MS, _ALIVE_TICKS = (
-    500,
-    2,
-)  # the eye needs no more, and the loop needs the processor; a sign of life each second, also where nothing is new
+# The eye needs no more, and the loop needs the processor; a sign of life each second, also where nothing is new.
+_TICK_MS, _ALIVE_TICKS = 500, 2
 _UNSEEN = 3  # updates that a slow browser may owe: what is more would pile up here
 _WINDOWS_S = {"10 s": 10.0, "60 s": 60.0, "all": np.inf}
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # told apart by the colour-blind, too
