@@ -130,7 +130,9 @@ def monte_carlo(
                     f"{', '.join(bench.input_names)}"
                 )
     functions = _functions_of(bench_list)
-    goals = [own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)]
+    goals: list[Mapping[str, Any]] = [
+        own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)
+    ]
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({goal[name] for goal in goals}) > 1:
             raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
@@ -142,7 +144,7 @@ def monte_carlo(
         threads = threads_of(workers)
         raw, stop = or_partial(lambda: _loops(*call, threads))
     else:
-        raw, stop = _in_chunks(*call, executor=executor, workers=workers, progress=progress)
+        raw, stop = _in_chunks(call, executor=executor, workers=workers, progress=progress)
     shape = (len(bench_list), len(seeker_list), len(seed_list))
     dims = ("bench", "seeker", "seed")
     finished = raw.pop("finished").reshape(shape)
@@ -190,18 +192,13 @@ def _loops(
 
 
 def _in_chunks(
-    benches: Sequence[_Plant],
-    seekers: Sequence[_Seeker],
-    seeds: Sequence[int],
-    answers: Sequence[list[Said]],
-    goals: Sequence[Mapping[str, Any]],
-    cycles: int,
-    form: str,
+    call: tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]], int, str],
     *,
     executor: MakesExecutor | None,
     workers: int | None,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[dict[str, NDArray[Any]], Interrupted | WorkerLostError | None]:
+    benches, seekers, seeds, answers, goals, cycles, form = call
     # What does not fit is found by one cycle of every pair, before any work; whose cycles count is checked by a chunk.
     shown = [{**goal, "exceed_from": None} for goal in goals]
     columns, stop = or_partial(lambda: _loops(benches, seekers, seeds[:1], answers, shown, min(cycles, 1), form))

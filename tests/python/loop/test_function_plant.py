@@ -209,14 +209,12 @@ def test_every_form_is_the_same_function(library: ctypes.CDLL) -> None:
     declared = library.plant
     declared.argtypes, declared.restype = FunctionPlant.C_TYPE._argtypes_, ctypes.c_int
     address = ctypes.cast(declared, ctypes.c_void_p).value
-    scipy = pytest.importorskip("scipy")
     data = (ctypes.c_double * 2)(0.05, -7.0)
     pointer = ctypes.cast(data, ctypes.c_void_p)
     for function, more in (
         (declared, {"user_data": data}),
         (address, {"user_data": np.array([0.05, -7.0])}),
         (np.uint64(address), {"user_data": pointer.value}),
-        (scipy.LowLevelCallable(declared, user_data=pointer), {}),
     ):
         plant = FunctionPlant(function, ["x"], **more)
         plant.apply({"x": -5.0})
@@ -268,13 +266,11 @@ def test_what_is_not_one_is_refused_by_name(library: ctypes.CDLL) -> None:
     wrong = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(("plant", library))
     single = list(FunctionPlant.C_TYPE._argtypes_)
     single[2] = ctypes.POINTER(ctypes.c_float)
-    scipy = pytest.importorskip("scipy")
     for function, message in (
         (0, "function = 0: must be the address of a function, not null"),
         (FunctionPlant.C_TYPE(), "not null"),
         (wrong, r"its signature is c_double \(c_double\): must be int \(const double \*inputs"),
         (ctypes.CFUNCTYPE(ctypes.c_int, *single)(("plant", library)), r"LP_c_float, c_\w+, c_void_p\): must be int"),
-        (scipy.LowLevelCallable(wrong), r"its signature is double \(double\): must be int"),
         (ctypes.CDLL(None).printf, "argtypes are not declared"),
         (-4, "function = -4"),
         (True, "function = True: must be a function of the inputs by name"),
