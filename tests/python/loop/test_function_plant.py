@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import ctypes
 import math
@@ -12,7 +11,6 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
@@ -24,7 +22,7 @@ import xarray as xr
 from tests.python.support.stepped import stepped
 
 from mgdd import optimize
-from mgdd.errors import Interrupted, InUseError, ParameterError, RigError
+from mgdd.errors import Interrupted, ParameterError, RigError
 from mgdd.guide import FeedForward
 from mgdd.loop import FunctionPlant, LoopCriteria, VirtualEngine, monte_carlo, run_seeker, seek, seek_front
 
@@ -337,28 +335,6 @@ def test_copies_share_the_function_and_no_other_process_has_it(library: ctypes.C
     with pytest.raises(ParameterError, match="this process only"):
         monte_carlo(plant, SEEKERS["Spsa first_order"](), range(4), cycles=5, executor=lambda: ProcessPoolExecutor(1))
     assert pickle.loads(pickle.dumps(FunctionPlant(math.hypot, ["x"]))).input_names == ("x",)
-
-
-def test_the_gil_is_released_while_it_runs(library: ctypes.CDLL) -> None:
-    plant, seeker, done = of(library, "slow"), SEEKERS["Spsa first_order"](), threading.Event()
-
-    def work() -> None:
-        run_seeker(plant, seeker, 200)
-        done.set()
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    turns, refused = 0, False
-    while not done.is_set():
-        turns += 1
-        with contextlib.suppress(InUseError):
-            plant.cycle  # noqa: B018
-            continue
-        refused = True
-        time.sleep(0.001)
-    thread.join()
-    assert turns > 5
-    assert refused
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.optimize import ExtremumSeeking, Limit, Spsa, measure_map, tune
+from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Spsa, measure_map, tune
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -140,14 +140,9 @@ def test_the_seeker_carries_what_was_tuned() -> None:
     seeker = tuning.seeker(start=-15.0, lower=-30.0, upper=10.0, limits=[Limit("p", 9.0)], hold_cycles=7)
     assert isinstance(seeker, ExtremumSeeking)
     settings = seeker.settings
-    assert settings["form"] == "batch"
     assert settings["amplitude"] == [tuning.amplitude]
-    assert settings["gain"] == [tuning.gain]
-    assert settings["rate"] == [tuning.rate]
-    assert settings["period"] == tuning.period
-    assert settings["curvature"] == BEND
-    assert settings["hold_cycles"] == 7
-    assert (settings["components"][0].delay_cycles, settings["components"][0].lag_cycles) == (38.0, 25.0)
+    assert (settings["period"], settings["curvature"], settings["hold_cycles"]) == (tuning.period, BEND, 7)
+    assert settings["components"] == [ComponentLag(delay_cycles=38.0, lag_cycles=25.0)]
     assert seeker.limit_names == ["p"]
     slow = tune(SIGMA, BEND, delay_cycles=38.0, lag_cycles=25.0, compensated=False)
     assert slow.period >= 378
@@ -156,9 +151,7 @@ def test_the_seeker_carries_what_was_tuned() -> None:
     assert blind.settings["components"][0].delay_cycles == 0.0
     spsa = tune(SIGMA, BEND, method="spsa").seeker(start=0.0, seed=5, maximize=False)
     assert isinstance(spsa, Spsa)
-    assert spsa.settings["schedule"] == "constant"
-    assert spsa.settings["seed"] == 5
-    assert spsa.settings["maximize"] is False
+    assert [spsa.settings[name] for name in ("schedule", "seed", "maximize")] == ["constant", 5, False]
 
 
 def test_summary_says_plainly_whether_the_wish_is_met() -> None:
