@@ -92,7 +92,7 @@ def track_many(
     airflow = [column_of("airflow_torque_nm", flows.get(r.name), len(r.angle_deg)) for r in wanted]
     sensors = sensors_of(noise_deg)
     plants = [
-        plant_of(throttle_of(each), wanted[0], None, sensors, first_seed + number)._core
+        plant_of(throttle_of(each), wanted[0], None, sensors, first_seed + number)
         for number, each in enumerate(throttles)
     ]
 

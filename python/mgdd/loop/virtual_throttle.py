@@ -15,7 +15,7 @@ from mgdd.throttle.faults import ThrottleFault, fault_pair
 _INPUTS = ("duty", "supply_v", "airflow_torque_nm", "bridge_open")
 
 
-class VirtualThrottle:
+class VirtualThrottle(_core.loop.VirtualThrottle):
     """An electronic throttle sample by sample, with both position sensors, their noise, and faults of every part.
 
     Parameters
@@ -88,7 +88,7 @@ class VirtualThrottle:
             "bridge": bridge,
             "seed": seed,
         }
-        self._core = _core.loop.VirtualThrottle(
+        super().__init__(
             throttle=self.throttle,
             sensors=self._given["sensors"],
             faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
@@ -112,16 +112,6 @@ class VirtualThrottle:
     def limit_names(self) -> tuple[str, ...]:
         """No limited quantities."""
         return ()
-
-    @property
-    def state(self) -> dict[str, list[float]]:
-        """What a run needs to go on bit for bit, as lists of numbers; setting it restores the run."""
-        columns: dict[str, list[float]] = self._core.state
-        return columns
-
-    @state.setter
-    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
-        self._core.state = {name: list(values) for name, values in saved.items()}
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.
@@ -147,7 +137,7 @@ class VirtualThrottle:
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
         applied = self._applied
-        reading = self._core.step(
+        reading = self.step(
             duty=applied["duty"],
             supply_v=applied["supply_v"],
             airflow_torque_nm=applied["airflow_torque_nm"],
