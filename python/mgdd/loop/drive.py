@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.control import Pid
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.loop.track import AngleController
 from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
@@ -35,20 +36,12 @@ _LABELS = {
 }
 
 
-class PositionController(Protocol):
-    """What steers the plate: `mgdd.control.Pid`, `mgdd.control.SlidingMode`, or an object of your own."""
-
-    def step(self, reference_deg: float, measurement_deg: float, /) -> float:
-        """Give the duty of a sample."""
-        ...
-
-
 def simulate_drive(
     chain: DemandChain,
     pedal_percent: ArrayLike,
     speed_rpm: ArrayLike,
     *,
-    controller: PositionController | None = None,
+    controller: AngleController | None = None,
     throttle: ThrottleLike | None = None,
     engine: DemandChain | None = None,
     measured_pressure: bool = True,
@@ -67,7 +60,7 @@ def simulate_drive(
         Pedal at every sample [%], 0 to 100.
     speed_rpm : float or array_like, shape (n,)
         Engine speed [rpm], > 0.
-    controller : PositionController, optional
+    controller : AngleController, optional
         ``step(reference_deg, measured_deg)`` gives the duty of a sample; a fresh `mgdd.control.Pid` if left out. It
         must have the sample time of the run.
     throttle : Throttle, Preset, str or path-like, optional

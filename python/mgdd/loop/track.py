@@ -38,7 +38,7 @@ _CORE = (_core.control.GuidedPredictive, _core.control.Pid, _core.control.Slidin
 class AngleController(Protocol):
     """A controller of the plate: any object with this method."""
 
-    def step(self, reference_deg: float, measurement_deg: float) -> float:
+    def step(self, reference_deg: float, measurement_deg: float, /) -> float:
         """Give the duty of this sample."""
         ...
 

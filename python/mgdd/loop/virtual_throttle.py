@@ -54,6 +54,8 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
     (33.6, True)
     """
 
+    limit_names: tuple[str, ...] = ()
+
     def __init__(
         self,
         throttle: ThrottleLike | None = None,
@@ -73,13 +75,13 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
         self.throttle = Throttle() if throttle is None else throttle_of(throttle)
         self.sample_s = sample_s
-        self._inputs = tuple(inputs)
+        self.input_names = tuple(inputs)
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._given: dict[str, Any] = {
             "throttle": self.throttle,
-            "inputs": self._inputs,
+            "inputs": self.input_names,
             "sensors": sensors or SensorPair(),
             "faults": tuple(faults),
             "start_deg": self.start_deg,
@@ -103,16 +105,6 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self._given, self.state, self._applied)
 
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the applied inputs."""
-        return self._inputs
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """No limited quantities."""
-        return ()
-
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.
 
@@ -121,8 +113,8 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         inputs : mapping of str to float
             One number per name of `input_names`; a duty is clipped to -1..1.
         """
-        values = checked_inputs(inputs, self._inputs)
-        self._applied = {**self._still, **dict(zip(self._inputs, values, strict=True))}
+        values = checked_inputs(inputs, self.input_names)
+        self._applied = {**self._still, **dict(zip(self.input_names, values, strict=True))}
 
     def measure(self) -> Measurement:
         """Run one sample under the inputs applied last, and read the sensors at its end.

@@ -280,9 +280,10 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
                 0.0, [limit.upper - abs(limit.upper) for limit in self.settings["limits"]] or None, applied=applied
             )
             return
-        near = np.flatnonzero(fired)[
-            np.argmin(np.linalg.norm((told["applied"] - at)[fired] / np.ptp(_bounds(self), axis=1), axis=1))
-        ]
+        own = self.settings
+        bounds = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
+        away = np.linalg.norm((told["applied"] - at)[fired] / np.ptp(bounds, axis=1), axis=1)
+        near = np.flatnonzero(fired)[np.argmin(away)]
         j = float(self.expected) if self.expected_sd > 0.0 else float(told["objective"][near])
         self.tell(j, told["limits"][near].tolist() or None, applied=applied)
 
@@ -304,9 +305,3 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
 
     def _prepared(self, settings: dict[str, Any]) -> dict[str, Any]:
         return with_guides(settings)
-
-
-def _bounds(seeker: GaussianProcessSeeking) -> Any:
-    own = seeker.settings
-    pairs = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
-    return np.array(pairs, np.float64)

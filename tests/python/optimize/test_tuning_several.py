@@ -117,6 +117,9 @@ def test_period_and_time_constant_follow_the_sensor(
     assert tuning.sensor_gain == pytest.approx(abs(sensor))
     turned = np.exp(-1j * np.radians(tuning.sensor_phase_deg))
     assert turned == pytest.approx(sensor / abs(sensor))
+    tau, size, step = tuning.time_constant_cycles, tuning.amplitude, tuning.period
+    noisy = max(size, 3.0 * np.sqrt(2.0 * step / tau) * tuning.rms) / step  # three deviations of a batch pass
+    assert tuning.rate == pytest.approx(noisy if method == "batch" else max(3.0 * size / step, 2.0 * 9.0 / tau))
     assert not tuning.met
 
 
