@@ -11,7 +11,7 @@ import pytest
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import LoopCriteria, Measurement, VirtualEngine, monte_carlo, run_seeker
+from mgdd.loop import Measurement, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.rig import SimulatedRig
 
@@ -98,25 +98,6 @@ def test_a_new_curve_keeps_the_error_of_the_old_one() -> None:
     assert seeker.guide(parabola(-2.0))
     assert seeker.estimate[0] == pytest.approx(-2.0 + error)
     assert not seeker.guide(parabola(40.0))
-
-
-@pytest.mark.parametrize("guide", [{"wall_heat_scale": 0.65}, {"wall_heat_scale": 0.0}, {"wall_heat_scale": 1.0}])
-@pytest.mark.parametrize("start", [None, -20.0])
-def test_a_rough_model_is_enough(guide: dict[str, float], start: float | None) -> None:
-    """Medians of 40 runs; the study has 200 and the table."""
-    bench = VirtualEngine()
-    curve = ModelOptimum(Cylinder(**guide)).curve(bench.point)
-    assert curve is not None
-    seeker = CurveSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0, curve=curve)
-    table = monte_carlo(
-        bench, seeker, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5)
-    )
-    stays = np.nan_to_num(table["cycles_stays"].to_numpy(), nan=400.0)
-    assert np.median(stays) <= 25.0
-    assert float(table["rms_soc_cad"].mean()) < 0.5
-    plain = ExtremumSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0)
-    slow = monte_carlo(bench, plain, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5))
-    assert float(table["rms_soc_cad"].mean()) < float(slow["rms_soc_cad"].mean())
 
 
 def test_limits_by_the_guides_curves_are_kept_while_it_arrives() -> None:

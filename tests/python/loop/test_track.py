@@ -286,9 +286,7 @@ def test_scales_of_the_plant_are_refused_by_their_option(
     assert said in capsys.readouterr().err
 
 
-def test_more_friction_is_more_stiction_unless_it_is_given(capsys: pytest.CaptureFixture[str]) -> None:
-    run = run_json(capsys, "throttle", "track", "--controller", "pid", "--plant-scale", "coulomb_nm=1.3")
-    assert run["plant_scale"] == {"coulomb_nm": 1.3, "stiction_nm": 1.3}
+def test_stiction_that_is_given_does_not_follow_the_friction(capsys: pytest.CaptureFixture[str]) -> None:
     own = ("--plant-scale", "coulomb_nm=1.3", "--plant-scale", "stiction_nm=1.5")
     run = run_json(capsys, "throttle", "track", "--controller", "pid", *own)
     assert run["plant_scale"] == {"coulomb_nm": 1.3, "stiction_nm": 1.5}

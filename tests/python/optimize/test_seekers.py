@@ -259,6 +259,7 @@ def test_it_goes_on_bit_for_bit_from_file_pickle_state_and_copies(make: Any, tmp
     others += [copy.copy(seeker), copy.deepcopy(seeker)]
     ends, before = [(run(other, 120), other.state, other.findings) for other in others], seeker.state
     assert seeker.history.sizes["cycle"] == 47
+    assert all(one.history.isel(cycle=slice(47)).identical(seeker.history) for one in others[2:])
     assert ends == [(run(seeker, 120), seeker.state, seeker.findings)] * 5
     assert before != seeker.state
 

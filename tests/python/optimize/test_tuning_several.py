@@ -130,6 +130,9 @@ def test_what_is_asked_for_in_less_time_or_with_less_room_is_not_met() -> None:
         late = tune(0.31, -0.083, method=method, cycles=4.0, amplitude_max=2.6, **spec)
         rough = tune(0.31, -0.083, method=method, cycles=240.0, amplitude_max=0.1, **spec)
         assert (late.met, late.cycles > 4.0, rough.met, rough.amplitude) == (False, True, False, 0.1)
+        asked = {**spec, "cycles": 240.0, "amplitude_max": 0.1}
+        assert [tune(0.31, -0.083, method=method, **asked | {"rms": s * rough.rms}).met for s in (0.97, 1.0)] == [0, 1]
+    assert late.rate == pytest.approx(max(2.0 * late.amplitude, 1.2 * 0.083 * late.gain * 9.0))  # of SPSA
 
 
 @pytest.mark.parametrize("curvature", [-0.1, [-0.1, -40.0]], ids=["one", "two"])
