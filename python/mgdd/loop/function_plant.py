@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import ctypes
 import math
@@ -15,6 +14,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.optimize.inputs import by_name_or_number
 
 if TYPE_CHECKING:
     from mgdd.optimize import Seeker
@@ -201,19 +201,16 @@ class FunctionPlant:
         """Call the function by name; one of a plain number shows itself at the first cycle."""
         if self._of_a_number:
             return self._function(*inputs.values())
-        try:
+        if self._cycle:
             return self._function(inputs)
+        try:
+            answer, self._of_a_number = by_name_or_number(self._function, inputs)
         except TypeError as error:
-            if self._cycle:
-                raise
-            with contextlib.suppress(Exception):
-                answer = self._function(*inputs.values())
-                self._of_a_number = True
-                return answer
             form = ", ".join(f"x[{name!r}]" for name in self.input_names)
             raise ParameterError(
                 f"function: takes one mapping of inputs by name, write lambda x: ... {form}: {error}"
             ) from error
+        return answer
 
     def _measurement(self, outputs: Sequence[float] | None) -> Measurement:
         if outputs is None:

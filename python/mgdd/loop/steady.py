@@ -132,7 +132,7 @@ def _best(
 
     grid = np.array(list(itertools.product(np.linspace(0.0, 1.0, _SCAN_POINTS[low.size]), repeat=low.size)))
     values, least = np.array([j(z) for z in grid]), np.array([room(z).min(initial=1.0) for z in grid])
-    free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]])
+    free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]]) if low.size > 1 else _peak(j, grid, values)
     if room(free).min(initial=1.0) >= 0.0:
         return low + free * span, low + free * span
     kept = np.flatnonzero(least >= 0.0)
@@ -142,6 +142,16 @@ def _best(
         asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
         raise ConvergenceError(f"no {asked} keeps {_said(caps)}: move a limit")
     return low + best * span, low + free * span
+
+
+def _peak(j: Any, grid: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the best of one input beside the best of its grid, without slopes: J may have small jumps, as NOx has."""
+    from scipy.optimize import minimize_scalar
+
+    top = int(values.argmax())
+    ends = grid[max(top - 1, 0), 0], grid[min(top + 1, len(grid) - 1), 0]
+    found = minimize_scalar(lambda z: -j(np.array([z])), bounds=ends, method="bounded", options={"xatol": 2.5e-6})
+    return np.array([found.x])
 
 
 def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -156,7 +166,7 @@ def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float
     ends = list(starts)
     for start in starts:
         found = minimize(
-            lambda z: -j(z), start, method="SLSQP", jac="3-point", bounds=[(0.0, 1.0)] * start.size, constraints=rules,
+            lambda z: -j(z), start, method="SLSQP", bounds=[(0.0, 1.0)] * start.size, constraints=rules,
             options={"eps": 1e-5, "ftol": 1e-10, "maxiter": 200},
         )  # fmt: skip
         ends.append(np.clip(found.x, 0.0, 1.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.optimize import Surface
 from mgdd.errors import Error, ParameterError, ShapeError
+from mgdd.optimize.inputs import by_name_or_number
 from mgdd.optimize.seeker import Seeker
 
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7, 5: 5}  # per input: 5 inputs are asked for 3,125 times
@@ -54,23 +54,12 @@ def _asked(guide: Callable[[Any], Any], names: Sequence[str], point: Sequence[fl
     at: Any = dict(zip(names, map(float, point), strict=True)) if names else np.asarray(point, np.float64)
     where = ", ".join(f"{name} = {value:.6g}" for name, value in at.items()) if names else f"{at}"
     try:
-        value = float(_called(guide, at))
+        value = float(by_name_or_number(guide, at)[0] if names else guide(at))
     except (Error, ArithmeticError, LookupError, TypeError, ValueError) as error:
         raise ParameterError(f"{argument} fails at {where}: {error}") from error
     if not math.isfinite(value):
         raise ParameterError(f"{argument} gives {value} at {where}: it must be finite between the bounds; narrow them")
     return value
-
-
-def _called(guide: Callable[..., Any], at: Any) -> Any:
-    """Call a guide with its inputs by name or, like a plant, as plain numbers in their order."""
-    try:
-        return guide(at)
-    except TypeError:
-        if isinstance(at, dict):
-            with contextlib.suppress(TypeError):
-                return guide(*at.values())
-        raise
 
 
 def _of_map(guide: Any, names: Sequence[str], argument: str) -> Any:

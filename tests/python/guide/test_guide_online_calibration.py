@@ -96,19 +96,6 @@ def test_state_and_pickle_go_on_bit_for_bit(method: str) -> None:
     assert other.state == calibration.state
 
 
-def test_several_parameters_and_a_measured_fuel() -> None:
-    bench = VirtualEngine(pressure_noise_bar=0.1, tdc_error_cad=0.8, soc_scatter_cad=0.0, seed=4)
-    names = ("wall_heat_scale", "tdc_offset_cad", "soc_offset_cad")
-    told = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty=ENGINE | {"fuel_heat_scale": 0.0})
-    free = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty=ENGINE)
-    for calibration in (told, free):
-        drive(copy.deepcopy(bench), calibration, 100)
-    assert list(told.verdicts) == ["wall_heat_scale", "soc_offset_cad", "tdc_offset_cad"]
-    assert told.parameters["tdc_offset_cad"] == pytest.approx(0.8, abs=0.1)
-    assert told.parameters["fuel_heat_scale"] == 1.0
-    assert told.standard_errors["tdc_offset_cad"] < 0.8 * free.standard_errors["tdc_offset_cad"]
-
-
 # Wall heat is not to be had from one measured trace: fuel, gamma and sensor are not known well enough, and the burn law
 # does not fit that well. A tool that called it determined would be wrong.
 @pytest.mark.parametrize("method", ["gauss_newton", "recursive", "extremum_seeking"])

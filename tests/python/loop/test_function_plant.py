@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -213,32 +214,11 @@ def test_every_form_is_the_same_function(library: ctypes.CDLL) -> None:
         (declared, {"user_data": data}),
         (address, {"user_data": np.array([0.05, -7.0])}),
         (np.uint64(address), {"user_data": pointer.value}),
+        (SimpleNamespace(address=address, ctypes=declared), {"user_data": data}),  # as a function of Numba
     ):
         plant = FunctionPlant(function, ["x"], **more)
         plant.apply({"x": -5.0})
         assert plant.measure().performance == 50.0 - 0.05 * 2.0 * 2.0
-
-
-def test_a_numba_function_is_one() -> None:
-    numba = pytest.importorskip("numba")
-    types = numba.types
-    doubles = types.CPointer(types.float64)
-
-    @numba.cfunc(types.int32(doubles, types.uintp, doubles, types.uintp, types.voidptr))
-    def plant(x: Any, n: Any, out: Any, m: Any, data: Any) -> int:  # noqa: ARG001
-        out[0] = 50.0 - 0.03 * (x[0] + 4.0) * (x[0] + 4.0)
-        return 0
-
-    for function in (plant, plant.address):
-        run = run_seeker(FunctionPlant(function, ["soc_cad"]), SEEKERS["Spsa first_order"](), 60)
-        xr.testing.assert_identical(run.dataset, run_seeker(in_python(), SEEKERS["Spsa first_order"](), 60).dataset)
-
-    @numba.cfunc(types.float64(types.float64))
-    def other(x: float) -> float:
-        return x
-
-    with pytest.raises(ParameterError, match=r"signature is c_double \(c_double\): must be int"):
-        FunctionPlant(other, ["x"])
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -348,16 +348,22 @@ def test_a_wrong_answer_keeps_what_was_found(answer: Any, message: str) -> None:
     assert part.run.dataset.sizes["cycle"] == part.seeker.cycle == 25
 
 
-def test_an_error_of_the_plant_passes_through_with_what_was_found() -> None:
-    rig = Rig(fails_at=31)
+@pytest.mark.parametrize("fails_at", [0, 1, 31])
+def test_an_error_of_the_plant_passes_through_with_what_was_found(fails_at: int) -> None:
+    rig = Rig(fails_at)
     with pytest.raises(OSError, match="the bus is gone") as info:
         seek(rig, TWO)
     part = info.value.partial  # type: ignore[attr-defined]
-    assert part.run.dataset.sizes["cycle"] == 31
-    whole = seek(Rig(), TWO, cycles=31)
-    assert part.inputs == whole.inputs
-    rig.fails_at = 10**9
-    assert run_seeker(rig, part.seeker, 9).dataset["cycle"].to_numpy().tolist() == list(range(31, 40))
+    assert part.run.dataset.sizes["cycle"] == fails_at
+    assert ("no_reading" in codes(part)) is (fails_at == 0)
+    assert part.summary()
+    if fails_at == 1:
+        assert part.value == limited({"soc_cad": -5.0, "egr": 0.2})[0]
+        assert math.isnan(part.value_sd)
+    if fails_at == 31:
+        assert part.inputs == seek(Rig(), TWO, cycles=31).inputs
+        rig.fails_at = 10**9
+        assert run_seeker(rig, part.seeker, 9).dataset["cycle"].to_numpy().tolist() == list(range(31, 40))
 
 
 def test_ctrl_c_keeps_what_was_found() -> None:
@@ -375,23 +381,6 @@ def test_ctrl_c_keeps_what_was_found() -> None:
     assert isinstance(info.value.partial, SeekResult)
     assert info.value.partial.interrupted
     assert "interrupted" in codes(info.value.partial)
-
-
-def test_an_error_in_the_first_cycle_has_an_empty_part() -> None:
-    with pytest.raises(OSError, match="bus") as info:
-        seek(Rig(fails_at=0), TWO)
-    part = info.value.partial  # type: ignore[attr-defined]
-    assert part.run.dataset.sizes["cycle"] == 0
-    assert "no_reading" in codes(part)
-    assert part.summary()
-
-
-def test_one_reading_is_what_is_known_of_j() -> None:
-    with pytest.raises(OSError, match="bus") as info:
-        seek(Rig(fails_at=1), TWO)
-    part = info.value.partial  # type: ignore[attr-defined]
-    assert part.value == limited({"soc_cad": -5.0, "egr": 0.2})[0]
-    assert math.isnan(part.value_sd)
 
 
 def test_it_is_the_seeker_of_that_name_and_nothing_else() -> None:
