@@ -6,7 +6,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -214,8 +214,6 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     >>> bool(abs(seeker.estimate[0] + 4.0) < 1.0 and abs(seeker.estimate[1] - 0.15) < 0.02)
     True
     """
-
-    kind: ClassVar[str] = "GaussianProcessSeeking"
 
     def ask(self, n: int | None = None) -> Any:
         """Give the input of the next cycle, or of several that a bench measures in parallel.

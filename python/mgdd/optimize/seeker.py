@@ -71,6 +71,8 @@ class Seeker(SeekerFindings):
         core = next((base for base in cls.__mro__[1:] if base.__module__.startswith("mgdd._core")), None)
         if core is not None:
             cls.__signature__ = inspect.signature(core)  # type: ignore[attr-defined]
+        if Seeker in cls.__bases__:
+            cls.kind = cls.__name__
 
     if not TYPE_CHECKING:  # the constructors of the core say what they take
 
