@@ -108,7 +108,7 @@ def test_a_delay_that_is_wrong_by_two_cycles_is_survived(error: int) -> None:
 def test_period_and_time_constant_follow_the_sensor(
     method: str, lag: dict[str, Any], period: tuple[int, int], least: float | None
 ) -> None:
-    tuning = tune(0.31, -0.083, method=method, cycles=30.0, distance=9.0, arrival=0.8, **lag)
+    tuning = tune(0.31, -0.083, method=method, cycles=30.0, rms=4.0, distance=9.0, arrival=0.8, **lag)
     assert tuning.period == period[method == "moving_average"]
     assert tuning.time_constant_cycles == pytest.approx(least or 2.0 * tuning.period)
     pole = np.exp(-1.0 / lag["lag_cycles"]) if "lag_cycles" in lag else 0.0
