@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
@@ -87,5 +85,3 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     >>> abs(seeker.estimate[0] + 6.0) < 0.5
     np.True_
     """
-
-    kind: ClassVar[str] = "CurveSeeking"

@@ -26,6 +26,9 @@ Answer = Literal["same", "followed", "held", "refused"]
 _LOG = logging.getLogger(__name__)
 _CAUSES = ("", "calibration", "following", "new_point")  # of a value, the weightier the later
 _LONGEST_SETTLING, _LAGS = 5, 3.0  # cycles before a reading of a test; lags until a sensor has settled
+# Standard deviation of the right share of a move about the trust before, of a guide as good as it was; probability that
+# it is not; relative standard deviation of its curvature; standard errors of the difference in J that make a verdict.
+_TRUST = {"trust_sd": 0.15, "doubt": 0.1, "curvature_spread": 0.2, "significance": 3.0}
 _UNIT = "unit of the input"
 _POINT = "point."  # of the columns of the state that hold the operating point
 
@@ -63,14 +66,6 @@ class FeedForward(Guided, _core.guide.FeedForward):
         slowest of the seeker's ``components``.
     noise_sd : float, optional
         Standard deviation of one reading of J; learnt from the readings if left out.
-    trust_sd : float
-        Standard deviation of the right share of a move about the trust before, of a guide as good as it was [-].
-    doubt : float
-        Probability that the guide is not as good as it was, in [0, 1).
-    curvature_spread : float
-        Relative standard deviation of the guide's curvature [-].
-    significance : float
-        Standard errors of the difference in J that make a verdict.
     keep_start : bool
         The guide's first value leaves the estimate at the seeker's own start, or where it stands if it has run, and
         the trim takes the distance; by itself the estimate begins at the guide's optimum.
@@ -124,10 +119,6 @@ class FeedForward(Guided, _core.guide.FeedForward):
         probe_cycles: int | None = None,
         probe_settling: int | None = None,
         noise_sd: float | None = None,
-        trust_sd: float = 0.15,
-        doubt: float = 0.1,
-        curvature_spread: float = 0.2,
-        significance: float = 3.0,
         keep_start: bool = False,
     ) -> None:
         if guide is not None and not callable(guide):
@@ -142,12 +133,8 @@ class FeedForward(Guided, _core.guide.FeedForward):
             "probe_cycles": int(settling <= _LONGEST_SETTLING) if probe_cycles is None else probe_cycles,
             "probe_settling": settling,
             "noise_sd": noise_sd,
-            "trust_sd": trust_sd,
-            "doubt": doubt,
-            "curvature_spread": curvature_spread,
-            "significance": significance,
         }
-        super().__init__(seeker, **self._options)
+        super().__init__(seeker, **self._options, **_TRUST)
         self._options["keep_start"] = bool(keep_start)
         self._set_seeker_history(seeker._history_columns())
         self._seeker_class, self._seeker_kind, self._seeker_settings = type(seeker), seeker.kind, seeker.settings

@@ -119,8 +119,7 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
             "noise_sd": noise_sd,
             "keep_start": keep_start,
         }
-        core: Any = None if calibration is None else calibration._core
-        super().__init__(seeker, model, core, point, **self._options)
+        super().__init__(seeker, model, calibration, point, **self._options)
         self._seeker_kind, self._seeker_settings = seeker.kind, seeker.settings
         self._made_of = (
             (copy.deepcopy(seeker), copy.deepcopy(model), point),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex
 
 import numpy as np
 
 from mgdd import _core
-from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.presets.meant import CylinderLike, cylinder_of
 from mgdd.results.describe import as_html, rows_of
@@ -18,7 +18,7 @@ from mgdd.results.result import NumbersResult
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -52,7 +52,7 @@ _FIGURES = {
 }
 
 
-class OnlineCalibration:
+class OnlineCalibration(_core.guide.OnlineCalibration):
     """Keeps parameters of the cycle model true to the mean pressure of the last cycles, and says which it cannot know.
 
     Offer every cycle, then update once: a refused cycle is left out and says why. What stands between model and
@@ -140,7 +140,7 @@ class OnlineCalibration:
     ) -> None:
         if isinstance(parameters, str):
             raise ParameterError.of("parameters", parameters, "a sequence of names")
-        self._core = _core.guide.OnlineCalibration(
+        super().__init__(
             cylinder=cylinder_of(engine, "engine"),
             method=method,
             parameters=list(parameters),
@@ -155,10 +155,13 @@ class OnlineCalibration:
             step_cad=step_cad,
             integrator=integrator,
         )
-        self._size = len(self._core.angles_cad)
+        self._size = len(self.angles_cad)
         self._history: list[tuple[str, list[float]]] = []
 
-    def offer(self, pressure_bar: ArrayLike, point: OperatingPoint, soc_cad: float, *, misfire: bool = False) -> str:
+    def offer(
+        self, pressure_bar: ArrayLike, point: OperatingPoint, soc_cad: SupportsFloat | SupportsIndex, *,
+        misfire: bool = False,
+    ) -> str:  # fmt: skip
         """Give the pressure of one cycle.
 
         Parameters
@@ -188,7 +191,7 @@ class OnlineCalibration:
             raise ShapeError(
                 f"pressure_bar has shape {pressure.shape}: must be ({self._size},), one per angle of angles_cad"
             )
-        return self._core.offer(pressure, point, float(soc_cad), misfire=misfire)
+        return super().offer(pressure, point, soc_cad, misfire=misfire)
 
     def update(self) -> str:
         """Do the work of one cycle: at most one step, or `trials_per_update` trials.
@@ -199,72 +202,38 @@ class OnlineCalibration:
             ``"updated"``; ``"collecting"`` while the window fills; ``"poor excitation"`` where every parameter is
             held; ``"COV"``, ``"jump"``, ``"no such cycle"``, or why the last cycle was refused.
         """
-        status = self._core.update()
-        values, errors, figures = self._core.values, self._core.errors, self._core.figures
-        row = [*values.values(), *errors.values(), *(figures[name] for name in _FIGURES)]
+        status = super().update()
+        row = [*self.values.values(), *self.errors.values(), *(self.figures[name] for name in _FIGURES)]
         self._history.append((status, row))
         return status
-
-    def restart(self) -> None:
-        """Forget all cycles and keep the parameters."""
-        self._core.restart()
-
-    @property
-    def cylinder(self) -> Cylinder:
-        """The guide with the parameters of it that are adapted."""
-        return self._core.cylinder
 
     @property
     def parameters(self) -> dict[str, float]:
         """Value of every parameter by name, adapted or only estimated beside them."""
-        return self._core.values
+        return self.values
 
     @property
     def standard_errors(self) -> dict[str, float]:
         """Standard error of every parameter by name; 0 for what is known exactly, and before the first step."""
-        return self._core.errors
+        return self.errors
 
     @property
     def verdicts(self) -> dict[str, ParameterVerdict]:
         """What the data determine of each adapted parameter."""
-        values, errors = self._core.values, self._core.errors
+        values, errors = self.values, self.errors
         return {
             name: ParameterVerdict(
                 name=name, value=values[name], standard_error=errors[name], knowledge=knowledge, sentence=sentence
             )
-            for name, (knowledge, sentence) in self._core.verdicts.items()
+            for name, (knowledge, sentence) in super().verdicts.items()
         }
-
-    @property
-    def determined(self) -> bool:
-        """Whether the data determine every adapted parameter."""
-        return self._core.determined
-
-    @property
-    def status(self) -> str:
-        """What became of the last call."""
-        return self._core.status
-
-    @property
-    def angles_cad(self) -> NDArray[np.float64]:
-        """Angles that a pressure trace is offered on, IVC to EVO [°CA aTDC]."""
-        return self._core.angles_cad
 
     @property
     def settings(self) -> dict[str, Any]:
         """Keywords that make this calibration again."""
-        settings = dict(self._core.settings)
+        settings = super().settings
         settings["engine"] = settings.pop("cylinder")
         return settings
-
-    @property
-    def state(self) -> dict[str, list[float]]:
-        """Cycles, parameters and all else that the next update depends on; setting it goes on bit for bit."""
-        return self._core.state
-
-    @state.setter
-    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
-        self._core.state = {name: list(column) for name, column in saved.items()}
 
     def summary(self) -> str:
         """Say status and verdicts as text.
@@ -281,10 +250,10 @@ class OnlineCalibration:
         gauss_newton: 0 cycles taken, 0 updates, now collecting
         wall_heat_scale = 0.5: no data, nothing was adapted yet
         """
-        figures = self._core.figures
+        figures = self.figures
         taken, updates = figures["accepted"], figures["updates"]
         jumps = f", {figures['jumps']} jumps" if figures["jumps"] else ""
-        lines = [f"{self._core.settings['method']}: {taken} cycles taken, {updates} updates{jumps}, now {self.status}"]
+        lines = [f"{self.settings['method']}: {taken} cycles taken, {updates} updates{jumps}, now {self.status}"]
         if updates:
             residual = f"residual {figures['residual_rms_bar']:.3g} bar rms"
             worth = f"worth {figures['effective_samples']:.0f} independent samples"
@@ -315,14 +284,14 @@ class OnlineCalibration:
             variables[f"{name}_error"] = ("update", rows[:, len(names) + i], unit, f"standard error: {meaning}")
         for i, (name, (unit, meaning)) in enumerate(_FIGURES.items()):
             variables[name] = ("update", rows[:, 2 * len(names) + i], unit, meaning)
-        return labelled_dataset(variables, attrs={"method": self._core.settings["method"]})
+        return labelled_dataset(variables, attrs={"method": self.settings["method"]})
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, (self.settings, self.state, self._history)
 
     def __repr__(self) -> str:
-        names = ", ".join(f"{name} {self.parameters[name]:.4g}" for name in self._core.settings["parameters"])
-        return f"<OnlineCalibration {self._core.settings['method']}: {names}, {self.status}>"
+        names = ", ".join(f"{name} {self.parameters[name]:.4g}" for name in self.settings["parameters"])
+        return f"<OnlineCalibration {self.settings['method']}: {names}, {self.status}>"
 
     def _repr_html_(self) -> str:
         return as_html("OnlineCalibration", rows_of({"status": self.status, **self.parameters, **self.settings}))

@@ -104,7 +104,7 @@ def run_seeker(
     uppers = criteria.limits_of(names, seeker)
     dataset.attrs |= criteria.attributes(names, uppers)
     summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
-    findings = findings_of(seeker.settings, **raw["watched"])
+    findings = findings_of(seeker.settings, raw["watched"])
     run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=findings)
     return hand_over(run, stop)
 

@@ -150,16 +150,8 @@ _FEWEST_SAMPLES = 4  # of the horizon of MGDD-1: a shorter one overshoots and sw
 
 def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) -> GuidedPredictive:
     first, second = round(x["first_move"]), round(x["second_move"])
-    settings: dict[str, Any] = {
-        "move_steps": (first, second, 20 - first - second),
-        "duty_change_weight": x["duty_change_weight"],
-        "speed_weight": x["speed_weight"],
-        "observer_angle_per_s": x["observer_angle_per_s"],
-        "observer_speed_per_s2": x["observer_speed_per_s2"],
-    }
-    for name in ("learning_rate_per_s", "gain_weight", "damping_weight", "bias_rate_per_deg_s", "trim_rate_per_deg_s"):
-        if name in x:
-            settings[name] = x[name]
+    settings: dict[str, Any] = {name: value for name, value in x.items() if not name.endswith("_move")}
+    settings["move_steps"] = (first, second, 20 - first - second)
     if "bias_rate_per_deg_s" in settings:
         most = _MOST_BIAS / (groups.plate.gain_deg_per_s2 * setup.sample_s**3)
         settings["bias_rate_per_deg_s"] = min(settings["bias_rate_per_deg_s"], most)
@@ -205,19 +197,8 @@ def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
 
 
 def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> SlidingMode:
-    return SlidingMode(
-        sample_s=setup.sample_s,
-        switching=x["switching"],
-        layer_deg=x["layer_deg"],
-        integral_per_s=x["integral_per_s"],
-        bandwidth_per_s=x["bandwidth_per_s"],
-        reference_pole_per_s=x["reference_pole_per_s"],
-        friction=min(x["friction"] * groups.plate.friction, 1.0),
-        integral_layers=x["integral_layers"],
-        reaching="implicit",
-        **groups.spring,
-        **groups.motion,
-    )
+    own = {**x, "friction": min(x["friction"] * groups.plate.friction, 1.0)}
+    return SlidingMode(sample_s=setup.sample_s, reaching="implicit", **own, **groups.spring, **groups.motion)
 
 
 _PREDICTIVE: dict[str, tuple[float, float, bool]] = {

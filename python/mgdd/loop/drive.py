@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.control import Pid
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.loop.track import AngleController
 from mgdd.loop.virtual_throttle import VirtualThrottle
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.labels import labelled_dataset
@@ -35,20 +36,12 @@ _LABELS = {
 }
 
 
-class PositionController(Protocol):
-    """What steers the plate: `mgdd.control.Pid`, `mgdd.control.SlidingMode`, or an object of your own."""
-
-    def step(self, reference_deg: float, measurement_deg: float, /) -> float:
-        """Give the duty of a sample."""
-        ...
-
-
 def simulate_drive(
     chain: DemandChain,
     pedal_percent: ArrayLike,
     speed_rpm: ArrayLike,
     *,
-    controller: PositionController | None = None,
+    controller: AngleController | None = None,
     throttle: ThrottleLike | None = None,
     engine: DemandChain | None = None,
     measured_pressure: bool = True,
@@ -67,7 +60,7 @@ def simulate_drive(
         Pedal at every sample [%], 0 to 100.
     speed_rpm : float or array_like, shape (n,)
         Engine speed [rpm], > 0.
-    controller : PositionController, optional
+    controller : AngleController, optional
         ``step(reference_deg, measured_deg)`` gives the duty of a sample; a fresh `mgdd.control.Pid` if left out. It
         must have the sample time of the run.
     throttle : Throttle, Preset, str or path-like, optional
@@ -143,7 +136,24 @@ def simulate_drive(
         on_the_way = 0.5 * (angle + values["angle_deg"])
         kpa, _, _ = _core.throttle.fill_manifold(truth, kpa, on_the_way, speed[k], sample_s=sample_s)
         angle, sensed = values["angle_deg"], values["sensed_angle_deg"]
-    return _dataset(rows, pedal, speed, truth, {"sample_s": sample_s, "seed": seed})
+    names = (
+        "wanted_torque_nm", "wanted_air_g_per_s", "wanted_pressure_kpa", "reference_deg",
+        "angle_deg", "sensed_angle_deg", "duty", "airflow_torque_nm", "pressure_kpa",
+    )  # fmt: skip
+    found = dict(zip(names, rows.T, strict=True))
+    travel = np.clip(found["angle_deg"], 0.0, 90.0)  # an end stop gives way a little
+    found["throttle_air_g_per_s"] = np.asarray(truth.throttle_g_per_s(travel, found["pressure_kpa"]))
+    found["cylinder_air_g_per_s"] = np.asarray(truth.cylinder_g_per_s(found["pressure_kpa"], speed))
+    found["torque_nm"] = np.asarray(truth.torque_nm(found["cylinder_air_g_per_s"], speed))
+    return labelled_dataset(
+        {
+            "time_s": ("time_s", np.arange(pedal.size) * sample_s),
+            "pedal_percent": ("time_s", pedal, "%", "pedal"),
+            "speed_rpm": ("time_s", speed, "rpm", "engine speed"),
+            **{name: ("time_s", found[name], *label) for name, label in _LABELS.items()},
+        },
+        attrs={"sample_s": sample_s, "seed": seed},
+    )
 
 
 def _traces(pedal_percent: ArrayLike, speed_rpm: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -167,30 +177,3 @@ def _steady(chain: DemandChain, truth: DemandChain, pedal: float, speed: float, 
     opening = float(chain.steady(pedal, speed)["opening_deg"].item())
     angle = min(max(opening, body.closed_deg), body.open_deg)
     return float(np.asarray(truth.steady_kpa(min(max(angle, 0.0), 90.0), speed))), angle
-
-
-def _dataset(
-    rows: NDArray[np.float64],
-    pedal: NDArray[np.float64],
-    speed: NDArray[np.float64],
-    truth: DemandChain,
-    settings: dict[str, float | int],
-) -> xr.Dataset:
-    names = (
-        "wanted_torque_nm", "wanted_air_g_per_s", "wanted_pressure_kpa", "reference_deg",
-        "angle_deg", "sensed_angle_deg", "duty", "airflow_torque_nm", "pressure_kpa",
-    )  # fmt: skip
-    found = dict(zip(names, rows.T, strict=True))
-    travel = np.clip(found["angle_deg"], 0.0, 90.0)  # an end stop gives way a little
-    found["throttle_air_g_per_s"] = np.asarray(truth.throttle_g_per_s(travel, found["pressure_kpa"]))
-    found["cylinder_air_g_per_s"] = np.asarray(truth.cylinder_g_per_s(found["pressure_kpa"], speed))
-    found["torque_nm"] = np.asarray(truth.torque_nm(found["cylinder_air_g_per_s"], speed))
-    return labelled_dataset(
-        {
-            "time_s": ("time_s", np.arange(pedal.size) * settings["sample_s"]),
-            "pedal_percent": ("time_s", pedal, "%", "pedal"),
-            "speed_rpm": ("time_s", speed, "rpm", "engine speed"),
-            **{name: ("time_s", found[name], *label) for name, label in _LABELS.items()},
-        },
-        attrs=settings,
-    )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance
+from mgdd._core.engine import NoxModel, OperatingPoint, Performance
 from mgdd.errors import ParameterError, argument
 from mgdd.guide import Curve, ModelOptimum, OnlineCalibration
 from mgdd.presets.meant import CylinderLike, cylinder_of
@@ -75,7 +75,9 @@ class EngineGuide:
 
     def model(self, bounds_cad: tuple[float, float]) -> ModelOptimum:
         """Make the model, whose best timing is sought between these bounds."""
-        return ModelOptimum(self._cylinder(), performance=self.performance, nox=self.nox, bounds_cad=bounds_cad)
+        return ModelOptimum(
+            cylinder_of(self.cylinder), performance=self.performance, nox=self.nox, bounds_cad=bounds_cad
+        )
 
     def best_of(self, model: ModelOptimum, point: OperatingPoint) -> float:
         """Give the model's best timing; ParameterError where it has none between the bounds."""
@@ -107,7 +109,7 @@ class EngineGuide:
         guides = list[Any]()
         for term in (self.performance or Performance()).terms:
             own = ModelOptimum(
-                self._cylinder(), performance=Performance([term]), nox=self.nox, bounds_cad=bounds_cad
+                cylinder_of(self.cylinder), performance=Performance([term]), nox=self.nox, bounds_cad=bounds_cad
             ).curve(point)
             if own is None:
                 raise ParameterError(f"{argument('guide', self.kind)}: the model has no cycle there")
@@ -116,7 +118,7 @@ class EngineGuide:
 
     def calibration(self) -> OnlineCalibration:
         """Make what lets the model learn."""
-        return OnlineCalibration(self._cylinder(), parameters=_CALIBRATED, steady_cycles=0, window_cycles=5)
+        return OnlineCalibration(cylinder_of(self.cylinder), parameters=_CALIBRATED, steady_cycles=0, window_cycles=5)
 
     def start(self, model: ModelOptimum, point: OperatingPoint, limits: Sequence[Any], best: float) -> float:
         """Give the timing nearest to its best one at which the model keeps clear of the limits."""
@@ -131,6 +133,3 @@ class EngineGuide:
             if all(c(x) <= lim.upper - _START_MARGIN * abs(lim.upper) for c, lim in zip(drawn, limits, strict=True))
         )
         return float(next(kept, best))
-
-    def _cylinder(self) -> Cylinder:
-        return cylinder_of(self.cylinder)

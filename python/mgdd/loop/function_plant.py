@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import ctypes
 import math
@@ -15,6 +14,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.optimize.inputs import by_name_or_number
 
 if TYPE_CHECKING:
     from mgdd.optimize import Seeker
@@ -24,28 +24,24 @@ C_TYPE = ctypes.CFUNCTYPE(
     ctypes.POINTER(ctypes.c_double), ctypes.c_size_t, ctypes.POINTER(ctypes.c_double), ctypes.c_size_t, ctypes.c_void_p,
 )  # fmt: skip
 _TAKES = "int (const double *inputs, size_t n_inputs, double *outputs, size_t n_outputs, void *user_data)"
-_FORM = "int(double*,size_t,double*,size_t,void*)"  # of a capsule, without blanks
 _CFuncPtr: Any = C_TYPE.__mro__[1]
 
 
-def address_of(function: Any) -> tuple[int, int] | None:
-    """Give the addresses of a compiled function and of data that it brings; None for anything else."""
+def address_of(function: Any) -> int | None:
+    """Give the address of a compiled function; None for anything else."""
     if isinstance(function, bool):
         return None
-    data = 0
     if isinstance(function, int | np.integer):
         address = int(function)
     elif isinstance(function, _CFuncPtr):
         address = _of_ctypes(function, function)
     elif isinstance(getattr(function, "address", None), int) and hasattr(function, "ctypes"):  # numba.cfunc
         address = _of_ctypes(function, function.ctypes)
-    elif isinstance(function, tuple) and hasattr(function, "signature"):  # scipy.LowLevelCallable
-        address, data = _of_capsule(function)
     else:
         return None
     if not 0 < address < 2 ** (8 * ctypes.sizeof(ctypes.c_void_p)):
         raise ParameterError.of("function", function, "the address of a function, not null")
-    return address, data
+    return address
 
 
 def data_address_of(user_data: Any) -> int:
@@ -86,20 +82,6 @@ def _number(kind: Any, like: Any) -> bool:
     return isinstance(code, str) and code in "iIlLqQ" and ctypes.sizeof(kind) == ctypes.sizeof(like)
 
 
-def _of_capsule(function: Any) -> tuple[int, int]:
-    signature = str(function.signature)
-    form = "".join(signature.split()).replace("const", "")
-    for size in ("unsignedlonglong", "unsignedlong", "ulonglong", "ulong", "uintptr_t", "uint64_t"):
-        form = form.replace(size, "size_t")
-    if form != _FORM:
-        raise ParameterError(f"function: its signature is {signature}: must be {_TAKES}")
-    capsule = tuple.__getitem__(function, 0)
-    pointer, context = ctypes.pythonapi.PyCapsule_GetPointer, ctypes.pythonapi.PyCapsule_GetContext
-    pointer.restype = context.restype = ctypes.c_void_p
-    pointer.argtypes, context.argtypes = [ctypes.py_object, ctypes.c_char_p], [ctypes.py_object]
-    return pointer(capsule, signature.encode()) or 0, context(capsule) or 0
-
-
 _FORMS = "return J, or (J, {limit: value}), or None for a failed cycle"
 
 
@@ -116,7 +98,7 @@ class FunctionPlant:
     ----------
     function : callable, int, or compiled function
         ``function({"soc_cad": -6.0}) -> J``, or ``-> (J, {"p_max_bar": 96.0})``. Compiled: a ctypes function of type
-        ``FunctionPlant.C_TYPE``, a `numba.cfunc`, a `scipy.LowLevelCallable`, or a bare address as a number, whose
+        ``FunctionPlant.C_TYPE``, a `numba.cfunc`, or a bare address as a number, whose
         signature cannot be checked and whose code the caller keeps alive. Loops call it on threads of their own,
         `monte_carlo` on several at once. A ctypes callback of a Python function takes the GIL in every cycle; an
         exception in it is a failed cycle.
@@ -175,11 +157,10 @@ class FunctionPlant:
         self._applied: dict[str, float] | None = None
         self._of_a_number = False
         self._core: _core.loop.FunctionPlant | None = None
-        if (found := address_of(function)) is not None:
-            address, data = found
+        if (address := address_of(function)) is not None:
             self._core = _core.loop.FunctionPlant(
-                address, data if user_data is None else data_address_of(user_data), inputs=len(self.input_names),
-                values=len(self._values) or 1, limits=list(self.limit_names), noise_sd=self._noise_sd, seed=self._seed,
+                address, data_address_of(user_data), inputs=len(self.input_names), values=len(self._values) or 1,
+                limits=list(self.limit_names), noise_sd=self._noise_sd, seed=self._seed,
             )  # fmt: skip
         elif not callable(function):
             raise ParameterError.of("function", function, "a function of the inputs by name, or a compiled one")
@@ -220,19 +201,16 @@ class FunctionPlant:
         """Call the function by name; one of a plain number shows itself at the first cycle."""
         if self._of_a_number:
             return self._function(*inputs.values())
-        try:
+        if self._cycle:
             return self._function(inputs)
+        try:
+            answer, self._of_a_number = by_name_or_number(self._function, inputs)
         except TypeError as error:
-            if self._cycle:
-                raise
-            with contextlib.suppress(Exception):
-                answer = self._function(*inputs.values())
-                self._of_a_number = True
-                return answer
             form = ", ".join(f"x[{name!r}]" for name in self.input_names)
             raise ParameterError(
                 f"function: takes one mapping of inputs by name, write lambda x: ... {form}: {error}"
             ) from error
+        return answer
 
     def _measurement(self, outputs: Sequence[float] | None) -> Measurement:
         if outputs is None:

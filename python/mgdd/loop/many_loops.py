@@ -114,9 +114,6 @@ def monte_carlo(
     bench_list = [benches] if isinstance(benches, VirtualEngine | FunctionPlant) else list(benches)
     seeker_list = list(seekers) if isinstance(seekers, Sequence) else [seekers]
     seed_list = _whole_seeds(seeds)
-    for seed in seed_list:
-        if not 0 <= seed < 2**64:
-            raise ParameterError(f"seeds: {seed} must be in [0, 2**64)")
     given = [criteria or LoopCriteria()] * len(bench_list) if not isinstance(criteria, Sequence) else list(criteria)
     if len(given) != len(bench_list):
         raise ShapeError(f"criteria has {len(given)} entries: give one for all or one per bench, {len(bench_list)}")
@@ -130,7 +127,9 @@ def monte_carlo(
                     f"{', '.join(bench.input_names)}"
                 )
     functions = _functions_of(bench_list)
-    goals = [own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)]
+    goals: list[Mapping[str, Any]] = [
+        own.to_core(bench.limit_names) for bench, own in zip(bench_list, given, strict=True)
+    ]
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({goal[name] for goal in goals}) > 1:
             raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
@@ -142,7 +141,7 @@ def monte_carlo(
         threads = threads_of(workers)
         raw, stop = or_partial(lambda: _loops(*call, threads))
     else:
-        raw, stop = _in_chunks(*call, executor=executor, workers=workers, progress=progress)
+        raw, stop = _in_chunks(call, executor=executor, workers=workers, progress=progress)
     shape = (len(bench_list), len(seeker_list), len(seed_list))
     dims = ("bench", "seeker", "seed")
     finished = raw.pop("finished").reshape(shape)
@@ -190,18 +189,13 @@ def _loops(
 
 
 def _in_chunks(
-    benches: Sequence[_Plant],
-    seekers: Sequence[_Seeker],
-    seeds: Sequence[int],
-    answers: Sequence[list[Said]],
-    goals: Sequence[Mapping[str, Any]],
-    cycles: int,
-    form: str,
+    call: tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]], int, str],
     *,
     executor: MakesExecutor | None,
     workers: int | None,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[dict[str, NDArray[Any]], Interrupted | WorkerLostError | None]:
+    benches, seekers, seeds, answers, goals, cycles, form = call
     # What does not fit is found by one cycle of every pair, before any work; whose cycles count is checked by a chunk.
     shown = [{**goal, "exceed_from": None} for goal in goals]
     columns, stop = or_partial(lambda: _loops(benches, seekers, seeds[:1], answers, shown, min(cycles, 1), form))
@@ -258,6 +252,9 @@ def _bare(seeker: _Seeker) -> _Seeker:
 
 def _whole_seeds(seeds: Iterable[int]) -> list[int]:
     try:
-        return [operator.index(seed) for seed in seeds]
+        whole = [operator.index(seed) for seed in seeds]
     except TypeError as error:
         raise ParameterError(f"seeds: must be whole numbers, for example range(20): {error}") from None
+    if wrong := [seed for seed in whole if not 0 <= seed < 2**64]:
+        raise ParameterError(f"seeds: {wrong[0]} must be in [0, 2**64)")
+    return whole

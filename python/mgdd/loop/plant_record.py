@@ -12,7 +12,6 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.loop.plant import Measurement
-from mgdd.loop.summary import noise_free_variable
 from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
@@ -48,17 +47,29 @@ def cycles_to_dataset(
         variables[name] = ("cycle", values, *OWN_LABELS.get(name, flag))
     variables["component"] = ("component", terms, "-", "term of the performance")
     variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
-    names = settings["limits"]
-    if names:
-        units = {name: label.units for name, label in VARIABLES.items()}
-        own = "unit of the limit"
-        variables["limit"] = ("limit", names, "-", "limited quantity")
-        variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)
-        variables["limits"] = (("cycle", "limit"), limits, own, "measured value of a limited quantity")
-        if noise_free_limits is not None:
-            variables["noise_free_limits"] = noise_free_variable(noise_free_limits)
-    out = labelled_dataset(variables, attrs={"seed": bench.seed, "nox_sensor": settings["nox_sensor"]})
-    return out.set_coords("limit_units") if names else out
+    attrs = {"seed": bench.seed, "nox_sensor": settings["nox_sensor"]}
+    return _with_limits(variables, settings["limits"], limits, noise_free_limits, attrs)
+
+
+def _with_limits(
+    variables: dict[str, tuple[Any, ...]],
+    names: Sequence[str],
+    measured: NDArray[np.float64],
+    noise_free: NDArray[np.float64] | None,
+    attrs: Mapping[str, Any] | None = None,
+) -> Dataset:
+    """Label cycles with their limited quantities, tables of cycle and limit."""
+    if not names:
+        return labelled_dataset(variables, attrs=attrs)
+    units = [VARIABLES[name].units if name in VARIABLES else _UNKNOWN for name in names]
+    over, own = ("cycle", "limit"), "unit of the limit"
+    variables["limit"] = ("limit", list(names), "-", "limited quantity")
+    variables["limit_units"] = ("limit", units, "-", own)
+    variables["limits"] = (over, measured, own, "measured value of a limited quantity")
+    if noise_free is not None:
+        text = "noise-free value of a limited quantity at the applied inputs"
+        variables["noise_free_limits"] = (over, noise_free, own, text)
+    return labelled_dataset(variables, attrs=attrs).set_coords("limit_units")
 
 
 def _unique(names: Sequence[str]) -> list[str]:
@@ -180,13 +191,5 @@ def dataset_of(cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapp
     width = cycles.components.shape[1]
     variables["component"] = ("component", np.arange(width), "-", "term of the performance")
     variables["components"] = (("cycle", "component"), cycles.components, "unit of J", "component of the performance")
-    if cycles.limits:
-        units = [VARIABLES[name].units if name in VARIABLES else _UNKNOWN for name in cycles.limits]
-        own, table = "unit of the limit", np.stack(list(cycles.limits.values()), axis=1)
-        variables["limit"] = ("limit", list(cycles.limits), "-", "limited quantity")
-        variables["limit_units"] = ("limit", units, "-", own)
-        variables["limits"] = (("cycle", "limit"), table, own, "measured value of a limited quantity")
-        if cycles.noise_free is not None:
-            variables["noise_free_limits"] = noise_free_variable(cycles.noise_free)
-    out = labelled_dataset(variables)
-    return out.set_coords("limit_units") if cycles.limits else out
+    table = np.stack([*cycles.limits.values()] or [cycles.j], axis=1)
+    return _with_limits(variables, list(cycles.limits), table, cycles.noise_free)

@@ -25,9 +25,8 @@ if TYPE_CHECKING:
 
     Point = tuple[float, ...] | NDArray[np.float64]
 
-_SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
-_SCAN_POINTS = {2: 31, 3: 13, 4: 7, 5: 5}  # per input, of several
+_SCAN_POINTS = {1: 161, 2: 31, 3: 13, 4: 7, 5: 5}  # per input
 _STARTS = 3
 _EDGE = 1e-6  # of the searched range, or of a limit
 
@@ -93,8 +92,8 @@ def find_optimum(
                 f"bounds: {name} = ({low:g}, {high:g}): must increase and lie in [{least:g}, {greatest:g}]"
             )
     caps = {limit.name: limit.upper - limit.margin for limit in kept}
-    search = _best_timing if len(bounds) == 1 else _best_of_several
-    best, free, curvature = search(quiet, caps, bounds)
+    best, free = _best(quiet, caps, bounds)
+    around = [_settled(quiet, (free[0] + away,))["j"] for away in (-_SECANT_CAD, 0.0, _SECANT_CAD) if len(bounds) == 1]
     at, limited = _settled(quiet, best), _limited(quiet, best)
     sides = _sides(limited, caps)
     early, late = (_limited(quiet, (best[0] + shift, *best[1:])) for shift in (-0.05, 0.05))
@@ -111,49 +110,14 @@ def find_optimum(
         active_limits=tuple(name for name, cap in caps.items() if sides[name] > cap - 1e-3 * max(1.0, abs(cap))),
         at_bound=min(edges) < 1e-3,
         bounds=dict(bounds),
-        curvature=curvature,
+        curvature=(around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2 if around else math.nan,
         free_inputs=dict(zip(bounds, map(float, free), strict=True)),
     )
 
 
-def _best_timing(
+def _best(
     quiet: VirtualEngine, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[Point, Point, float]:
-    """Give the best timing, that without limits, and the bend of J there."""
-    from scipy.optimize import brentq, minimize_scalar
-
-    low, high = bounds["soc_cad"]
-
-    def j(soc: float) -> float:
-        return float(_settled(quiet, (soc,))["j"])
-
-    def excess(soc: float) -> float:
-        now = _sides(_limited(quiet, (soc,)), caps)
-        return max((now[name] - limit for name, limit in caps.items()), default=-1.0)
-
-    def peak(a: float, b: float) -> float:
-        return float(minimize_scalar(lambda x: -j(x), bounds=(a, b), method="bounded", options={"xatol": 1e-4}).x)
-
-    grid = np.linspace(low, high, round((high - low) / _SCAN_CAD) + 1)
-    values = np.array([j(x) for x in grid])
-    top = int(np.argmax(values))
-    free = peak(grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)])
-    soc = free
-    if excess(free) > 0.0:
-        kept = np.array([excess(x) <= 0.0 for x in grid])
-        if not kept.any():
-            raise ConvergenceError(f"no soc_cad in [{low:g}, {high:g}] keeps {_said(caps)}: move a limit")
-        best = int(np.argmax(np.where(kept, values, -np.inf)))
-        step = 1 if grid[best] < free else -1
-        outside = grid[best + step] if abs(grid[best + step] - grid[best]) < abs(free - grid[best]) else free
-        soc = float(brentq(excess, grid[best], outside, xtol=1e-6)) if excess(outside) > 0.0 else float(grid[best])
-    around = [j(free - _SECANT_CAD), j(free), j(free + _SECANT_CAD)]
-    return (soc,), (free,), (around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2
-
-
-def _best_of_several(
-    quiet: VirtualEngine, caps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[Point, Point, float]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Give the best inputs and those without limits: a grid, then SLSQP from its best points."""
     low, span = np.array([b[0] for b in bounds.values()]), np.array([b[1] - b[0] for b in bounds.values()])
     uppers = np.array(list(caps.values()))
@@ -168,16 +132,26 @@ def _best_of_several(
 
     grid = np.array(list(itertools.product(np.linspace(0.0, 1.0, _SCAN_POINTS[low.size]), repeat=low.size)))
     values, least = np.array([j(z) for z in grid]), np.array([room(z).min(initial=1.0) for z in grid])
-    free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]])
+    free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]]) if low.size > 1 else _peak(j, grid, values)
     if room(free).min(initial=1.0) >= 0.0:
-        return low + free * span, low + free * span, math.nan
+        return low + free * span, low + free * span
     kept = np.flatnonzero(least >= 0.0)
     starts = grid[kept[np.argsort(-values[kept])[:_STARTS]]] if kept.size else grid[np.argsort(-least)[:_STARTS]]
     best = _climbed(j, room, starts)
     if room(best).min() < -_EDGE:
         asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
         raise ConvergenceError(f"no {asked} keeps {_said(caps)}: move a limit")
-    return low + best * span, low + free * span, math.nan
+    return low + best * span, low + free * span
+
+
+def _peak(j: Any, grid: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the best of one input beside the best of its grid, without slopes: J may have small jumps, as NOx has."""
+    from scipy.optimize import minimize_scalar
+
+    top = int(values.argmax())
+    ends = grid[max(top - 1, 0), 0], grid[min(top + 1, len(grid) - 1), 0]
+    found = minimize_scalar(lambda z: -j(np.array([z])), bounds=ends, method="bounded", options={"xatol": 2.5e-6})
+    return np.array([found.x])
 
 
 def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float64]:

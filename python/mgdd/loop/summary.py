@@ -187,11 +187,6 @@ def with_a_limit(raw: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]
     return {key: value for key, value in raw.items() if key not in free}
 
 
-def noise_free_variable(table: NDArray[np.float64]) -> tuple[Any, ...]:
-    """Label limited quantities at the applied inputs without scatter and noise."""
-    return (("cycle", "limit"), table, _OWN, "noise-free value of a limited quantity at the applied inputs")
-
-
 def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
     return float(part.sum() / whole.sum()) if whole.any() else math.nan
 

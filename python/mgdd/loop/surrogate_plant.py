@@ -99,8 +99,9 @@ class SurrogatePlant:
         self._weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         if not self._weights:
             raise ParameterError("objective = {}: must name at least one signal")
-        self._limits, self._inputs, signals = tuple(limit_names_of(limits)), tuple(inputs), list(surrogate.signals)
-        for what, names in (("objective", self._weights), ("limits", [n for n in self._limits if n != _LEVERAGE])):
+        self.input_names, self.limit_names = tuple(inputs), tuple(limit_names_of(limits))
+        signals = list(surrogate.signals)
+        for what, names in (("objective", self._weights), ("limits", [n for n in self.limit_names if n != _LEVERAGE])):
             if unknown := [name for name in names if name not in signals]:
                 raise ParameterError(f"{what}: {unknown[0]!r} is not a signal: must be one of {signals}")
         known = tuple(surrogate.support.inputs)
@@ -129,19 +130,9 @@ class SurrogatePlant:
         self._sensor = steady.copy()
         self._row = self._left = self._cycles = 0
 
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the steered inputs."""
-        return self._inputs
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limited signals."""
-        return self._limits
-
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the injection of the next cycle."""
-        self._applied = checked_inputs(inputs, self._inputs)
+        self._applied = checked_inputs(inputs, self.input_names)
 
     def measure(self) -> Measurement:
         """Run one cycle at the inputs applied last.
@@ -155,16 +146,16 @@ class SurrogatePlant:
         if self._applied is None:
             raise RigError("measure() before apply(): apply the inputs first")
         soi, *others = self._applied
-        reading = self.step(soi, dict(zip(self._inputs[1:], others, strict=True)))
+        reading = self.step(soi, dict(zip(self.input_names[1:], others, strict=True)))
         support, point = self.surrogate.support, self._point_applied
         applied = dict(zip(support.inputs, point.tolist(), strict=True)) if self._outside == "clamp" else {}
         known = {**reading, _LEVERAGE: float(support.leverage(point[None])[0]) / support.leverage_limit}
         return Measurement(
             components=tuple(weight * float(reading[name]) for name, weight in self._weights.items()),
-            limits={name: float(known[name]) for name in self._limits},
+            limits={name: float(known[name]) for name in self.limit_names},
             values={name: float(value) for name, value in reading.items()},
-            noise_free_limits={name: self._noise_free.get(name, known[name]) for name in self._limits},
-            applied={name: value for name, value in applied.items() if name in self._inputs},
+            noise_free_limits={name: self._noise_free.get(name, known[name]) for name in self.limit_names},
+            applied={name: value for name, value in applied.items() if name in self.input_names},
         )
 
     def step(self, soi_cad: float, at: Mapping[str, float] | None = None) -> dict[str, float | bool]:

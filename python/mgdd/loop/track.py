@@ -38,7 +38,7 @@ _CORE = (_core.control.GuidedPredictive, _core.control.Pid, _core.control.Slidin
 class AngleController(Protocol):
     """A controller of the plate: any object with this method."""
 
-    def step(self, reference_deg: float, measurement_deg: float) -> float:
+    def step(self, reference_deg: float, measurement_deg: float, /) -> float:
         """Give the duty of this sample."""
         ...
 
@@ -127,7 +127,7 @@ def track(
     if inner is not None:
         run = _core.loop.track_throttle(
             inner,
-            plant._core,
+            plant,
             delay_samples=delay_samples,
             reference_deg=wanted.angle_deg,
             airflow_torque_nm=airflow,
@@ -224,7 +224,7 @@ def _run_in_python(
     measured = plant.start_deg
     for k, wanted in enumerate(reference_deg):
         out["duty"][k] = controller.step(float(wanted), measured)
-        values = plant._core.step(
+        values = plant.step(
             duty=out["duty"][k - delay_samples] if k >= delay_samples else 0.0,
             supply_v=supply[k] if len(supply) else still["supply_v"],
             airflow_torque_nm=airflow[k] if len(airflow) else 0.0,

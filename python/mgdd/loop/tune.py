@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted, ParameterError, WorkerLostError
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop.controller_families import Setup, groups_of
 from mgdd.loop.many_tracks import track_many
 from mgdd.loop.reference import Reference
 from mgdd.loop.tuned import family_of, shipped_numbers
 from mgdd.parallel.finished import hand_over
-from mgdd.parallel.pool import MakesExecutor, Pool
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.results.result import NumbersResult
 
@@ -118,9 +116,7 @@ def tune_controller(
     seed: int = 0,
     delay_samples: int = 1,
     noise_deg: float = 0.03,
-    executor: MakesExecutor | None = None,
     workers: int | None = None,
-    progress: Callable[[int, float], None] | None = None,
 ) -> Tuning:
     """Tune a kind of controller for throttles around one; it knows that one only.
 
@@ -141,11 +137,8 @@ def tune_controller(
         Of throttles, noise and search.
     delay_samples, noise_deg : int, float
         As for `track_many`.
-    executor, workers
-        As in `mgdd.parallel.map_items`, for the runs of a set: threads on all cores if left out. The numbers do not
-        depend on them.
-    progress : callable, optional
-        Called with the number of runs and the least cost so far.
+    workers : int, optional
+        As for `track_many`.
 
     Returns
     -------
@@ -157,8 +150,8 @@ def tune_controller(
     ------
     mgdd.errors.ParameterError
         An unknown kind or a budget below 30.
-    mgdd.errors.WorkerLostError, mgdd.errors.Interrupted
-        A lost worker, Ctrl-C; ``partial`` is the Tuning of the sets that were run to the end, None where none was.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the Tuning of the sets that were run to the end, None where none was.
 
     Examples
     --------
@@ -190,25 +183,18 @@ def tune_controller(
             delay_samples=delay_samples,
             noise_deg=noise_deg,
             first_seed=seed,
-            executor=pool,
             workers=workers,
         )
         outside = float(np.abs(np.asarray(shares, float) - inside).sum())
         cost = tracking_cost(runs.isel(controller=0)) + 10.0 * outside
         seen.append((cost, tuple(map(float, inside))))
-        if progress is not None:
-            progress(len(seen), min(seen)[0])
         return cost
 
-    stop: Interrupted | WorkerLostError | None = None
-    start = _shares(family.space, shipped_numbers(kind, groups))
-    with nullcontext() if executor is None else Pool(executor, workers) as pool:
-        try:
-            _search(cost_of, start, budget, seed, seen)
-        except WorkerLostError as lost:
-            stop = lost
-        except KeyboardInterrupt:
-            stop = Interrupted(f"interrupted: {len(seen)} of {budget} sets were run, the best is in .partial")
+    stop: Interrupted | None = None
+    try:
+        _search(cost_of, _shares(family.space, shipped_numbers(kind, groups)), budget, seed, seen)
+    except KeyboardInterrupt:
+        stop = Interrupted(f"interrupted: {len(seen)} of {budget} sets were run, the best is in .partial")
     if stop is not None and not seen:
         stop.partial = None  # the runs of half a set are not a tuning
         raise stop

@@ -296,8 +296,9 @@ class VirtualEngine(_core.loop.VirtualEngine):
         Optimum
             Input ``soc_cad``, to about 0.001 CAD, and the others; objective ``j``. ``values`` holds the indicators
             there and, for every limited one, ``scatter_NAME``: the standard deviation from cycle to cycle that the
-            scatter of SOC causes, to first order, in its unit. The curvature is taken over ±3 CAD at the free optimum;
-            of several inputs it is NaN, and the optimum is sought by a grid and from its best points by SLSQP.
+            scatter of SOC causes, to first order, in its unit. The optimum is sought by a grid, then beside its best
+            point or, of several inputs and under limits, from its best points by SLSQP. The curvature is taken over
+            ±3 CAD at the free optimum; of several inputs it is NaN.
 
         Raises
         ------

@@ -15,7 +15,7 @@ from mgdd.throttle.faults import ThrottleFault, fault_pair
 _INPUTS = ("duty", "supply_v", "airflow_torque_nm", "bridge_open")
 
 
-class VirtualThrottle:
+class VirtualThrottle(_core.loop.VirtualThrottle):
     """An electronic throttle sample by sample, with both position sensors, their noise, and faults of every part.
 
     Parameters
@@ -54,6 +54,8 @@ class VirtualThrottle:
     (33.6, True)
     """
 
+    limit_names: tuple[str, ...] = ()
+
     def __init__(
         self,
         throttle: ThrottleLike | None = None,
@@ -73,13 +75,13 @@ class VirtualThrottle:
             raise ParameterError.of("seed", seed, "in [0, 2**64)")
         self.throttle = Throttle() if throttle is None else throttle_of(throttle)
         self.sample_s = sample_s
-        self._inputs = tuple(inputs)
+        self.input_names = tuple(inputs)
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._given: dict[str, Any] = {
             "throttle": self.throttle,
-            "inputs": self._inputs,
+            "inputs": self.input_names,
             "sensors": sensors or SensorPair(),
             "faults": tuple(faults),
             "start_deg": self.start_deg,
@@ -88,7 +90,7 @@ class VirtualThrottle:
             "bridge": bridge,
             "seed": seed,
         }
-        self._core = _core.loop.VirtualThrottle(
+        super().__init__(
             throttle=self.throttle,
             sensors=self._given["sensors"],
             faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
@@ -103,26 +105,6 @@ class VirtualThrottle:
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self._given, self.state, self._applied)
 
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the applied inputs."""
-        return self._inputs
-
-    @property
-    def limit_names(self) -> tuple[str, ...]:
-        """No limited quantities."""
-        return ()
-
-    @property
-    def state(self) -> dict[str, list[float]]:
-        """What a run needs to go on bit for bit, as lists of numbers; setting it restores the run."""
-        columns: dict[str, list[float]] = self._core.state
-        return columns
-
-    @state.setter
-    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
-        self._core.state = {name: list(values) for name, values in saved.items()}
-
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.
 
@@ -131,8 +113,8 @@ class VirtualThrottle:
         inputs : mapping of str to float
             One number per name of `input_names`; a duty is clipped to -1..1.
         """
-        values = checked_inputs(inputs, self._inputs)
-        self._applied = {**self._still, **dict(zip(self._inputs, values, strict=True))}
+        values = checked_inputs(inputs, self.input_names)
+        self._applied = {**self._still, **dict(zip(self.input_names, values, strict=True))}
 
     def measure(self) -> Measurement:
         """Run one sample under the inputs applied last, and read the sensors at its end.
@@ -147,7 +129,7 @@ class VirtualThrottle:
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
         applied = self._applied
-        reading = self._core.step(
+        reading = self.step(
             duty=applied["duty"],
             supply_v=applied["supply_v"],
             airflow_torque_nm=applied["airflow_torque_nm"],

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from mgdd import _core
 from mgdd.optimize.seeker import Seeker
 
@@ -90,8 +88,6 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     400
     """
 
-    kind: ClassVar[str] = "ExtremumSeeking"
-
 
 class Spsa(Seeker, _core.optimize.Spsa):
     """Simultaneous perturbation: the slope in every direction from two measurements.
@@ -165,8 +161,6 @@ class Spsa(Seeker, _core.optimize.Spsa):
     True
     """
 
-    kind: ClassVar[str] = "Spsa"
-
 
 class GradientDescent(Seeker, _core.optimize.GradientDescent):
     """Gradient steps by two-sided differences, two cycles per input and step.
@@ -219,8 +213,6 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
     (4, -5.0)
     """
 
-    kind: ClassVar[str] = "GradientDescent"
-
 
 class GoldenSection(Seeker, _core.optimize.GoldenSection):
     """Golden-section search of one input that trusts a comparison only beyond the noise.
@@ -269,5 +261,3 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     >>> seeker.cycle, round(float(seeker.estimate[0]), 2)
     (17, -5.6)
     """
-
-    kind: ClassVar[str] = "GoldenSection"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,6 +73,16 @@ def with_inputs(settings: Mapping[str, Any]) -> dict[str, Any]:
         for name, value in settings.items()
     }
     return {**own, "inputs": list(inputs)}
+
+
+def by_name_or_number(function: Callable[..., Any], inputs: Mapping[str, float]) -> tuple[Any, bool]:
+    """Call a function with its inputs by name, else as plain numbers, and say whether it took numbers."""
+    try:
+        return function(inputs), False
+    except TypeError:
+        with contextlib.suppress(TypeError):
+            return function(*inputs.values()), True
+        raise
 
 
 def unit_of_input(given: Input) -> str:

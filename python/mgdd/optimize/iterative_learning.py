@@ -77,7 +77,7 @@ class ConvergenceReport(NumbersResult):
         return f"<ConvergenceReport {self.sentence}>"
 
 
-class IterativeLearning:
+class IterativeLearning(_core.optimize.IterativeLearning):
     """Learn the input trajectory of a task that is repeated trial by trial.
 
     Ask for the input of the trial, apply it, return the error ``e = r - y`` (`tell`); sample t of both belongs to the
@@ -198,7 +198,7 @@ class IterativeLearning:
             "rate": np.inf if rate is None else rate,
             "guard": guard,
         }
-        self._core = _core.optimize.IterativeLearning(**self._settings)
+        super().__init__(**self._settings)
         self._report: ConvergenceReport | None = None
         if self._settings["impulse_response"].size and not self.convergence().asymptotic:
             warnings.warn(f"law {law!r} {self.convergence().sentence}", UserWarning, stacklevel=3)
@@ -211,7 +211,7 @@ class IterativeLearning:
         ndarray, shape (N,)
             A copy. Asking again before `tell` gives the same.
         """
-        return self._core.ask()
+        return super().ask()
 
     def tell(self, error: ArrayLike) -> None:
         """Learn from the error of this trial.
@@ -232,9 +232,9 @@ class IterativeLearning:
             beyond the range of a float.
             As after every refusal, the learner is as it was.
         """
-        self._core.tell(_column(error, "error"))
+        super().tell(_column(error, "error"))
 
-    def convergence(self) -> ConvergenceReport:
+    def convergence(self) -> ConvergenceReport:  # type: ignore[override]
         """Judge the law on its model, before the first trial or after any.
 
         Returns
@@ -254,36 +254,16 @@ class IterativeLearning:
         no error remains
         """
         if self._report is None:
-            found = self._core.convergence()
+            found = super().convergence()
             if found["limit_error_map"] is not None:
                 found["limit_error_map"].flags.writeable = False
             self._report = ConvergenceReport(**found)
         return self._report
 
     @property
-    def trial(self) -> int:
-        """Number of the trial to come; trials count from 0."""
-        return self._core.trial
-
-    @property
-    def relative_degree(self) -> int:
-        """Samples m until an input acts."""
-        return self._core.relative_degree
-
-    @property
-    def frozen(self) -> bool:
-        """Whether the guard has stopped learning; every further trial repeats `best_input`."""
-        return self._core.frozen
-
-    @property
-    def best_trial(self) -> int | None:
+    def best_trial(self) -> int | None:  # type: ignore[override]
         """Trial of the least error norm, None before the first."""
-        return self._core.best_trial if self._core.trial else None
-
-    @property
-    def best_input(self) -> NDArray[np.float64]:
-        """Its input, shape (N,); the initial one before the first."""
-        return self._core.best_input
+        return super().best_trial if self.trial else None
 
     @property
     def history(self) -> xr.Dataset:
@@ -291,7 +271,7 @@ class IterativeLearning:
 
         The 2-norm is taken over the errors that inputs reach.
         """
-        norms = self._core.error_norms
+        norms = self.error_norms
         return labelled_dataset(
             {
                 "trial": ("trial", np.arange(self.trial - norms.size, self.trial), "-", "trial"),
@@ -300,27 +280,27 @@ class IterativeLearning:
             attrs={"law": self._settings["law"]},
         )
 
-    @property
+    @property  # type: ignore[override]
     def state(self) -> dict[str, list[float]]:
         """Numbers by name, fit for JSON; set them to go on bit for bit, in a learner of the same settings.
 
         Setting raises ParameterError or ShapeError for names, lengths or values that cannot be, and changes nothing
         then.
         """
-        return self._core.state()
+        return super().state()
 
     @state.setter
     def state(self, state: Mapping[str, ArrayLike]) -> None:
         if not isinstance(state, Mapping):
             raise ParameterError(f"state is a {type(state).__name__}: must be a mapping of names to columns")
-        self._core.restore({str(name): _column(column, f"state {name!r}").tolist() for name, column in state.items()})
+        self.restore({str(name): _column(column, f"state {name!r}").tolist() for name, column in state.items()})
 
     def __getstate__(self) -> dict[str, Any]:
         return {"settings": self._settings, "state": self.state}
 
     def __setstate__(self, pickled: dict[str, Any]) -> None:
         self._settings = pickled["settings"]
-        self._core = _core.optimize.IterativeLearning(**self._settings)
+        super().__init__(**self._settings)
         self._report = None
         self.state = pickled["state"]
 

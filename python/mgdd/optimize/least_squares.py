@@ -36,11 +36,7 @@ def least_squares(
     data: ArrayLike | None = None,
     max_iterations: int = 200,
     cost_tolerance: float = 1e-12,
-    step_tolerance: float = 1e-10,
-    gradient_tolerance: float = 1e-12,
-    initial_damping: float = 1e-3,
     correlation_limit: float = 0.98,
-    rank_tolerance: float = 1e-10,
 ) -> FitReport:
     """Minimise half the sum of squares of a residual with an exact Jacobian.
 
@@ -65,16 +61,10 @@ def least_squares(
         What the residual compares with, in its unit; gives `FitReport.nrmse_fit_percent`.
     max_iterations : int
         Trial steps.
-    cost_tolerance, step_tolerance : float
-        Relative change of the cost, and scaled step over scaled parameters, that count as none [-].
-    gradient_tolerance : float
-        Cosine between the residual and a free Jacobian column that counts as zero [-].
-    initial_damping : float
-        Relative to Jacobian columns of unit length [-].
+    cost_tolerance : float
+        Relative change of the cost that counts as none [-].
     correlation_limit : float
         Absolute correlation beyond which two parameters are reported as unidentifiable [-].
-    rank_tolerance : float
-        Singular value of the column-scaled Jacobian, relative to the largest, that counts as zero [-].
 
     Returns
     -------
@@ -117,13 +107,7 @@ def least_squares(
         for name, low, high, log in zip(names, lowers.tolist(), uppers.tolist(), logs.tolist(), strict=True)
     ]
     options = LeastSquaresOptions(
-        max_iterations=max_iterations,
-        cost_tolerance=cost_tolerance,
-        step_tolerance=step_tolerance,
-        gradient_tolerance=gradient_tolerance,
-        initial_damping=initial_damping,
-        correlation_limit=correlation_limit,
-        rank_tolerance=rank_tolerance,
+        max_iterations=max_iterations, cost_tolerance=cost_tolerance, correlation_limit=correlation_limit
     )
     measured = None if data is None else _vector(data, "data")
     return FitReport.from_core(

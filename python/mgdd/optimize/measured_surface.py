@@ -165,13 +165,11 @@ def _richer(x: Array, y: Array) -> tuple[Array, int] | None:
             continue
         u = _scaled(x)[0]
         single = [np.polynomial.chebyshev.chebvander(column, degree) for column in u.T]
-        design = single[0]
-        if x.shape[1] > 1:
-            design = np.column_stack(
-                [np.prod([one[:, power] for one, power in zip(single, own, strict=True)], axis=0) for own in powers]
-            )
-            if np.linalg.cond(design) > _ILL:
-                continue
+        design = np.column_stack(
+            [np.prod([one[:, power] for one, power in zip(single, own, strict=True)], axis=0) for own in powers]
+        )
+        if x.shape[1] > 1 and np.linalg.cond(design) > _ILL:
+            continue
         return y.mean() + design @ np.linalg.lstsq(design, y - y.mean(), rcond=None)[0], y.size - len(powers)
     return None
 

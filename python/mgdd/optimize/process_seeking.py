@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from mgdd import _core
 from mgdd._core.optimize import Surface
 from mgdd.errors import Error, ParameterError, ShapeError
+from mgdd.optimize.inputs import by_name_or_number
 from mgdd.optimize.seeker import Seeker
 
 _NODES = {1: 41, 2: 17, 3: 11, 4: 7, 5: 5}  # per input: 5 inputs are asked for 3,125 times
@@ -54,23 +54,12 @@ def _asked(guide: Callable[[Any], Any], names: Sequence[str], point: Sequence[fl
     at: Any = dict(zip(names, map(float, point), strict=True)) if names else np.asarray(point, np.float64)
     where = ", ".join(f"{name} = {value:.6g}" for name, value in at.items()) if names else f"{at}"
     try:
-        value = float(_called(guide, at))
+        value = float(by_name_or_number(guide, at)[0] if names else guide(at))
     except (Error, ArithmeticError, LookupError, TypeError, ValueError) as error:
         raise ParameterError(f"{argument} fails at {where}: {error}") from error
     if not math.isfinite(value):
         raise ParameterError(f"{argument} gives {value} at {where}: it must be finite between the bounds; narrow them")
     return value
-
-
-def _called(guide: Callable[..., Any], at: Any) -> Any:
-    """Call a guide with its inputs by name or, like a plant, as plain numbers in their order."""
-    try:
-        return guide(at)
-    except TypeError:
-        if isinstance(at, dict):
-            with contextlib.suppress(TypeError):
-                return guide(*at.values())
-        raise
 
 
 def _of_map(guide: Any, names: Sequence[str], argument: str) -> Any:
@@ -226,8 +215,6 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     True
     """
 
-    kind: ClassVar[str] = "GaussianProcessSeeking"
-
     def ask(self, n: int | None = None) -> Any:
         """Give the input of the next cycle, or of several that a bench measures in parallel.
 
@@ -280,9 +267,10 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
                 0.0, [limit.upper - abs(limit.upper) for limit in self.settings["limits"]] or None, applied=applied
             )
             return
-        near = np.flatnonzero(fired)[
-            np.argmin(np.linalg.norm((told["applied"] - at)[fired] / np.ptp(_bounds(self), axis=1), axis=1))
-        ]
+        own = self.settings
+        bounds = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
+        away = np.linalg.norm((told["applied"] - at)[fired] / np.ptp(bounds, axis=1), axis=1)
+        near = np.flatnonzero(fired)[np.argmin(away)]
         j = float(self.expected) if self.expected_sd > 0.0 else float(told["objective"][near])
         self.tell(j, told["limits"][near].tolist() or None, applied=applied)
 
@@ -304,9 +292,3 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
 
     def _prepared(self, settings: dict[str, Any]) -> dict[str, Any]:
         return with_guides(settings)
-
-
-def _bounds(seeker: GaussianProcessSeeking) -> Any:
-    own = seeker.settings
-    pairs = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
-    return np.array(pairs, np.float64)

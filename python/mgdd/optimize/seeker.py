@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
+_RECORDS: dict[str, type[Any]] = {
+    "component_lag": _core.optimize.ComponentLag, "limit": _core.optimize.Limit, "input": _core.optimize.Input,
+}  # fmt: skip
 
 
 class Seeker(SeekerFindings):
@@ -68,6 +71,8 @@ class Seeker(SeekerFindings):
         core = next((base for base in cls.__mro__[1:] if base.__module__.startswith("mgdd._core")), None)
         if core is not None:
             cls.__signature__ = inspect.signature(core)  # type: ignore[attr-defined]
+        if Seeker in cls.__bases__:
+            cls.kind = cls.__name__
 
     if not TYPE_CHECKING:  # the constructors of the core say what they take
 
@@ -274,13 +279,8 @@ def _encode(value: Any) -> Any:
     """JSON has no infinities and no objects: both become tagged mappings."""
     if isinstance(value, float) and not math.isfinite(value):
         return {"number": repr(value)}
-    if isinstance(value, _core.optimize.ComponentLag):
-        return {"component_lag": {"delay_cycles": value.delay_cycles, "lag_cycles": value.lag_cycles}}
-    if isinstance(value, _core.optimize.Limit):
-        own = "name upper margin method weight scale delay_cycles lag_cycles margin_sd delay_uncertainty"
-        return {"limit": {name: getattr(value, name) for name in own.split()}}
-    if isinstance(value, _core.optimize.Input):
-        return {"input": _encode(value.to_dict())}
+    if tag := next((tag for tag, kind in _RECORDS.items() if isinstance(value, kind)), ""):
+        return {tag: _encode(value.to_dict())}
     if isinstance(value, _core.guide.Curve):
         return {"curve": value._table}
     if isinstance(value, _core.optimize.Surface):
@@ -293,16 +293,13 @@ def _encode(value: Any) -> Any:
 
 
 def _decode(item: dict[str, Any]) -> Any:
-    if set(item) == {"number"}:
+    tag = next(iter(item)) if len(item) == 1 else ""
+    if tag == "number":
         return float(item["number"])
-    if set(item) == {"component_lag"}:
-        return _core.optimize.ComponentLag(**item["component_lag"])
-    if set(item) == {"limit"}:
-        return _core.optimize.Limit(**item["limit"])
-    if set(item) == {"input"}:
-        return _core.optimize.Input(**item["input"])
-    if set(item) == {"curve"}:
+    if tag in _RECORDS:
+        return _RECORDS[tag](**item[tag])
+    if tag == "curve":
         return _core.guide.Curve._of_table(item["curve"])
-    if set(item) == {"surface"}:
+    if tag == "surface":
         return _core.optimize.Surface(*item["surface"])
     return item

@@ -9,7 +9,7 @@ import numpy as np
 from mgdd.results.finding import Finding
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -81,39 +81,30 @@ class SeekerFindings(_CoreSeeker):
         >>> [finding.code for finding in seeker.findings], float(history["applied"][-1, 0]) <= 3.0
         (['failing_inputs'], True)
         """
-        return findings_of(self.settings, **self._watched)
+        return findings_of(self.settings, self._watched)
 
 
-def findings_of(
-    settings: Mapping[str, Any],
-    *,
-    cycle: int,
-    misfires: int,
-    failing_above: NDArray[np.float64],
-    failing_below: NDArray[np.float64],
-    failing_everywhere: bool,
-    limit_delays: Mapping[str, float],
-    alike: Sequence[float],
-    applied_share: NDArray[np.float64],
-) -> tuple[Finding, ...]:
-    """Put into words what a seeker has seen."""
+def findings_of(settings: Mapping[str, Any], watched: Mapping[str, Any]) -> tuple[Finding, ...]:
+    """Put into words what a seeker of the core has seen."""
     out = list[Finding]()
-    if failing_everywhere:
+    if watched["failing_everywhere"]:
         text = "the last twelve cycles and more have failed, of every input that was tried"
         out.append(Finding("failing_everywhere", (), text, "look at the plant, or start where it is known to run"))
-    for side, edges in (("above", failing_above), ("below", failing_below)):
+    for side in ("above", "below"):
+        edges = watched[f"failing_{side}"]
         for index in np.flatnonzero(np.isfinite(edges)):
             name, edge = _name(settings, int(index)), float(edges[index])
             text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
             remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
             out.append(Finding("failing_inputs", (name,), text, remedy))
+    cycle, misfires, alike = watched["cycle"], watched["misfires"], watched["alike"]
     if not out and misfires >= max(4, 0.1 * cycle):
         text = f"{misfires} of {cycle} cycles gave no reading: J is learnt from the others"
         out.append(
             Finding("failing_cycles", (), text, "mend what makes them fail, or set bounds inside of where they do")
         )
     for limit in settings["limits"]:
-        taken = limit_delays[limit.name]
+        taken = watched["limit_delays"][limit.name]
         if taken != limit.delay_cycles:
             text = f"readings of {limit.name} fit a delay of {taken:g} cycles, not {limit.delay_cycles:g} as stated"
             at_end = abs(taken - limit.delay_cycles) >= limit.delay_uncertainty
@@ -126,9 +117,10 @@ def findings_of(
         if count >= _FROZEN:
             text = f"{name} read the same to the last bit in {count:.0f} cycles in a row, at different inputs"
             out.append(Finding("frozen", (name,), text, "look at what measures it, or whether it is read at all"))
-    for index in np.flatnonzero(applied_share < _FOLLOWED):
+    share = watched["applied_share"]
+    for index in np.flatnonzero(share < _FOLLOWED):
         name = _name(settings, int(index))
-        text = f"{applied_share[index]:.0%} of the moves of {name} that were asked for are applied"
+        text = f"{share[index]:.0%} of the moves of {name} that were asked for are applied"
         remedy = "look at the actuator: a stop, a lag or coarse steps; set bounds inside of a stop"
         out.append(Finding("not_followed", (name,), text, remedy))
     return tuple(out)

@@ -323,28 +323,13 @@ def tune(
     """
     hessian, names = hessian_of(curvature, inputs)
     lengths = {"rms": rms, "distance": distance, "arrival": arrival, "amplitude_max": amplitude_max}
-    lengths = {name: named_values(name, value, names) for name, value in lengths.items()}
-    how: dict[str, Any] = {
-        "method": method,
-        "delay_cycles": delay_cycles,
-        "lag_cycles": lag_cycles,
-        "compensated": compensated,
-        "delay_uncertainty": delay_uncertainty,
-        "cycles": cycles,
-    }
+    lag: dict[str, Any] = {"delay_cycles": delay_cycles, "lag_cycles": lag_cycles, "compensated": compensated}
     check_wish(noise_sd, method, delay_uncertainty, cycles)
     several, of = np.ndim(hessian) > 0, of_each(np.atleast_2d(hessian), names)
-    each = {name: per_input(name, value, of) for name, value in lengths.items()}
-    values = tuned(noise_sd, np.atleast_2d(hessian), of, lengths=each, **how)
+    each = {name: per_input(name, named_values(name, value, names), of) for name, value in lengths.items()}
+    wanted: dict[str, Any] = {"method": method, "delay_uncertainty": delay_uncertainty, "cycles": cycles}
+    values = tuned(noise_sd, np.atleast_2d(hessian), of, lengths=each, **wanted, **lag)
     if not several:
         del values["harmonics"]
         values = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-    return Tuning(
-        **values,
-        noise_sd=noise_sd,
-        curvature=hessian,
-        delay_cycles=delay_cycles,
-        lag_cycles=lag_cycles,
-        compensated=compensated,
-        inputs=names,
-    )
+    return Tuning(**values, **lag, noise_sd=noise_sd, curvature=hessian, inputs=names)

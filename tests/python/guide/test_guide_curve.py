@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import LoopCriteria, Measurement, VirtualEngine, monte_carlo, run_seeker
-from mgdd.optimize import ExtremumSeeking, Limit, Seeker
+from mgdd.loop import Measurement, VirtualEngine, run_seeker
+from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.rig import SimulatedRig
 
 PLANT_BEST_CAD = -5.63
@@ -85,22 +83,6 @@ def test_what_cannot_be_sought_is_refused(spoilt: dict[str, Any], said: str) -> 
         seeking(**spoilt)
 
 
-def test_it_arrives_goes_on_from_a_file_and_from_a_pickle(tmp_path: Path) -> None:
-    seeker = seeking(limits=[Limit("p_max_bar", 150.0)], delay_cycles=2)
-    for _ in range(20):
-        x = float(seeker.ask()[0])
-        seeker.tell(-0.0255 * (x + 6.0) ** 2, [100.0 - 3.0 * x])
-    seeker.save(tmp_path / "seeker.json")
-    others = [Seeker.load(tmp_path / "seeker.json"), pickle.loads(pickle.dumps(seeker)), copy.deepcopy(seeker)]
-    for one in others:
-        assert isinstance(one, CurveSeeking)
-        assert one.state == seeker.state
-    assert others[1].history.identical(seeker.history)
-    assert seeker.limit_states == {"p_max_bar": "free"}
-    with pytest.raises(DataError, match="holds a CurveSeeking, not a"):
-        ExtremumSeeking.load(tmp_path / "seeker.json")
-
-
 def test_a_state_that_would_scale_j_by_nothing_is_refused() -> None:
     seeker = seeking()
     before = seeker.state
@@ -116,25 +98,6 @@ def test_a_new_curve_keeps_the_error_of_the_old_one() -> None:
     assert seeker.guide(parabola(-2.0))
     assert seeker.estimate[0] == pytest.approx(-2.0 + error)
     assert not seeker.guide(parabola(40.0))
-
-
-@pytest.mark.parametrize("guide", [{"wall_heat_scale": 0.65}, {"wall_heat_scale": 0.0}, {"wall_heat_scale": 1.0}])
-@pytest.mark.parametrize("start", [None, -20.0])
-def test_a_rough_model_is_enough(guide: dict[str, float], start: float | None) -> None:
-    """Medians of 40 runs; the study has 200 and the table."""
-    bench = VirtualEngine()
-    curve = ModelOptimum(Cylinder(**guide)).curve(bench.point)
-    assert curve is not None
-    seeker = CurveSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0, curve=curve)
-    table = monte_carlo(
-        bench, seeker, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5)
-    )
-    stays = np.nan_to_num(table["cycles_stays"].to_numpy(), nan=400.0)
-    assert np.median(stays) <= 25.0
-    assert float(table["rms_soc_cad"].mean()) < 0.5
-    plain = ExtremumSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0)
-    slow = monte_carlo(bench, plain, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5))
-    assert float(table["rms_soc_cad"].mean()) < float(slow["rms_soc_cad"].mean())
 
 
 def test_limits_by_the_guides_curves_are_kept_while_it_arrives() -> None:
@@ -215,18 +178,6 @@ def test_a_rig_and_the_bench_go_the_same_way(plain: bool) -> None:
         third = guided(VirtualEngine(schedule=schedule), plain=plain)
         run_seeker(rig, third, 90)
     assert third.history["estimate"][:, 0].equals(one.history["estimate"][:, 0])
-
-
-def test_a_guided_engine_is_pickled_and_goes_on() -> None:
-    bench = VirtualEngine(seed=2)
-    engine = guided(bench)
-    run_seeker(bench, engine, 30)
-    again, same = pickle.loads(pickle.dumps(engine)), copy.deepcopy(bench)
-    assert again.history.identical(engine.history)
-    run_seeker(bench, engine, 20)
-    run_seeker(same, again, 20)
-    assert again.state == engine.state
-    assert "GuidedEngine with CurveSeeking, cycle 50" in repr(again)
 
 
 def test_a_point_without_a_best_timing_is_refused_and_the_run_goes_on() -> None:

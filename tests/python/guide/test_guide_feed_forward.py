@@ -163,19 +163,6 @@ def test_small_changes_are_followed_and_calibrations_move_nothing() -> None:
     assert ff.estimate[0] == pytest.approx(before)
 
 
-def test_noise_of_the_operating_point_is_filtered() -> None:
-    spread = []
-    for share in (1.0, 0.2):
-        rng = np.random.default_rng(5)
-        ff = FeedForward(ExtremumSeeking(**SPACE), lambda fuel: -0.35 * fuel, following_share=share)
-        for _ in range(2000):
-            ff.at(20.0 + 0.2 * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
-            ff.tell(plant(float(ff.ask()[0]), -7.0))
-        spread.append(float(np.std(ff.history["feed_forward"].to_numpy()[100:])))
-        assert (ff.history["point"] == 1).all()
-    assert spread[1] / spread[0] == pytest.approx(math.sqrt(0.2 / 1.8), rel=0.1)
-
-
 def test_history_says_what_came_from_the_guide_and_what_from_the_trim() -> None:
     rng = np.random.default_rng(3)
     ff = FeedForward(ExtremumSeeking(**SPACE), lambda fuel: curved(-0.35 * fuel + 1.0), noise_sd=0.25)

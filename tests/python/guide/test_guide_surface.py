@@ -11,7 +11,6 @@ import pytest
 import xarray as xr
 
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.loop import seek
 from mgdd.optimize import ComponentLag, GaussianProcessSeeking, Seeker
 from mgdd.surrogate import fit_response
 
@@ -100,12 +99,6 @@ def test_inputs_without_names_and_components() -> None:
     assert seeker.estimate[0] == pytest.approx(-4.0, abs=1.0)
     assert seeker.estimate[1] == pytest.approx(0.2, abs=0.02)
     assert seeker.delay_cycles == [0.0, 3.0]
-
-
-def test_seek_takes_it() -> None:
-    found = seek(plant, BOUNDS, start=START, cycles=30, guide=guide, seed=1)
-    assert found.inputs["soc_cad"] == pytest.approx(-4.0, abs=1.0)
-    assert "guide" in found.reason
 
 
 def raising(x: Any) -> float:

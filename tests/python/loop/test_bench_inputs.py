@@ -16,7 +16,7 @@ from mgdd.errors import ParameterError, ShapeError
 from mgdd.guide import GuidedEngine, ModelOptimum
 from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.loop import seek as seek_on
-from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking, Spsa
+from mgdd.optimize import ExtremumSeeking, GaussianProcessSeeking
 from mgdd.results.labels import check_labels
 
 THREE = ["soc_cad", "egr", "intake_pressure_kpa"]
@@ -114,8 +114,10 @@ def test_the_optimum_under_limits_is_that_of_a_fine_grid(limits: dict[str, float
 
 def test_one_input_is_bounded_by_its_name() -> None:
     bench = VirtualEngine()
-    whole = bench.find_optimum({"p_max_bar": 95.0})
-    assert whole["soc_cad"] == bench.find_optimum({"p_max_bar": 95.0}, bounds={"soc_cad": (-20.0, 5.0)})["soc_cad"]
+    whole, part = (
+        bench.find_optimum({"p_max_bar": 95.0}, bounds=own)["soc_cad"] for own in (None, {"soc_cad": (-20, 5)})
+    )
+    assert part == pytest.approx(whole, abs=1e-6)
     assert bench.find_optimum(bounds={"soc_cad": (-4.0, 5.0)})["soc_cad"] == pytest.approx(-4.0, abs=1e-3)
     best = bench.find_optimum({"nox_soft_ppm": 1100.0})
     assert best["nox_true_ppm"] == pytest.approx(1100.0, abs=0.01)
@@ -132,22 +134,6 @@ def test_a_lower_limit_of_the_optimum_is_where_a_fine_scan_has_it(inputs: tuple[
     assert best["soc_cad"] == pytest.approx(float(kept["soc_cad"][int(kept["j"].to_numpy().argmax())]), abs=0.1)
     assert best.active_limits == ("-p_max_bar",)
     assert best["p_max_bar"] == pytest.approx(130.0, abs=0.2)
-
-
-def test_seekers_of_named_inputs_run_on_it_in_any_order() -> None:
-    turned = {name: BOUNDS[name] for name in reversed(BOUNDS)}
-    start = {"soc_cad": -6.0, "egr": 0.1, "intake_pressure_kpa": 150.0}
-    ends = []
-    for bounds in (BOUNDS, turned):
-        seeker = Spsa(
-            inputs=bounds, start=start, perturbation=[2.0, 0.02, 4.0] if bounds is BOUNDS else [4.0, 0.02, 2.0]
-        )
-        run = run_seeker(VirtualEngine(inputs=THREE, limits=["p_max_bar"], seed=1), seeker, 30)
-        assert list(run.dataset["input"].values) == THREE
-        np.testing.assert_array_equal(run.dataset["applied"].sel(input="egr"), run.dataset["egr"])
-        np.testing.assert_array_equal(run.dataset["estimate"][0], [start[name] for name in THREE])
-        ends.append(dict(zip(seeker.input_names, seeker.estimate, strict=True)))
-    assert ends[0].keys() == ends[1].keys()
 
 
 def test_whole_loops_are_those_of_one_at_a_time() -> None:

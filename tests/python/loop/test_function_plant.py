@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import ctypes
 import math
@@ -12,10 +11,10 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ import xarray as xr
 from tests.python.support.stepped import stepped
 
 from mgdd import optimize
-from mgdd.errors import Interrupted, InUseError, ParameterError, RigError
+from mgdd.errors import Interrupted, ParameterError, RigError
 from mgdd.guide import FeedForward
 from mgdd.loop import FunctionPlant, LoopCriteria, VirtualEngine, monte_carlo, run_seeker, seek, seek_front
 
@@ -209,40 +208,17 @@ def test_every_form_is_the_same_function(library: ctypes.CDLL) -> None:
     declared = library.plant
     declared.argtypes, declared.restype = FunctionPlant.C_TYPE._argtypes_, ctypes.c_int
     address = ctypes.cast(declared, ctypes.c_void_p).value
-    scipy = pytest.importorskip("scipy")
     data = (ctypes.c_double * 2)(0.05, -7.0)
     pointer = ctypes.cast(data, ctypes.c_void_p)
     for function, more in (
         (declared, {"user_data": data}),
         (address, {"user_data": np.array([0.05, -7.0])}),
         (np.uint64(address), {"user_data": pointer.value}),
-        (scipy.LowLevelCallable(declared, user_data=pointer), {}),
+        (SimpleNamespace(address=address, ctypes=declared), {"user_data": data}),  # as a function of Numba
     ):
         plant = FunctionPlant(function, ["x"], **more)
         plant.apply({"x": -5.0})
         assert plant.measure().performance == 50.0 - 0.05 * 2.0 * 2.0
-
-
-def test_a_numba_function_is_one() -> None:
-    numba = pytest.importorskip("numba")
-    types = numba.types
-    doubles = types.CPointer(types.float64)
-
-    @numba.cfunc(types.int32(doubles, types.uintp, doubles, types.uintp, types.voidptr))
-    def plant(x: Any, n: Any, out: Any, m: Any, data: Any) -> int:  # noqa: ARG001
-        out[0] = 50.0 - 0.03 * (x[0] + 4.0) * (x[0] + 4.0)
-        return 0
-
-    for function in (plant, plant.address):
-        run = run_seeker(FunctionPlant(function, ["soc_cad"]), SEEKERS["Spsa first_order"](), 60)
-        xr.testing.assert_identical(run.dataset, run_seeker(in_python(), SEEKERS["Spsa first_order"](), 60).dataset)
-
-    @numba.cfunc(types.float64(types.float64))
-    def other(x: float) -> float:
-        return x
-
-    with pytest.raises(ParameterError, match=r"signature is c_double \(c_double\): must be int"):
-        FunctionPlant(other, ["x"])
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -268,13 +244,11 @@ def test_what_is_not_one_is_refused_by_name(library: ctypes.CDLL) -> None:
     wrong = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(("plant", library))
     single = list(FunctionPlant.C_TYPE._argtypes_)
     single[2] = ctypes.POINTER(ctypes.c_float)
-    scipy = pytest.importorskip("scipy")
     for function, message in (
         (0, "function = 0: must be the address of a function, not null"),
         (FunctionPlant.C_TYPE(), "not null"),
         (wrong, r"its signature is c_double \(c_double\): must be int \(const double \*inputs"),
         (ctypes.CFUNCTYPE(ctypes.c_int, *single)(("plant", library)), r"LP_c_float, c_\w+, c_void_p\): must be int"),
-        (scipy.LowLevelCallable(wrong), r"its signature is double \(double\): must be int"),
         (ctypes.CDLL(None).printf, "argtypes are not declared"),
         (-4, "function = -4"),
         (True, "function = True: must be a function of the inputs by name"),
@@ -341,28 +315,6 @@ def test_copies_share_the_function_and_no_other_process_has_it(library: ctypes.C
     with pytest.raises(ParameterError, match="this process only"):
         monte_carlo(plant, SEEKERS["Spsa first_order"](), range(4), cycles=5, executor=lambda: ProcessPoolExecutor(1))
     assert pickle.loads(pickle.dumps(FunctionPlant(math.hypot, ["x"]))).input_names == ("x",)
-
-
-def test_the_gil_is_released_while_it_runs(library: ctypes.CDLL) -> None:
-    plant, seeker, done = of(library, "slow"), SEEKERS["Spsa first_order"](), threading.Event()
-
-    def work() -> None:
-        run_seeker(plant, seeker, 200)
-        done.set()
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    turns, refused = 0, False
-    while not done.is_set():
-        turns += 1
-        with contextlib.suppress(InUseError):
-            plant.cycle  # noqa: B018
-            continue
-        refused = True
-        time.sleep(0.001)
-    thread.join()
-    assert turns > 5
-    assert refused
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")

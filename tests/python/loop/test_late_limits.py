@@ -77,13 +77,6 @@ def test_a_peak_pressure_ten_cycles_late_is_truly_kept(name: str) -> None:
     assert 0.0 < np.mean(applied) - best < 2.0, applied
 
 
-def test_without_its_delay_the_same_limit_is_broken_most_of_the_time() -> None:
-    limit = Limit("p_max_bar", UPPER, margin_sd=0.0)
-    for name in ("Spsa first_order", "Spsa second_order"):
-        run = run_seeker(LatePressure(1), seekers(limit, 1)[name](), 2000)
-        assert run.summary["noise_free_judged_above_fraction_p_max_bar"] > 0.3, name
-
-
 def test_a_limit_is_the_same_after_every_journey(tmp_path: Path) -> None:
     limit = Limit("p_max_bar", 95.0, margin=1.5, scale=7.0, delay_cycles=10.5, lag_cycles=2.0, margin_sd=0.25)
     assert (limit.delay_cycles, limit.lag_cycles, limit.margin_sd) == (10.5, 2.0, 0.25)

@@ -12,10 +12,8 @@ import pytest
 from mgdd import _core, presets
 from mgdd.engine import Cylinder, OperatingPoint, Performance, PerformanceTerm, simulate
 from mgdd.errors import ParameterError, RigError, ShapeError
-from mgdd.loop import Measurement, SensorDynamics, VirtualEngine
+from mgdd.loop import SensorDynamics, VirtualEngine
 from mgdd.results.labels import check_labels
-from mgdd.rig import SimulatedRig
-from mgdd.rig.base import Rig
 
 QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
 SILENT = SensorDynamics(delay_s=3.0, lag_s=2.0)
@@ -185,32 +183,3 @@ def test_the_request_array_is_left_alone() -> None:
     np.testing.assert_array_equal(soc, [-100.0, -6.0])
     np.testing.assert_array_equal(out["clamped"], [True, False])
     assert float(out["soc_cad"][0]) == -60.0
-
-
-def test_the_rig_is_the_bench() -> None:
-    bench, twin = VirtualEngine(**RICH), VirtualEngine(**RICH)
-    rig = SimulatedRig(bench)
-    assert isinstance(rig, Rig)
-    with rig as entered:
-        assert entered is rig
-        with pytest.raises(RigError, match=r"measure\(\) before apply\(\)"):
-            rig.measure()
-        for bad in (float("nan"), float("inf")):
-            with pytest.raises(ParameterError, match=r"soc_cad = (nan|inf): must be finite"):
-                rig.apply({"soc_cad": bad})
-        assert bench.cycle == 0
-        for soc in requests(30):
-            rig.apply({"soc_cad": soc})
-            measured, expected = rig.measure(), twin.step(soc)
-            assert isinstance(measured, Measurement)
-            assert measured.components == tuple(expected["components"])
-            assert measured.performance == pytest.approx(expected["j"])
-            assert measured.limits == expected["limits"]
-            assert measured.misfire is expected["misfire"]
-            assert measured.values["soc_cad"] == expected["soc_cad"]
-        rig.measure()  # the engine runs on at the timing applied last
-        assert bench.cycle == 31
-    for call in (rig.measure, lambda: rig.apply({"soc_cad": -6.0}), rig.__enter__):
-        with pytest.raises(RigError, match="the rig is closed"):
-            call()
-    assert issubclass(RigError, OSError)

@@ -88,29 +88,6 @@ def test_an_optimizable_is_sought() -> None:
     assert list(of_page("seek_optimizable")(Optimizable(), cycles=10).inputs) == ["parameter_0", "parameter_1"]
 
 
-def test_a_real_environment_is_sought() -> None:
-    gymnasium = pytest.importorskip("gymnasium")
-
-    class Env(Steps, gymnasium.Env):  # type: ignore[misc, name-defined]
-        action_space = gymnasium.spaces.Box(BOX.low, BOX.high)
-        observation_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
-
-    env = gymnasium.wrappers.TimeLimit(Env(), max_episode_steps=7)
-    found = of_page("seek_env")(env, cycles=80)
-    assert efficiency(list(found.inputs.values())) > 55.8
-
-
-def test_a_real_optimizable_is_sought() -> None:
-    coi = pytest.importorskip("cernml.coi")
-    spaces = pytest.importorskip("gymnasium.spaces")
-
-    class Optimizable(Task, coi.SingleOptimizable):  # type: ignore[misc, name-defined]
-        optimization_space = spaces.Box(BOX.low, BOX.high)
-
-    found = of_page("seek_optimizable")(Optimizable(), cycles=60)
-    assert efficiency(list(found.inputs.values())) > 55.9
-
-
 def test_the_lines_of_the_page_about_one_call_run() -> None:
     text = PAGE.read_text(encoding="utf-8")
     section = text.split("## Find the best settings")[1].split("\n## ")[0]

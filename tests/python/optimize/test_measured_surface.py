@@ -1,4 +1,4 @@
-"""`measure_map` of several inputs: the quadratic surface of a noisy map, its doubts, and what it refuses."""
+"""`measure_map`: the quadratic surface of a noisy map, its doubts, and what it refuses."""
 
 from __future__ import annotations
 
@@ -34,30 +34,38 @@ def quadratic(x: Array) -> Array:
     return 56.0 + 0.5 * np.einsum("ni,ij,nj->n", away, BEND[: x.shape[1], : x.shape[1]], away)
 
 
-@pytest.mark.parametrize("inputs", [2, 3])
+@pytest.mark.parametrize("inputs", [1, 2, 3])
 @pytest.mark.parametrize("maximize", [True, False])
 def test_an_exact_quadratic_comes_back(inputs: int, maximize: bool) -> None:
     x = spread(15, inputs, 1)
     sign = 1.0 if maximize else -1.0
     found = measure_map(x, sign * quadratic(x), maximize=maximize)
-    np.testing.assert_allclose(found.curvature, sign * BEND[:inputs, :inputs], rtol=1e-6)
-    np.testing.assert_allclose(found.optimum, BEST[:inputs], rtol=1e-6)
+    np.testing.assert_allclose(np.atleast_2d(found.curvature), sign * BEND[:inputs, :inputs], rtol=1e-6)
+    np.testing.assert_allclose(np.atleast_1d(found.optimum), BEST[:inputs], rtol=1e-6)
     assert found.noise_sd < 1e-10
     assert (found.points, found.findings, found.inputs) == (15, (), ())
+    if inputs == 1:
+        assert isinstance(found.optimum, float)
+        assert found.bends is None
+        return
     along = found.directions @ found.curvature @ found.directions.T
     np.testing.assert_allclose(along, np.diag(found.bends), atol=1e-9)
     assert (np.diff(np.abs(found.bends)) < 0.0).all()
 
 
-def test_standard_errors_are_those_of_the_scatter_over_many_repetitions() -> None:
-    x = spread(40, 2, 3)
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_standard_errors_are_those_of_the_scatter_over_many_repetitions(inputs: int) -> None:
+    x = spread(40, inputs, 3)
     rng = np.random.default_rng(4)
     maps = [measure_map(x, quadratic(x) + rng.normal(0.0, NOISE, 40)) for _ in range(400)]
-    for name, truth in (("noise_sd", NOISE), ("curvature", BEND[:2, :2]), ("optimum", BEST[:2])):
+    bend, best = BEND[:inputs, :inputs], BEST[:inputs]
+    for name, truth in (("noise_sd", NOISE), ("curvature", np.squeeze(bend)), ("optimum", np.squeeze(best))):
         values = np.array([getattr(found, name) for found in maps])
         stated = np.mean([getattr(found, f"{name}_stderr") for found in maps], axis=0)
         assert (np.abs(values.mean(axis=0) - truth) < 0.25 * values.std(axis=0)).all()
         np.testing.assert_allclose(stated, values.std(axis=0), rtol=0.15)
+    if inputs == 1:
+        return
     of_all = np.cov(np.array([found.optimum for found in maps]).T)
     np.testing.assert_allclose(np.mean([found.optimum_covariance for found in maps], axis=0), of_all, rtol=0.3)
     assert np.mean([bool(found.findings) for found in maps]) < 0.025

@@ -14,15 +14,7 @@ from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.optimize import least_squares
 
-OPTIONS = (
-    "max_iterations",
-    "cost_tolerance",
-    "step_tolerance",
-    "gradient_tolerance",
-    "initial_damping",
-    "correlation_limit",
-    "rank_tolerance",
-)
+OPTIONS = ("max_iterations", "cost_tolerance", "correlation_limit")
 
 
 def linear(a, b):
@@ -151,18 +143,6 @@ def test_correlation_limit_decides_who_is_named():
     assert least_squares(linear(a, b), [0.0, 0.0], correlation_limit=0.9999).unidentifiable == ()
 
 
-# 95 % intervals cover the truth in 190 of 200 fits, give or take 3.6 standard deviations of 3.08.
-def test_stderr_covers_the_truth_as_often_as_it_promises():
-    t = np.linspace(0.0, 5.0, 60)
-    truth = np.array([2.0, 0.8, 0.3])
-    covered = np.zeros(3)
-    for seed in range(200):
-        noise = 0.05 * np.random.default_rng(seed).normal(size=t.size)
-        fit = least_squares(decay(t, truth[0] * np.exp(-truth[1] * t) + truth[2] + noise), [1.0, 0.3, 0.0])
-        covered += np.abs(fit.values - truth) < 1.96 * fit.stderr
-    assert np.all(np.abs(covered - 190) <= 11), covered
-
-
 @pytest.mark.parametrize("answer", [None, (np.array([np.nan, 1.0]), np.eye(2)), (np.ones(2), np.full((2, 2), np.inf))])
 def test_start_that_cannot_be_evaluated_is_a_status(answer):
     calls = []
@@ -241,7 +221,6 @@ def test_a_model_that_changes_its_number_of_residuals_is_refused():
         ({"names": ["a", "a"]}, ParameterError, "'a' appears twice"),
         ({"max_iterations": 0}, ParameterError, "max_iterations = 0"),
         *(({name: np.nan}, ParameterError, f"{name} = nan") for name in OPTIONS[1:]),
-        ({"initial_damping": -1.0}, ParameterError, r"initial_damping = -1: must be in \[1e-24, 1e\+30\]"),
         ({"names": ["", "b"]}, ParameterError, "parameter 0 has no name"),
         ({"x0": [[0.0, 1.0]]}, ShapeError, "x0 has 2 dimensions"),
         ({"x0": ["low", "high"]}, ParameterError, "must be numbers"),
@@ -334,31 +313,6 @@ def test_defaults_are_those_of_the_core():
     options = _core.optimize.LeastSquaresOptions()
     for name in OPTIONS:
         assert inspect.signature(least_squares).parameters[name].default == getattr(options, name)
-
-
-@pytest.mark.parametrize(
-    "value",
-    [
-        _core.optimize.Parameter(name="a", lower=1e-3, upper=2.0, log_scaled=True),
-        _core.optimize.LeastSquaresOptions(max_iterations=7, rank_tolerance=1e-9, evaluate_together=False),
-    ],
-)
-def test_parameter_structs_pickle_compare_and_print(value):
-    copy = pickle.loads(pickle.dumps(value))
-    assert copy == value
-    assert repr(copy) == repr(value)
-    shown = "name='a', lower=0.001, upper=2.0, log_scaled=True"
-    if isinstance(value, _core.optimize.LeastSquaresOptions):
-        shown = "rank_tolerance=1e-09, evaluate_together=False"
-    assert shown in " ".join(repr(value).split())
-    assert value != type(value)(**({"name": "a"} if isinstance(value, _core.optimize.Parameter) else {}))
-
-
-def test_options_are_keyword_only():
-    with pytest.raises(TypeError):
-        _core.optimize.LeastSquaresOptions(7)
-    with pytest.raises(TypeError):
-        _core.optimize.Parameter("a")
 
 
 def test_intervals_hold_as_often_as_they_say_even_of_few_residuals() -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -170,26 +168,6 @@ def test_an_input_of_which_little_is_applied_is_said(name: str) -> None:
     assert "not_followed" not in codes(as_asked)
 
 
-@every
-def test_a_seeker_goes_on_bit_for_bit_from_its_state(name: str) -> None:
-    one, rng = SEEKERS[name](), np.random.default_rng(5)
-    slow = lag(3.0)
-    for cycle in range(50):
-        applied = slow(float(np.ravel(one.ask())[0]))
-        one.tell(0.0 if cycle == 20 else j_at(applied, rng), applied=applied)
-    other = SEEKERS[name]()
-    other.state = one.state
-    for _ in range(40):
-        asked, again = one.ask(), other.ask()
-        assert np.array_equal(asked, again)
-        applied = slow(float(np.ravel(asked)[0]))
-        j = j_at(applied, rng)
-        for seeker in (one, other):
-            seeker.tell(j, applied=applied)
-    assert one.state == other.state
-    assert codes(one) == codes(other)
-
-
 def path(make: Callable[[], Any], scale: float = 1.0, missing: int = 0, *, says: bool = False) -> list[float]:
     """What is asked over eighty cycles; every so many, where given, nothing is read."""
     seeker, rng, asked = make(), np.random.default_rng(7), []
@@ -214,19 +192,6 @@ def test_what_is_asked_is_the_same_again_and_within_bounds(name: str) -> None:
     assert path(SEEKERS[name]) == path(SEEKERS[name])
     assert path(SEEKERS[name], missing=5, says=True) == path(SEEKERS[name], missing=5)
     assert np.isfinite(path(SEEKERS[name], missing=1)).all()
-
-
-@every
-def test_copies_go_on_alike_and_apart(name: str) -> None:
-    one, rng = SEEKERS[name](), np.random.default_rng(5)
-    for _ in range(30):
-        one.tell(j_at(float(np.ravel(one.ask())[0]), rng))
-    for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
-        before = one.state
-        assert other.state == before
-        other.tell(j_at(float(np.ravel(other.ask())[0]), rng))
-        assert one.state == before
-        assert other.state != before
 
 
 @every

@@ -1,13 +1,12 @@
-"""Seekers in Python: ask and tell, bad input, history, files, pickles, and runs that go on in another process."""
+"""Seekers in Python: ask and tell, bad input, history, files, pickles."""
 
 from __future__ import annotations
 
+import copy
 import inspect
 import json
 import math
 import pickle
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -248,33 +247,21 @@ def test_history_holds_what_was_applied_and_told(make: Any) -> None:
 
 
 # --- files and pickles --------------------------------------------------------------------------------------
-CONTINUE = """
-import json, pickle, sys
-sys.path.insert(0, {folder!r})
-from test_seekers import run
-from mgdd.optimize import Seeker
-path = {path!r}
-seeker = Seeker.load(path) if path.endswith("json") else pickle.loads(open(path, "rb").read())
-print(json.dumps([run(seeker, 120), seeker.state]))
-"""
-
-
-@pytest.mark.parametrize("way", ["json", "pickle"])
-def test_a_new_process_continues_bit_for_bit(way: str, tmp_path: Path) -> None:
-    scripts, expected = [], []
-    for name, make in MAKERS.items():
-        seeker = make()
-        run(seeker, 47)
-        seeker.ask()
-        path = tmp_path / f"{name}.{way}"
-        if way == "json":
-            seeker.save(path)
-        else:
-            path.write_bytes(pickle.dumps(seeker))
-        scripts.append(CONTINUE.format(folder=str(Path(__file__).parent), path=str(path)))
-        expected.append([run(seeker, 120), seeker.state])
-    done = subprocess.run([sys.executable, "-c", "".join(scripts)], capture_output=True, text=True, check=True)
-    assert [json.loads(line) for line in done.stdout.splitlines()] == expected
+@every
+def test_it_goes_on_bit_for_bit_from_file_pickle_state_and_copies(make: Any, tmp_path: Path) -> None:
+    seeker = make()
+    run(seeker, 47)
+    seeker.ask()
+    seeker.save(tmp_path / "seeker.json")
+    stated = make()
+    stated.state = seeker.state
+    others = [stated, Seeker.load(tmp_path / "seeker.json"), pickle.loads(pickle.dumps(seeker))]
+    others += [copy.copy(seeker), copy.deepcopy(seeker)]
+    ends, before = [(run(other, 120), other.state, other.findings) for other in others], seeker.state
+    assert seeker.history.sizes["cycle"] == 47
+    assert all(one.history.isel(cycle=slice(47)).identical(seeker.history) for one in others[2:])
+    assert ends == [(run(seeker, 120), seeker.state, seeker.findings)] * 5
+    assert before != seeker.state
 
 
 @every

@@ -94,85 +94,45 @@ def test_a_delay_that_is_wrong_by_two_cycles_is_survived(error: int) -> None:
     assert (lost > 5.0 * LENGTHS[:2]).any()
 
 
-@pytest.mark.parametrize("rms", [0.9, 4.0])
-@pytest.mark.parametrize("cycles", [30.0, 900.0])
+@pytest.mark.parametrize("method", ["batch", "moving_average"])
 @pytest.mark.parametrize(
     ("lag", "period", "least"),  # the least time constant, in cycles
     [
-        ({}, {"batch": 6, "moving_average": 10}, None),
-        ({"delay_cycles": 7.0, "lag_cycles": 11.0, "delay_uncertainty": 0.0}, 27, 108.0),  # 2.4 x 11, rounded up
-        (
-            {"delay_cycles": 70.0, "lag_cycles": 1.0, "delay_uncertainty": 0.0},
-            {"batch": 6, "moving_average": 10},
-            213.0,
-        ),
-        ({"delay_cycles": 38.0, "lag_cycles": 25.0}, 76, 304.0),  # a fifth of 63 is not known: 60 degrees
-        ({"delay_cycles": 5.0}, 12, 48.0),  # two cycles at least
-        ({"delay_cycles": 7.0, "lag_cycles": 11.0, "delay_uncertainty": 0.0, "compensated": False}, 108, 216.0),
+        ({}, (6, 10), None),
+        ({"delay_cycles": 7.0, "lag_cycles": 11.0, "delay_uncertainty": 0.0}, (27, 27), 108.0),  # 2.4 x 11, rounded up
+        ({"delay_cycles": 70.0, "lag_cycles": 1.0, "delay_uncertainty": 0.0}, (6, 10), 213.0),
+        ({"delay_cycles": 38.0, "lag_cycles": 25.0}, (76, 76), 304.0),  # a fifth of 63 is not known: 60 degrees
+        ({"delay_cycles": 5.0}, (12, 12), 48.0),  # two cycles at least
     ],
 )
-@pytest.mark.parametrize("method", ["batch", "moving_average"])
-def test_a_dither_of_one_input_by_its_closed_forms(
-    method: str, lag: dict[str, Any], period: Any, least: float | None, cycles: float, rms: float
+def test_period_and_time_constant_follow_the_sensor(
+    method: str, lag: dict[str, Any], period: tuple[int, int], least: float | None
 ) -> None:
-    blind = not lag.get("compensated", True)
-    if blind and method == "moving_average":
-        return
-    noise, bend, distance, arrival, most = 0.31, 0.083, 9.0, 0.8, 2.6
-    tuning = tune(
-        noise,
-        -bend,
-        method=method,
-        rms=rms,
-        cycles=cycles,
-        distance=distance,
-        arrival=arrival,
-        amplitude_max=most,
-        **lag,
-    )
-    batch, period = method == "batch", period[method] if isinstance(period, dict) else period
-    assert tuning.period == period
+    tuning = tune(0.31, -0.083, method=method, cycles=30.0, rms=4.0, distance=9.0, arrival=0.8, **lag)
+    assert tuning.period == period[method == "moving_average"]
+    assert tuning.time_constant_cycles == pytest.approx(least or 2.0 * tuning.period)
     pole = np.exp(-1.0 / lag["lag_cycles"]) if "lag_cycles" in lag else 0.0
-    z = np.exp(2j * np.pi / period)
+    z = np.exp(2j * np.pi / tuning.period)
     sensor = z ** -lag.get("delay_cycles", 0.0) * (1.0 - pole) / (1.0 - pole / z)
-    turned = lag.get("delay_cycles", 0.0) * 360.0 / period - np.degrees(np.angle((1.0 - pole) / (1.0 - pole / z)))
     assert tuning.sensor_gain == pytest.approx(abs(sensor))
-    assert tuning.sensor_phase_deg == pytest.approx(turned)
-    echo = abs(sensor) * (np.cos(np.radians(turned)) if blind else 1.0)
-    tau = max(least or 2.0 * period, (0.85 * cycles - period) / np.log(distance / arrival))
-    assert tuning.time_constant_cycles == pytest.approx(tau)
-    stepping = np.sqrt(1.0 - period / (2.0 * tau)) if batch else 1.0
-    unit = noise / (echo * bend * np.sqrt(tau) * stepping)  # rms at an amplitude of one
-    assert tuning.amplitude == pytest.approx(min(most, unit / rms))
-    assert tuning.rms == pytest.approx(unit / tuning.amplitude)
-    assert tuning.gain == pytest.approx(2.0 / (tuning.amplitude * bend * tau) / (echo if blind else 1.0))
-    passed = (
-        max(tuning.amplitude, 3.0 * np.sqrt(2.0 * period / tau) * tuning.rms) / period
-        if batch
-        else max(3.0 * tuning.amplitude / period, 2.0 * distance / tau)
-    )
-    assert tuning.rate == pytest.approx(passed)
-    linear = float(np.clip(passed * tau, arrival, distance))
-    assert tuning.cycles == pytest.approx(period + (distance - linear) / passed + tau * np.log(linear / arrival))
-    assert tuning.dither_cost == pytest.approx(0.25 * bend * tuning.amplitude**2)
-    assert tuning.jitter_cost == pytest.approx(0.5 * bend * tuning.rms**2)
-    assert tuning.met == (tuning.rms <= rms * (1.0 + 1e-6) and tuning.cycles <= cycles)
+    turned = np.exp(-1j * np.radians(tuning.sensor_phase_deg))
+    assert turned == pytest.approx(sensor / abs(sensor))
+    tau, size, step = tuning.time_constant_cycles, tuning.amplitude, tuning.period
+    noisy = max(size, 3.0 * np.sqrt(2.0 * step / tau) * tuning.rms) / step  # three deviations of a batch pass
+    assert tuning.rate == pytest.approx(noisy if method == "batch" else max(3.0 * size / step, 2.0 * 9.0 / tau))
+    assert not tuning.met
 
 
-@pytest.mark.parametrize("cycles", [240.0, 4.0])  # the second asks for more than half of the way per iteration
-def test_spsa_of_one_input_by_its_closed_forms(cycles: float) -> None:
-    tuning = tune(0.31, -0.083, method="spsa", rms=0.9, cycles=cycles, distance=9.0, arrival=0.8, amplitude_max=2.6)
-    q = min(0.5, 1.0 - (0.8 / 9.0) ** (2.0 / (0.85 * cycles)))
-    unit = 0.31 / 0.083 * np.sqrt(q / (2.0 * (2.0 - q)))
-    assert tuning.period == 2
-    assert tuning.amplitude == pytest.approx(min(2.6, unit / 0.9))
-    assert tuning.gain == pytest.approx(q / 0.083)
-    assert tuning.rate == pytest.approx(max(2.0 * tuning.amplitude, 1.2 * q * 9.0))
-    assert tuning.time_constant_cycles == pytest.approx(-2.0 / np.log(1.0 - q))
-    assert tuning.cycles == pytest.approx(2.0 * np.log(0.8 / 9.0) / np.log(1.0 - q))
-    assert tuning.rms == pytest.approx(unit / tuning.amplitude)
-    assert tuning.dither_cost == pytest.approx(0.5 * 0.083 * tuning.amplitude**2)
-    assert tuning.met == (tuning.cycles <= cycles and tuning.rms <= 0.9 * (1.0 + 1e-6))
+def test_what_is_asked_for_in_less_time_or_with_less_room_is_not_met() -> None:
+    spec: dict[str, Any] = {"rms": 0.9, "distance": 9.0, "arrival": 0.8}
+    for method in METHODS:
+        assert tune(0.31, -0.083, method=method, cycles=240.0, amplitude_max=2.6, **spec).met
+        late = tune(0.31, -0.083, method=method, cycles=4.0, amplitude_max=2.6, **spec)
+        rough = tune(0.31, -0.083, method=method, cycles=240.0, amplitude_max=0.1, **spec)
+        assert (late.met, late.cycles > 4.0, rough.met, rough.amplitude) == (False, True, False, 0.1)
+        asked = {**spec, "cycles": 240.0, "amplitude_max": 0.1}
+        assert [tune(0.31, -0.083, method=method, **asked | {"rms": s * rough.rms}).met for s in (0.97, 1.0)] == [0, 1]
+    assert late.rate == pytest.approx(max(2.0 * late.amplitude, 1.2 * 0.083 * late.gain * 9.0))  # of SPSA
 
 
 @pytest.mark.parametrize("curvature", [-0.1, [-0.1, -40.0]], ids=["one", "two"])

@@ -11,14 +11,12 @@ import pytest
 import xarray as xr
 
 import parallel_work as work
-from executor_calls import CALLS, SPACE, fixed_chunks, plain, same, tuning
-from mgdd.control import Pid
+from executor_calls import CALLS, SPACE, fixed_chunks, plain, same
 from mgdd.errors import ParameterError
-from mgdd.loop import Reference, VirtualEngine, monte_carlo, run_seeker, track_many
+from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
 from mgdd.parallel import map_items
 from mgdd.parallel.pool import cores, processes
-from mgdd.throttle import Throttle
 
 
 @pytest.fixture(scope="module")
@@ -60,15 +58,14 @@ def test_dask_changes_no_bit() -> None:
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
-        for name in ("monte_carlo", "track_many", "fit_first_principle"):
+        for name in ("monte_carlo", "fit_first_principle"):
             assert same(CALLS[name](executor=client.get_executor()), plain(name))
 
 
-@pytest.mark.parametrize(("name", "n"), [("monte_carlo", 42), ("track_many", 165)])
-def test_progress_counts_runs_and_changes_no_bit(name: str, n: int) -> None:
+def test_progress_counts_runs_and_changes_no_bit() -> None:
     seen: list[tuple[int, int]] = []
-    assert same(CALLS[name](progress=lambda *counts: seen.append(counts)), plain(name))
-    assert seen[-1] == (n, n)
+    assert same(CALLS["monte_carlo"](progress=lambda *counts: seen.append(counts)), plain("monte_carlo"))
+    assert seen[-1] == (42, 42)
     assert [done for done, _ in seen] == sorted({done for done, _ in seen})
 
 
@@ -78,19 +75,6 @@ def test_a_worker_computes_on_one_thread(pool: Executor) -> None:
     assert set(map_items(work.cores_inside, range(9))) == {1}
     assert set(map_items(work.cores_inside, range(9), executor=pool)) == {1}
     assert cores() == len(os.sched_getaffinity(0))
-
-
-def test_a_pool_made_for_a_tuning_is_made_once() -> None:
-    made: list[Executor] = []
-
-    def make() -> Executor:
-        made.append(ThreadPoolExecutor(2))
-        return made[-1]
-
-    tuning(executor=make)
-    assert len(made) == 1
-    with pytest.raises(RuntimeError, match="after shutdown"):
-        made[0].submit(print)
 
 
 # --- what is refused ----------------------------------------------------------------------------------------
@@ -115,9 +99,6 @@ def test_what_does_not_fit_is_refused_before_any_work() -> None:
     ):
         with pytest.raises(ParameterError, match=message):
             call()
-    steps = [Reference.step(a, 2, hold_s=0.1) for a in (40, 1)]
-    with pytest.raises(Exception, match="airflow_torque_nm"):
-        track_many({"pid": Pid()}, steps, [Throttle()] * 3, airflow_torque_nm={steps[1].name: [0.1]}, executor=NoWork())
 
 
 def test_reading_is_not_moving() -> None:

@@ -15,9 +15,12 @@ import numpy as np
 import pytest
 
 import parallel_work as work
-from executor_calls import CALLS, fixed_chunks, groups, plain, tuning
+from executor_calls import CALLS, fixed_chunks, groups, plain
 from mgdd.errors import Interrupted, WorkerLostError
+from mgdd.loop import tune_controller
+from mgdd.loop.tune import tracking_cost
 from mgdd.results.labels import check_labels
+from mgdd.throttle import Throttle
 
 pytestmark = pytest.mark.slow
 
@@ -34,8 +37,8 @@ class Dies(work.Dropping):
         return super().submit(fn, *args, **kwargs)
 
 
-@pytest.mark.parametrize(("name", "figure"), [("monte_carlo", "mean_soc_cad"), ("track_many", "mse_deg2")])
-def test_a_lost_worker_hands_over_what_is_done(name: str, figure: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lost_worker_hands_over_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    name, figure = "monte_carlo", "mean_soc_cad"
     fixed_chunks(monkeypatch, 4)
     with pytest.raises(WorkerLostError) as lost:
         CALLS[name](executor=Dies(7), workers=2)
@@ -49,17 +52,6 @@ def test_a_lost_worker_hands_over_what_is_done(name: str, figure: str, monkeypat
     check_labels(part)
 
 
-def test_a_lost_worker_leaves_the_best_tuning_so_far() -> None:
-    with pytest.raises(WorkerLostError) as lost:
-        tuning(executor=Dies(60), workers=2)
-    part = lost.value.partial
-    assert 0 < part.evaluations < 30
-    assert part.cost >= plain("tune_controller").cost
-    with pytest.raises(WorkerLostError) as lost:
-        tuning(executor=Dies(0), workers=2)
-    assert lost.value.partial is None
-
-
 def test_a_lost_worker_leaves_the_best_of_the_finished_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     fixed_chunks(monkeypatch, 1)
     with pytest.raises(WorkerLostError) as lost:
@@ -69,8 +61,15 @@ def test_a_lost_worker_leaves_the_best_of_the_finished_starts(monkeypatch: pytes
     assert part.report.rmse == min(part.start_rmse)
 
 
-@pytest.mark.parametrize("executor", ["None", "ThreadPoolExecutor", "processes(2)"])
-@pytest.mark.parametrize("name", ["monte_carlo", "track_many"])
+@pytest.mark.parametrize(
+    ("name", "executor"),
+    [
+        ("monte_carlo", "None"),
+        ("monte_carlo", "ThreadPoolExecutor"),
+        ("monte_carlo", "processes(2)"),
+        ("track_many", "None"),
+    ],
+)
 def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> None:
     program = f"""
         import multiprocessing, os, signal, sys, threading
@@ -121,12 +120,16 @@ def test_ctrl_c_carries_what_is_done(name: str, executor: str, root: Path) -> No
     assert (done.stdout, done.stderr) == ("kept\n", "")
 
 
-def test_ctrl_c_while_tuning_leaves_the_best_so_far() -> None:
-    def progress(n: int, _: float) -> None:
-        if n == 5:
-            os.kill(os.getpid(), signal.SIGINT)
+def test_ctrl_c_while_tuning_leaves_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    costs: list[float] = []
 
+    def cost_and_stop(runs: Any) -> float:
+        costs.append(tracking_cost(runs))
+        if len(costs) == 6:
+            os.kill(os.getpid(), signal.SIGINT)
+        return costs[-1]
+
+    monkeypatch.setattr("mgdd.loop.tune.tracking_cost", cost_and_stop)
     with pytest.raises(Interrupted, match=r"5 of 30 sets were run") as stop:
-        tuning(progress=progress)
-    assert stop.value.partial.evaluations == 5
-    assert stop.value.partial.cost <= stop.value.partial.start_cost
+        tune_controller("pid", Throttle(), n_throttles=3, budget=30, seed=2)
+    assert (stop.value.partial.evaluations, stop.value.partial.cost) == (5, min(costs[:5]))

@@ -9,25 +9,14 @@ import numpy as np
 import xarray as xr
 
 import parallel_work as work
-from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.engine import OperatingPoint
 from mgdd.identify import fit_ode
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.smooth import SmoothThrottle
-from mgdd.loop import (
-    LoopCriteria,
-    Reference,
-    VirtualEngine,
-    monte_carlo,
-    track_many,
-    tune_controller,
-    tuned_controller,
-)
-from mgdd.loop.tune import draw_throttles
+from mgdd.loop import LoopCriteria, VirtualEngine, monte_carlo
 from mgdd.optimize import ExtremumSeeking, FitOptions, GradientDescent, Limit, Spsa
 from mgdd.parallel.chunks import Plan
 from mgdd.results import Fit
-from mgdd.throttle import Throttle
 
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
 
@@ -48,27 +37,6 @@ def loops(**how: Any) -> xr.Dataset:
         LoopCriteria(optimum=-8.5, limits={"p_max_bar": 120.0}),
     ]
     return monte_carlo(benches, seekers, [3, 1, 4, 15, 9, 2**63, 6], cycles=260, criteria=goals, **how)
-
-
-def tracks(**how: Any) -> xr.Dataset:
-    """Eleven throttles are a full group of lanes and a broken one; one of the controllers is of another class each."""
-    throttles = [*draw_throttles(Throttle(), 10, seed=5), Throttle(friction="stribeck", stiction_nm=0.3)]
-    controllers = {
-        "guided": GuidedPredictive(),
-        "mgdd1": Mgdd1(),
-        "pid": Pid(),
-        "sliding": SlidingMode(),
-        "nmpc": tuned_controller("nmpc"),
-    }
-    steps = [Reference.step(a, b, hold_s=0.1, after_s=0.3) for a, b in ((40, 42), (4, 20))]
-    return track_many(
-        controllers, [*steps, "sine:30:5:2"], throttles, first_seed=10, delay_samples=2,
-        airflow_torque_nm={steps[1].name: -0.05}, **how,
-    )  # fmt: skip
-
-
-def tuning(**how: Any) -> Any:
-    return tune_controller("pid", Throttle(), n_throttles=3, budget=30, seed=2, **how)
 
 
 def records() -> tuple[xr.Dataset, np.ndarray]:
@@ -102,8 +70,6 @@ def ode(**how: Any) -> Fit:
 
 CALLS: dict[str, Callable[..., Any]] = {
     "monte_carlo": loops,
-    "track_many": tracks,
-    "tune_controller": tuning,
     "SmoothThrottle.fit": smooth,
     "fit_first_principle": groups,
     "fit_ode": ode,
@@ -111,15 +77,13 @@ CALLS: dict[str, Callable[..., Any]] = {
 
 
 def same(one: Any, two: Any) -> bool:
-    """Every bit of a Dataset, of a fit with its reports, of a tuning."""
+    """Every bit of a Dataset, of a fit with its reports."""
     if isinstance(one, xr.Dataset):
         return one.identical(two)
-    if isinstance(one, Fit):
-        rows = [(f.parameters, f.start_rmse, f.n_best, f.unidentifiable, str(f.findings)) for f in (one, two)]
-        arrays = [(f.report.values, f.report.stderr, f.report.residual) for f in (one, two)]
-        alike = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(*arrays, strict=True))
-        return alike and rows[0] == rows[1] and one.run.identical(two.run)
-    return bool(one == two)
+    rows = [(f.parameters, f.start_rmse, f.n_best, f.unidentifiable, str(f.findings)) for f in (one, two)]
+    arrays = [(f.report.values, f.report.stderr, f.report.residual) for f in (one, two)]
+    alike = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(*arrays, strict=True))
+    return alike and rows[0] == rows[1] and one.run.identical(two.run)
 
 
 _KEPT: dict[str, Any] = {}
