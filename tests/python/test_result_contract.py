@@ -20,7 +20,7 @@ import mgdd
 from map_cases import sweep as map_sweep
 from mgdd import datasets, identify, io, plot, presets
 from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignition_delay, simulate
-from mgdd.errors import DataError, Error, ParameterError
+from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
@@ -173,12 +173,6 @@ def test_a_result_can_do_what_every_result_can(name: str, tmp_path: Path) -> Non
     assert isinstance(made.plot(), Axes)
     again = pickle.loads(pickle.dumps(made))
     xr.testing.assert_identical(again.dataset, data)
-    pytest.importorskip("plotly")
-    if ax.tables:  # of a few numbers
-        with pytest.raises(DataError, match="a figure with a Table has no interactive form"):
-            made.plot(engine="plotly")
-    else:
-        assert made.plot(engine="plotly").data
 
 
 def test_tables_are_over_the_main_dimension() -> None:

@@ -7,9 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,23 +20,11 @@ from mgdd.results.labels import check_labels
 pytestmark = pytest.mark.slow
 
 
-class Dies(work.Dropping):
-    """Works for a while, then loses everything."""
-
-    def __init__(self, last: int) -> None:
-        super().__init__("cancelled")
-        self.last = last
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
-        self.always = self.count > self.last
-        return super().submit(fn, *args, **kwargs)
-
-
 @pytest.mark.parametrize(("name", "figure"), [("monte_carlo", "mean_soc_cad"), ("track_many", "mse_deg2")])
 def test_a_lost_worker_hands_over_what_is_done(name: str, figure: str, monkeypatch: pytest.MonkeyPatch) -> None:
     fixed_chunks(monkeypatch, 4)
     with pytest.raises(WorkerLostError) as lost:
-        CALLS[name](executor=Dies(7), workers=2)
+        CALLS[name](executor=work.Dropping("cancelled", after=7), workers=2)
     part = lost.value.partial
     done = part["finished"].to_numpy()
     assert 0 < done.sum() < done.size
@@ -51,19 +37,19 @@ def test_a_lost_worker_hands_over_what_is_done(name: str, figure: str, monkeypat
 
 def test_a_lost_worker_leaves_the_best_tuning_so_far() -> None:
     with pytest.raises(WorkerLostError) as lost:
-        tuning(executor=Dies(60), workers=2)
+        tuning(executor=work.Dropping("cancelled", after=60), workers=2)
     part = lost.value.partial
     assert 0 < part.evaluations < 30
     assert part.cost >= plain("tune_controller").cost
     with pytest.raises(WorkerLostError) as lost:
-        tuning(executor=Dies(0), workers=2)
+        tuning(executor=work.Dropping("cancelled"), workers=2)
     assert lost.value.partial is None
 
 
 def test_a_lost_worker_leaves_the_best_of_the_finished_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     fixed_chunks(monkeypatch, 1)
     with pytest.raises(WorkerLostError) as lost:
-        groups(executor=Dies(3), workers=1)
+        groups(executor=work.Dropping("cancelled", after=3), workers=1)
     part = lost.value.partial
     assert 0 < len(part.start_rmse) < 5
     assert part.report.rmse == min(part.start_rmse)

@@ -10,7 +10,6 @@ import pickle
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
@@ -161,9 +160,8 @@ def test_traces_on_request() -> None:
         {"workers": 1},
         {"workers": 7},
         {"executor": work.LateReversed(), "workers": 3},
-        {"executor": work.Dropping("error"), "workers": 3},
     ],
-    ids=["one", "seven", "late and reversed", "dropping"],
+    ids=["one", "seven", "late and reversed"],
 )
 def test_the_executor_does_not_matter(options: dict[str, Any], table: xr.Dataset) -> None:
     assert sweep(CYLINDER, POINT, GRID, **options).identical(table)
@@ -209,13 +207,8 @@ def test_progress_counts_cycles() -> None:
 
 
 def test_a_lost_worker_hands_over_what_is_done(table: xr.Dataset) -> None:
-    class Dies(work.Dropping):
-        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
-            self.always = self.count > 5
-            return super().submit(fn, *args, **kwargs)
-
     with pytest.raises(WorkerLostError) as lost:
-        sweep(CYLINDER, POINT, GRID, executor=Dies("cancelled"), workers=2)
+        sweep(CYLINDER, POINT, GRID, executor=work.Dropping("cancelled", after=6), workers=2)
     part = lost.value.partial
     done = part["finished"].values
     assert 0 < done.sum() < 96
@@ -299,23 +292,13 @@ def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixt
 )
 def test_bad_grids(over: Any, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
-        sweep(CYLINDER, POINT, over, executor=NoWork())
-
-
-class NoWork(work.Dropping):
-    """An executor that nothing must reach: bad input is found before."""
-
-    def __init__(self) -> None:
-        super().__init__("error")
-
-    def submit(self, *_: Any, **__: Any) -> Any:
-        raise AssertionError("work was begun")
+        sweep(CYLINDER, POINT, over, executor=work.NoWork())
 
 
 def test_bad_points_and_outputs() -> None:
     def refused(over: Any, message: str, error: type[Exception] = ParameterError, **options: Any) -> None:
         with pytest.raises(error, match=message):
-            sweep(CYLINDER, POINT, over, executor=NoWork(), **options)
+            sweep(CYLINDER, POINT, over, executor=work.NoWork(), **options)
 
     columns = {"soc_cad": [-6.0, -5.0], "fuel_mg": [1.0, 2.0, 3.0]}
     refused(
