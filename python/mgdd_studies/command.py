@@ -15,8 +15,8 @@ from mgdd.cli.progress import Stopped
 from mgdd.errors import ParameterError
 from mgdd.parallel.pool import processes
 from mgdd.report import Table, write_report
-from mgdd.report.sections import cells, column_names
 from mgdd_studies.registry import available_studies, run_study
+from mgdd_studies.sections import cells, column_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -26,7 +26,6 @@ from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
-from mgdd.plot.convergence import convergence
 from mgdd.plot.response import response_diagnostics
 from mgdd.report import Report
 from mgdd.results.labels import check_labels
@@ -203,7 +202,6 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "map_contour": (lambda: MADE["CalibrationMap"](Path()), ("soc_cad",)),
     "correlation_matrix": (throttle_fit, ()),
     "response_diagnostics": (response, ()),
-    "convergence": (lambda: run_study("sensor-delay", quick=True, figures=False), ()),
     "pressure": (lambda: Drawn(simulate("puma_single")), ()),
     "pressure of cycles": (lambda: Drawn(analyze(pressures(), "puma_single", quiet=True)), ()),
     "cycles": (lambda: Drawn(record()), ("ca50_cad",)),
@@ -219,7 +217,6 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
 
 
 DRAWN_BY = {
-    "convergence": convergence,
     "pressure of cycles": plot.pressure,
     "spectrum of cycles": plot.cycles,
     "map of cycles": plot.cycles,

@@ -15,7 +15,6 @@ from mgdd.guide import FeedForward
 from mgdd.loop import LoopCriteria, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
-from mgdd.plot.convergence import convergence, learning
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 CAD = np.arange(-120.0, 121.0)
@@ -89,29 +88,11 @@ def sought():
     ).set_coords("limit_units")  # fmt: skip
 
 
-def tracks():
-    cases, dims = ["slow", "fast"], ("case", "cycle")
-    curves = np.stack([-6.0 - 9.0 * np.exp(-CYCLE / t) for t in (80.0, 20.0)])
-    cad = "°CA aTDC"
-    return labelled_dataset({
-        "cycle": ("cycle", CYCLE), "case": ("case", cases, "-", "case"),
-        "estimate_median_cad": (dims, curves, cad, "estimate"), "optimum_cad": ((), -6.0, cad, "optimum"),
-        "estimate_low_cad": (dims, curves - 0.5, cad, "low"), "estimate_high_cad": (dims, curves + 0.7, cad, "high"),
-    })  # fmt: skip
-
-
 def readings(over="cycle"):
     axis = {"cycle": CYCLE.astype(float), "soc_cad": SOC, "t_max_k": 1900.0 + 10.0 * SOC}[over]
     names = ("true", "analyser", "fast", "soft", "soft_corrected")
     return labelled_dataset({
         over: (over, axis), **{f"nox_{name}_ppm": (over, 900.0 + axis + k) for k, name in enumerate(names)},
-    })  # fmt: skip
-
-
-def learned():
-    return labelled_dataset({
-        "law": ("law", ["p", "norm_optimal"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
-        "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0], [8.0, 1.0, 0.5]], "°CA", "rms error of CA50"),
     })  # fmt: skip
 
 
@@ -129,10 +110,8 @@ PLOTS = {
     "throttle under control": (plot.throttle_run, followed),
     "throttle": (plot.throttle_run, lambda: followed().drop_vars("reference_deg")),
     "seeking": (plot.seeking, sought),
-    "convergence": (convergence, tracks),
     "sensors over cycles": (plot.sensors, readings),
     "sensors over timing": (plot.sensors, lambda: readings("soc_cad")),
-    "learning": (learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
     "pressure of a measurement": (plot.pressure, lambda: datasets.read("hd_diesel_128x144")[3]),
@@ -329,9 +308,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
         (plot.seeking, sought, "asked", "mgdd.loop.run_seeker"),
-        (convergence, tracks, "estimate_median_cad", "a study of seekers"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.VirtualEngine.run"),
-        (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
         (plot.throttle_run, followed, "angle_deg", "mgdd.throttle.simulate_throttle"),
     ],
 )
@@ -390,21 +367,6 @@ def test_seeking_shows_the_slope_or_leaves_panels_out():
     assert np.isfinite(line(plot.seeking(misfired).figure.axes[1], "mean of 50 cycles").get_ydata()).all()
     with pytest.raises(DataError, match="limit_values: 'torque' was not measured"):
         plot.seeking(sought(), limit_values={"torque": 3.0})
-
-
-def test_convergence_bands_and_refusals():
-    ax = convergence(tracks())
-    np.testing.assert_array_equal(line(ax, "fast").get_ydata(), tracks()["estimate_median_cad"][1])
-    assert len(ax.collections) == 2
-    band = ax.collections[0].get_paths()[0].vertices[:, 1]
-    low, high = tracks()["estimate_low_cad"][0], tracks()["estimate_high_cad"][0]
-    assert (band.min(), band.max()) == pytest.approx((float(low.min()), float(high.max())))
-    assert len(convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
-    with pytest.raises(DataError, match="must be cycle and one more"):
-        convergence(tracks().isel(case=0, drop=True))
-    many = tracks().isel(case=[0, 1] * 6).assign_coords(case=("case", list("abcdefghijkl"), tracks()["case"].attrs))
-    with pytest.raises(DataError, match="case has 12 entries: at most 9"):
-        convergence(many)
 
 
 def test_sensors_over_cycles_timing_and_temperature():
