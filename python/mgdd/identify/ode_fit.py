@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
+from mgdd.errors import ParameterError, ShapeError
 from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
-from mgdd.identify.starts import search_starts, spread_starts
+from mgdd.identify.starts import spread_starts
 from mgdd.optimize import least_squares
 from mgdd.optimize.least_squares import FitOptions, Resolved, fit_of, fit_options, fit_run, quality_of
 from mgdd.parallel.finished import hand_over, keep_finished
-from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit
 from mgdd.results.fit_report import FitReport
 from mgdd.signals.even_grid import even_step
@@ -49,8 +48,6 @@ def fit_ode(
     skip: int = 0,
     sigma: float = 1.0,
     options: FitOptions | None = None,
-    executor: MakesExecutor | None = None,
-    workers: int | None = None,
 ) -> Fit:
     """Fit parameters and start of the user's own ODE to a record: output error of the free run.
 
@@ -92,9 +89,6 @@ def fit_ode(
     options : FitOptions, optional
         1 start, 100 trial steps and a tolerance of 1e-9 by default; more starts come from a Latin
         hypercube (seed 0) between the bounds, which must then be finite.
-    executor, workers
-        As in `mgdd.parallel.map_items`, for the starts: one after the other if left out. Python takes turns in threads,
-        so processes are what helps; they need `derivative` and `output` at the top level of a module.
 
     Returns
     -------
@@ -111,8 +105,6 @@ def fit_ode(
         A record that is not finite or not evenly sampled.
     Interrupted
         Ctrl-C; ``partial`` is the best fit of the starts that were finished.
-    WorkerLostError
-        As in `mgdd.parallel.map_items`; ``partial`` as after Ctrl-C.
 
     See Also
     --------
@@ -197,11 +189,7 @@ def fit_ode(
     ]
     starts = spread_starts(first, box, n_starts, chosen_options.seed)
     reports: list[FitReport] = []
-    stop: Interrupted | WorkerLostError | None
-    if executor is None and workers is None:
-        stop = keep_finished(search.one, starts, reports)
-    else:
-        reports, stop = search_starts(search.each, starts, executor=executor, workers=workers)
+    stop = keep_finished(search.one, starts, reports)
     if reports[0].status == "evaluation_failed" and n_starts == 1:
         raise ParameterError("the model gives no finite simulation at the start values: change them or raise substeps")
     best = min(reports, key=lambda report: report.cost if np.isfinite(report.cost) else np.inf)
@@ -228,7 +216,7 @@ def fit_ode(
 
 @dataclass(frozen=True, kw_only=True)
 class _Search:
-    """All that a search needs beside its start, in a form that a worker can be sent."""
+    """All that a search needs beside its start."""
 
     derivative: Derivative
     output: Output
@@ -247,9 +235,6 @@ class _Search:
     upper: NDArray[np.float64]
     logs: Sequence[bool]
     options: Resolved
-
-    def each(self, starts: Sequence[Mapping[str, float]]) -> list[FitReport]:
-        return [self.one(start) for start in starts]
 
     def one(self, start: Mapping[str, float]) -> FitReport:
         return least_squares(

@@ -152,8 +152,6 @@ def test_ten_parameters_from_python_reach_the_noise_floor():
     assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
     assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
     assert "viscous_nms_per_rad" in fit.unidentifiable
-    alone = SmoothThrottle().fit(log, start_values=starts, lanes=False, **box)
-    assert [report.cost for report in alone.start_reports] == [report.cost for report in fit.start_reports]
     with pytest.raises(ShapeError, match="start_values has shape"):
         SmoothThrottle().fit(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
     with pytest.raises(ParameterError, match="start torque_constant"):

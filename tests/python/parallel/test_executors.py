@@ -59,7 +59,7 @@ def test_dask_changes_no_bit() -> None:
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
-        for name in ("monte_carlo", "track_many", "fit_first_principle"):
+        for name in ("monte_carlo", "track_many"):
             assert same(CALLS[name](executor=client.get_executor()), plain(name))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import parallel_work as work
-from executor_calls import CALLS, fixed_chunks, groups, plain, tuning
+from executor_calls import CALLS, fixed_chunks, plain, tuning
 from mgdd.errors import Interrupted, WorkerLostError
 from mgdd.results.labels import check_labels
 
@@ -44,15 +44,6 @@ def test_a_lost_worker_leaves_the_best_tuning_so_far() -> None:
     with pytest.raises(WorkerLostError) as lost:
         tuning(executor=work.Dropping("cancelled"), workers=2)
     assert lost.value.partial is None
-
-
-def test_a_lost_worker_leaves_the_best_of_the_finished_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    fixed_chunks(monkeypatch, 1)
-    with pytest.raises(WorkerLostError) as lost:
-        groups(executor=work.Dropping("cancelled", after=3), workers=1)
-    part = lost.value.partial
-    assert 0 < len(part.start_rmse) < 5
-    assert part.report.rmse == min(part.start_rmse)
 
 
 @pytest.mark.parametrize("executor", ["None", "ThreadPoolExecutor", "processes(2)"])

@@ -39,11 +39,6 @@ def cores_inside(_: object) -> int:
     return cores()
 
 
-def lag(_t: float, x: Any, u: Any, p: Any) -> Any:
-    """Give the slope of a first-order lag with gain and time constant."""
-    return (p[0] * u[0] - x) / p[1]
-
-
 def deadly(x: float) -> float:
     """Take down the worker that touches item 7."""
     if x == 7.0:

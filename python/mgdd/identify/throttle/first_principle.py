@@ -5,25 +5,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, WorkerLostError
-from mgdd.identify.starts import rank, search_starts
+from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
 from mgdd.identify.throttle.first_principle_problem import group_starts, groups_problem, log_columns
 from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
-from mgdd.parallel.pool import MakesExecutor, threads_of
+from mgdd.parallel.pool import threads_of
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 STATIC = (*GROUP_NAMES[2:7], "limp_home_deg")
 SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
@@ -39,8 +34,6 @@ def fit_first_principle(
     closed_deg: float = 0.0,
     open_deg: float = 90.0,
     options: FitOptions | None = None,
-    executor: MakesExecutor | None = None,
-    workers: int | None = None,
     resistance_ohm: float | None = None,
     supply_v: float | None = None,
     inertia_kgm2: float | None = None,
@@ -75,9 +68,6 @@ def fit_first_principle(
     options : FitOptions, optional
         4 starts, within a factor of 2 around the first, with seed 0, 60 trial steps per stage and a tolerance of 1e-10
         of the last stage by default.
-    executor, workers
-        As in `mgdd.parallel.map_items`, for the starts: threads on all cores if left out. The fit does not depend on
-        them.
     resistance_ohm, supply_v, inertia_kgm2, torque_constant_nm_per_a : float, optional
         Known numbers, for `FirstPrincipleModel.physical_parameters`; their absence is reported in `findings`.
 
@@ -92,8 +82,8 @@ def fit_first_principle(
         A log that is not evenly sampled or too short, or whose plate hardly moves.
     ParameterError
         Unknown group names, or a value outside its bounds.
-    Interrupted, WorkerLostError
-        Ctrl-C, a lost worker; ``partial`` is the best fit of what was searched until then, None where nothing was.
+    Interrupted
+        Ctrl-C; ``partial`` is the best fit of what was searched until then, None where nothing was.
 
     References
     ----------
@@ -111,7 +101,6 @@ def fit_first_principle(
         raise ParameterError.of("delay_samples", problem.values["delay_samples"], text)
     if test is not None:
         log_columns(test)
-    threads = threads_of(workers)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in problem.free if name in STATIC]
     dynamics = [index[name] for name in problem.free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
@@ -128,19 +117,11 @@ def fit_first_principle(
     ]
     starts = group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed)
     how = {"records": [problem.record()], "stages": stages, "closed_deg": closed_deg, "open_deg": open_deg}
-    stop: Interrupted | WorkerLostError | None
-    if executor is None:
-        found, stop = or_partial(lambda: _fit(starts, how, threads))
-        errors, n_reached, values = [one.rmse for one in found["reports"]], int(found["n_reached"]), found["values"]
-        report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
-    else:
-        search = partial(_one_by_one, how=how, angle=problem.angle)
-        each, stop = search_starts(search, starts, executor=executor, workers=workers)
-        best, n_reached = rank([own for own, _ in each])
-        report, values = each[best]
-        errors = [own.rmse for own, _ in each]
+    search = partial(_core.identify.fit_throttle_groups, starts=starts, substeps=SUBSTEPS, n_threads=threads_of(None))
+    found, stop = or_partial(lambda: search(**how))
+    report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
     model = FirstPrincipleModel(
-        parameters=dict(zip(GROUP_NAMES, values, strict=True)),
+        parameters=dict(zip(GROUP_NAMES, found["values"], strict=True)),
         closed_deg=closed_deg,
         open_deg=open_deg,
         substeps=SUBSTEPS,
@@ -178,24 +159,9 @@ def fit_first_principle(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(map(float, errors))),
-        n_best=n_reached,
+        start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
+        n_best=int(found["n_reached"]),
         run=run,
         draw=draw_free_run,
     )
     return hand_over(fit, stop)
-
-
-def _fit(starts: Sequence[Sequence[float]], how: Mapping[str, Any], threads: int) -> dict[str, Any]:
-    found: dict[str, Any] = _core.identify.fit_throttle_groups(
-        starts=starts, substeps=SUBSTEPS, n_threads=threads, **how
-    )
-    return found
-
-
-def _one_by_one(
-    starts: Sequence[Sequence[float]], *, how: Mapping[str, Any], angle: NDArray[np.float64]
-) -> list[tuple[FitReport, list[float]]]:
-    """Search from each start by itself: the core gives all groups of the best one only."""
-    found = [_fit([start], how, 1) for start in starts]
-    return [(FitReport.from_core(one["reports"][0], angle), list(one["values"])) for one in found]
