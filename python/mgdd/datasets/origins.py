@@ -28,14 +28,12 @@ class Origin(NamedTuple):
 ORIGINS: dict[str, dict[str, Origin]] = {
     "cascaded_tanks": {
         "dataBenchmark.csv": Origin(
-            f"{_NEURAL}/CTS/data/dataBenchmark.csv",
-            "ef2388ed822f3aef4aa80d6b0f2b466dd80b361786b3eafc7a2957c31ea323a7",
-        ),
+            f"{_NEURAL}/CTS/data/dataBenchmark.csv", "ef2388ed822f3aef4aa80d6b0f2b466dd80b361786b3eafc7a2957c31ea323a7"
+        )
     },
     "emps": {
         "DATA_EMPS.mat": Origin(
-            f"{_NEURAL}/EMPS/data/DATA_EMPS.mat",
-            "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e",
+            f"{_NEURAL}/EMPS/data/DATA_EMPS.mat", "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e"
         ),
         "DATA_EMPS_PULSES.mat": Origin(
             f"{_NEURAL}/EMPS/data/DATA_EMPS_PULSES.mat",
@@ -46,7 +44,7 @@ ORIGINS: dict[str, dict[str, Origin]] = {
         "WienerHammerBenchmark.csv": Origin(
             f"{_ADAPTATION}/WH/data/WH2009/WienerHammerBenchmark.csv",
             "95f241ac5e0afb48c47b24b3630f55e0d6f8f2f4dec145bd8adf852b19851fa3",
-        ),
+        )
     },
 }
 

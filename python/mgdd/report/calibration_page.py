@@ -258,10 +258,7 @@ def _span(pair: Sequence[float], digits: int) -> str:
 
 
 def draw(
-    analyses: Sequence[xr.Dataset],
-    main: Member,
-    profiles: Mapping[str, WallHeatProfile],
-    timing: Sequence[BestTiming],
+    analyses: Sequence[xr.Dataset], main: Member, profiles: Mapping[str, WallHeatProfile], timing: Sequence[BestTiming]
 ) -> dict[str, Figure]:
     """Draw the figures by caption; nothing is registered with pyplot."""
     out = {

@@ -84,10 +84,7 @@ def write_page(
     """Write sections as one page, whole or not at all; `facts` stand behind the date and what made it."""
     first, last = _first_and_last_fact(made_by)
     page = _rendered(
-        title=title,
-        verdict=verdict,
-        facts=[first, *facts.items(), last],
-        sections=list(map(_section, sections)),
+        title=title, verdict=verdict, facts=[first, *facts.items(), last], sections=list(map(_section, sections))
     )
     write_whole_text(file, page)
 

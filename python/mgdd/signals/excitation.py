@@ -313,12 +313,7 @@ def staircase(
 
 
 def triangle(
-    duration_s: float = 40.0,
-    *,
-    offset: float,
-    amplitude: float,
-    frequency_hz: float = 0.05,
-    sample_s: float = 1e-3,
+    duration_s: float = 40.0, *, offset: float, amplitude: float, frequency_hz: float = 0.05, sample_s: float = 1e-3
 ) -> xr.Dataset:
     """Ramp slowly up and down: friction by the hysteresis, preload by the jump at limp-home, springs by the slope.
 

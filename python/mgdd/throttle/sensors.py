@@ -95,11 +95,7 @@ class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core'
         time = run["time_s"].to_numpy()
         sample = even_step(time)
         raw = _core.throttle.sense(
-            self,
-            run["angle_deg"].to_numpy(),
-            sample_s=sample,
-            seed=seed,
-            faults=fault_pair(faults),
+            self, run["angle_deg"].to_numpy(), sample_s=sample, seed=seed, faults=fault_pair(faults)
         )
         onset = min((fault.from_s for fault in faults), default=0.0)
         latched = raw["fault"].any()

@@ -79,19 +79,17 @@ def test_a_one_sided_log_names_the_other_side_and_an_excitation():
     kept = next(finding for finding in fit.findings if finding.code == "start_value_kept")
     assert set(kept.names) == {"beta_below_duty", "kappa_below_duty_per_deg"}
     assert "excitation" in kept.remedy
-    assert "groups_only" in {finding.code for finding in fit.findings}
     assert fit.parameters["beta_below_duty"] == TYPICAL["beta_below_duty"]
 
 
-def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
-    fit = fit_first_principle(two_sided_log(), test=make_log(noise_deg=0.03), options=FitOptions(n_starts=2))
+def test_a_two_sided_log_with_noise_gives_both_sides():
+    fit = fit_first_principle(two_sided_log(), options=FitOptions(n_starts=2))
     assert isinstance(fit.model, Model)
     assert fit.kind == "first_principle"
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty", "beta_below_duty"):
         assert fit.parameters[name] == pytest.approx(TRUTH[name], rel=0.03), name
     assert fit.parameters["limp_home_deg"] == pytest.approx(8.0, abs=0.1)
     assert fit.train.nrmse_fit_percent > 98.0
-    assert fit.test.nrmse_fit_percent > 90.0
     assert FirstPrincipleModel.from_toml(fit.to_toml()) == fit.model
 
 

@@ -229,10 +229,7 @@ def test_log_pv_slopes():
     ax = plot.pressure(analysed(), log_pv=True)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     np.testing.assert_array_equal(line(ax, "cylinder pressure").get_data(), [LITRE, BAR])
-    fitted = {
-        "compression n = 1.350 (−100 to −40 °CA aTDC)": 1.35,
-        "expansion n = 1.310 (60 to 120 °CA aTDC)": 1.31,
-    }
+    fitted = {"compression n = 1.350 (−100 to −40 °CA aTDC)": 1.35, "expansion n = 1.310 (60 to 120 °CA aTDC)": 1.31}
     for label, exponent in fitted.items():
         volume, bar = line(ax, label).get_data()
         assert -np.diff(np.log(bar)) / np.diff(np.log(volume)) == pytest.approx(exponent)

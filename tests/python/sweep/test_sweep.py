@@ -156,11 +156,7 @@ def test_traces_on_request() -> None:
 # --- executors ----------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     "options",
-    [
-        {"workers": 1},
-        {"workers": 7},
-        {"executor": work.LateReversed(), "workers": 3},
-    ],
+    [{"workers": 1}, {"workers": 7}, {"executor": work.LateReversed(), "workers": 3}],
     ids=["one", "seven", "late and reversed"],
 )
 def test_the_executor_does_not_matter(options: dict[str, Any], table: xr.Dataset) -> None:
@@ -278,11 +274,7 @@ def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixt
         ({"soc_cad": [-6.0, -5.0, -6.0]}, ParameterError, "soc_cad = -6: must be on the axis once"),
         ({"soc_cad": [-6.0, math.nan]}, ParameterError, r"soc_cad\[1\] = nan: must be finite"),
         ({"soc_cad": [-6.0, 40.0]}, ParameterError, "soc_cad = 40 .*: must be"),
-        (
-            {"fuel": [3.0]},
-            ParameterError,
-            r"over = 'fuel': must be a known input: .*soc_cad, burn_duration_cad,",
-        ),
+        ({"fuel": [3.0]}, ParameterError, r"over = 'fuel': must be a known input: .*soc_cad, burn_duration_cad,"),
         ({"speed": [3.0]}, ParameterError, "over = 'speed': .*did you mean 'speed_rpm'"),
         ({"burn_shape": [1.0]}, ParameterError, "sweep once per choice .*triangle"),
         ({"compression_ratio": [16.0, 0.5]}, ParameterError, "compression_ratio = 0.5: must be"),

@@ -11,12 +11,7 @@ from mgdd import presets
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.loop import ThrottleFault
 from mgdd.results.labels import check_labels, labelled_dataset
-from mgdd.throttle import (
-    SensorPair,
-    Throttle,
-    characteristics,
-    simulate_throttle,
-)
+from mgdd.throttle import SensorPair, Throttle, characteristics, simulate_throttle
 from mgdd.throttle.characteristics import airflow_torque_nm
 from mgdd.throttle.simulation import step_summary
 
