@@ -23,40 +23,12 @@ def analysed(*, spoil=lambda _, bar: bar, step=0.5, decimals=None, point=POINT, 
     return analyze(trace, CYLINDER, point=point, quiet=True, **said)
 
 
-def held(start, stop):
-    return lambda angle, bar: np.where((angle >= start) & (angle <= stop), bar[np.searchsorted(angle, start)], bar)
-
-
-@pytest.mark.parametrize("step", [0.2, 0.5, 1.0])
-@pytest.mark.parametrize("decimals", [None, 1])
-def test_a_clipped_amplifier_is_named(step, decimals):
-    assert analysed(step=step, decimals=decimals).attrs["warnings"] == ""
-    cut = analysed(step=step, decimals=decimals, spoil=lambda _, bar: np.minimum(bar, 0.9 * bar.max()))
-    assert "a saturated amplifier or the end of its range" in cut.attrs["warnings"]
-
-
-@pytest.mark.parametrize(("start", "stop"), [(-80.0, -70.0), (-50.0, -40.0), (85.0, 95.0)])
-def test_a_stuck_sensor_is_named(start, stop):
-    assert "equal samples: a stuck sensor" in analysed(spoil=held(start, stop)).attrs["warnings"]
-
-
 def test_equal_samples_of_a_coarse_converter_are_no_fault():
     for point in (POINT, POINT.replace(fuel_mg=0.0)):
         for step in (0.1, 1.0):
             for decimals in (0, 1):
                 warnings = analysed(step=step, decimals=decimals, point=point).attrs["warnings"]
                 assert not any(word in warnings for word in ("equal samples", "off its neighbours"))
-
-
-@pytest.mark.parametrize("at", [-80.0, 75.0, 100.0])
-def test_a_single_sample_of_5_bar_is_named(at):
-    spoilt = analysed(spoil=lambda angle, bar: bar + 5.0 * (angle == at))
-    assert f"the sample at {at:g} °CA aTDC stands " in spoilt.attrs["warnings"]
-
-
-def test_thermal_shock_is_named():
-    spoilt = analysed(spoil=lambda angle, bar: bar - np.clip(angle / 30.0, 0.0, 1.0))
-    assert "suspect thermal shock of the sensor" in spoilt.attrs["warnings"]
 
 
 def test_the_heat_of_the_stated_fuel_shows_a_wrong_gain():
