@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.dead_centre import degree_cost
-from mgdd.engine.sample_doubts import sample_doubts
+from mgdd.engine.doubts import sample_doubts
 from mgdd.engine.trace_cycles import COLUMNS, expansion_of, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError, printable
 from mgdd.io.pressure import as_trace

@@ -149,7 +149,7 @@ def _axes(figure: Figure) -> list[dict[str, Any]]:
             label = next(filter(None, (getattr(own, f"get_{way}label")() for own in (ax, *beside))), way)
             shown[way] = [*getattr(ax, f"get_{way}lim")(), getattr(ax, f"get_{way}scale")(), label]
         if ax.axison and {shown["x"][2], shown["y"][2]} <= {"linear", "log"}:
-            out.append({"place": ax.get_position().extents.tolist(), **shown})
+            out.append({"place": [*map(float, ax.get_position().extents)], **shown})
     return out
 
 

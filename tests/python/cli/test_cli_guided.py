@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.guide_map import learn_map
+from mgdd.cli.seek import learn_map
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.loop import VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking

@@ -84,7 +84,7 @@ def fit_first_principle(
         if part and (fraction == 1.0 or fraction * problem.angle.size >= 200)
     ]
     starts = group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed)
-    how = {"records": [problem.record()], "stages": stages, "closed_deg": 0.0, "open_deg": 90.0}
+    how: dict[str, Any] = {"records": [problem.record()], "stages": stages, "closed_deg": 0.0, "open_deg": 90.0}
     search = partial(_core.identify.fit_throttle_groups, starts=starts, substeps=SUBSTEPS, n_threads=threads_of(None))
     found, stop = or_partial(lambda: search(**how))
     report = FitReport.from_core(found["reports"][found["best"]], problem.angle)

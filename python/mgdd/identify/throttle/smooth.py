@@ -144,7 +144,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
             raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
         time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
         state = self.state_of(initial_state)
-        how = {
+        how: dict[str, Any] = {
             "duty": duty,
             "angle_deg": angle,
             "lower": _ten(lower, "lower"),
