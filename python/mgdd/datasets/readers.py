@@ -1,4 +1,4 @@
-"""Public data by name: each set as labelled Datasets."""
+"""Public data by name: each set as labelled Datasets, and the two measured engine maps."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ from mgdd.identify.engine.records import CylinderFit, Load, figures_of, starts_o
 from mgdd.identify.engine.request import GAMMA_PARAMETER, listed, pegged
 from mgdd.identify.engine.timing_records import undetermined
 from mgdd.parallel.finished import hand_over
+from mgdd.plot.calibration import family_strips
 from mgdd.plot.calibration import wall_heat_profile as draw_profile
-from mgdd.plot.family import family_strips
 from mgdd.plot.style import drawn, new_figure
 from mgdd.presets.meant import cylinder_of, point_of
 from mgdd.report.report import Report

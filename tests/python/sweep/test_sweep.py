@@ -26,8 +26,7 @@ from mgdd.engine import Cylinder, NoxProxy, OperatingPoint, simulate, timing_swe
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.results.labels import check_labels
 from mgdd.sweep import sweep
-from mgdd.sweep.cases import case_of, input_labels
-from mgdd.sweep.cycles import simulate_cases
+from mgdd.sweep.cycles import case_of, input_labels, simulate_cases
 
 CYLINDER = Cylinder(burn_shape="wiebe", wall_heat_scale=0.7, bore_mm=83.0)
 POINT = OperatingPoint(speed_rpm=1750.0, fuel_mg=17.0)
@@ -180,8 +179,7 @@ def test_any_chunks_give_the_same_bits(cuts: set[int]) -> None:
 
 
 def chunked(kept: list[Any] = []) -> Any:  # noqa: B006 - the whole is computed once
-    from mgdd.sweep.cases import cases_of
-    from mgdd.sweep.cycles import NOX, Request
+    from mgdd.sweep.cycles import NOX, Request, cases_of
 
     if not kept:
         cases = cases_of(GRID, points=False)
