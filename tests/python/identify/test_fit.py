@@ -21,8 +21,7 @@ from mgdd.optimize import FitOptions, least_squares
 from mgdd.optimize.least_squares import fit_options
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
-from mgdd.results.fit import FitQuality
-from mgdd.results.model import Model
+from mgdd.results.fit import FitQuality, Model
 from mgdd.throttle import PseudoWiener
 from mgdd_studies.benchmarks.two_tanks import TwoTanksModel
 

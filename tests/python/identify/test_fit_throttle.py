@@ -17,7 +17,7 @@ from mgdd.identify.throttle.nuisances import TYPICAL_SHARE, delay_weights
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.results.model import Model
+from mgdd.results.fit import Model
 
 TRUTH = {
     "tau_s": 0.0197,

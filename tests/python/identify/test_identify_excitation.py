@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from mgdd import identify, signals
 from mgdd.errors import ConvergenceError, DataError, ParameterError
 from mgdd.identify import check_excitation, design_excitation
-from mgdd.identify.throttle.excitation_check import _signal_of
-from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.excitation import EXCITATIONS, _signal_of
 from mgdd.signals import chirp, triangle
 from mgdd.throttle import Throttle, characteristics, simulate_throttle
 

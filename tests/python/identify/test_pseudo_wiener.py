@@ -13,7 +13,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results.model import Model
+from mgdd.results.fit import Model
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3

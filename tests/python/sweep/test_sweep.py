@@ -7,9 +7,6 @@ import logging
 import math
 import multiprocessing
 import pickle
-import subprocess
-import sys
-import textwrap
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
@@ -23,7 +20,7 @@ from hypothesis import strategies as st
 import parallel_work as work
 from mgdd import _core
 from mgdd.engine import Cylinder, NoxProxy, OperatingPoint, simulate, timing_sweep
-from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
+from mgdd.errors import ParameterError, ShapeError, WorkerLostError
 from mgdd.results.labels import check_labels
 from mgdd.sweep import sweep
 from mgdd.sweep.cycles import case_of, input_labels, simulate_cases
@@ -212,37 +209,6 @@ def test_a_lost_worker_hands_over_what_is_done(table: xr.Dataset) -> None:
     check_labels(part)
 
 
-def test_ctrl_c_carries_what_is_done() -> None:
-    program = """
-        import os, signal
-        import numpy as np
-        from mgdd.engine import Cylinder, OperatingPoint
-        from mgdd.errors import Interrupted
-        from mgdd.sweep import sweep
-
-        def progress(done, n):
-            if done > 50:
-                os.kill(os.getpid(), signal.SIGINT)
-
-        soc = np.linspace(-20.0, 10.0, 3001)
-        grid = {"speed_rpm": np.linspace(1000.0, 3000.0, 101), "soc_cad": soc}
-        try:
-            sweep(Cylinder(), OperatingPoint(), grid, progress=progress, outputs="imep_gross_bar", step_cad=5.0)
-        except KeyboardInterrupt as stop:
-            assert isinstance(stop, Interrupted)
-            part = stop.partial
-            done = part["finished"].values
-            assert part.sizes == {"speed_rpm": 101, "soc_cad": 3001}
-            assert 50 < done.sum() < done.size, done.sum()
-            assert (np.isfinite(part["imep_gross_bar"].values) == done).all()
-            print("kept")
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert (done.stdout, done.stderr) == ("kept\n", "")
-
-
 # --- outside the model's range ---------------------------------------------------------------------------------------
 def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixture) -> None:
     grid = {"speed_rpm": [1500.0, 100.0, 120.0], "wall_heat_scale": [1.0, 100.0]}
@@ -315,7 +281,3 @@ def test_an_absurd_size_is_refused_with_its_bytes() -> None:
         sweep(CYLINDER, POINT, grid)
     with pytest.raises(ParameterError, match=r"bytes \(.* GiB\), more than the \d+ GiB of this machine"):
         sweep(CYLINDER, POINT, {"soc_cad": np.linspace(-20.0, 10.0, 10**7)}, traces=True)
-
-
-def test_interrupted_is_a_keyboard_interrupt() -> None:
-    assert issubclass(Interrupted, KeyboardInterrupt)

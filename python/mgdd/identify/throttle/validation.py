@@ -16,10 +16,9 @@ from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io.throttle_checks import check_throttle_log
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
-from mgdd.results.fit import FitQuality
+from mgdd.results.fit import FitQuality, Model
 from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import labelled_dataset
-from mgdd.results.model import Model
 from mgdd.results.result import Result, merged
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, rmse, vaf_percent
