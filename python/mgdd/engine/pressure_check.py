@@ -75,18 +75,8 @@ _REMEDIES = {
 }
 # What a speed that swings within a turn makes of angles at one speed, 5 % of it an eighth of the work.
 _SWINGS = (
-    "tdc",
-    "strokes",
-    "level",
-    "pegging",
-    "compression",
-    "expansion",
-    "mass",
-    "gain",
-    "exchange",
-    "drift",
-    "slip",
-)
+    "tdc", "strokes", "level", "pegging", "compression", "expansion", "mass", "gain", "exchange", "drift", "slip",
+)  # fmt: skip
 _SWING = (
     "take the angle of an encoder: it is made of time at one speed, and a speed that swings within a turn does this"
 )
@@ -254,19 +244,10 @@ def check_pressure(
         made = as_trace(trace)
         name = str(made.attrs.get("file", name))
         found = analyze(
-            made,
-            cylinder,
-            point=point,
-            pegging=pegging,
-            pegging_exponent=pegging_exponent,
-            inlet_pressure_kpa=inlet_pressure_kpa,
-            bmep_bar=bmep_bar,
-            brake_torque_nm=brake_torque_nm,
-            n_cylinders=n_cylinders,
-            fuel_mg=fuel_mg,
-            traces=made.sizes.get(CYCLE, 1) == 1,
-            quiet=True,
-        )
+            made, cylinder, point=point, pegging=pegging, pegging_exponent=pegging_exponent,
+            inlet_pressure_kpa=inlet_pressure_kpa, bmep_bar=bmep_bar, brake_torque_nm=brake_torque_nm,
+            n_cylinders=n_cylinders, fuel_mg=fuel_mg, traces=made.sizes.get(CYCLE, 1) == 1, quiet=True,
+        )  # fmt: skip
     except DataError as error:
         return PressureCheck(name, (Check("file", "fail", str(error)),))
     said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))

@@ -1,4 +1,4 @@
-"""Duty signals: designed for a throttle, and judged before they are sent: what would the plate do, what would it show."""
+"""Duty signals: designed for a throttle, and judged before they are sent: what the plate would do, and show."""
 
 from __future__ import annotations
 
