@@ -204,7 +204,7 @@ class InUseError(Error, RuntimeError):
 
 
 class WorkerLostError(Error, RuntimeError):
-    """A worker of an executor that is gone, with work that could not be done again.
+    """A worker of an executor that is gone, with its work.
 
     Attributes
     ----------

@@ -14,9 +14,9 @@ from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.finished import hand_over
 from mgdd.parallel.pool import MakesExecutor, Pool
 from mgdd.report import Report
-from mgdd.report.sections import standard_sections
 from mgdd.results.labels import to_jsonable
 from mgdd.results.result import Figures
+from mgdd_studies.sections import standard_sections
 from mgdd_studies.titles import STUDIES
 from mgdd_studies.verdicts import verdict_of
 

@@ -13,11 +13,10 @@ from mgdd.cli.options import refuse_idle
 from mgdd.cli.output import emit, whole_or_part
 from mgdd.cli.progress import Stopped
 from mgdd.errors import ParameterError
-from mgdd.io.extras import import_extra
 from mgdd.parallel.pool import processes
 from mgdd.report import Table, write_report
-from mgdd.report.sections import cells, column_names
 from mgdd_studies.registry import available_studies, run_study
+from mgdd_studies.sections import cells, column_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 __all__ = ["fill", "rows_table", "run", "run_study"]
 
 _STUDY = Options(run_study, "seeds", "quick")
-_PAGE = Options(write_report, "interactive")
 _LOW = "_low"
 _OPTIONS = {"real": ("guided",)}  # of single studies
 
@@ -44,7 +42,6 @@ def fill(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
-    _PAGE.add(parser)
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: %(default)s)")
 
 
@@ -65,10 +62,6 @@ def run(args: argparse.Namespace) -> None:
             refuse_idle(args, option, why=f"it is an option of the study {', '.join(studies)}, not of {args.name}")
         elif getattr(args, option) is not None:
             options[option] = getattr(args, option)
-    if args.report is None:
-        refuse_idle(args, "interactive", why="it is of the page that --report writes")
-    elif args.interactive:
-        import_extra("plotly", "interactive", "an interactive figure")  # before the study runs, not after it
     folder = None if args.figures is None else Path(args.figures)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -88,7 +81,7 @@ def run(args: argparse.Namespace) -> None:
     for path, (caption, figure) in files.items():
         figure.savefig(path, dpi=120, metadata={"Title": caption})
     if args.report is not None:
-        write_report(result, args.report, **_PAGE.given(args))
+        write_report(result, args.report)
     if stopped:
         raise Stopped(f"{len(summary['rows'])} finished rows are printed")
 

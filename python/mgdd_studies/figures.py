@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.plot.convergence import convergence
 from mgdd.plot.style import new_figure
+from mgdd_studies.curves import convergence
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,10 +12,10 @@ import numpy as np
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.guide import Curve
 from mgdd.loop import VirtualEngine
-from mgdd.plot.convergence import convergence
 from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset
 from mgdd_studies.base import Parts, Progress, StudyResult, check_seeds
+from mgdd_studies.curves import convergence
 from mgdd_studies.figures import convergence_panels, names_of
 from mgdd_studies.guide_cases import (
     GUIDES,

@@ -246,7 +246,7 @@ def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from mgdd.plot.convergence import learning as learning_curves
+    from mgdd_studies.curves import learning as learning_curves
 
     tracks = dataset[["estimate_median_cad", "estimate_low_cad", "estimate_high_cad", "optimum_cad"]]
     names = names_of(dataset, "seeker")

@@ -12,8 +12,8 @@ from mgdd import presets
 from mgdd.control import Pid, SlidingMode, ThrottleSupervisor
 from mgdd.identify.throttle.free_run import free_run, quality_of
 from mgdd.loop.controller_families import FAMILIES, Setup, groups_of
+from mgdd.results.fit import Model
 from mgdd.results.labels import labelled_dataset
-from mgdd.results.model import Model
 from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import Throttle, simulate_throttle
 

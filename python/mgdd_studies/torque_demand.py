@@ -146,7 +146,7 @@ def _dataset(runs: list[xr.Dataset], names: list[str]) -> xr.Dataset:
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from mgdd.plot.drive import drive
+    from mgdd_studies.curves import drive
 
     caption = "A tip-in, a tip-out and a ramp under rising speed, the engine as the chain believes: wanted and obtained"
     return {caption: drawn(drive, dataset.isel(case=0), size=(6.8, 7.6))}

@@ -44,16 +44,11 @@ def test_every_field_refuses_what_is_outside_its_domain_and_changes_nothing(kind
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"bore_mm": -86.0}, r"bore_mm = -86 mm: must be > 0"),
-        ({"bore_mm": math.nan}, r"bore_mm = -?nan mm: must be > 0"),
-        ({"compression_ratio": 1.0}, r"compression_ratio = 1: must be > 1"),
-        ({"compression_ratio": 0.5}, r"compression_ratio = 0\.5: must be > 1"),
         ({"connecting_rod_mm": 40.0}, r"connecting_rod_mm = 40 mm: must be longer than the crank radius.*86"),
         ({"ivc_cad": 130.0, "evo_cad": 120.0}, r"ivc_cad = 130 °CA aTDC: must be before evo_cad = 120"),
         ({"ivc_cad": 140.0}, r"ivc_cad = 140 °CA aTDC.*°bTDC"),
         ({"ivc_cad": 140.0, "evo_cad": 150.0}, r"ivc_cad = 140.*°bTDC.*pass -140"),
         ({"evo_cad": 490.0}, r"evo_cad = 490.*firing TDC = 0"),
-        ({"gamma": 1.0}, r"gamma = 1: must be > 1"),
         ({"gamma_model": "linear", "gamma_linear_slope_per_k": -1.9e-4}, r"gamma_linear_slope_per_k.*must stay > 1"),
         ({"burn_shape": "square"}, r"burn_shape = 'square': must be one of triangle, wiebe, double_wiebe"),
         ({"gamma_model": "cubic"}, r"gamma_model = 'cubic'.*polynomial"),

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.engine import Indicating, simulate
-from mgdd.engine.noise import a_weighting_db
+from mgdd.engine.indicating import a_weighting_db
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results.labels import check_labels
 

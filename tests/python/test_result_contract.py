@@ -20,13 +20,12 @@ import mgdd
 from map_cases import sweep as map_sweep
 from mgdd import datasets, identify, io, plot, presets
 from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignition_delay, simulate
-from mgdd.errors import DataError, Error, ParameterError
+from mgdd.errors import Error, ParameterError
 from mgdd.guide import OnlineCalibration, TimingMap
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, FitOptions, IterativeLearning, measure_map, tune
-from mgdd.plot.convergence import convergence
 from mgdd.plot.response import response_diagnostics
 from mgdd.report import Report
 from mgdd.results.labels import check_labels
@@ -173,12 +172,6 @@ def test_a_result_can_do_what_every_result_can(name: str, tmp_path: Path) -> Non
     assert isinstance(made.plot(), Axes)
     again = pickle.loads(pickle.dumps(made))
     xr.testing.assert_identical(again.dataset, data)
-    pytest.importorskip("plotly")
-    if ax.tables:  # of a few numbers
-        with pytest.raises(DataError, match="a figure with a Table has no interactive form"):
-            made.plot(engine="plotly")
-    else:
-        assert made.plot(engine="plotly").data
 
 
 def test_tables_are_over_the_main_dimension() -> None:
@@ -209,7 +202,6 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
     "map_contour": (lambda: MADE["CalibrationMap"](Path()), ("soc_cad",)),
     "correlation_matrix": (throttle_fit, ()),
     "response_diagnostics": (response, ()),
-    "convergence": (lambda: run_study("sensor-delay", quick=True, figures=False), ()),
     "pressure": (lambda: Drawn(simulate("puma_single")), ()),
     "pressure of cycles": (lambda: Drawn(analyze(pressures(), "puma_single", quiet=True)), ()),
     "cycles": (lambda: Drawn(record()), ("ca50_cad",)),
@@ -225,7 +217,6 @@ DRAWN: dict[str, tuple[Callable[[], Any], tuple[Any, ...]]] = {
 
 
 DRAWN_BY = {
-    "convergence": convergence,
     "pressure of cycles": plot.pressure,
     "spectrum of cycles": plot.cycles,
     "map of cycles": plot.cycles,

@@ -46,17 +46,6 @@ def test_an_unknown_name_says_where_the_known_ones_are(capsys: pytest.CaptureFix
         assert out == ""
 
 
-def test_a_page_that_zooms_is_refused_before_the_study_runs(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr("mgdd_studies.command.run_study", lambda *_, **__: pytest.fail("it ran"))
-    _, err = run(capsys, "sensor-delay", "--interactive", code=2)
-    assert "--interactive does not act here; it is of the page that --report writes" in err
-    monkeypatch.setitem(sys.modules, "plotly", None)
-    _, err = run(capsys, "sensor-delay", "--report", str(tmp_path), "--interactive", code=2)
-    assert 'an interactive figure needs plotly: pip install "mgdd[interactive]"' in err
-
-
 def test_refused_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert "seeds = 0: must be >= 1" in run(capsys, "sensor-delay", "--seeds", "0", code=2)[1]
     assert "the ending must be one of .json" in run(capsys, "sensor-delay", "-o", str(tmp_path / "a.txt"), code=2)[1]

@@ -17,7 +17,6 @@ from mgdd import datasets
 from mgdd.cli import main
 from mgdd.report import write_report
 from mgdd.results.labels import labelled_dataset
-from mgdd_studies import run_study
 from mgdd_studies.base import StudyResult
 from mgdd_studies.registry import available_studies
 from mgdd_studies.verdicts import verdict_of
@@ -127,20 +126,6 @@ def test_standard_sections_say_rows_numbers_lists_and_interruption() -> None:
     fits = sections["Fits"].table
     assert fits is not None
     assert (fits.columns, fits.rows) == (("pressure RMSE, closed cycle [bar]",), (("–",),))
-
-
-def test_the_figures_zoom_and_the_pictures_stay_for_paper(tmp_path: Path) -> None:
-    pytest.importorskip("plotly")
-    result = run_study("sensor-delay", seeds=2, quick=True)
-    text = write_report(result, tmp_path, interactive=True).read_text(encoding="utf-8")
-    assert text.count("Plotly.newPlot(d,") == text.count("<img class=") == len(result.figures)
-    assert len(re.findall(r"<script>", text.split("<h1>")[0])) == 1
-    assert "<noscript>" in text
-    figure = next(iter(result.figures.values()))
-    figure.axes[0].set_xlabel("$x$")  # which Plotly cannot write: the picture stays, and says why
-    text = write_report(result, tmp_path, interactive=True).read_text(encoding="utf-8")
-    assert text.count("Plotly.newPlot(d,") == len(result.figures) - 1
-    assert "has no interactive form" in text
 
 
 def test_the_verdict_is_made_of_the_numbers() -> None:

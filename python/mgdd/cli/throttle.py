@@ -14,17 +14,20 @@ from mgdd.cli.from_library import Options, as_option
 from mgdd.cli.options import option
 from mgdd.cli.output import emit
 from mgdd.cli.ranges import assignments
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.errors import DataError, ParameterError, argument, did_you_mean
 from mgdd.io import read_throttle_log
 from mgdd.io.parameters import ParameterFile
+from mgdd.io.table import Place, read_table
 from mgdd.plot import throttle_run
 from mgdd.plot.style import drawn
 from mgdd.presets.preset import Preset
+from mgdd.signals.even_grid import even_step
 from mgdd.throttle import DemandChain, Throttle, simulate_throttle
-from mgdd.throttle.duty_file import read_duty
 from mgdd.throttle.simulation import step_summary
 
 if TYPE_CHECKING:
+    import os
+
     import xarray as xr
 
 LOG = Options(
@@ -151,3 +154,35 @@ def _simulate(args: argparse.Namespace) -> None:
 
 
 COMMANDS = {"simulate": (_add_simulate, _simulate), "demand": (_add_demand, _demand)}
+
+
+_OPTIONAL = ("supply_v", "airflow_torque_nm")
+
+
+def read_duty(path: str | os.PathLike[str], given: Mapping[str, float]) -> dict[str, Any]:
+    """Read what `mgdd.throttle.simulate_throttle` takes: ``time_s``, ``duty``, and other signals that the file has.
+
+    A column of a `given` constant contradicts it.
+    """
+    table = read_table(path)
+    header = table.header
+    if header is None:
+        raise DataError(f"{path}: no header: name the columns, at least time_s,duty")
+    table.require_units_of_names()
+    for name in given:
+        if name in header:
+            raise ParameterError(f"{argument(name)} and the column {name} of {path} contradict each other: give one")
+    names = ("time_s", "duty", *(name for name in _OPTIONAL if name in header))
+    out: dict[str, Any] = {name: table.numbers(table.index(name)) for name in names}
+    place = Place(table.source, table.lines)
+    even_step(out["time_s"], where=lambda at: place.cell(at, "time_s"), remedy="resample the duty first")
+    duty, supply = out["duty"], out.get("supply_v", np.zeros(1))
+    if np.abs(duty).max() > 1.0:
+        at = int(np.argmax(np.abs(duty) > 1.0))
+        raise DataError(
+            f"{place.cell(at, 'duty')}: duty = {duty[at]:g}: must be in [-1, 1]; a duty in percent is divided by 100"
+        )
+    if supply.min() < 0.0:
+        at = int(np.argmax(supply < 0.0))
+        raise DataError(f"{place.cell(at, 'supply_v')}: supply_v = {supply[at]:g} V: must be >= 0")
+    return out | dict(given)

@@ -12,7 +12,7 @@ from mgdd.cli.options import option
 from mgdd.cli.output import emit, warn
 from mgdd.cli.throttle import LOG, add_throttle, log_in, throttle_of
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.excitation import EXCITATIONS
 from mgdd.io.files import write_whole_text
 from mgdd.optimize import FitOptions
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from mgdd.identify.throttle.excitation_check import ExcitationCheck
+    from mgdd.identify.throttle.excitation import ExcitationCheck
     from mgdd.identify.throttle.validation import ThrottleValidation
 
 

@@ -1,15 +1,14 @@
-"""Public data by name: each set as labelled Datasets."""
+"""Public data by name: each set as labelled Datasets, and the two measured engine maps."""
 
 from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
-from mgdd.datasets import origins
-from mgdd.datasets.engine_maps import engine_map
+from mgdd.datasets import files
 from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, LICENCES, names, path
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
@@ -20,6 +19,7 @@ from mgdd.signals.even_grid import check_count
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
 _H2DF_SHA256 = "482b1cd0ce7e6389d8872f547d6fb05f7f63df9715eb6de1e76d7c066dada39c"
 _CAD = "°CA aTDC"
@@ -149,7 +149,7 @@ def read(
     -5.06
     """
     if fetch and name not in names():
-        origins.fetch(name)
+        files.fetch(name)
     if name == "h2df_502":
         return _h2df_cycles(checked=checked, mask_held=mask_held)
     if name not in FILES:
@@ -280,3 +280,66 @@ def _wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
         )
 
     return record(slice(0, 100_000), "estimation"), record(slice(100_000, None), "test")
+
+
+_AXES = ("speed_rpm", "torque_Nm")
+# Column of the file: name here, offset, unit, long name.
+_COLUMNS: dict[str, tuple[str, float, str, str]] = {
+    "fuel_g_s": ("fuel_g_per_s", 0.0, "g/s", "fuel flow"),
+    "nox_g_s": ("nox_g_per_s", 0.0, "g/s", "NOx, engine out"),
+    "pm_g_s": ("pm_g_per_s", 0.0, "g/s", "particulate matter, engine out"),
+    "hc_g_s": ("hc_g_per_s", 0.0, "g/s", "unburnt hydrocarbons, engine out"),
+    "co_g_s": ("co_g_per_s", 0.0, "g/s", "CO, engine out"),
+    "exh_temp_C": ("exhaust_temperature_k", 273.15, "K", "exhaust temperature"),
+    "exh_flow_g_s": ("exhaust_g_per_s", 0.0, "g/s", "exhaust flow"),
+}
+_TITLES = {"vw_1.9tdi_ornl_hot.csv": "Volkswagen 1.9 L TDI", "mercedes_1.7_ornl_hot.csv": "Mercedes 1.7 L diesel"}
+_ATTRS = {
+    "source": "data/fuel_converter of https://github.com/geraldo-reboucas/adv-vehicle-sim, commit b3777b3",
+    "citation": "measured at Oak Ridge National Laboratory (S. Sluder), published with ADVISOR",
+    "licence": LICENCES[ENGINE_MAPS],
+    "changes": "matrices as a table, temperature in K; the rows above full load, which the source pads, are left out",
+    "note": "warm engine, steady state, stock calibration: neither timing nor rail pressure nor EGR vary",
+}
+_G_PER_KWH = 3600.0 * 1000.0  # (g/s) / W
+
+
+def engine_map(file: Path) -> xr.Dataset:
+    """Read one engine; NaN above its full load, and where a share of zero power is asked for."""
+    table = read_table(file)
+    lacking = [name for name in (*_AXES, *_COLUMNS, "attainable") if name not in (table.header or ())]
+    if lacking:
+        raise DataError(f"{file}: no column {lacking[0]!r}: this is not an engine map of the set")
+    speed, torque = (table.numbers(table.index(name)) for name in _AXES)
+    speeds, torques = np.unique(speed), np.unique(torque)
+    shape = speeds.size, torques.size
+    place = np.ravel_multi_index((np.searchsorted(speeds, speed), np.searchsorted(torques, torque)), shape)
+    if place.size != speeds.size * torques.size or np.unique(place).size != place.size:
+        raise DataError(
+            f"{file}: {place.size} rows: a map of {shape[0]} speeds and {shape[1]} torques has one for each"
+        )
+
+    def grid(column: NDArray[Any]) -> NDArray[Any]:
+        out = np.empty(shape, column.dtype)
+        out.ravel()[place] = column
+        return out
+
+    attainable = grid(table.numbers(table.index("attainable")) == 1.0)
+    columns = {name: np.where(attainable, grid(table.numbers(table.index(name))), np.nan) for name in _COLUMNS}
+    power_w = torques * speeds[:, None] * (np.pi / 30.0)
+    with np.errstate(divide="ignore"):
+        per_work = np.where(power_w > 0.0, _G_PER_KWH / power_w, np.nan)
+    dims = ("speed_rpm", "torque_nm")
+    variables: dict[str, tuple[object, ...]] = {
+        "speed_rpm": ("speed_rpm", speeds, "rpm", "engine speed"),
+        "torque_nm": ("torque_nm", torques, "N m", "torque"),
+        "attainable": (dims, attainable, "-", "at or below full load"),
+        "full_load_nm": (
+            "speed_rpm", np.max(np.where(attainable, torques, -np.inf), axis=1), "N m", "highest attainable torque"
+        ),
+        "bsfc_g_per_kwh": (dims, columns["fuel_g_s"] * per_work, "g/kWh", "brake specific fuel consumption"),
+        "nox_g_per_kwh": (dims, columns["nox_g_s"] * per_work, "g/kWh", "brake specific NOx"),
+    }  # fmt: skip
+    for column, (name, offset, units, long_name) in _COLUMNS.items():
+        variables[name] = (dims, columns[column] + offset, units, long_name)
+    return labelled_dataset(variables, attrs={"title": _TITLES.get(file.name, file.stem), "file": file.name, **_ATTRS})

@@ -134,11 +134,7 @@ class FeasibleRegion:
         self.rule = rule
 
     @classmethod
-    def of_model(
-        cls,
-        indicators: Indicators,
-        limits: Mapping[str, float] | Sequence[Limit],
-    ) -> FeasibleRegion:
+    def of_model(cls, indicators: Indicators, limits: Mapping[str, float] | Sequence[Limit]) -> FeasibleRegion:
         """Make the region in which a model keeps limits.
 
         Parameters

@@ -38,11 +38,7 @@ def sampler_of(method: str, factors: int, generator: np.random.Generator) -> Sam
 
 
 def draw_inside(
-    sample: Sampler,
-    n: int,
-    *,
-    inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
-    what: str,
+    sample: Sampler, n: int, *, inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]], what: str
 ) -> tuple[NDArray[np.float64], int, int]:
     """Draw points until n of them are feasible: those, and how many of how many were."""
     kept: list[NDArray[np.float64]] = []

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.dead_centre import degree_cost
-from mgdd.engine.sample_doubts import sample_doubts
+from mgdd.engine.doubts import sample_doubts
 from mgdd.engine.trace_cycles import COLUMNS, expansion_of, is_of_cycles, of_cycles
 from mgdd.errors import DataError, ParameterError, printable
 from mgdd.io.pressure import as_trace
@@ -190,38 +190,26 @@ def analyze(
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
     intake = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
     options = {
-        "pegging": pegging,
-        "pegging_exponent": pegging_exponent,
+        "pegging": pegging, "pegging_exponent": pegging_exponent,
         "inlet_pressure_kpa": own.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
-        "gamma_source": source,
-        "gamma": number,
-        "heat_from_cad": window[0] if window else None,
-        "heat_to_cad": window[1] if window else None,
+        "gamma_source": source, "gamma": number,
+        "heat_from_cad": window[0] if window else None, "heat_to_cad": window[1] if window else None,
         "earliest_burn_cad": _number(trace, "soi_cad", _number(trace, "spark_cad")),
         "burn_from_cad": float(trace["soc_cad"]) if simulated else None,
-        "total_at_end": simulated,
-        "fractions": fractions,
-        "smoothing": _smoothing(smoothing, simulated),
-        "smoothing_width_cad": smoothing_width_cad,
+        "total_at_end": simulated, "fractions": fractions,
+        "smoothing": _smoothing(smoothing, simulated), "smoothing_width_cad": smoothing_width_cad,
         "smoothing_cutoff_hz": smoothing_cutoff_hz,
         "intake_pressure_kpa": intake if intake is not None or whole is None else whole.intake_pressure_kpa,
         "intake_factor": _POINT_FACTOR if intake is None else _STATED_FACTOR,
         "bmep_bar": _bmep(trace, cylinder, bmep_bar, brake_torque_nm, n_cylinders),
         "fuel_heat_j": _fuel_heat(trace, cylinder, fuel_mg),
-        "knock_low_hz": knock_band_hz[0],
-        "knock_high_hz": knock_band_hz[1],
-        "knock_from_cad": knock_window_cad[0],
-        "knock_to_cad": knock_window_cad[1],
-    }
+        "knock_low_hz": knock_band_hz[0], "knock_high_hz": knock_band_hz[1],
+        "knock_from_cad": knock_window_cad[0], "knock_to_cad": knock_window_cad[1],
+    }  # fmt: skip
     if knock_threshold_bar is not None and not knock_threshold_bar > 0.0:
         raise ParameterError.of("knock_threshold_bar", knock_threshold_bar, "> 0 bar")
-    attrs = {
-        "file": trace.attrs.get("file", "trace"),
-        "method": pegging,
-        "gamma": text,
-        "fractions": fractions,
-        "dp_max": _DP_MAX,
-    }
+    file = trace.attrs.get("file", "trace")
+    attrs = {"file": file, "method": pegging, "gamma": text, "fractions": fractions, "dp_max": _DP_MAX}
     given = "given" if heat_window_cad else "whole" if simulated else None
     try:
         if is_of_cycles(trace):
@@ -239,7 +227,7 @@ def analyze(
             raise
         raise error.reworded(f"{error}; the torque was taken as that of its cylinders: see n_cylinders") from None
     for warning in () if quiet else result.attrs["warnings"].splitlines():
-        _LOG.warning("%s", printable(f"{attrs['file']}: {warning}"))
+        _LOG.warning("%s", printable(f"{file}: {warning}"))
     if not is_of_cycles(trace):
         doubted = str(trace.attrs.get("warnings", "")).splitlines()
     return result.assign_attrs(

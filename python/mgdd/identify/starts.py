@@ -1,20 +1,13 @@
-"""Where the searches of one fit begin, on whom they run, and which of them ended best."""
+"""Where the searches of one fit begin, and which of them ended best."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Mapping, Sequence
 
 from mgdd import _core
-from mgdd.errors import Interrupted, WorkerLostError
-from mgdd.parallel.chunks import run_chunks
-from mgdd.parallel.pool import MakesExecutor
 from mgdd.results.fit import ARRIVED
 from mgdd.results.fit_report import FitReport
-
-Start = TypeVar("Start")
-Found = TypeVar("Found")
 
 
 def spread_starts(
@@ -24,25 +17,6 @@ def spread_starts(
     further = _core.optimize.latin_hypercube(box, n_starts - 1, seed) if n_starts > 1 else []
     names = [parameter.name for parameter in box]
     return [dict(first), *({**first, **dict(zip(names, point.tolist(), strict=True))} for point in further)]
-
-
-def search_starts(
-    search: Callable[[Sequence[Start]], Sequence[Found]],
-    starts: Sequence[Start],
-    *,
-    executor: MakesExecutor | None,
-    workers: int | None,
-) -> tuple[list[Found], Interrupted | WorkerLostError | None]:
-    """Search from every start on an executor."""
-    found: dict[int, Found] = {}
-
-    def keep(start: int, stop: int, part: Sequence[Found]) -> None:
-        found.update(zip(range(start, stop), part, strict=True))
-
-    stop = run_chunks(search, lambda a, b: (starts[a:b],), keep, len(starts), executor=executor, workers=workers)
-    if stop is not None and not found:
-        raise stop
-    return [found[number] for number in sorted(found)], stop
 
 
 def rank(reports: Sequence[FitReport]) -> tuple[int, int]:

@@ -28,7 +28,7 @@ from mgdd.loop.tune import tune_controller
 from mgdd.loop.tuned import tuned_controller
 from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.loop.virtual_throttle import VirtualThrottle
-from mgdd.throttle.faults import ThrottleFault
+from mgdd.throttle.sensors import ThrottleFault
 
 __all__ = [
     "EngineGuide",

@@ -10,7 +10,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets.meant import ThrottleLike, throttle_of
 from mgdd.throttle import SensorPair, Throttle
-from mgdd.throttle.faults import ThrottleFault, fault_pair
+from mgdd.throttle.sensors import ThrottleFault, fault_pair
 
 _INPUTS = ("duty", "supply_v", "airflow_torque_nm", "bridge_open")
 

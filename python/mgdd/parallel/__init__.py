@@ -1,7 +1,7 @@
 """Work that outgrows one core or one machine: any executor, and the same results in the same order.
 
-Whatever takes ``executor=`` in mgdd goes through here: work is cut into chunks, what a lost worker had is done again,
-and Ctrl-C keeps what is finished.
+Whatever takes ``executor=`` in mgdd goes through here: work is cut into chunks, and Ctrl-C or a lost worker leaves what
+is finished.
 """
 
 from __future__ import annotations

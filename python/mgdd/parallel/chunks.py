@@ -7,14 +7,12 @@ import os
 import pickle
 import time
 import traceback
-from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
-from mgdd._arguments import shown
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.parallel.pool import MakesExecutor, Pool, single_threaded
 
@@ -30,16 +28,14 @@ def pieces(start: int, stop: int, width: int) -> Iterator[tuple[int, int, int]]:
 
 _WANTED_S = 0.25  # of a chunk: far above the cost of handing it over, short enough for progress and Ctrl-C
 _GROWTH = 8  # a chunk may be that much larger than the largest one measured
-_ATTEMPTS = 3
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Items ``start`` to ``stop`` (exclusive) of the work, and how often they have been handed out before."""
+    """Items ``start`` to ``stop`` (exclusive) of the work."""
 
     start: int
     stop: int
-    attempt: int = 0
 
     @property
     def size(self) -> int:
@@ -53,29 +49,18 @@ class Chunk:
 class Plan:
     """Cuts ``n_items`` into chunks, in order; the cost of an item is measured while the work goes on."""
 
-    def __init__(
-        self, n_items: int, workers: int, *, seconds_per_item: float | None = None, largest: int | None = None
-    ) -> None:
+    def __init__(self, n_items: int, workers: int, *, largest: int | None = None) -> None:
         self._n, self._workers = n_items, workers
         self._largest = n_items if largest is None else largest
-        self._cost_s, self._measured = seconds_per_item, 0 if seconds_per_item is None else n_items
-        self._next = 0
-        self._lost: deque[Chunk] = deque()
+        self._cost_s, self._measured, self._next = 0.0, 0, 0
 
     @property
     def n_at_once(self) -> int:
         """Chunks that may be out at a time: one more per worker, so that none waits for the next."""
         return 2 * self._workers if self._measured else self._workers
 
-    @property
-    def has_lost(self) -> bool:
-        """Whether a lost chunk is next."""
-        return bool(self._lost)
-
     def next(self) -> Chunk | None:
         """Return the next chunk, None when everything was handed out."""
-        if self._lost:
-            return self._lost.popleft()
         if self._next == self._n:
             return None
         start, self._next = self._next, self._next + self._size()
@@ -84,19 +69,13 @@ class Plan:
     def measured(self, chunk: Chunk, seconds: float) -> None:
         """Learn what the items of a finished chunk have cost."""
         now = seconds / chunk.size
-        self._cost_s = now if self._cost_s is None else 0.5 * (self._cost_s + now)
+        self._cost_s = 0.5 * (self._cost_s + now) if self._measured else now
         self._measured = max(self._measured, chunk.size)
 
-    def lost(self, chunk: Chunk) -> bool:
-        """Plan a lost chunk again; False where that was tried often enough."""
-        again = replace(chunk, attempt=chunk.attempt + 1)
-        self._lost.append(again)
-        return again.attempt < _ATTEMPTS
-
     def _size(self) -> int:
-        left = self._n - self._next
-        if self._cost_s is None or not self._measured:
+        if not self._measured:
             return 1
+        left = self._n - self._next
         by_time = math.floor(_WANTED_S / self._cost_s) if self._cost_s > 0.0 else left
         fair = math.ceil(left / (2 * self._workers))  # the last chunks get small: nobody waits long for the others
         return max(1, min(by_time, fair, self._largest, _GROWTH * self._measured))
@@ -121,7 +100,6 @@ def run_chunks(
     *,
     executor: MakesExecutor | None = None,
     workers: int | None = None,
-    seconds_per_item: float | None = None,
     largest: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Interrupted | WorkerLostError | None:
@@ -131,7 +109,7 @@ def run_chunks(
     are called here, one at a time; only `function` and what `cut` returns go to the workers.
     """
     with nullcontext(executor) if isinstance(executor, Pool) else Pool(executor, workers) as pool:
-        return _Run(function, cut, keep, n_items, pool, seconds_per_item, largest, progress).go()
+        return _Run(function, cut, keep, n_items, pool, largest, progress).go()
 
 
 class _Run:
@@ -142,18 +120,17 @@ class _Run:
         keep: Callable[[int, int, Any], None],
         n_items: int,
         pool: Pool,
-        seconds_per_item: float | None,
         largest: int | None,
         progress: Callable[[int, int], None] | None,
     ) -> None:
         self._function, self._cut, self._keep, self._pool = function, cut, keep, pool
         self._n, self._done, self._progress = n_items, 0, progress
-        self._plan = Plan(n_items, pool.workers, seconds_per_item=seconds_per_item, largest=largest)
+        self._plan = Plan(n_items, pool.workers, largest=largest)
         self._out: dict[Future[_Answer], Chunk] = {}
         self._failed: tuple[Chunk, Exception] | None = None
 
     def go(self) -> Interrupted | WorkerLostError | None:
-        """Work to the end, to an error, to Ctrl-C, or to a chunk that no worker survives."""
+        """Work to the end, to an error, to Ctrl-C, or to a lost worker."""
         try:
             while self._submit():
                 done = wait(self._out, return_when=FIRST_COMPLETED).done
@@ -164,9 +141,10 @@ class _Run:
         except KeyboardInterrupt:
             self._settle()
             return Interrupted(f"interrupted: {self._kept()}")
-        except _Lost as lost:
+        except WorkerLostError as lost:
             self._settle()
-            return lost.error
+            lost.args = (f"{lost}; {self._kept()}",)
+            return lost
         except BaseException:
             self._settle(keep=False)
             raise
@@ -176,41 +154,32 @@ class _Run:
 
     def _submit(self) -> bool:
         """Hand out chunks; False when nothing is out and nothing is left."""
-        while self._failed is None and len(self._out) < self._room() and (chunk := self._plan.next()):
+        while self._failed is None and len(self._out) < self._plan.n_at_once and (chunk := self._plan.next()):
             arguments = self._cut(chunk.start, chunk.stop)
-            if chunk.start == 0 and self._pool.crosses_processes:
-                _require_picklable(self._function, *arguments)
             try:
-                # The attempt makes the call a new one: Dask would give the failed result of an equal call again.
-                future = self._pool.submit(_answer, chunk.attempt, os.getpid(), self._function, arguments)
+                self._out[self._pool.submit(_answer, os.getpid(), self._function, arguments)] = chunk
             except BrokenExecutor as error:
-                self._lose([chunk, *self._out.values()], error)
-                continue
-            self._out[future] = chunk
+                raise self._lost(chunk, error) from error
         return bool(self._out)
 
     def _start_of(self, future: Future[_Answer]) -> int:
         return self._out[future].start
 
-    def _room(self) -> int:
-        """How many chunks may be out: a lost one goes alone, so that the one that kills its worker is found."""
-        alone = self._plan.has_lost or any(chunk.attempt for chunk in self._out.values())
-        return 1 if alone else self._plan.n_at_once
-
     def _take(self, future: Future[_Answer]) -> None:
         chunk = self._out.pop(future, None)
-        if chunk is None:  # lost with a pool that broke meanwhile
+        if chunk is None:  # cancelled behind one that failed
             return
         try:
             answer = future.result()
-        except BrokenExecutor as error:
-            self._lose([chunk, *self._out.values()], error)
-        except Exception as error:  # noqa: BLE001 - every executor has its own words for a worker that is gone
+        except Exception as error:
             if isinstance(error, pickle.PicklingError | TypeError | AttributeError):
-                self._refuse_unpicklable(chunk, error)
-            self._again(chunk, error)
-        else:
-            self._accept(chunk, answer)
+                raise ParameterError(
+                    f"{chunk}: the work or what it returns cannot be pickled, so it cannot go from one process to "
+                    f"another ({error}): define functions and classes at the top level of a module that the workers "
+                    "can import, and return plain data; or use threads"
+                ) from error
+            raise self._lost(chunk, error) from error
+        self._accept(chunk, answer)
 
     def _accept(self, chunk: Chunk, answer: _Answer) -> None:
         if answer.error is not None:
@@ -224,24 +193,12 @@ class _Run:
         self._done += chunk.size
         self._plan.measured(chunk, answer.seconds)
 
-    def _lose(self, chunks: list[Chunk], error: Exception) -> None:
-        """Do again what a broken pool had, in a new one."""
-        self._out.clear()
-        lowest = min(chunks, key=lambda chunk: chunk.start)
-        if not self._pool.renew():
-            raise _Lost(
-                f"a worker was lost with {lowest} of {self._n} and its pool cannot go on ({_said(error)}): pass a "
-                f"function that makes the executor, and lost work is done again; {self._kept()}"
-            ) from error
-        for chunk in sorted(chunks, key=lambda chunk: chunk.start):
-            self._again(chunk, error)
-
-    def _again(self, chunk: Chunk, error: BaseException) -> None:
-        if not self._plan.lost(chunk):
-            raise _Lost(
-                f"{chunk} of {self._n} was lost {chunk.attempt + 1} times, last by {_said(error)}: this work may kill "
-                f"its worker, for example by its memory; {self._kept()}"
-            ) from error
+    def _lost(self, chunk: Chunk, error: BaseException) -> WorkerLostError:
+        said = f"{type(error).__name__}: {error}".removesuffix(": ")
+        return WorkerLostError(
+            f"a worker was lost with {chunk} of {self._n} ({said}): this work may kill its worker, for example by its "
+            "memory: take fewer workers, and run the rest again"
+        )
 
     def _kept(self) -> str:
         if not self._done:
@@ -256,26 +213,8 @@ class _Run:
             if keep and not future.cancelled() and future.exception() is None and future.result().error is None:
                 self._accept(running[future], future.result())
 
-    def _refuse_unpicklable(self, chunk: Chunk, error: BaseException) -> None:
-        _require_picklable(self._function, *self._cut(chunk.start, chunk.stop))
-        raise ParameterError(
-            f"{chunk}: the work or what it returns cannot go from one process to another ({error}): define functions "
-            "and classes at the top level of a module that the workers can import, and return plain data"
-        ) from error
 
-
-class _Lost(Exception):  # noqa: N818 - the way out of the loop, not an error that anybody sees
-    def __init__(self, message: str) -> None:
-        super().__init__(message)
-
-    @property
-    def error(self) -> WorkerLostError:
-        error = WorkerLostError(str(self))
-        error.__cause__ = self.__cause__
-        return error
-
-
-def _answer(attempt: int, caller: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> _Answer:  # noqa: ARG001
+def _answer(caller: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> _Answer:
     """Run in the worker, on one thread: the time it took, and the result or the error of the work."""
     begun = time.perf_counter()
     try:
@@ -295,23 +234,3 @@ def _portable(error: Exception) -> Exception:
         error = RuntimeError(f"{type(error).__name__}: {error}")
     error.add_note(f"in a worker:\n{where}")
     return error
-
-
-def _require_picklable(*things: Any) -> None:
-    """Refuse what cannot leave the process, by name."""
-    for thing in things:
-        try:
-            pickle.dumps(thing)
-        except Exception as error:
-            raise ParameterError(
-                f"{_name(thing)} cannot be pickled, so no other process can have it ({error}): define functions and "
-                "classes at the top level of a module, and hand over plain data; or use threads"
-            ) from error
-
-
-def _name(thing: Any) -> str:
-    return str(getattr(thing, "__qualname__", "")) or shown(thing)
-
-
-def _said(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -19,14 +19,12 @@ def map_items(
     *,
     executor: MakesExecutor | None = None,
     workers: int | None = None,
-    seconds_per_item: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:
     """Call a function with every item, on threads, processes or machines; the results stand in the order of the items.
 
-    Items are handed out in chunks: small ones first, then as many as fit in a quarter of a second. What a lost worker
-    had is done again, up to three times, so the function should give the same answer when it is called again. What
-    the function calls of mgdd takes one core, unless its own `workers` says otherwise: the other workers have the rest.
+    Items are handed out in chunks: small ones first, then as many as fit in a quarter of a second. What the function
+    calls of mgdd takes one core, unless its own `workers` says otherwise: the other workers have the rest.
 
     Parameters
     ----------
@@ -35,14 +33,11 @@ def map_items(
     items : iterable
         What it is called with.
     executor : concurrent.futures.Executor or callable, optional
-        Threads of this process if left out; or a pool of processes, ``client.get_executor()`` of Dask,
-        ``mpi4py.futures.MPIPoolExecutor()``. A pool of processes cannot go on when it loses one: give a function that
-        makes the pool, such as ``lambda: ProcessPoolExecutor(4)``, and it is made anew. What that makes is closed at
-        the end, a given executor stays open.
+        Threads of this process if left out; or a pool of processes, ``client.get_executor()`` of Dask, which does the
+        work of a lost worker again, ``mpi4py.futures.MPIPoolExecutor()``. What a function makes, such as
+        ``lambda: ProcessPoolExecutor(4)``, is closed at the end, a given executor stays open.
     workers : int, optional
         Number of threads, or of the workers of an executor that does not say it; one per core if left out.
-    seconds_per_item : float, optional
-        What an item costs [s], where it is known; measured if left out.
     progress : callable, optional
         Called with the number of finished items and that of all.
 
@@ -58,7 +53,7 @@ def map_items(
     mgdd.errors.ParameterError
         A bad executor, or work that cannot be pickled.
     mgdd.errors.WorkerLostError
-        A worker was lost and the work could not be done again; ``partial`` has the finished results by number of item.
+        A worker was lost, as one that is out of memory; ``partial`` has the finished results by number of item.
     mgdd.errors.Interrupted
         Ctrl-C; ``partial`` has the finished results by number of item, and nothing is left running.
 
@@ -84,7 +79,6 @@ def map_items(
         len(given),
         executor=executor,
         workers=workers,
-        seconds_per_item=seconds_per_item,
         progress=progress,
     )
     if stop is not None:

@@ -18,7 +18,7 @@ _single: ContextVar[bool] = ContextVar("single", default=False)
 
 
 class Pool:
-    """An executor with the number of its workers; a broken one is made anew where a function makes it."""
+    """An executor with the number of its workers."""
 
     def __init__(self, executor: MakesExecutor | Any, workers: int | None) -> None:
         self._wanted = _checked(workers)
@@ -45,19 +45,6 @@ class Pool:
         """Hand a call to the executor."""
         future: Future[Any] = self._executor.submit(function, *arguments)
         return future
-
-    @property
-    def crosses_processes(self) -> bool:
-        """Whether the executor is known to pickle what it is handed."""
-        return isinstance(self._executor, ProcessPoolExecutor)
-
-    def renew(self) -> bool:
-        """Replace a broken executor; False where it is unknown how it is made."""
-        if self._make is None:
-            return False
-        self._executor.shutdown(wait=False)
-        self._executor = self._make()
-        return True
 
     def close(self) -> None:
         """End an executor that was made here; nothing runs on behind it. A given one stays open."""

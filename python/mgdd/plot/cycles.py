@@ -7,19 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    GREY,
-    ORANGE,
-    axis_label,
-    beside,
-    finished,
-    legend,
-    new_axes,
-    require,
-)
+from mgdd.plot.style import BLACK, BLUE, COLOURS, GREY, ORANGE, axis_label, beside, finished, legend, new_axes, require
 from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:

@@ -7,19 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    axis_label,
-    divide,
-    finished,
-    legend,
-    minus,
-    new_axes,
-    require,
-)
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, divide, finished, legend, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:

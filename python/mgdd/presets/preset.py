@@ -18,9 +18,7 @@ from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
 from mgdd.results.describe import core_rows, described
 
 _TABLES: Mapping[str, Any] = MappingProxyType({"cylinder": Cylinder, "point": OperatingPoint, "throttle": Throttle})
-_OF_KIND: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {"engine": ("cylinder", "point"), "throttle": ("throttle",)},
-)
+_OF_KIND: Mapping[str, tuple[str, ...]] = MappingProxyType({"engine": ("cylinder", "point"), "throttle": ("throttle",)})
 # What a file of one's own must say, by kind, in the first table of the kind: nobody's parts have a default.
 _REQUIRED: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {

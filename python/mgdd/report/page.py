@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
-from mgdd.errors import DataError
 from mgdd.io.files import write_whole_text
 from mgdd.report.sections import as_number
 from mgdd.results.labels import to_jsonable
@@ -32,7 +31,7 @@ _NUMBERS = " The numbers stand in summary.json beside this page."
 _SHORT = 8  # rows of a table that is not folded
 
 
-def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report", *, interactive: bool = False) -> Path:
+def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report") -> Path:
     """Write a report as one page, or as a folder with the page and its numbers.
 
     Parameters
@@ -42,19 +41,11 @@ def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report",
     folder : path-like
         Made if missing; ``index.html`` and ``summary.json`` in it are replaced. Or a file that ends in ``.html``: the
         page alone, whole or not at all.
-    interactive : bool
-        Zoom and hover in the figures, by Plotly (``pip install "mgdd[interactive]"``): some 5 MB more. Paper, and a
-        browser without scripts, shows the pictures.
 
     Returns
     -------
     pathlib.Path
-        The page. It holds its figures itself and needs no network.
-
-    Raises
-    ------
-    ImportError
-        Interactive figures without Plotly.
+        The page. It holds its figures itself and needs no network; the values under the pointer stand below a figure.
 
     Examples
     --------
@@ -72,12 +63,12 @@ def write_report(result: Report, folder: str | os.PathLike[str] = "mgdd-report",
     """
     folder = Path(folder)
     if folder.suffix == ".html":
-        write_whole_text(folder, _page(result, interactive=interactive))
+        write_whole_text(folder, _page(result))
         return folder
     text = json.dumps(to_jsonable(result.summary), indent=2, ensure_ascii=False, allow_nan=False)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    (folder / "index.html").write_text(_page(result, interactive=interactive, numbers=_NUMBERS), encoding="utf-8")
+    (folder / "index.html").write_text(_page(result, numbers=_NUMBERS), encoding="utf-8")
     return folder / "index.html"
 
 
@@ -93,20 +84,12 @@ def write_page(
     """Write sections as one page, whole or not at all; `facts` stand behind the date and what made it."""
     first, last = _first_and_last_fact(made_by)
     page = _rendered(
-        title=title,
-        verdict=verdict,
-        facts=[first, *facts.items(), last],
-        sections=[_section(section, interactive=False) for section in sections],
+        title=title, verdict=verdict, facts=[first, *facts.items(), last], sections=list(map(_section, sections))
     )
     write_whole_text(file, page)
 
 
-def _page(result: Report, *, interactive: bool, numbers: str = "") -> str:
-    script = ""
-    if interactive:
-        from mgdd.results.interactive import plotly_script
-
-        script = plotly_script()
+def _page(result: Report, *, numbers: str = "") -> str:
     first, last = _first_and_last_fact(result.made_by)
     return _rendered(
         title=result.heading,
@@ -114,23 +97,19 @@ def _page(result: Report, *, interactive: bool, numbers: str = "") -> str:
         interrupted=bool(result.summary.get("interrupted")),
         facts=[first, *_inputs(result.summary), last],
         # What is seen at a glance stands before what is looked up.
-        sections=sorted(
-            (_section(section, interactive=interactive) for section in result.sections),
-            key=lambda section: not section["figures"],
-        ),
-        script=script,
+        sections=sorted(map(_section, result.sections), key=lambda section: not section["figures"]),
         numbers=numbers,
     )
 
 
-def _rendered(*, interrupted: bool = False, script: str = "", numbers: str = "", **parts: Any) -> str:
+def _rendered(*, interrupted: bool = False, numbers: str = "", **parts: Any) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("mgdd.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
     style, _, _ = loader.get_source(environment, "style.css")
     page = environment.get_template("page.html")
-    return page.render(style=style, short=_SHORT, interrupted=interrupted, script=script, numbers=numbers, **parts)
+    return page.render(style=style, short=_SHORT, interrupted=interrupted, numbers=numbers, **parts)
 
 
 def _inputs(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -147,26 +126,31 @@ def _first_and_last_fact(made_by: str) -> tuple[tuple[str, str], tuple[str, str]
     return ("Written", written), ("Versions", f"mgdd {__version__}, Python {platform.python_version()}, {others}")
 
 
-def _section(section: Section, *, interactive: bool) -> dict[str, Any]:
+def _section(section: Section) -> dict[str, Any]:
     return {
         "title": section.title,
         "text": section.text,
         "items": section.items,
         "table": section.table,
         "figures": [
-            {"caption": caption, "png": _png(figure)} | (_live(figure) if interactive else {"live": ""})
+            {"caption": caption, "png": _png(figure), "axes": json.dumps(_axes(figure))}
             for caption, figure in section.figures.items()
         ],
     }
 
 
-def _live(figure: Figure) -> dict[str, Any]:
-    from mgdd.results.interactive import as_plotly
-
-    try:
-        return {"live": as_plotly(figure).to_json().replace("<", "\\u003c")}
-    except DataError as error:  # the picture stays
-        return {"live": "", "still": str(error)}
+def _axes(figure: Figure) -> list[dict[str, Any]]:
+    """Say where axes lie, in shares of a drawn figure, and what they show, so that the page can read the pointer."""
+    out = []
+    for ax in figure.axes:
+        shown: dict[str, Any] = {}
+        for way in "xy":
+            beside = getattr(ax, f"get_shared_{way}_axes")().get_siblings(ax)  # one of them may have the label
+            label = next(filter(None, (getattr(own, f"get_{way}label")() for own in (ax, *beside))), way)
+            shown[way] = [*getattr(ax, f"get_{way}lim")(), getattr(ax, f"get_{way}scale")(), label]
+        if ax.axison and {shown["x"][2], shown["y"][2]} <= {"linear", "log"}:
+            out.append({"place": [*map(float, ax.get_position().extents)], **shown})
+    return out
 
 
 def _png(figure: Figure) -> str:

@@ -8,8 +8,6 @@ from __future__ import annotations
 from mgdd._rooms import furnish as _furnish
 from mgdd.results.fit import Fit
 
-__all__ = [
-    "Fit",
-]
+__all__ = ["Fit"]
 
 _furnish(__name__)

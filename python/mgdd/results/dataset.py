@@ -19,11 +19,10 @@ class _Plot(DatasetPlotAccessor):
 
     __slots__ = ()
 
-    def __call__(self, *, ax: Axes | None = None, engine: str = "matplotlib") -> Any:
+    def __call__(self, *, ax: Axes | None = None) -> Any:
         """Draw as `mgdd.results.result.Result.plot` does."""
         # By name: texts and figures stand above the data that they show.
-        drawn_by = import_module("mgdd.results.result").drawn_by
-        return drawn_by(engine, lambda own: import_module("mgdd.plot.data").data(self._ds, ax=own), ax)
+        return import_module("mgdd.plot.data").data(self._ds, ax=ax)
 
 
 class _PlotOf:
@@ -34,7 +33,7 @@ class _PlotOf:
 class Dataset(xr.Dataset):  # type: ignore[no-untyped-call]
     """The data of a function or a result: an `xarray.Dataset` that has a summary and a figure of its own.
 
-    A selection, a mean and a pickle of it are one again; ``plot()`` takes ``ax`` and ``engine`` as that of a `Fit`.
+    A selection, a mean and a pickle of it are one again; ``plot()`` takes ``ax`` as that of a `Fit`.
 
     Examples
     --------

@@ -182,10 +182,7 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
 
 
 def labelled_dataset(
-    variables: Mapping[str, Sequence[Any]],
-    *,
-    attrs: Mapping[str, Any] | None = None,
-    copy: bool = True,
+    variables: Mapping[str, Sequence[Any]], *, attrs: Mapping[str, Any] | None = None, copy: bool = True
 ) -> Dataset:
     """Build a Dataset in which nothing lacks a unit, of ``name: (dims, values, units, long_name)``; values are copied.
 

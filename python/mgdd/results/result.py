@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
@@ -80,32 +80,25 @@ class Result:
         """
         return as_text(self._title(), self._rows())
 
-    def plot(self, *, ax: Axes | None = None, engine: str = "matplotlib") -> Any:
+    def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the result: runs, maps and scans as figures of `mgdd.plot` do, a few numbers as their table.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
             Where to draw; None makes a figure.
-        engine : {"matplotlib", "plotly"}
-            Plotly, which ``pip install "mgdd[interactive]"`` brings, zooms and hovers.
 
         Returns
         -------
-        matplotlib.axes.Axes or plotly.graph_objects.Figure
-            The axes, the first where there are several; or the whole interactive figure.
+        matplotlib.axes.Axes
+            The axes, the first where there are several.
 
         Raises
         ------
         DataError
-            A result that has nothing to draw, as a fit that keeps no run or a motored estimate; or only a table, where
-            the engine is Plotly.
-        ParameterError
-            Another engine, or axes for Plotly.
-        ImportError
-            Plotly is not installed.
+            A result that has nothing to draw, as a fit that keeps no run or a motored estimate.
         """
-        return drawn_by(engine, self._draw, ax)
+        return self._draw(ax)
 
     def _draw(self, ax: Axes | None) -> Axes:
         return as_figure(self._title(), self._rows(), ax)
@@ -216,22 +209,6 @@ def _sorted(name: str, value: Any, numbers: dict[str, Any], texts: dict[str, Any
             numbers[f"{name}_{key}"] = own
     elif isinstance(value, tuple) and value and all(isinstance(own, str) for own in value):
         texts[name] = "\n".join(value)
-
-
-def drawn_by(engine: str, draw: Callable[[Any], Any], ax: Axes | None) -> Any:
-    """Draw by matplotlib, on axes or a new figure, or make the Plotly figure of what that draws."""
-    if engine == "matplotlib":
-        return draw(ax)
-    if engine != "plotly" or ax is not None:
-        bound = "'matplotlib', or 'plotly' without ax"
-        raise ParameterError(f"engine = {engine!r}: must be {bound}", field="engine", value=engine, bound=bound)
-    from matplotlib.figure import Figure
-
-    from mgdd.results.interactive import as_plotly
-
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    draw(figure.add_subplot())
-    return as_plotly(figure)
 
 
 def merged(*datasets: xr.Dataset, attrs: Mapping[str, Any] | None = None) -> xr.Dataset:

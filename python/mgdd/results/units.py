@@ -29,93 +29,38 @@ _FACTOR = r"[A-Za-zµ]+(\*\*\d)?"
 _EXPRESSION = re.compile(rf"(1|{_FACTOR})([*/]{_FACTOR})*")
 
 _UNITS = {
-    "_deg_per_s2_per_duty": "deg/s² per duty",
-    "_duty_per_deg": "duty/deg",
-    "_per_deg2": "1/deg²",
-    "_per_deg": "1/deg",
-    "_deg_per_duty": "deg/duty",
-    "_nms_per_rad": "N m s/rad",
-    "_nm_per_rad": "N m/rad",
-    "_nm_per_rpm": "N m/rpm",
-    "_nm_per_a": "N m/A",
-    "_vs_per_rad": "V s/rad",
-    "_deg_per_s": "deg/s",
-    "_rad_per_s": "rad/s",
-    "_ns_per_m": "N s/m",
-    "_n_per_m": "N/m",
-    "_n_per_v": "N/V",
-    "_n_per_s": "N/s",
-    "_m_per_s": "m/s",
-    "_g_per_s": "g/s",
-    "_bar_per_cad": "bar/°CA",
-    "_bar2_cad": "bar² °CA",
-    "_bar2_per_khz": "bar²/kHz",
-    "_bar_cad": "bar °CA",
-    "_percent_per_cad2": "%/°CA²",
-    "_percent_per_cad": "%/°CA",
-    "_percent_per_ppm": "%/ppm",
-    "_mj_per_kg": "MJ/kg",
-    "_g_per_kwh": "g/kWh",
-    "_per_ppm": "1/ppm",
-    "_per_cad2": "1/°CA²",
-    "_per_cad": "1/°CA",
-    "_per_s": "1/s",
-    "_per_k": "1/K",
-    "_kgm2": "kg m²",
-    "_samples": "samples",
-    "_cycles": "cycles",
-    "_percent": "%",
-    "_kw": "kW",
-    "_duration_cad": "°CA",
-    "_scatter_cad": "°CA",
-    "_rms_cad": "°CA",
-    "_cad": "°CA aTDC",
-    "_mean_j": "unit of J",
-    "_deg2": "deg²",
-    "_deg": "deg",
-    "_rad": "rad",
-    "_duty": "-",
-    "_ohm": "ohm",
-    "_rpm": "rpm",
-    "_bar": "bar",
-    "_kpa": "kPa",
-    "_pa": "Pa",
-    "_ppm": "ppm",
-    "_khz": "kHz",
-    "_hz": "Hz",
-    "_mm2": "mm²",
-    "_mm": "mm",
-    "_nm": "N m",
-    "_mh": "mH",
-    "_ms": "ms",
-    "_mg": "mg",
-    "_us": "µs",
-    "_kg": "kg",
-    "_m": "m",
-    "_g": "g",
-    "_l": "L",
-    "_h": "H",
-    "_n": "N",
-    "_v": "V",
-    "_a": "A",
-    "_j": "J",
-    "_k": "K",
-    "_s": "s",
-}
-_LONGEST_FIRST = sorted(_UNITS, key=len, reverse=True)
+    "deg": "deg", "deg2": "deg²", "rad": "rad", "cad": "°CA", "cad2": "°CA²", "rpm": "rpm", "s": "s", "ms": "ms",
+    "us": "µs", "h": "h", "hz": "Hz", "khz": "kHz", "m": "m", "mm": "mm", "mm2": "mm²", "l": "L", "g": "g", "mg": "mg",
+    "kg": "kg", "kgm2": "kg m²", "n": "N", "nm": "N m", "nms": "N m s", "ns": "N s", "bar": "bar", "bar2": "bar²",
+    "kpa": "kPa", "pa": "Pa", "k": "K", "j": "J", "mj": "MJ", "kw": "kW", "kwh": "kWh", "v": "V", "vs": "V s", "a": "A",
+    "ohm": "ohm", "mh": "mH", "ppm": "ppm", "percent": "%", "duty": "duty",
+}  # fmt: skip
+_ALONE = {"cad": "°CA aTDC", "duty": "-", "h": "H", "ns": "ns"}  # what these say without a quotient
+_WHOLE = {
+    "_deg_per_s2_per_duty": "deg/s² per duty", "_bar2_cad": "bar² °CA", "_bar_cad": "bar °CA", "_duration_cad": "°CA",
+    "_scatter_cad": "°CA", "_rms_cad": "°CA", "_mean_j": "unit of J", "_samples": "samples", "_cycles": "cycles",
+}  # fmt: skip
+_ENDING = re.compile(
+    rf"(?:{'|'.join(_WHOLE)}|(?:(?:_(?P<over>{'|'.join(_UNITS)}))?(?P<per>_per))?_(?P<unit>{'|'.join(_UNITS)}))$"
+)
 
 
 def unit_of(name: str) -> str:
     """Read the unit off the end of a name, ``"-"`` if it has none; a single letter is a name."""
-    whole = f"_{name}" if len(name) > 1 else name
-    unit = next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
-    return "°CA" if unit == "°CA aTDC" and name.startswith("rms_") else unit  # a distance, not an angle
+    found = _ENDING.search(f"_{name}") if len(name) > 1 else None
+    if found is None:
+        return "-"
+    over, per, unit = found["over"], found["per"], found["unit"]
+    if per:
+        return f"{_UNITS[over] if over else 1}/{_UNITS[unit]}"
+    if unit == "cad" and name.startswith("rms_"):
+        return "°CA"  # a distance, not an angle
+    return (_ALONE.get(unit) or _UNITS[unit]) if unit else _WHOLE[found[0]]
 
 
 def without_unit(name: str) -> str:
     """Return a name in words, without the unit at its end; the whole name where the unit is all of it."""
-    ending = next((ending for ending in _LONGEST_FIRST if name.endswith(ending)), "")
-    return (name.removesuffix(ending) or name).replace("_", " ").strip()
+    return (_ENDING.sub("", name) or name).replace("_", " ").strip()
 
 
 def attribute_units(printed: str) -> str:

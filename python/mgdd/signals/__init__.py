@@ -9,14 +9,6 @@ from mgdd._rooms import furnish as _furnish
 from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
 from mgdd.signals.metrics import nrmse_fit_percent
 
-__all__ = [
-    "amplitude_random_steps",
-    "chirp",
-    "multisine",
-    "nrmse_fit_percent",
-    "prbs",
-    "staircase",
-    "triangle",
-]
+__all__ = ["amplitude_random_steps", "chirp", "multisine", "nrmse_fit_percent", "prbs", "staircase", "triangle"]
 
 _furnish(__name__)

@@ -1,4 +1,7 @@
-"""Duty signals that make a throttle show its parameters: offset and amplitude, sampled, within -1..1."""
+"""Duty signals that make a throttle show its parameters: offset and amplitude, sampled, within -1..1.
+
+Each gives ``duty`` over ``time_s``, with attributes that say what it is, and refuses what `chirp` refuses.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +54,8 @@ def chirp(
     Raises
     ------
     ParameterError
-        A duty beyond ±1, a frequency at or above half the sampling rate, a length below two samples.
+        Here and in the other signals: a duty beyond ±1, a frequency at or above half the sampling rate, a length
+        below two samples, a number outside what its parameter says.
 
     Examples
     --------
@@ -96,11 +100,6 @@ def multisine(
     -------
     xarray.Dataset
         ``duty`` over ``time_s``; ``attrs["crest_factor"]`` is peak over RMS of the swing.
-
-    Raises
-    ------
-    ParameterError
-        As in `chirp`; less than one harmonic, more than there are odd ones, less than one period.
 
     Notes
     -----
@@ -163,16 +162,6 @@ def prbs(
     sample_s : float
         Sample time [s].
 
-    Returns
-    -------
-    xarray.Dataset
-        ``duty`` over ``time_s``.
-
-    Raises
-    ------
-    ParameterError
-        As in `chirp`; an unknown register; a hold shorter than the sample time.
-
     Examples
     --------
     >>> from mgdd.signals import prbs
@@ -215,16 +204,6 @@ def amplitude_random_steps(
     seed : int, optional
         Of levels and holds. None takes the golden-ratio sequence, level k at ``2 frac(0.618 k) - 1``, which fills
         the swing evenly.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``duty`` over ``time_s``.
-
-    Raises
-    ------
-    ParameterError
-        As in `chirp`; a hold shorter than the sample time; a range without seed; a negative seed.
 
     Examples
     --------
@@ -282,16 +261,6 @@ def staircase(
     cycles : int
         How often up and down.
 
-    Returns
-    -------
-    xarray.Dataset
-        ``duty`` over ``time_s``; starts and ends at the lowest duty.
-
-    Raises
-    ------
-    ParameterError
-        As in `chirp`; a step that is not positive, less than one cycle.
-
     Examples
     --------
     >>> from mgdd.signals import staircase
@@ -313,12 +282,7 @@ def staircase(
 
 
 def triangle(
-    duration_s: float = 40.0,
-    *,
-    offset: float,
-    amplitude: float,
-    frequency_hz: float = 0.05,
-    sample_s: float = 1e-3,
+    duration_s: float = 40.0, *, offset: float, amplitude: float, frequency_hz: float = 0.05, sample_s: float = 1e-3
 ) -> xr.Dataset:
     """Ramp slowly up and down: friction by the hysteresis, preload by the jump at limp-home, springs by the slope.
 
@@ -330,16 +294,6 @@ def triangle(
         Mean duty and half the swing [-]; starts at `offset`, upwards.
     frequency_hz : float
         Ramps up and down per second [Hz].
-
-    Returns
-    -------
-    xarray.Dataset
-        ``duty`` over ``time_s``.
-
-    Raises
-    ------
-    ParameterError
-        As in `chirp`.
 
     Examples
     --------

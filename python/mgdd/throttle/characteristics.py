@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 _DEG = math.radians(1.0)
-AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
 
 
 def characteristics(throttle: ThrottleLike, angle_deg: ArrayLike | None = None) -> xr.Dataset:
@@ -135,29 +134,6 @@ def airflow_torque_nm(throttle: ThrottleLike, angle_deg: ArrayLike) -> NDArray[n
     if not np.isfinite(angle).all():
         raise ParameterError("angle_deg holds a value that is not finite")
     return np.asarray(_core.throttle.airflow_torque(throttle, angle.ravel())).reshape(angle.shape)
-
-
-def mass_flow_kg_per_s(
-    area_m2: ArrayLike,
-    *,
-    pressure_drop_kpa: ArrayLike,
-    discharge_coefficient: float = 1.0,
-    density_kg_per_m3: float = AIR_KG_PER_M3,
-) -> NDArray[np.float64]:
-    """Give the mass flow [kg/s] through areas [m²] on a steady flow bench, C_d A sqrt(2 rho dp), at drops of few kPa.
-
-    Tan (2018) lists C_d and the density of air at 20 °C among the symbols of the throttle; the equation is Bernoulli's.
-    """
-    area, drop = np.asarray(area_m2, dtype=np.float64), np.asarray(pressure_drop_kpa, dtype=np.float64)
-    for name, values in (("area_m2", area), ("pressure_drop_kpa", drop)):
-        bad = ~(np.isfinite(values) & (values >= 0.0))
-        if bad.any():
-            raise ParameterError.of(name, values[bad].flat[0], "finite and >= 0")
-    if not 0.0 < discharge_coefficient <= 1.5:
-        raise ParameterError.of("discharge_coefficient", discharge_coefficient, "> 0 and <= 1.5")
-    if not (math.isfinite(density_kg_per_m3) and density_kg_per_m3 > 0.0):
-        raise ParameterError.of("density_kg_per_m3", density_kg_per_m3, "> 0 and finite")
-    return np.asarray(discharge_coefficient * area * np.sqrt(2.0 * density_kg_per_m3 * 1e3 * drop))
 
 
 def _breakaway_nm(t: Throttle) -> float:

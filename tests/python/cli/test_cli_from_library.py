@@ -140,7 +140,7 @@ def test_choices_of_the_library_hold_its_default() -> None:
 
 def test_choices_that_are_documented_are_those_that_are_checked() -> None:
     from mgdd.design.points import METHODS
-    from mgdd.identify.throttle.excitation_design import EXCITATIONS
+    from mgdd.identify.throttle.excitation import EXCITATIONS
     from mgdd.identify.throttle.fits import CHOICES
     from mgdd.io.pressure_checks import PRESSURE_UNITS
     from mgdd.io.reading import ANGLE_UNITS

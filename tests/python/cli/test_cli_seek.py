@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
@@ -9,14 +10,18 @@ import signal
 import subprocess
 import sys
 import time
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mgdd.cli import main
+from mgdd.cli.seek import learn_map
 from mgdd.engine import Performance
-from mgdd.loop import VirtualEngine
+from mgdd.guide import FeedForward, TimingMap
+from mgdd.loop import VirtualEngine, run_seeker
+from mgdd.optimize import ExtremumSeeking
 from typed import Capsys, commands
 
 seek, refused = commands("engine", "seek")
@@ -212,3 +217,198 @@ def test_ctrl_c_leaves_the_cycles_so_far(tmp_path: Path) -> None:
     assert result["interrupted"] is True
     assert 0 <= result["cycles"] < 2_000_000
     assert f"interrupted: {result['cycles']} cycles are kept".encode() in err
+
+
+seek, refused = commands("engine", "seek")
+
+KINDS = ("feed_forward", "curve", "calibrated", "map")
+ROUGH = ("--guide-set", "wall_heat_scale=0.8", "--guide-set", "burn_duration_ref_cad=45")
+FIELDS = {"guide", "j_lost", "estimate_sd", "trust", "cycles_to"}
+OPTIMUM_CAD, LIMITED_CAD = -5.63, -3.08
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    file = tmp_path / "timing.toml"
+    made = TimingMap({"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20, 40]}, -9.0)
+    file.write_text(made.to_toml(), encoding="utf-8")
+    return file
+
+
+def options(kind: str, table: Path) -> tuple[str, ...]:
+    return ("--guide", "map", "--guide-map", str(table)) if kind == "map" else ("--guide", kind, *ROUGH)
+
+
+def first_timing(file: Path) -> float:
+    with file.open(encoding="utf-8") as stream:
+        return float(next(csv.DictReader(line for line in stream if not line.startswith("#")))["asked_soc_cad"])
+
+
+def test_without_a_guide_nothing_is_guided(capsys: Capsys) -> None:
+    out = seek(capsys, "--cycles", "60")
+    assert out.keys() >= FIELDS
+    assert out["guide"] == "none"
+    assert out == seek(capsys, "--cycles", "60", "--guide", "none")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_begins_at_the_guide_and_improves_on_it(kind: str, capsys: Capsys, table: Path) -> None:
+    out = seek(capsys, *options(kind, table), "--cycles", "600", "--seed", "3")
+    assert out.keys() >= FIELDS
+    assert out["guide"] == kind
+    assert out["start"]["soc_cad"] == pytest.approx(-9.0 if kind == "map" else -9.87, abs=0.1)
+    assert abs(out["start"]["soc_cad"] - OPTIMUM_CAD) > 2.0  # a rough guide, on which the measurements improve
+    assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.2)
+    assert out["j_lost"] < 0.1
+    if kind in ("curve", "calibrated"):
+        assert out["cycles_to"] <= 15
+        assert 0.2 < out["estimate_sd"] < 3.0
+        assert out["seeker"] == "CurveSeeking"
+    else:
+        assert out["estimate_sd"] is None
+        assert out["seeker"] == "ExtremumSeeking"
+    if kind == "calibrated":
+        assert out["guide_wall_heat_scale"] == pytest.approx(0.5, rel=0.05)  # the bench has 0.5
+
+
+def test_a_plain_parabola_guides_as_well(capsys: Capsys) -> None:
+    out = seek(capsys, "--guide", "curve", *ROUGH, "--guide-shape", "parabola", "--cycles", "600")
+    assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
+
+
+def test_another_engine_can_be_the_guide(capsys: Capsys) -> None:
+    out = seek(capsys, "--guide", "curve", "--guide-preset", "hd_diesel_128x144", "--cycles", "600")
+    assert out["preset"] == "puma_single"
+    assert abs(out["start"]["soc_cad"] - OPTIMUM_CAD) > 0.2
+    assert out["figures"]["final_soc_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
+
+
+@pytest.mark.parametrize("kind", ["feed_forward", "curve", "calibrated"])
+def test_a_guided_run_starts_below_the_limit(kind: str, capsys: Capsys, tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"  # an exact model: over the limit at its best
+    out = seek(capsys, "--guide", kind, "--limit", "p_max_bar=95", "-o", str(file))
+    assert "start_above_limit" not in [finding["code"] for finding in out["findings"]]
+    assert first_timing(file) == pytest.approx(out["start"]["soc_cad"], abs=1.0 + 1e-9)  # the dither
+    assert out["start"]["soc_cad"] > LIMITED_CAD
+    assert out["figures"]["noise_free_worst_p_max_bar"] < 97.0  # at the guide's own best timing 105.6
+    assert out["optimum"]["soc_cad"] == pytest.approx(LIMITED_CAD, abs=0.01)
+    assert -0.1 < out["figures"]["final_soc_cad"] - LIMITED_CAD < 1.25
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_start_is_that_of_the_user(kind: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    out = seek(capsys, *options(kind, table), "--start", "soc_cad=-18", "--cycles", "50", "-o", str(file))
+    assert out["start"] == {"soc_cad": -18.0}
+    assert first_timing(file) == pytest.approx(-18.0, abs=1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        ("--guide-preset puma_single", "--guide-preset does not act here; --guide none has no model"),
+        ("--guide-set wall_heat_scale=1", "--guide-set does not act here; --guide none has no model"),
+        ("--guide calibrated --guide-shape parabola", "--guide-shape 'parabola': a parabola cannot be calibrated"),
+        ("--guide-shape parabola", "--guide-shape does not act here; --guide none has no model"),
+        ("--guide-map x.toml", "--guide-map does not act here; --guide none has no model"),
+        ("--guide map", "--guide map needs --guide-map FILE"),
+        ("--guide map --guide-map x.txt", "--guide-map x.txt: the ending must be one of .csv, .toml"),
+        ("--guide map --guide-map x.csv --guide-map-out y.txt", "--guide-map-out y.txt: the ending must be one of"),
+        ("--guide map --guide-map x.csv --guide-map-out no/y.csv", "no/y.csv: the folder no does not exist; make it"),
+        ("--guide map --guide-map none.csv", "none.csv"),
+        ("--guide-map-out y.csv", "--guide-map-out does not act here; --guide none has no model"),
+        ("--guide curve --guide-map-out y.csv", "--guide-map-out does not act here; --guide curve has a model"),
+        (
+            "--guide map --guide-map x.csv --guide-map-out y.csv --limit p_max_bar=95",
+            "--guide-map-out does not act here; with --limit a run ends at the best timing within the limit",
+        ),
+        ("--guide map --guide-map none.toml", "none.toml"),
+        ("--guide map --guide-map x.toml --guide-set wall_heat_scale=1", "--guide-set does not act here; --guide map"),
+        ("--guide curve --guide-map x.toml", "--guide-map does not act here; --guide curve has a model"),
+        ("--guide feed_forward --guide-shape parabola", "--guide-shape 'parabola': a parabola is not one timing"),
+        ("--guide curve --seeker spsa", "--seeker acts with --guide none, feed_forward or map"),
+        ("--guide calibrated --sensor analyser", "use --sensor soft, or --guide curve with the model's shape"),
+        ("--guide curve --guide-shape parabola --sensor analyser", "use --sensor soft, or --guide curve with"),
+        ("--guide feed_forward --seeker golden_section", "--seeker golden_section searches its whole range"),
+        ("--guide curve --guide-set foo=1", "--guide-set foo: is not a field of the cylinder"),
+        ("--guide curve --guide-set wall_heat_scale", "--guide-set wall_heat_scale: write FIELD=VALUE"),
+        ("--guide curve --guide-set bore_mm=90 --guide-set bore_mm=91", "--guide-set bore_mm is given twice"),
+        ("--guide curve --guide-set wall_heat_scale=-1", "--guide-set wall_heat_scale = -1: must be in [0, 100]"),
+        ("--guide curve --guide-set wall_heat_scale=much", "--guide-set wall_heat_scale = 'much': must be a number"),
+        ("--guide curve --guide-set speed_rpm=3000", "--guide-set speed_rpm: belongs to the operating point"),
+        ("--guide curve --guide-set speed-rpm=3000", "--guide-set speed_rpm: belongs to the operating point"),
+        ("--guide curve --guide-preset nowhere", "--guide-preset nowhere: no preset 'nowhere'"),
+        ("--guide curve --input soc_cad=5:10", "--guide curve: the best timing of the model, -5.6"),
+    ],
+)
+def test_what_cannot_guide_is_refused_with_the_remedy(argv: str, said: str, capsys: Capsys) -> None:
+    assert said in refused(capsys, *argv.split())
+
+
+def test_a_table_that_ends_before_the_point_is_refused(capsys: Capsys, table: Path) -> None:
+    said = refused(capsys, "--guide", "map", "--guide-map", str(table), "--speed-rpm", "3500")
+    assert "its axes end before" in said
+
+
+def test_a_feed_forward_beyond_the_bounds_starts_inside(capsys: Capsys) -> None:
+    out = seek(capsys, "--guide", "feed_forward", "--input", "soc_cad=-4:10", "--cycles", "50")
+    assert -4.0 < out["start"]["soc_cad"] <= -3.0
+
+
+@pytest.mark.parametrize("ending", ["csv", "toml"])
+def test_a_run_that_settles_writes_its_timing_back(ending: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
+    before, out_file = tmp_path / "timing.csv", tmp_path / f"learnt.{ending}"
+    TimingMap.from_toml(table.read_text(encoding="utf-8")).write_csv(before, source="by hand")
+    run = ("--guide", "map", "--guide-map", str(before), "--guide-map-out", str(out_file), "--cycles", "1200")
+    out = seek(capsys, *run, "--seed", "3", "--fuel-mg", "22")
+    assert (out["guide_map_learnt"], out["guide_map_out"]) == (True, str(out_file))
+    learnt = TimingMap.read_csv(out_file) if ending == "csv" else TimingMap.from_toml(out_file.read_text("utf-8"))
+    point = {"speed_rpm": 1500.0, "fuel_mg": 22.0}
+    assert learnt(point) == pytest.approx(out["guide_map_cad"], abs=1e-12)
+    assert abs(learnt(point) - out["figures"]["final_soc_cad"]) < 0.5 < abs(-9.0 - out["figures"]["final_soc_cad"])
+    assert learnt.sd_cad.min() < 1.0
+    assert learnt.support[1, 1] > learnt.support[1, 2] > learnt.support[0, 0] == 0.0
+    text = out_file.read_text(encoding="utf-8")
+    assert "mgdd engine seek at speed_rpm=1500 fuel_mg=22 seed=3" in text
+    if ending == "csv":
+        assert text.count("by hand") == 7  # the run has taught two cells of nine
+    again = seek(capsys, "--guide", "map", "--guide-map", str(out_file), "--fuel-mg", "22", "--cycles", "50")
+    assert again["start"]["soc_cad"] == pytest.approx(out["guide_map_cad"], abs=1e-9)
+    assert "guide_map_learnt" not in again
+
+
+def test_a_run_that_has_not_settled_writes_nothing(
+    capsys: Capsys, caplog: pytest.LogCaptureFixture, table: Path, tmp_path: Path
+) -> None:
+    out_file = tmp_path / "learnt.csv"
+    run = ("--guide", "map", "--guide-map", str(table), "--guide-map-out", str(out_file), "--cycles", "60", "--json")
+    assert main(["engine", "seek", *run]) == 0
+    out = json.loads(capsys.readouterr().out)
+    assert (out["guide_map_learnt"], out["guide_map_out"], out["guide_map_cad"]) == (False, None, -9.0)
+    assert not out_file.exists()
+    said = out["warnings"][-1]
+    assert f"--guide-map-out {out_file}: not written, the estimate has not settled" in said
+    assert said.endswith("raise --cycles")
+    assert said in caplog.text
+
+
+def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None:
+    bench, timing = VirtualEngine(seed=2), TimingMap.from_toml(table.read_text(encoding="utf-8"))
+    seeker = FeedForward(ExtremumSeeking(start=-9.0, lower=-30.0, upper=10.0), timing)
+    seeker.at(bench.point)
+    run_seeker(bench, seeker, 900)
+    args = Namespace(guide_map=str(table), guide_map_out=str(tmp_path / "out.csv"), seed=2)
+    for interrupted in (True, False):
+        before = timing.to_toml()
+        figures, doubts = learn_map(args, timing, seeker, bench.point, interrupted=interrupted)
+        assert figures["guide_map_learnt"] is not interrupted
+        assert (tmp_path / "out.csv").exists() is not interrupted
+        assert (timing.to_toml() == before) is interrupted
+        assert any("interrupted" in doubt for doubt in doubts) is interrupted
+
+
+def test_an_axis_that_no_point_has_is_named(capsys: Capsys, tmp_path: Path) -> None:
+    file = tmp_path / "timing.csv"
+    file.write_text("speed,timing_cad\n900,-2\n1500,-5\n", encoding="utf-8")
+    said = refused(capsys, "--guide", "map", "--guide-map", str(file))
+    assert "axis 'speed' is not a number of the operating point: did you mean 'speed_rpm'?" in said

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from mgdd import datasets
-from mgdd.datasets.files import path
-from mgdd.datasets.origins import ORIGINS, Origin, fetch
+from mgdd.datasets.files import ORIGINS, Origin, fetch, path
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
 from mgdd.results.labels import ANGLE, check_labels
@@ -203,7 +202,6 @@ def served(tmp_path, monkeypatch):
     origins = {
         "moon": {f: Origin(f"{server.url}/{f}", hashlib.sha256(content).hexdigest()) for f, content in files.items()}
     }
-    monkeypatch.setattr(sys.modules["mgdd.datasets.origins"], "ORIGINS", origins)
     monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "ORIGINS", origins)
     monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "own"))
@@ -231,7 +229,7 @@ def test_a_set_is_fetched_once_and_found(served, tmp_path):
 
 def test_only_what_is_missing_is_fetched(monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr(sys.modules["mgdd.datasets.origins"], "fetch", asked.append)
+    monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "fetch", asked.append)
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path))
     assert len(datasets.read(NAME, fetch=True)) == 4

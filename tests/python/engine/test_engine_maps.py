@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from mgdd import datasets
-from mgdd.datasets.engine_maps import engine_map
+from mgdd.datasets.readers import engine_map
 from mgdd.errors import DataError
 from mgdd.maps import CalibrationMap, read_map, write_map
 from mgdd.results.labels import check_labels

@@ -150,8 +150,6 @@ def test_the_edge_of_the_range_is_marked():
         ((), {"limits": {"p_max_bar": math.nan}}, "p_max_bar = nan"),
         ((), {"bounds_cad": (10.0, -30.0)}, "bounds_cad"),
         ((), {"bounds_cad": (-90.0, 0.0)}, r"bounds_cad.*\[-60, 20\]"),
-        ((), {"integrator": "rk4"}, "integrator = 'rk4'.*trapezoid"),
-        ((), {"step_cad": 0.0}, "step_cad"),
     ],
 )
 def test_bad_input_is_refused_by_name(arguments, keyword, match):

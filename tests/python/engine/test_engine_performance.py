@@ -15,7 +15,12 @@ from mgdd.engine import (
     Performance,
     PerformanceTerm,
     SoftSensor,
+    ThermalNo,
+    analyze,
     fit_nox_proxy,
+    nox_at_reference_humidity,
+    nox_g_per_kwh,
+    simulate,
     timing_sweep,
 )
 from mgdd.errors import DataError, ParameterError, ShapeError
@@ -105,9 +110,6 @@ def test_performance_takes_signals_by_name() -> None:
         (lambda: PerformanceTerm("nox_ppm", reference=0.0), "reference = 0 ppm: must be > 0"),
         (lambda: PerformanceTerm("nox_ppm", above=-1.0), "above = -1 ppm: must be > 0"),
         (lambda: PerformanceTerm("nox_ppm", float("inf")), "weight = inf: must be finite"),
-        (lambda: NoxProxy(reference_nox_ppm=0.0), "reference_nox_ppm = 0 ppm: must be > 0"),
-        (lambda: NoxModel(intake_o2_fraction=2.0), "intake_o2_fraction = 2: must be > 0 and <= 1"),
-        (lambda: SoftSensor(correction_gain=-1.0), r"correction_gain = -1: must be in \[0, 1\]"),
         (lambda: SensorDynamics().delay_at(-1.0), r"speed_rpm = -1 rpm: must be in \[0, 100000\]"),
         (lambda: SensorDynamics(delay_s=100.0), r"sensor.delay_s = 100 s: must be in \[0, 60\]"),
     ],
@@ -115,3 +117,112 @@ def test_performance_takes_signals_by_name() -> None:
 def test_records_refuse_by_name(make: object, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         make()
+
+
+TRUE = ThermalNo(lambda_burned=1.02, calibration=0.35, mixing_time_ms=1.5)
+TIMINGS = (-12.0, -9.0, -6.0, -3.0, 0.0, 3.0)
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    """Give cycles of one engine over timing and load, their points, and what a plant of another mixture emits."""
+    random = np.random.default_rng(11)
+    points = [OperatingPoint(speed_rpm=1400.0, fuel_mg=fuel) for fuel in (12.0, 20.0) for _ in TIMINGS]
+    cycles = [simulate(Cylinder(), p, soc_cad=soc) for p, soc in zip(points, 2 * TIMINGS, strict=True)]
+    nox = [float(TRUE.cycle(c, Cylinder(), point=p)["nox_ppm"]) for c, p in zip(cycles, points, strict=True)]
+    return cycles, points, np.array(nox) * np.exp(0.03 * random.standard_normal(len(nox)))
+
+
+def test_measured_pressure_gives_the_no_of_the_cycle_behind_it() -> None:
+    point = OperatingPoint()
+    cycle = simulate(Cylinder(), point, soc_cad=-7.0, step_cad=0.5)
+    back = analyze(cycle, Cylinder(), point=point, gamma="cylinder", fractions="gross")
+    direct, measured = (ThermalNo().cycle(c, Cylinder(), point=point) for c in (cycle, back))
+    assert float(measured["nox_ppm"]) == pytest.approx(float(direct["nox_ppm"]), rel=0.01)
+    assert float(measured["flame_max_k"]) == pytest.approx(float(direct["flame_max_k"]), abs=5.0)
+    assert float(direct["no_ppm"][-1]) == float(direct["nox_ppm"])
+
+
+def test_the_fit_finds_mixture_and_factor_of_another_plant(sweep) -> None:
+    cycles, points, nox = sweep
+    found = ThermalNo(mixing_time_ms=1.5).fit(cycles, nox, Cylinder(), points=points)
+    assert found.points == 12
+    assert found.lambda_low <= 1.02 <= found.lambda_high
+    assert found.model.lambda_burned == pytest.approx(1.02, abs=0.05)
+    assert found.model.calibration == pytest.approx(0.35, rel=0.25)
+    assert 0.01 < found.residual_ln < 0.06
+    assert found.doubts == ()
+    exact = [float(TRUE.cycle(c, Cylinder(), point=p)["nox_ppm"]) for c, p in zip(cycles, points, strict=True)]
+    sharp = ThermalNo(mixing_time_ms=1.5).fit(cycles, exact, Cylinder(), points=points)
+    assert sharp.doubts == ()
+    assert sharp.model.lambda_burned == pytest.approx(1.02, abs=0.01)
+    assert sharp.lambda_high - sharp.lambda_low < 0.5 * (found.lambda_high - found.lambda_low)
+
+
+def test_a_fitted_half_tells_the_other_half_where_a_proxy_of_temperature_does_not(sweep) -> None:
+    cycles, points, nox = sweep
+    low, high = slice(0, 6), slice(6, 12)  # loads
+    found = ThermalNo().fit(cycles[low], nox[low], Cylinder(), points=points[low]).model
+    told = [
+        float(found.cycle(c, Cylinder(), point=p)["nox_ppm"]) for c, p in zip(cycles[high], points[high], strict=True)
+    ]
+    t_max = np.array([float(c["t_max_k"]) for c in cycles])
+    proxy = fit_nox_proxy(t_max[low], nox[low], map="arrhenius").proxy.arrhenius_ppm(t_max[high])
+    error, of_proxy = (np.sqrt(np.mean(np.log(each / nox[high]) ** 2)) for each in (np.array(told), np.array(proxy)))
+    assert error < 0.15
+    assert error < 0.5 * of_proxy
+
+
+def test_few_or_like_cycles_are_doubted(sweep) -> None:
+    cycles, points, nox = sweep
+    one = ThermalNo().fit(cycles[:1], nox[:1], Cylinder(), points=points[0])
+    assert "1 cycle(s): the mixture stays 1.1" in one.doubts[0]
+    assert np.isnan(one.residual_ln)
+    again = ThermalNo(calibration=one.model.calibration).cycle(cycles[0], Cylinder(), point=points[0])
+    assert float(again["nox_ppm"]) == pytest.approx(nox[0], rel=1e-12)
+    noisy = nox[2] * np.array([1.0, 0.7, 1.3, 0.9])
+    alike = ThermalNo().fit([cycles[2]] * 4, noisy, Cylinder(), points=points[2])
+    assert "do not tell the mixture" in alike.doubts[0]
+    grams = ThermalNo().fit(cycles[:1], nox[:1] * 1e-6, Cylinder(), points=points[0])
+    assert "unit of nox_ppm" in grams.doubts[1]
+
+
+def test_a_proxy_takes_its_slope_from_the_model(sweep) -> None:
+    cycles, points, _ = sweep
+    fit = fit_nox_proxy(
+        [float(c["t_max_k"]) for c in cycles[:6]],
+        [float(TRUE.cycle(c, Cylinder(), point=p)["nox_ppm"]) for c, p in zip(cycles[:6], points[:6], strict=True)],
+    )
+    assert isinstance(fit.proxy, NoxProxy)
+    assert fit.residual_ln < 0.15
+
+
+def test_bad_input_is_refused_by_name(sweep) -> None:
+    cycles, points, nox = sweep
+    with pytest.raises(ParameterError, match=r"lambda_burned = 9: must be in \[0.7, 3\]"):
+        ThermalNo(lambda_burned=9.0).cycle(cycles[0], Cylinder(), point=points[0])
+    with pytest.raises(ParameterError, match="rates = 'fast'"):
+        ThermalNo(rates="fast").cycle(cycles[0], Cylinder(), point=points[0])
+    with pytest.raises(DataError, match="the cycle has no temperature_k"):
+        ThermalNo().cycle(cycles[0].drop_vars("temperature_k"), Cylinder(), point=points[0])
+    with pytest.raises(DataError, match="the cycle has no burned_fraction or heat"):
+        ThermalNo().cycle(cycles[0].drop_vars("burned_fraction"), Cylinder(), point=points[0])
+    with pytest.raises(DataError, match="give one cycle"):
+        ThermalNo().cycle(cycles[0].expand_dims(cycle=[1, 2]), Cylinder(), point=points[0])
+    with pytest.raises(DataError, match=r"nox_ppm\[1\] = -3.0: must be > 0|nox_ppm\[1\] = -3"):
+        ThermalNo().fit(cycles[:2], [100.0, -3.0], Cylinder(), points=points[0])
+    with pytest.raises(ShapeError, match="2 cycles, 3 values of nox_ppm"):
+        ThermalNo().fit(cycles[:2], nox[:3], Cylinder(), points=points[0])
+    with pytest.raises(DataError, match="no cycle"):
+        ThermalNo().fit([], [], Cylinder(), points=points[0])
+    with pytest.raises(ParameterError, match="exhaust_kg_per_h = 0"):
+        nox_g_per_kwh(100.0, exhaust_kg_per_h=0.0, power_kw=1.0)
+    with pytest.raises(ParameterError, match=r"intake_water_fraction = 0\.5"):
+        nox_at_reference_humidity(100.0, 0.5)
+    with pytest.raises(ParameterError, match="ignition = 'glow'"):
+        nox_at_reference_humidity(100.0, 0.01, ignition="glow")
+
+
+def test_humidity_as_the_rule_computes_it() -> None:
+    assert float(nox_at_reference_humidity(700.5, 0.022)) == pytest.approx(736.2, abs=0.05)
+    assert float(nox_at_reference_humidity(154.7, 0.022, ignition="spark")) == pytest.approx(169.5, abs=0.05)

@@ -15,15 +15,13 @@ from matplotlib.figure import Figure
 from mgdd import datasets, presets
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import fit_cylinder, fit_ode, identify_throttle
-from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.optimize.least_squares import fit_options
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
-from mgdd.results.fit import FitQuality
-from mgdd.results.model import Model
+from mgdd.results.fit import FitQuality, Model
 from mgdd.throttle import PseudoWiener
 from mgdd_studies.benchmarks.two_tanks import TwoTanksModel
 
@@ -46,7 +44,7 @@ def fits() -> dict[str, Fit]:
     record = {"time_s": TIME, "u": np.ones(TIME.size), "y": y}
     start = {"parameters": {"gain": 1.0, "tau_s": 1.0}, "initial_state": [0.0]}
     return {
-        "first_principle": fit_first_principle(log(), test=log(), options=once),
+        "first_principle": identify_throttle(log(), "first_principle", test=log(), options=once),
         "pw_r": identify_throttle(log(), test=log(), limp_home_deg=8.0, options=once),
         "ode": fit_ode(lag, record, **start),
         "cylinder": fit_cylinder(datasets.read("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),

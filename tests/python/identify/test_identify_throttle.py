@@ -14,7 +14,7 @@ from mgdd.identify import identify_throttle, load_throttle_model, validate_throt
 from mgdd.io import throttle_log
 from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import FitOptions
-from mgdd.results.model import Model
+from mgdd.results.fit import Model
 from mgdd.signals import amplitude_random_steps, chirp, triangle
 from mgdd.throttle import PseudoWiener, Throttle, simulate_throttle
 

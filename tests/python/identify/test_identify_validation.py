@@ -12,7 +12,6 @@ from hypothesis.extra.numpy import arrays
 
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import ThrottleValidation, n_step_rms
@@ -268,7 +267,7 @@ def test_crossings_are_counted_with_a_band() -> None:
     assert content.time_above_s == pytest.approx(content.time_below_s, abs=0.05)
 
 
-@pytest.mark.parametrize("how", ["identify_throttle", "fit_first_principle", "fit_pseudo_wiener"])
+@pytest.mark.parametrize("how", ["identify_throttle", "fit_pseudo_wiener"])
 def test_a_fit_in_percent_has_one_definition(how: str) -> None:
     """Every way to a fit says the figure that its validation says: the free run without its first 50 ms."""
     rng = np.random.default_rng(0)
@@ -282,7 +281,6 @@ def test_a_fit_in_percent_has_one_definition(how: str) -> None:
     once = FitOptions(n_starts=1)
     fits = {
         "identify_throttle": lambda: identify.identify_throttle(train, test=test, options=once),
-        "fit_first_principle": lambda: fit_first_principle(train, test=test, options=once),
         "fit_pseudo_wiener": lambda: fit_pseudo_wiener(train, limp_home_deg=8.0, options=once),
     }
     fit = fits[how]()

@@ -13,7 +13,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results.model import Model
+from mgdd.results.fit import Model
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3
@@ -35,11 +35,7 @@ def simulate(model: PseudoWiener, start_deg: float, time=TIME, duty=DUTY) -> xr.
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: f"{model.kind}-{len(model.parameters)}")
 def test_a_model_survives_every_copy(model: PseudoWiener) -> None:
     assert isinstance(model, Model)
-    for other in (
-        PseudoWiener.from_toml(model.to_toml()),
-        pickle.loads(pickle.dumps(model)),
-        copy.deepcopy(model),
-    ):
+    for other in (PseudoWiener.from_toml(model.to_toml()), pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
         assert other == model
         assert hash(other) == hash(model)
     assert model.replace(limp_home_deg=9.0) != model

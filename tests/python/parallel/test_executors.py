@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import parallel_work as work
-from executor_calls import CALLS, SPACE, fixed_chunks, plain, same
+from executor_calls import SPACE, fixed_chunks, loops, plain
 from mgdd.errors import ParameterError
 from mgdd.loop import VirtualEngine, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit
@@ -25,30 +25,25 @@ def pool() -> Iterator[Executor]:
         yield made
 
 
-@pytest.mark.parametrize("name", CALLS)
 @pytest.mark.parametrize("size", [1, 4, 1000])
-def test_chunks_on_threads_change_no_bit(name: str, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_on_threads_change_no_bit(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     fixed_chunks(monkeypatch, size)
-    assert same(CALLS[name](executor=ThreadPoolExecutor, workers=3), plain(name))
+    assert loops(executor=ThreadPoolExecutor, workers=3).identical(plain())
 
 
-@pytest.mark.parametrize("name", CALLS)
-def test_processes_change_no_bit(name: str, pool: Executor) -> None:
-    assert same(CALLS[name](executor=pool), plain(name))
+def test_processes_change_no_bit(pool: Executor) -> None:
+    assert loops(executor=pool).identical(plain())
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CALLS)
-def test_order_and_losses_change_no_bit(name: str) -> None:
-    for executor in (work.LateReversed(), work.Dropping("error")):
-        assert same(CALLS[name](executor=executor, workers=3), plain(name))
+def test_order_changes_no_bit() -> None:
+    assert loops(executor=work.LateReversed(), workers=3).identical(plain())
 
 
-@pytest.mark.parametrize("name", CALLS)
-def test_the_number_of_threads_changes_no_bit(name: str) -> None:
-    assert same(CALLS[name](workers=1), plain(name))
+def test_the_number_of_threads_changes_no_bit() -> None:
+    assert loops(workers=1).identical(plain())
     with pytest.raises(ParameterError, match="workers = 0: must be >= 1"):
-        CALLS[name](workers=0)
+        loops(workers=0)
 
 
 @pytest.mark.slow
@@ -58,13 +53,12 @@ def test_dask_changes_no_bit() -> None:
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
-        for name in ("monte_carlo", "fit_first_principle"):
-            assert same(CALLS[name](executor=client.get_executor()), plain(name))
+        assert loops(executor=client.get_executor()).identical(plain())
 
 
 def test_progress_counts_runs_and_changes_no_bit() -> None:
     seen: list[tuple[int, int]] = []
-    assert same(CALLS["monte_carlo"](progress=lambda *counts: seen.append(counts)), plain("monte_carlo"))
+    assert loops(progress=lambda *counts: seen.append(counts)).identical(plain())
     assert seen[-1] == (42, 42)
     assert [done for done, _ in seen] == sorted({done for done, _ in seen})
 
@@ -78,16 +72,9 @@ def test_a_worker_computes_on_one_thread(pool: Executor) -> None:
 
 
 # --- what is refused ----------------------------------------------------------------------------------------
-class NoWork(Executor):
-    """An executor that nothing must reach: bad input is found before."""
-
-    def submit(self, *_: Any, **__: Any) -> Any:
-        raise AssertionError("work was handed out")
-
-
 def test_what_does_not_fit_is_refused_before_any_work() -> None:
     def loops_of(benches: Any, seekers: Any, seeds: Any = (1,), cycles: int = 5) -> xr.Dataset:
-        return monte_carlo(benches, seekers, seeds, cycles=cycles, executor=NoWork())
+        return monte_carlo(benches, seekers, seeds, cycles=cycles, executor=work.NoWork())
 
     fits = ExtremumSeeking(**SPACE)
     capped = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 90.0)])

@@ -1,4 +1,4 @@
-"""What loops, runs, fits and tunings hand over after a lost worker or Ctrl-C."""
+"""What loops, runs and tunings hand over after a lost worker or Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 
 import parallel_work as work
-from executor_calls import CALLS, fixed_chunks, groups, plain
+from executor_calls import fixed_chunks, loops, plain
 from mgdd.errors import Interrupted, WorkerLostError
 from mgdd.loop import tune_controller
 from mgdd.loop.tune import tracking_cost
@@ -25,40 +24,18 @@ from mgdd.throttle import Throttle
 pytestmark = pytest.mark.slow
 
 
-class Dies(work.Dropping):
-    """Works for a while, then loses everything."""
-
-    def __init__(self, last: int) -> None:
-        super().__init__("cancelled")
-        self.last = last
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
-        self.always = self.count > self.last
-        return super().submit(fn, *args, **kwargs)
-
-
 def test_a_lost_worker_hands_over_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    name, figure = "monte_carlo", "mean_soc_cad"
     fixed_chunks(monkeypatch, 4)
     with pytest.raises(WorkerLostError) as lost:
-        CALLS[name](executor=Dies(7), workers=2)
+        loops(executor=work.Dropping("cancelled", after=7), workers=2)
     part = lost.value.partial
     done = part["finished"].to_numpy()
     assert 0 < done.sum() < done.size
     assert f"{done.sum()} of {done.size} are finished" in str(lost.value)
-    assert part.sizes == plain(name).sizes
-    np.testing.assert_array_equal(part[figure].to_numpy()[done], plain(name)[figure].to_numpy()[done])
-    assert np.isnan(part[figure].to_numpy()[~done]).all()
+    assert part.sizes == plain().sizes
+    np.testing.assert_array_equal(part["mean_soc_cad"].to_numpy()[done], plain()["mean_soc_cad"].to_numpy()[done])
+    assert np.isnan(part["mean_soc_cad"].to_numpy()[~done]).all()
     check_labels(part)
-
-
-def test_a_lost_worker_leaves_the_best_of_the_finished_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    fixed_chunks(monkeypatch, 1)
-    with pytest.raises(WorkerLostError) as lost:
-        groups(executor=Dies(3), workers=1)
-    part = lost.value.partial
-    assert 0 < len(part.start_rmse) < 5
-    assert part.report.rmse == min(part.start_rmse)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,8 @@ from mgdd.guide import FeedForward
 from mgdd.loop import LoopCriteria, VirtualEngine, run_seeker
 from mgdd.optimize import ExtremumSeeking
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
-from mgdd.plot.convergence import convergence, learning
+from mgdd.plot.identification import error_growth, residual_correlation
+from mgdd.plot.throttle import free_run
 from mgdd.results.labels import ANGLE, labelled_dataset
 
 CAD = np.arange(-120.0, 121.0)
@@ -89,29 +90,11 @@ def sought():
     ).set_coords("limit_units")  # fmt: skip
 
 
-def tracks():
-    cases, dims = ["slow", "fast"], ("case", "cycle")
-    curves = np.stack([-6.0 - 9.0 * np.exp(-CYCLE / t) for t in (80.0, 20.0)])
-    cad = "°CA aTDC"
-    return labelled_dataset({
-        "cycle": ("cycle", CYCLE), "case": ("case", cases, "-", "case"),
-        "estimate_median_cad": (dims, curves, cad, "estimate"), "optimum_cad": ((), -6.0, cad, "optimum"),
-        "estimate_low_cad": (dims, curves - 0.5, cad, "low"), "estimate_high_cad": (dims, curves + 0.7, cad, "high"),
-    })  # fmt: skip
-
-
 def readings(over="cycle"):
     axis = {"cycle": CYCLE.astype(float), "soc_cad": SOC, "t_max_k": 1900.0 + 10.0 * SOC}[over]
     names = ("true", "analyser", "fast", "soft", "soft_corrected")
     return labelled_dataset({
         over: (over, axis), **{f"nox_{name}_ppm": (over, 900.0 + axis + k) for k, name in enumerate(names)},
-    })  # fmt: skip
-
-
-def learned():
-    return labelled_dataset({
-        "law": ("law", ["p", "norm_optimal"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
-        "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0], [8.0, 1.0, 0.5]], "°CA", "rms error of CA50"),
     })  # fmt: skip
 
 
@@ -129,10 +112,8 @@ PLOTS = {
     "throttle under control": (plot.throttle_run, followed),
     "throttle": (plot.throttle_run, lambda: followed().drop_vars("reference_deg")),
     "seeking": (plot.seeking, sought),
-    "convergence": (convergence, tracks),
     "sensors over cycles": (plot.sensors, readings),
     "sensors over timing": (plot.sensors, lambda: readings("soc_cad")),
-    "learning": (learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
     "pressure of a measurement": (plot.pressure, lambda: datasets.read("hd_diesel_128x144")[3]),
@@ -250,10 +231,7 @@ def test_log_pv_slopes():
     ax = plot.pressure(analysed(), log_pv=True)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     np.testing.assert_array_equal(line(ax, "cylinder pressure").get_data(), [LITRE, BAR])
-    fitted = {
-        "compression n = 1.350 (−100 to −40 °CA aTDC)": 1.35,
-        "expansion n = 1.310 (60 to 120 °CA aTDC)": 1.31,
-    }
+    fitted = {"compression n = 1.350 (−100 to −40 °CA aTDC)": 1.35, "expansion n = 1.310 (60 to 120 °CA aTDC)": 1.31}
     for label, exponent in fitted.items():
         volume, bar = line(ax, label).get_data()
         assert -np.diff(np.log(bar)) / np.diff(np.log(volume)) == pytest.approx(exponent)
@@ -329,9 +307,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
         (plot.seeking, sought, "asked", "mgdd.loop.run_seeker"),
-        (convergence, tracks, "estimate_median_cad", "a study of seekers"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.VirtualEngine.run"),
-        (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
         (plot.throttle_run, followed, "angle_deg", "mgdd.throttle.simulate_throttle"),
     ],
 )
@@ -392,21 +368,6 @@ def test_seeking_shows_the_slope_or_leaves_panels_out():
         plot.seeking(sought(), limit_values={"torque": 3.0})
 
 
-def test_convergence_bands_and_refusals():
-    ax = convergence(tracks())
-    np.testing.assert_array_equal(line(ax, "fast").get_ydata(), tracks()["estimate_median_cad"][1])
-    assert len(ax.collections) == 2
-    band = ax.collections[0].get_paths()[0].vertices[:, 1]
-    low, high = tracks()["estimate_low_cad"][0], tracks()["estimate_high_cad"][0]
-    assert (band.min(), band.max()) == pytest.approx((float(low.min()), float(high.max())))
-    assert len(convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
-    with pytest.raises(DataError, match="must be cycle and one more"):
-        convergence(tracks().isel(case=0, drop=True))
-    many = tracks().isel(case=[0, 1] * 6).assign_coords(case=("case", list("abcdefghijkl"), tracks()["case"].attrs))
-    with pytest.raises(DataError, match="case has 12 entries: at most 9"):
-        convergence(many)
-
-
 def test_sensors_over_cycles_timing_and_temperature():
     for over in ("cycle", "soc_cad", "t_max_k"):
         data = readings(over)
@@ -452,3 +413,145 @@ def test_a_run_that_knows_its_optimum_and_limit_shows_them(guided: bool) -> None
     assert line(limited, "limit p_max_bar 104").get_ydata()[0] == 104.0
     assert sum(item.get_label().startswith("limit ") for item in limited.get_lines()) == 1
     assert "optimum −4.00" in entries(plot.seeking(run, optimum_cad=-4.0))
+
+
+TIME = np.arange(400) * 0.05
+DUTY = 0.3 * np.sin(0.6 * TIME)
+DEG = 30.0 + 80.0 * DUTY - 5.0 * np.cos(0.6 * TIME)
+
+
+def log():
+    return labelled_dataset({"time_s": ("time_s", TIME), "duty": ("time_s", DUTY), "angle_deg": ("time_s", DEG)})
+
+
+def run():
+    return labelled_dataset({
+        "time_s": ("time_s", TIME), "angle_deg": ("time_s", DEG), "model_deg": ("time_s", DEG + 0.1),
+        "residual_deg": ("time_s", 0.0 * TIME + 0.1, "deg", "model minus measured angle"),
+    }, attrs={"kind": "pw_r"})  # fmt: skip
+
+
+def n_step(names=("pw_r", "persistence")):
+    rms = np.outer(1.0 + np.arange(len(names)), [0.03, 0.05, 0.08])
+    return labelled_dataset({
+        "predictor": ("predictor", list(names), "-", "predictor"),
+        "horizon_s": ("horizon_s", [0.005, 0.02, 0.05], "s", "horizon"),
+        "n_step_rms_deg": (("predictor", "horizon_s"), rms, "deg", "RMS error ahead"),
+    })  # fmt: skip
+
+
+def correlations():
+    lag = np.arange(1, 26)
+    return labelled_dataset({
+        "lag": ("lag", lag, "samples", "lag"),
+        "autocorrelation": ("lag", 0.5**lag, "-", "autocorrelation of the residual"),
+        "cross_correlation": ("lag", 0.01 * np.cos(lag), "-", "correlation of residual and earlier duty"),
+        "limit": ((), 0.03, "-", "95 % limit"),
+    })  # fmt: skip
+
+
+def matrix(value=-0.99):
+    names = ["preload_duty", "coulomb_duty", "tau_s"]
+    values = [[1.0, value, 0.1], [value, 1.0, np.nan], [0.1, np.nan, 1.0]]
+    return labelled_dataset({
+        "parameter": ("parameter", names, "-", "parameter"), "other": ("other", names, "-", "parameter"),
+        "correlation": (("parameter", "other"), values, "-", "correlation"),
+    })  # fmt: skip
+
+
+ALL = {
+    plot.holding_duty: (log, "plate angle [deg]", "duty [-]"),
+    free_run: (run, "", "plate angle [deg]"),
+    error_growth: (n_step, "horizon [ms]", "RMS error ahead [deg]"),
+    residual_correlation: (correlations, "", "residual with itself [-]"),
+    plot.correlation_matrix: (matrix, "", ""),
+}
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("draw", ALL, ids=lambda f: f.__name__)
+def test_axes_say_their_units_and_given_axes_are_used(draw):
+    make, x, y = ALL[draw]
+    figure, panes = plt.subplots(1, 2, layout="constrained")
+    ax = draw(make(), ax=panes[1])
+    assert ax is panes[1]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (x, y)
+    assert not panes[0].lines
+    figure.canvas.draw()
+    assert draw(make()).figure is not figure
+
+
+@pytest.mark.parametrize("draw", ALL, ids=lambda f: f.__name__)
+def test_a_missing_variable_is_named(draw):
+    dataset = ALL[draw][0]()
+    name = next(n for n in ("angle_deg", "n_step_rms_deg", "autocorrelation", "correlation") if n in dataset)
+    with pytest.raises(DataError, match=f"no variable '{name}'"):
+        draw(dataset.drop_vars(name))
+
+
+def test_branches_follow_the_direction_of_the_duty():
+    ax = plot.holding_duty(log(), limp_home_deg=8.0)
+    rising, falling = ax.lines[0].get_ydata(), ax.lines[1].get_ydata()
+    slope = np.diff(DUTY, prepend=DUTY[0])
+    np.testing.assert_array_equal(np.isfinite(rising)[1:], slope[1:] > 0.0)
+    np.testing.assert_array_equal(np.isnan(rising), np.isfinite(falling))
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [
+        "duty rising",
+        "duty falling",
+        "limp-home 8 deg",
+    ]
+    staircase = log().assign(duty=("time_s", np.repeat([0.0, 0.1, 0.2, 0.1], 100), log()["duty"].attrs))
+    held = plot.holding_duty(staircase).lines[0].get_ydata()
+    assert np.isfinite(held[:300]).all()
+    assert np.isnan(held[300:]).all(), "where the duty holds, the last direction counts"
+
+
+def test_a_model_lies_over_the_branches():
+    ax = plot.holding_duty(log().assign(model_deg=("time_s", DEG + 1.0, {"units": "deg", "long_name": "model"})))
+    np.testing.assert_array_equal(ax.lines[-1].get_xdata(), DEG + 1.0)
+
+
+def test_the_free_run_has_its_residual_below():
+    ax = free_run(run())
+    panel = ax.figure.axes[-1]
+    assert panel.get_xlabel() == "time [s]"
+    np.testing.assert_allclose(panel.lines[0].get_ydata(), 0.1)
+    assert ax.get_legend().get_texts()[1].get_text() == "model, free run (pw r)"
+
+
+def test_lags_outside_the_limit_are_squares():
+    ax = residual_correlation(correlations())
+    lower = ax.figure.axes[-1]
+    assert ax.lines[1].get_xdata().tolist() == [1, 2, 3, 4, 5]
+    assert ax.lines[1].get_marker() == "s"
+    assert lower.lines[1].get_xdata().size == 0
+
+
+def test_the_matrix_frames_what_cannot_be_told_apart():
+    from matplotlib.patches import Rectangle
+
+    ax = plot.correlation_matrix(matrix())
+    assert [text.get_text() for text in ax.texts] == [
+        "1.00",
+        "−0.99",
+        "0.10",
+        "−0.99",
+        "1.00",
+        "–",
+        "0.10",
+        "–",
+        "1.00",
+    ]
+    assert sum(isinstance(patch, Rectangle) for patch in ax.patches) == 2
+    assert not plot.correlation_matrix(matrix(0.9)).patches
+
+
+def test_five_lines_are_the_most():
+    with pytest.raises(DataError, match="at most 5"):
+        error_growth(n_step(tuple("abcdef")))
+    assert len(error_growth(n_step(tuple("abcde"))).lines) == 5

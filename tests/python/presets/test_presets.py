@@ -93,10 +93,7 @@ def test_a_preset_keeps_its_own_sources():
 
 
 @given(
-    bore=st.floats(20.0, 500.0),
-    ratio=st.floats(5.0, 30.0),
-    scale=st.floats(0.0, 3.0),
-    slope=st.floats(-1.0e-4, 1.0e-4),
+    bore=st.floats(20.0, 500.0), ratio=st.floats(5.0, 30.0), scale=st.floats(0.0, 3.0), slope=st.floats(-1.0e-4, 1.0e-4)
 )
 @settings(max_examples=50)
 def test_any_number_survives_exactly(bore, ratio, scale, slope, tmp_path_factory):

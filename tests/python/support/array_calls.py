@@ -34,7 +34,7 @@ from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.sweep import sweep
-from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
+from mgdd.throttle.characteristics import airflow_torque_nm
 from realtime_loops import make_loop
 
 Array = np.ndarray[Any, Any]
@@ -318,7 +318,4 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),
     "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
-    "throttle.characteristics.mass_flow_kg_per_s": (
-        lambda area, drop: mass_flow_kg_per_s(area_m2=area, pressure_drop_kpa=drop), (1e-6 * OPEN, 1.0 + OPEN),
-    ),
 }  # fmt: skip

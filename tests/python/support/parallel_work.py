@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from mgdd.parallel.pool import cores
@@ -40,21 +39,8 @@ def cores_inside(_: object) -> int:
     return cores()
 
 
-def lag(_t: float, x: Any, u: Any, p: Any) -> Any:
-    """Give the slope of a first-order lag with gain and time constant."""
-    return (p[0] * u[0] - x) / p[1]
-
-
-def killed_once(flag: str, x: float) -> float:
-    """Take the worker down at item 7, the first time."""
-    if x == 7.0 and not Path(flag).exists():
-        Path(flag).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return x * x
-
-
 def deadly(x: float) -> float:
-    """Take down every worker that touches item 7."""
+    """Take down the worker that touches item 7."""
     if x == 7.0:
         os.kill(os.getpid(), signal.SIGKILL)
     return x * x
@@ -114,20 +100,26 @@ class Pickling(Executor):
 
 
 class Dropping(Executor):
-    """Loses every third call, by a cancelled future or by an error of its own; the others run at once."""
+    """Runs some calls at once, then loses all others, by a cancelled future or by an error of its own."""
 
-    def __init__(self, how: str, always: bool = False) -> None:
-        self.how, self.always, self.count = how, always, 0
+    def __init__(self, how: str, after: int = 0) -> None:
+        self.how, self.after, self.count = how, after, 0
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
         self.count += 1
-        if self.always or self.count % 3 == 1:
-            if self.how == "cancelled":
-                future.cancel()
-                future.set_running_or_notify_cancel()
-            else:
-                future.set_exception(ConnectionError("the worker is gone"))
-        else:
+        if self.count <= self.after:
             future.set_result(fn(*args, **kwargs))
+        elif self.how == "cancelled":
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        else:
+            future.set_exception(ConnectionError("the worker is gone"))
         return future
+
+
+class NoWork(Executor):
+    """An executor that nothing must reach: bad input is found before."""
+
+    def submit(self, *_: Any, **__: Any) -> Any:
+        raise AssertionError("work was handed out")

@@ -183,6 +183,6 @@ class BestTiming(Result):
         }
 
     def _draw(self, ax: Axes | None) -> Axes:
-        from mgdd.plot.family import family_strip
+        from mgdd.plot.calibration import family_strip
 
         return family_strip(self, ax=ax)

@@ -5,25 +5,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, WorkerLostError
-from mgdd.identify.starts import rank, search_starts
+from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
-from mgdd.identify.throttle.first_principle_problem import group_starts, groups_problem, log_columns
+from mgdd.identify.throttle.first_principle_problem import group_starts, groups_problem
 from mgdd.identify.throttle.free_run import as_log, below_ceiling, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.nuisances import SHARE, TYPICAL_SHARE, with_nuisances
 from mgdd.optimize.least_squares import FitOptions, fit_options
 from mgdd.parallel.finished import hand_over, or_partial
-from mgdd.parallel.pool import MakesExecutor, threads_of
+from mgdd.parallel.pool import threads_of
 from mgdd.results import Fit
-from mgdd.results.finding import Finding
 from mgdd.results.fit_report import FitReport
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 STATIC = (*GROUP_NAMES[2:7], "limp_home_deg")
 SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
@@ -32,86 +26,49 @@ SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
 def fit_first_principle(
     log: Any,
     *,
-    test: Any = None,
     start_values: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
-    closed_deg: float = 0.0,
-    open_deg: float = 90.0,
     options: FitOptions | None = None,
-    executor: MakesExecutor | None = None,
-    workers: int | None = None,
-    resistance_ohm: float | None = None,
-    supply_v: float | None = None,
-    inertia_kgm2: float | None = None,
-    torque_constant_nm_per_a: float | None = None,
 ) -> Fit:
-    """Identify the first-principle throttle from duty and angle.
+    """Fit the groups tau = J/b, G = g/J, T_pt/g, k_s/g and T_d/g, g the stall torque per duty, in a structure given.
 
-    Duty and angle determine torques only in units of duty and inertia only as an acceleration per duty, so the
-    unknowns are groups: tau = J/b, G = g/J, preload T_pt/g, stiffness k_s/g and friction T_d/g with g the stall torque
-    per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
-    the free run is then fitted in stages (dynamics, static groups, all), from several starts. A side of limp-home
-    the log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or
-    torque constant the physical numbers are computed back (`FirstPrincipleModel.physical_parameters`) and reported in
-    `findings`.
+    A regression on the torque balance of the moving samples gives the start; the free run is then fitted in stages
+    (dynamics, static groups, all), from several starts. A side of limp-home the log does not visit keeps its start
+    values and is named. `mgdd.identify.identify_throttle` chooses the structure, and knows delays.
 
     Parameters
     ----------
     log : Dataset, DataFrame or mapping of columns
         ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], evenly sampled.
-    test : Dataset, DataFrame or mapping of columns, optional
-        Another log; gives the quality ``test``.
-    start_values : mapping of str to float, optional
-        Start values of some groups; taken as they are instead of the regression.
-    fixed : mapping of str to float, optional
-        Groups that are known and not estimated.
+    start_values, fixed : mapping of str to float, optional
+        Start values of some groups, taken as they are instead of the regression; groups that are not estimated.
     free : sequence of str, optional
         Further groups to estimate: ``electrical_s ramp_deg stribeck_drop stribeck_deg_per_s presliding_deg
         presliding_damping half_gap_deg delay_samples viscous_share``. Otherwise they keep their start values; with a
         lag ``viscous_share`` is 0.25 where it is not given, and its range counts in the errors.
-    closed_deg, open_deg : float
-        Mechanical stops [deg].
     options : FitOptions, optional
         4 starts, within a factor of 2 around the first, with seed 0, 60 trial steps per stage and a tolerance of 1e-10
         of the last stage by default.
-    executor, workers
-        As in `mgdd.parallel.map_items`, for the starts: threads on all cores if left out. The fit does not depend on
-        them.
-    resistance_ohm, supply_v, inertia_kgm2, torque_constant_nm_per_a : float, optional
-        Known numbers, for `FirstPrincipleModel.physical_parameters`; their absence is reported in `findings`.
-
-    Returns
-    -------
-    mgdd.results.Fit
-        ``kind`` is ``first_principle``.
 
     Raises
     ------
-    DataError
-        A log that is not evenly sampled or too short, or whose plate hardly moves.
-    ParameterError
-        Unknown group names, or a value outside its bounds.
-    Interrupted, WorkerLostError
-        Ctrl-C, a lost worker; ``partial`` is the best fit of what was searched until then, None where nothing was.
+    Interrupted
+        Ctrl-C; ``partial`` is the best fit of what was searched until then, None where nothing was.
 
     References
     ----------
     Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty.
     """
     log = as_log(log)
-    test = None if test is None else as_log(test, "test")
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
     share_known = any(SHARE in given for given in (start_values or {}, fixed or {}, free))
-    problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed, stops_deg=(closed_deg, open_deg))
+    problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed)
     if not share_known and ("electrical_s" in problem.free or problem.values["electrical_s"] > 0.0):
         problem = dataclasses.replace(problem, values={**problem.values, SHARE: TYPICAL_SHARE})
     if whole_shift(problem.values["delay_samples"]):
         text = "within [0, 5] here; identify_throttle(log, 'first_principle') knows delays of up to 20 samples"
         raise ParameterError.of("delay_samples", problem.values["delay_samples"], text)
-    if test is not None:
-        log_columns(test)
-    threads = threads_of(workers)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in problem.free if name in STATIC]
     dynamics = [index[name] for name in problem.free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
@@ -127,45 +84,13 @@ def fit_first_principle(
         if part and (fraction == 1.0 or fraction * problem.angle.size >= 200)
     ]
     starts = group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed)
-    how = {"records": [problem.record()], "stages": stages, "closed_deg": closed_deg, "open_deg": open_deg}
-    stop: Interrupted | WorkerLostError | None
-    if executor is None:
-        found, stop = or_partial(lambda: _fit(starts, how, threads))
-        errors, n_reached, values = [one.rmse for one in found["reports"]], int(found["n_reached"]), found["values"]
-        report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
-    else:
-        search = partial(_one_by_one, how=how, angle=problem.angle)
-        each, stop = search_starts(search, starts, executor=executor, workers=workers)
-        best, n_reached = rank([own for own, _ in each])
-        report, values = each[best]
-        errors = [own.rmse for own, _ in each]
-    model = FirstPrincipleModel(
-        parameters=dict(zip(GROUP_NAMES, values, strict=True)),
-        closed_deg=closed_deg,
-        open_deg=open_deg,
-        substeps=SUBSTEPS,
-        sample_s=problem.step_s,
-    )
-    findings = [*problem.findings]
-    findings += report.findings
-    if supply_v is None or resistance_ohm is None or (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
-        findings.append(
-            Finding(
-                "groups_only",
-                (),
-                "groups only: duty and angle cannot separate inertia, torque constant, resistance and damping",
-                "give resistance_ohm, supply_v and one of inertia_kgm2 and torque_constant_nm_per_a",
-            )
-        )
-    else:
-        physical = model.physical_parameters(
-            resistance_ohm=resistance_ohm,
-            supply_v=supply_v,
-            inertia_kgm2=inertia_kgm2,
-            torque_constant_nm_per_a=torque_constant_nm_per_a,
-        )
-        text = "physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items())
-        findings.append(Finding("physical_parameters", tuple(physical), text))
+    how: dict[str, Any] = {"records": [problem.record()], "stages": stages, "closed_deg": 0.0, "open_deg": 90.0}
+    search = partial(_core.identify.fit_throttle_groups, starts=starts, substeps=SUBSTEPS, n_threads=threads_of(None))
+    found, stop = or_partial(lambda: search(**how))
+    report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
+    groups = dict(zip(GROUP_NAMES, found["values"], strict=True))
+    model = FirstPrincipleModel(parameters=groups, substeps=SUBSTEPS, sample_s=problem.step_s)
+    findings = (*problem.findings, *report.findings)
     report = with_nuisances(problem, model.parameters, report, substeps=SUBSTEPS, share_known=share_known)
     run = free_run(model, log)
     train = quality_of([run])
@@ -174,28 +99,12 @@ def fit_first_principle(
         model=model,
         kind=model.kind,
         train=train,
-        test=None if test is None else quality_of([free_run(model, test)]),
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(map(float, errors))),
-        n_best=n_reached,
+        start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
+        n_best=int(found["n_reached"]),
         run=run,
         draw=draw_free_run,
     )
     return hand_over(fit, stop)
-
-
-def _fit(starts: Sequence[Sequence[float]], how: Mapping[str, Any], threads: int) -> dict[str, Any]:
-    found: dict[str, Any] = _core.identify.fit_throttle_groups(
-        starts=starts, substeps=SUBSTEPS, n_threads=threads, **how
-    )
-    return found
-
-
-def _one_by_one(
-    starts: Sequence[Sequence[float]], *, how: Mapping[str, Any], angle: NDArray[np.float64]
-) -> list[tuple[FitReport, list[float]]]:
-    """Search from each start by itself: the core gives all groups of the best one only."""
-    found = [_fit([start], how, 1) for start in starts]
-    return [(FitReport.from_core(one["reports"][0], angle), list(one["values"])) for one in found]

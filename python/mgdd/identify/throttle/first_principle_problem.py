@@ -122,7 +122,7 @@ def groups_problem(
     free: Sequence[str] = (),
     start_values: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
-    stops_deg: tuple[float, float],
+    stops_deg: tuple[float, float] = (0.0, 90.0),
 ) -> GroupsProblem:
     """Read a log, check names and values, and start from the torque balance of its moving samples."""
     time, duty, angle = log_columns(log)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from mgdd.results.model import Model
+    from mgdd.results.fit import Model
 
 _EARLY = 0.75  # of the log, for both models; they are compared on the rest
 _BETTER_PERCENT = 0.3  # PW-R must gain that much to replace the groups, which have physical meaning

@@ -10,9 +10,8 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
-from mgdd.results.fit import FitQuality
+from mgdd.results.fit import FitQuality, Model
 from mgdd.results.labels import labelled_dataset
-from mgdd.results.model import Model
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 from mgdd.signals.model import as_signal, columns_of

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.optimize import FitOptions
-    from mgdd.results.model import Model
+    from mgdd.results.fit import Model
 
 _IDLE_DUTY = 0.03
 # Rest, as the noise of a sensor and the soft corner of the preload leave it.

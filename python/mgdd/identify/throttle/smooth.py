@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
-from mgdd.identify.starts import rank, search_starts
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.identify.starts import rank
 from mgdd.io.parameters import ModelParameters, wanted
 from mgdd.optimize.least_squares import FitOptions, fit_of, fit_options, fit_run
 from mgdd.parallel.finished import hand_over, or_partial
-from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit
 from mgdd.results.describe import described
 from mgdd.results.fit_report import FitReport
@@ -99,9 +97,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
         upper: ArrayLike,
         initial_state: Mapping[str, float] | Sequence[float] | None = None,
         options: FitOptions | None = None,
-        lanes: bool = True,
-        executor: MakesExecutor | None = None,
-        workers: int | None = None,
     ) -> Fit:
         """Fit the ten parameters to a record of duty and angle; the known constants are those of this model.
 
@@ -122,11 +117,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
         options : FitOptions, optional
             A tolerance of 1e-9 of the last stage by default; the other options have no effect here and
             are refused.
-        lanes : bool
-            Several starts at once; False takes one after the other and gives the same numbers.
-        executor, workers
-            As in `mgdd.parallel.map_items`, for the starts: one thread if both are left out. The fit does not depend on
-            them.
 
         Returns
         -------
@@ -141,8 +131,8 @@ class SmoothThrottle(SampledModel, ModelParameters):
             A start outside its bounds, or a constant that is not positive.
         DataError
             A record that is not finite.
-        Interrupted, WorkerLostError
-            Ctrl-C, a lost worker; ``partial`` is the best fit of what was searched until then, None where nothing was.
+        Interrupted
+            Ctrl-C; ``partial`` is the best fit of what was searched until then, None where nothing was.
 
         References
         ----------
@@ -154,7 +144,7 @@ class SmoothThrottle(SampledModel, ModelParameters):
             raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
         time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
         state = self.state_of(initial_state)
-        how = {
+        how: dict[str, Any] = {
             "duty": duty,
             "angle_deg": angle,
             "lower": _ten(lower, "lower"),
@@ -163,15 +153,10 @@ class SmoothThrottle(SampledModel, ModelParameters):
             "start": state,
             **self.constants,
             "cost_tolerance": chosen.tolerance,
-            "lanes": lanes,
+            "lanes": True,
         }
-        search = partial(_searches, how=how)
-        stop: Interrupted | WorkerLostError | None
-        if executor is None and workers is None:
-            found, stop = or_partial(lambda: search(table.tolist()))
-        else:
-            found, stop = search_starts(search, table.tolist(), executor=executor, workers=workers)
-        reports = tuple(found)
+        found, stop = or_partial(lambda: _core.identify.fit_smooth_throttle(starts=table.tolist(), **how))
+        reports = tuple(map(FitReport.from_core, found["reports"]))
         number, reached = rank(reports)
         best = reports[number]
         fitted = replace(self, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
@@ -179,11 +164,6 @@ class SmoothThrottle(SampledModel, ModelParameters):
         run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
         errors = (report.rmse for report in reports)
         return hand_over(fit_of(best, fitted, run, errors, n_best=reached, start_reports=reports), stop)
-
-
-def _searches(starts: Sequence[Sequence[float]], how: Mapping[str, Any]) -> list[FitReport]:
-    found, stop = or_partial(lambda: _core.identify.fit_smooth_throttle(starts=starts, **how))
-    return hand_over([FitReport.from_core(report) for report in found["reports"]], stop)
 
 
 def _ten(values: ArrayLike, name: str) -> list[float]:

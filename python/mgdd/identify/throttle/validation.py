@@ -16,11 +16,10 @@ from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io.throttle_checks import check_throttle_log
 from mgdd.results import Fit
 from mgdd.results.finding import Finding
-from mgdd.results.fit import FitQuality
+from mgdd.results.fit import FitQuality, Model
 from mgdd.results.fit_report import FitReport
 from mgdd.results.labels import labelled_dataset
-from mgdd.results.model import Model
-from mgdd.results.result import Result, drawn_by, merged
+from mgdd.results.result import Result, merged
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, rmse, vaf_percent
 from mgdd.signals.model import columns_of
@@ -133,7 +132,7 @@ class ThrottleValidation(Result):
         )
         return "\n".join([*rows, *(f"  {finding}" for finding in self.findings)])
 
-    def plot(self, what: str = "free_run", *, ax: Any = None, engine: str = "matplotlib") -> Any:
+    def plot(self, what: str = "free_run", *, ax: Any = None) -> Any:
         """Draw one part of the validation.
 
         Parameters
@@ -143,18 +142,16 @@ class ThrottleValidation(Result):
             one-step residual remembers of itself and of the duty.
         ax : matplotlib.axes.Axes, optional
             Where to draw; None makes a figure.
-        engine : {"matplotlib", "plotly"}
-            As in `mgdd.results.Result`.
 
         Returns
         -------
-        matplotlib.axes.Axes or plotly.graph_objects.Figure
-            The upper axes; a panel below them is ``ax.figure.axes[-1]``. Or the whole interactive figure.
+        matplotlib.axes.Axes
+            The upper axes; a panel below them is ``ax.figure.axes[-1]``.
 
         Raises
         ------
         ParameterError
-            Another part or engine.
+            Another part.
         """
         from mgdd.plot.identification import error_growth, residual_correlation
         from mgdd.plot.throttle import free_run
@@ -162,7 +159,7 @@ class ThrottleValidation(Result):
         parts = {"free_run": free_run, "n_step": error_growth, "residuals": residual_correlation}
         if what not in parts:
             raise ParameterError.of("what", what, f"one of {', '.join(parts)}")
-        return drawn_by(engine, lambda place: parts[what](self, ax=place), ax)
+        return parts[what](self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Give figures and sentences as a dict, without the runs."""

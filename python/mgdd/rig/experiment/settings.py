@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from mgdd.errors import ParameterError, hinted
-from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.excitation import EXCITATIONS
 from mgdd.identify.throttle.fits import CHOICES
 from mgdd.io.parameters import fits
 from mgdd.loop.controller_families import FAMILIES

@@ -1,4 +1,4 @@
-"""Estimates over cycles, of seekers and cases with the band of many seeds; errors over the trials of learning."""
+"""Estimates over cycles with the band of many seeds, errors over the trials of learning, and a drive over time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, finished, minus, new_axes, require
+from mgdd.plot.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    LINE_STYLES,
+    ORANGE,
+    axis_label,
+    divide,
+    finished,
+    minus,
+    new_axes,
+    require,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,6 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
     from mgdd.results.result import Result
+
+__all__ = ["convergence", "drive", "learning"]
 
 _MARKERS = "osv^D"
 _BAND = ("estimate_low_cad", "estimate_high_cad")
@@ -72,3 +87,33 @@ def learning(learned: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     ax.yaxis.set_minor_formatter("{x:g}")
     ax.grid(alpha=0.3, which="both")
     return finished(ax, learned, "trial", "ca50_error_cad", lines, columns=3, grid=False)
+
+
+# Panels: label, and the lines, what is wanted first.
+_PANELS = (
+    ("torque [N m]", (("wanted_torque_nm", "wanted"), ("torque_nm", "obtained"))),
+    ("plate angle [deg]", (("reference_deg", "reference"), ("angle_deg", "opening"))),
+    ("manifold\npressure [kPa]", (("wanted_pressure_kpa", "wanted, behind its lag"), ("pressure_kpa", "obtained"))),
+)
+
+
+def drive(run: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
+    """Draw pedal, torque, plate angle and manifold pressure of a `mgdd.loop.simulate_drive` over time."""
+    names = tuple(name for _, lines in _PANELS for name, _ in lines)
+    run = require("run", run, ("time_s", "pedal_percent", *names), "mgdd.loop.simulate_drive")
+    ax = new_axes(ax, height=6.4)
+    time = run["time_s"].to_numpy()
+    ax.plot(time, run["pedal_percent"], color=BLACK, linewidth=1.3)
+    ax.set_ylabel(axis_label(run, "pedal_percent"))
+    ax.set_xlim(float(time[0]), float(time[-1]))
+    below = divide(ax, (0.7, 1.0, 1.0, 1.0))[1:]
+    for panel, (label, ((wanted, asked), (obtained, got))) in zip(below, _PANELS, strict=True):
+        panel.plot(time, run[wanted], color=ORANGE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=asked)
+        panel.plot(time, run[obtained], color=BLUE, linewidth=1.2, label=got)
+        panel.set_ylabel(label)
+        panel.legend(loc="best", frameon=False, fontsize="small")
+    below[-1].set_xlabel(axis_label(run, "time_s"))
+    for one in (ax, *below):
+        one.grid(alpha=0.3)
+    ax.figure.align_ylabels([ax, *below])
+    return ax
