@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.cycle_period import CYCLE_DEG, repetition
+from mgdd.io.cycle_phase import phases
 from mgdd.io.table import Place
 from mgdd.signals.even_grid import wide_steps
 
@@ -21,8 +22,8 @@ SAME_ANGLE = 0.01
 _ROUNDED = 0.3
 # An encoder's step divides the cycle: by so much of a sample a step may miss that, or is meant to.
 _WHOLE, _NEARLY_WHOLE = 1e-3, 0.2
-# A record may lack this share of its samples, which its cycles then show; more is another step.
-_LOSABLE = 0.01
+# A record may lack this share of its samples, at so many places; more is another step.
+_LOSABLE, _PLACES = 0.01, 8
 # Sums of steps end this much [deg] beside the angle that was meant.
 _ROUNDING = 1e-6
 
@@ -222,6 +223,7 @@ def _running(
             f"{place.source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
             f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
         )
+    taken: tuple[int, ...] | None = None
     starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _ROUNDED * step)
     head, tail = int(starts[0]), degrees.size - int(starts[-1])
     grid = degrees[starts[0] : starts[1]]
@@ -233,7 +235,12 @@ def _running(
     same = np.all(np.diff(starts) == grid.size)
     cut = degrees[starts[0] : starts[0] + at.size].reshape(at.shape) if same else at
     if same and np.abs(cut - at).max() <= SAME_ANGLE * step:
-        values = values[:, starts[0] : starts[0] + at.size].reshape(-1, *at.shape)
+        stream = values[:, starts[0] :]
+        values = stream[:, : at.size].reshape(-1, *at.shape)
+        if encoded and not counts_turns:
+            past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
+            values, taken, more = _without_losses(past, step, values, stream)
+            notes += more
     else:
         at = at[at[:, -1] <= degrees[-1] + _ROUNDED * step]
         values = np.stack([np.interp(at, degrees, row) for row in values])
@@ -246,4 +253,42 @@ def _running(
         np.ascontiguousarray(values[..., order]),
         rows[starts[0] : starts[1]][order],
         tuple(notes),
+        taken,
+        count if taken is not None else 0,
     )
+
+
+def _without_losses(
+    past: NDArray[np.float64], step: float, values: NDArray[np.float64], stream: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[int, ...] | None, list[str]]:
+    """Cut anew behind places where an encoder's record lacks samples, and leave out the cycles around each.
+
+    `values` are the channels (channel, cycle, angle) as cut from the `stream` (channel, sample) at even steps.
+    """
+    count, size = values.shape[1:]
+    begins = size * np.arange(count)
+    out: set[int] = set()
+    notes = []
+    for _ in range(_PLACES):
+        kept = np.array([k for k in range(count) if k not in out])
+        placed = phases(past, values[0, kept])
+        jump = None if placed is None else placed.jump(step)
+        lost = 0 if jump is None else -round(jump.cad / step)
+        if jump is None or not lost:
+            break
+        behind = int(kept[jump.cycle])
+        begins[behind:] -= lost
+        out |= {behind - 1, behind}
+        what = f"{abs(lost)} samples {'are missing' if lost > 0 else 'too many'}"
+        notes.append(
+            f"{what} between the compressions of cycles {behind} and {behind + 1} of {count}: both are left out, those "
+            "behind are cut "
+            f"{abs(lost) * step:.3g} degrees {'earlier' if lost > 0 else 'later'}; the step of {step:g} stays"
+        )
+        out |= {k for k in range(count) if begins[k] + size > stream.shape[1]}
+        at = np.clip(begins[:, None] + np.arange(size), 0, stream.shape[1] - 1)
+        values = stream[:, at]
+    if not out:
+        return values, None, []
+    taken = tuple(k for k in range(count) if k not in out)
+    return np.ascontiguousarray(values[:, list(taken)]), taken, notes

@@ -138,6 +138,22 @@ def test_noise_free_is_the_same_bench_without_scatter_and_noise() -> None:
         bench.noise_free_limits([0.0], [-1])
 
 
+def test_a_timing_exactly_at_the_limit_is_above_it_in_half_of_the_cycles() -> None:
+    """The pressure falls with the timing, so a symmetric scatter of the timing carries half of the cycles over."""
+    bench, soc = VirtualEngine(limits=["p_max_bar"], seed=2), np.full(4000, -3.0)
+    free = bench.noise_free_limits(soc, np.arange(4000))
+    dataset = bench.run(soc)
+    over = (("cycle", "input"), soc[:, np.newaxis])
+    dataset = dataset.assign(input=("input", ["soc_cad"]), estimate=over, applied=over)
+    dataset["noise_free_limits"] = dataset["limits"].copy(data=free)
+    summary = summarize_cycles(dataset, LoopCriteria(limits={"p_max_bar": float(free[0, 0])}))
+    four_sigma = 4.0 * math.sqrt(0.25 / 4000)
+    assert summary["above_fraction_p_max_bar"] == pytest.approx(0.5, abs=four_sigma)
+    assert summary["judged_above_fraction_p_max_bar"] == pytest.approx(0.5, abs=four_sigma * math.sqrt(4 / 3))
+    assert summary["noise_free_above_cycles_p_max_bar"] == 0.0
+    assert summary["noise_free_worst_p_max_bar"] == summary["limit_p_max_bar"] < summary["worst_p_max_bar"]
+
+
 def test_the_surrogate_knows_its_surfaces_and_the_throttle_has_no_limits() -> None:
     surrogate = fit_surrogate(random_step_records(1500))
     run = run_seeker(SurrogatePlant(surrogate, limits=["mprr"], seed=4), seeker(mprr=5.0), 60)

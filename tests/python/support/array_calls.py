@@ -28,7 +28,7 @@ from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.io.pressure_checks import check_trace
 from mgdd.loop import Reference, VirtualEngine, simulate_drive, track, track_many
 from mgdd.maps import CalibrationMap
-from mgdd.rig.exchange import RigRecord
+from mgdd.rig.exchange import RigRecord, flat
 from mgdd.rig.realtime import RingTransport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse, residual_tests, rmse, vaf_percent
@@ -201,7 +201,8 @@ def pedals(pedal: Any, speed: Any, wanted: Any) -> Any:
 
 
 def exchanged(row: Any) -> Any:
-    return RigRecord.from_columns(["misfire", "input.duty", "value.angle_deg"], [row, row]).to_columns()[1]
+    record = RigRecord.from_columns(["misfire", "input.duty", "value.angle_deg"], [row, row])
+    return [list(flat(exchange).values()) for exchange in record]
 
 
 def whole_cycle(pressure: Any) -> xr.Dataset:
