@@ -66,6 +66,8 @@ def near_names(name: str, known: Iterable[str]) -> list[str]:
     close = [other for other in near if len(stem) >= _SHORTEST_STEM and _letters(other).startswith(stem)]
     if not 0 < len(close) <= _MOST_NAMES:
         close = [other for other in near if words and all(_words(other) & _meant(word) for word in words)]
+        if len(close) > _MOST_NAMES:  # of many, those that say no more
+            close = [other for other in close if len(_words(other)) == min(map(len, map(_words, close)))]
     if not 0 < len(close) <= _MOST_NAMES:
         close = difflib.get_close_matches(name, near, 1)
     return close

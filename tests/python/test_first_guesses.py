@@ -49,6 +49,7 @@ GUESSES: dict[str, tuple[Callable[[], Any], str]] = {
     # A function that stands elsewhere, or has another name.
     "of the package": (lambda: untyped(mgdd, "find_optimum"), r"did you mean mgdd\.engine\.find_optimum\?"),
     "several places": (lambda: untyped(mgdd, "simulate"), r"mgdd\.engine\.simulate or mgdd\.throttle\.simulate_thr"),
+    "reader of another library": (lambda: untyped(mgdd, "read_csv"), r"mgdd\.io\.read\?"),
     "class": (lambda: untyped(mgdd, "Spsa"), r"did you mean mgdd\.optimize\.Spsa\?"),
     "of another module": (lambda: untyped(engine, "seek_front"), r"did you mean mgdd\.loop\.seek_front\?"),
     "studies": (lambda: untyped(mgdd, "studies"), "did you mean the package mgdd_studies"),
@@ -86,7 +87,7 @@ GUESSES: dict[str, tuple[Callable[[], Any], str]] = {
     "input beside": (lambda: sweep_module.sweep(ENGINE, soc_cad=[1.0]), r"as \{'soc_cad': \["),  # type: ignore[arg-type]
     # A method that a result has not.
     "method": (lambda: engine.find_optimum(ENGINE).summarize(), "did you mean 'summary'"),  # type: ignore[attr-defined]
-    "form of a file": (lambda: engine.simulate(ENGINE).save("run.csv"), r"path = 'run.csv': .*\.nc"),
+    "form of a file": (lambda: engine.simulate(ENGINE).save("run.csv"), r"path = 'run.csv': .*\.nc.*to_csv"),
     "no model file": (lambda: engine.find_optimum(ENGINE).save("best.toml"), r"path = 'best.toml': .*\.nc"),
 }
 

@@ -159,8 +159,8 @@ COMMANDS = {
 _ALSO = {
     "engine simulate": "run cycle", "engine analyze": "analyse analysis", "engine check": "trust",
     "engine calibrate": "fit calibration", "engine optimum": "optimise optimize best", "engine seek": "search",
-    "engine sweep": "grid", "map optimize": "optimise optimum", "map export": "convert write",
-    "map trade-off": "pareto", "map show": "plot", "map diff": "compare", "map design": "doe",
+    "engine sweep": "grid", "map optimize": "optimise optimum build make", "map export": "convert write",
+    "map fit": "build make", "map trade-off": "pareto", "map show": "plot", "map diff": "compare", "map design": "doe",
     "throttle track": "control run", "throttle excite": "signal", "data info": "read", "data get": "download",
     "data list": "datasets --list-datasets",
     "preset list": "presets --list-presets", "study": "studies", "rig selftest": "self-test test", "doctor": "info",
@@ -216,11 +216,18 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Raise the message, with the nearest choice behind one that is none, or an example of what lacks."""
+        """Raise the message, with the nearest choice behind one that is none, a form or an example of what lacks."""
         if found := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)$", message):
             message = hinted(message, found[1], [choice.strip("' ") for choice in found[2].split(",")])
         elif message.endswith("required") or "required: " in message:
             message += f", as in {self.example}"
+        elif found := re.search(r"argument (\S+): expected one argument$", message):
+            action = next(own for own in self._actions if "/".join(own.option_strings) == found[1])
+            form = f", {action.metavar}; below zero it is {action.option_strings[-1]}=-…" if action.type else ""
+            message += f", one of {', '.join(action.choices)}" if action.choices else form
+        elif found := re.search(r"argument --(\S+): invalid .*'.+:.+'$", message):
+            over = f"; a range is --over {found[1].replace('-', '_')}=LOW:HIGH:COUNT"
+            message += over if "--over" in self.format_usage() else ""
         raise UsageError(message, self)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:

@@ -43,16 +43,16 @@ def log_in(args: argparse.Namespace, file: str) -> xr.Dataset:
     return read_throttle_log(file, **LOG.given(args))
 
 
-def add_preset(group: Any, name: str) -> None:
+def add_preset(group: Any) -> None:
     """Add the preset of a throttle."""
     what = f"{', '.join(presets.available('throttle'))} or a TOML file (default: {_DEFAULT_PRESET})"
-    option(group, f"{name} NAME_OR_FILE.toml", what, dest="preset")
+    option(group, "--preset NAME_OR_FILE.toml", what)
 
 
 def add_throttle(parser: argparse.ArgumentParser) -> None:
     """Add preset and fields; the names are those of the parameters."""
     group = parser.add_argument_group("throttle")
-    add_preset(group, "--preset")
+    add_preset(group)
     option(group, "--set FIELD=VALUE ...", "any field of the throttle, repeatable, for example coulomb_nm=0.3")
 
 

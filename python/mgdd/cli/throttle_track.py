@@ -40,7 +40,7 @@ def _add_track(parser: Any) -> None:
 
 def _add_plant(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("plant")
-    add_preset(group, "--plant")
+    add_preset(group)
     option(group, "--plant-scale FIELD=FACTOR ...",
            "multiply a field of the plant, repeatable; the controller does not know, for example coulomb_nm=1.4 "
            "(stiction goes with it)")  # fmt: skip

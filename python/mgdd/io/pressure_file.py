@@ -270,7 +270,8 @@ def choose_pressure(
     if not possible:
         names = [heads[i].name for i in range(table.width) if i != angle and heads[i].quantity == "pressure"]
         column = argument("pressure_column", repr(names[0]) if names else "")
-        raise DataError(f"{table.source}: no pressure behind the angle column: name it, {column}")
+        log = "; a log of a throttle is for read_throttle_log" if any("duty" in one.name for one in heads) else ""
+        raise DataError(f"{table.source}: no pressure behind the angle column: name it, {column}{log}")
     exact = [i for i in possible if heads[i].name == "pressure_bar"]
     if len(possible) == 1 or len(exact) == 1:
         return exact or possible

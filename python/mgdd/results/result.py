@@ -170,6 +170,7 @@ def saved(what: Any, path: str | os.PathLike[str]) -> None:
         Path(path).write_text(give(), encoding="utf-8")
     else:
         bound = "a file that ends in .nc, for the data" + (", or in .toml, for the parameters" if give else "")
+        bound += "; to_dataframe().to_csv(path) writes a CSV file" if ending == ".csv" else ""
         raise ParameterError.of("path", os.fspath(path), bound)
 
 

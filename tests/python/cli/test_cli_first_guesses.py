@@ -54,6 +54,11 @@ throttle identify log.csv = throttle identify
 throttle tune = throttle tune
 throttle control = throttle track
 engine tune -> mgdd throttle tune
+map build -> mgdd map fit or mgdd map optimize
+throttle track --preset P2 = throttle track
+engine seek --guide -> one of none, curve, calibrated
+engine sweep --soc -20:5:1 -> below zero it is --soc-cad=-
+engine sweep --soc=-20:5:1 -> --over soc_cad=LOW:HIGH:COUNT
 selftest = rig selftest
 download hd_diesel_128x144 -o d.csv = data get
 engin simulate -> 'engine'

@@ -245,7 +245,7 @@ def run_json(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
 def test_the_command_line_tracks(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     table, figure = tmp_path / "run.csv", tmp_path / "run.png"
     out = run_json(
-        capsys, "throttle", "track", "--controller", "guided", "--reference", "step:40:42", "--plant", "P2",
+        capsys, "throttle", "track", "--controller", "guided", "--reference", "step:40:42", "--preset", "P2",
         "--plant-scale", "coulomb_nm=1.3", "--seed", "4", "-o", str(table), "--figure", str(figure),
     )  # fmt: skip
     assert out["settling_ms"] < 60.0
@@ -265,7 +265,7 @@ def test_the_command_line_tracks(capsys: pytest.CaptureFixture[str], tmp_path: P
     for argv in (
         ["throttle", "track", "--plant-scale", "colomb_nm=1.2"],
         ["throttle", "track", "--reference", "step:40"],
-        ["throttle", "track", "--plant", "puma_single"],
+        ["throttle", "track", "--preset", "puma_single"],
     ):
         assert main(argv) == 2
     assert "coulomb_nm" in capsys.readouterr().err
