@@ -93,7 +93,7 @@ def _text(summary: Any) -> list[str | Table]:
 
 
 def _guided_text(summary: Any) -> list[str | Table]:
-    columns = ("seeker", "start [CAD]", "cycles to 1 CAD", "lost in 100 cycles [% x cycles]", "late loss [%]")
+    columns = ("seeker", "start [CAD]", "cycles to 1 CAD", "loss in 100 cycles [% x cycles]", "late loss [%]")
     rows = [
         (
             _GUIDED[row["case"]], f"{row['start_cad']:.1f}", f"{row['cycles_to_1_cad']:g}",
