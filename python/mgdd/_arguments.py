@@ -94,7 +94,7 @@ def refusal(
     furthest = max(place for place, _, _ in culprits)
     last = [(argument, value) for place, argument, value in culprits if place == furthest]
     argument, value = last[0]
-    bound_text = " or ".join(dict.fromkeys(_said(each.kind) for each, _ in last))
+    bound_text = " or ".join(dict.fromkeys(_type_text(each.kind) for each, _ in last))
     if has_units(value):
         bound_text = _BOUND
     remedy = _remedy(argument, value)
@@ -268,20 +268,20 @@ def _is_sequence(value: Any) -> bool:
     return not isinstance(value, str | bytes) and hasattr(value, "__len__") and hasattr(value, "__getitem__")
 
 
-def _said(kind: ast.expr) -> str:
+def _type_text(kind: ast.expr) -> str:
     if isinstance(kind, ast.BinOp):
         names = [choice for choice in _choices(kind) if _name(choice) != "SupportsIndex"]
-        return " or ".join(_said(choice) for choice in names)
+        return " or ".join(_type_text(choice) for choice in names)
     if not isinstance(kind, ast.Subscript):
         name = _name(kind)
         return _NAMED.get(name, _article(name))
     items, outer = _items(kind), _name(kind.value)
     if outer == "Annotated":
         size = str(items[1].value) if isinstance(items[1], ast.Constant) else ""
-        said = _said(items[0])
-        return said.replace("a sequence of", f"a sequence of {size[10:-1]}") if size.startswith("FixedSize(") else said
+        text = _type_text(items[0])
+        return text.replace("a sequence of", f"a sequence of {size[10:-1]}") if size.startswith("FixedSize(") else text
     if outer == "tuple":
-        return f"({', '.join(_said(item) for item in items)})"
+        return f"({', '.join(_type_text(item) for item in items)})"
     if outer == "Mapping":
         return f"a mapping of names to {_plural(items[1])}"
     return f"a sequence of {_plural(items[0])}"
@@ -291,7 +291,7 @@ def _plural(kind: ast.expr) -> str:
     plurals = {_NUMBER: "numbers", _WHOLE: "whole numbers", "str": "names"}
     first = _choices(kind)[0]
     if isinstance(first, ast.Subscript):
-        return f"entries that are {_said(kind)}"
+        return f"entries that are {_type_text(kind)}"
     return plurals.get(_name(first), f"{_name(first)}s")
 
 

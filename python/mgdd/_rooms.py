@@ -129,10 +129,10 @@ def _look(
     if isinstance(error, TypeError) and error.__traceback__ is not None and error.__traceback__.tb_next is None:
         names = [each.name for each in parameters]
         unknown = next((each for each in keywords if each not in names), "")
-        return _of_a_record(name, unknown, names) or unbound(name, parameters, given, keywords, _said(doc))
+        return _of_a_record(name, unknown, names) or unbound(name, parameters, given, keywords, _parameter_kinds(doc))
     if isinstance(error, Error):
         places = [each.name for each in parameters if each.kind is each.POSITIONAL_OR_KEYWORD][: len(given)]
-        kinds = [f"{each.annotation} {_said(doc).get(each.name, '')}" for each in parameters[: len(places)]]
+        kinds = [f"{each.annotation} {_parameter_kinds(doc).get(each.name, '')}" for each in parameters[: len(places)]]
         if any(_belongs_elsewhere(value, place, kinds) for place, value in enumerate(given[: len(places)])):
             error.args = (f"{error}; did you mean {name}({', '.join(places)}) in this order?",)
     return None
@@ -158,12 +158,12 @@ def _belongs_elsewhere(value: Any, place: int, kinds: Sequence[str]) -> bool:
     return any(fits) and not fits[place]
 
 
-def _said(doc: str) -> dict[str, str]:
+def _parameter_kinds(doc: str) -> dict[str, str]:
     """Kind and first sentence of each parameter of a numpydoc text."""
     from inspect import cleandoc
 
-    said: dict[str, str] = {}
+    kinds: dict[str, str] = {}
     for names, kind, text in re.findall(r"^([\w, ]+?)( : .+)?\n((?: {4}.*\n)+)", cleandoc(doc), re.MULTILINE):
         first = " ".join(text.split()).partition(". ")[0].rstrip(".")
-        said |= dict.fromkeys(names.split(", "), f"{kind.removeprefix(' : ')}: {first}".removeprefix(": "))
-    return said
+        kinds |= dict.fromkeys(names.split(", "), f"{kind.removeprefix(' : ')}: {first}".removeprefix(": "))
+    return kinds

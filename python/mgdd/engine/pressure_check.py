@@ -250,16 +250,16 @@ def check_pressure(
         )  # fmt: skip
     except DataError as error:
         return PressureCheck(name, (Check("file", "fail", str(error)),))
-    said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
-    said = [(kind, text) for kind, text in said if not (kind == "reading" and _of_angle(text))]
+    doubts = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
+    doubts = [(kind, text) for kind, text in doubts if not (kind == "reading" and _of_angle(text))]
     engine = cylinder_of(cylinder)
-    said += record_doubts(made, found, engine, point_of(point))
+    doubts += record_doubts(made, found, engine, point_of(point))
     fuel_mg = stated("fuel_mg", fuel_mg, point)
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
     known = [key for key, value in judged.items() if value or _known(made, key)]
     skipped = _skipped(made, found, known) | hidden(made, found, engine)
     swing = _SWING if made.attrs.get("angle_from") == "time" else ""
-    checks = [_check(check, kinds, said, skipped, swing) for check, kinds in _CHECKS.items()]
+    checks = [_check(check, kinds, doubts, skipped, swing) for check, kinds in _CHECKS.items()]
     if assumed:
         text = f"no engine is given: read with {assumed}"
         remedy = "give the engine: cylinder= in Python, --preset or --set bore_mm=... on the command line"
@@ -277,18 +277,18 @@ def _known(trace: xr.Dataset, name: str) -> bool:
 
 
 def _check(
-    name: str, kinds: tuple[str, ...], said: list[tuple[str, str]], skipped: dict[str, tuple[str, str]], swing: str
+    name: str, kinds: tuple[str, ...], doubts: list[tuple[str, str]], skipped: dict[str, tuple[str, str]], swing: str
 ) -> Check:
-    """Put all that was said of one check together; `swing` is the first cause of what an uneven turn looks like."""
-    own = [(kind, text) for kind, text in said if kind in kinds]
-    if not own:
+    """Combine the doubts of one check; `swing` is the first cause of what looks like an uneven turn."""
+    findings = [(kind, text) for kind, text in doubts if kind in kinds]
+    if not findings:
         return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "no fault found")
-    verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in own) else "doubt"
-    remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in own if kind in _REMEDIES)
-    if swing and any(kind in _SWINGS for kind, _ in own):
+    verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in findings) else "doubt"
+    remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in findings if kind in _REMEDIES)
+    if swing and any(kind in _SWINGS for kind, _ in findings):
         remedies = {swing: None, **remedies}
     first: dict[str, str] = {}
-    for kind, text in own:  # each line of the reader is a doubt of its own
+    for kind, text in findings:  # each line of the reader is a doubt of its own
         first.setdefault(text if kind == "reading" else kind, text)
     return Check(name, verdict, "; ".join(first.values()), "; ".join(remedies))
 
@@ -322,8 +322,8 @@ def record_doubts(
     trace: xr.Dataset, found: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
 ) -> list[tuple[str, str]]:
     """Give the doubts of a record beyond those of its analysis, each as its kind and its text."""
-    said = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, found) + _of_exchange(trace, found)
-    return said + _of_soft_top(trace, found, engine) + _of_tdc(trace, found, engine, point)
+    doubts = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, found) + _of_exchange(trace, found)
+    return doubts + _of_soft_top(trace, found, engine) + _of_tdc(trace, found, engine, point)
 
 
 def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list[tuple[str, str]]:
@@ -370,8 +370,8 @@ def hidden(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> dict[str, 
     step = float(np.median(np.diff(angle)))
     out = {}
     if int(found.attrs["motored"]) < len(bar):
-        said = found.attrs["open"] or "a fired trace hardly shows an error of TDC"
-        out["top dead centre"] = (said, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
+        text = found.attrs["open"] or "a fired trace hardly shows an error of TDC"
+        out["top dead centre"] = (text, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
         if engine.compression_ratio >= _SPARK_RATIO or len(bar) < _SOFT_CYCLES:
             text = "a gain that falls off above 0.7 of the peak looks like another burn"
             few = "10 fired cycles or more" if engine.compression_ratio < _SPARK_RATIO else "a dead-weight calibration"

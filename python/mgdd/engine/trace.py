@@ -167,9 +167,9 @@ def analyze(
     9.4
     14.9
     """
-    cylinder, said = cylinder_of(cylinder), point
+    cylinder, stated_point = cylinder_of(cylinder), point
     point = point_of(point)
-    named = stated("fuel_mg", fuel_mg, said)
+    named = stated("fuel_mg", fuel_mg, stated_point)
     fuel_mg = named if named or fuel_mg is not None else None  # a point without fuel is motored
     if isinstance(trace, Iterator):
         trace, chunks = _first_of(trace, traces=traces)
@@ -178,9 +178,9 @@ def analyze(
         chunks = iter([trace])
     doubted: list[str] = []  # by who read it, and logged there
     simulated = "motored_pressure_bar" in trace.variables
-    whole = None if isinstance(said, Mapping) else point  # what a mapping leaves out is a default, not this record's
+    whole = None if isinstance(stated_point, Mapping) else point  # what it leaves out is a default, not this record's
     if inlet_pressure_kpa is None:
-        inlet_pressure_kpa = stated("intake_pressure_kpa", None, said)
+        inlet_pressure_kpa = stated("intake_pressure_kpa", None, stated_point)
     if pegging == "inlet" and inlet_pressure_kpa is None and whole is None:
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake_pressure_kpa")
     if fractions not in ("net", "gross", "rassweiler_withrow"):
@@ -267,8 +267,8 @@ def _one(
     made = _core.engine.TraceOptions(**options)
     angle, bar = trace[ANGLE].values, trace["pressure_bar"].values
     raw = _core.engine.analyze(angle, bar, cylinder, point, made)
-    said = list(zip(raw["doubts"], raw["warnings"], strict=True)) + expansion_of(raw, cylinder, point)
-    said = sample_doubts(angle, bar) + said
+    doubts = list(zip(raw["doubts"], raw["warnings"], strict=True)) + expansion_of(raw, cylinder, point)
+    doubts = sample_doubts(angle, bar) + doubts
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
@@ -282,8 +282,8 @@ def _one(
             "mass_source": raw["mass_source"],
             "heat_window": given or ("found" if raw["window_found"] else "no burn found"),
             "motored": int(raw["motored"]),
-            "warnings": "\n".join(text for _, text in said),
-            "doubts": "\n".join(kind for kind, _ in said),
+            "warnings": "\n".join(text for _, text in doubts),
+            "doubts": "\n".join(kind for kind, _ in doubts),
             "open": "" if raw["motored"] else degree_cost(raw[ANGLE], raw["pressure_bar"], cylinder).of_fired(),
         },
     )

@@ -105,10 +105,10 @@ class CalibrationMap(MapForms):
             raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(own)} make {shape}")
         self._values = np.ascontiguousarray(np.broadcast_to(table, shape))
         self._table = _table(own, self._values)
-        said = dict(labels or {})
-        self._labels = {each: checked_label(each, said.pop(each, None)) for each in (*own, name)}
-        if said:
-            raise ParameterError.of("labels", next(iter(said)), f"of {', '.join(self._labels)}")
+        given = dict(labels or {})
+        self._labels = {each: checked_label(each, given.pop(each, None)) for each in (*own, name)}
+        if given:
+            raise ParameterError.of("labels", next(iter(given)), f"of {', '.join(self._labels)}")
         self._cells = checked_cells(self._values, own, cells or {})
         self._task, self._provenance = task, _texts(provenance or {})
         for array in (*own.values(), self._values):
@@ -240,8 +240,8 @@ class CalibrationMap(MapForms):
     def __repr__(self) -> str:
         size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
         kinds, counts = np.unique(self._cells["source"], return_counts=True)
-        said = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
-        return f"<CalibrationMap {self._name} [{self.unit}], {size}, {said}>"
+        sources = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
+        return f"<CalibrationMap {self._name} [{self.unit}], {size}, {sources}>"
 
     def _title(self) -> str:
         return repr(self)[1:-1]

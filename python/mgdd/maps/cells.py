@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError, did_you_mean
-from mgdd.results.labels import VARIABLES, Label, said_unit
+from mgdd.results.labels import VARIABLES, Label, name_unit
 from mgdd.results.units import attribute_units, unit_of
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def can_be_name(text: str) -> bool:
 
 def checked_label(name: str, given: tuple[str, str] | None) -> Label:
     """Give unit and long name of an axis or value; a unit that contradicts the ending of the name is refused."""
-    known = VARIABLES.get(name) or Label(said_unit(name), spoken_name(name))
+    known = VARIABLES.get(name) or Label(name_unit(name), spoken_name(name))
     label = known if given is None else Label(*map(str, given))
     try:
         written = attribute_units(label.units)
@@ -131,9 +131,9 @@ def checked_cells(
     if bad.any():
         at = int(np.argmax(bad))
         source = str(cells["source"].ravel()[at])
-        said = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
+        conflict = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
         raise DataError(
-            f"{said}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
+            f"{conflict}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
             "fill the cell or say why it is empty"
         )
     for column in cells.values():
@@ -149,7 +149,7 @@ def cell_at(axes: Mapping[str, NDArray[np.float64]], place: int) -> str:
 
 def spoken_name(name: str) -> str:
     """Give a name in words, without the unit at its end."""
-    parts, unit = name.split("_"), said_unit(name)
+    parts, unit = name.split("_"), name_unit(name)
     ends = [k for k in range(1, len(parts)) if unit != "-" and unit_of("_" + "_".join(parts[k:])) == unit]
     return " ".join(parts[: max(ends)] if ends else parts)
 

@@ -68,10 +68,10 @@ def dcm_text(blocks: Sequence[DcmBlock], comments: Sequence[str]) -> str:
         keyword = "KENNFELD" if block.y else "KENNLINIE" if block.x else "FESTWERT"
         sizes = "".join(f" {len(entries)}" for entries in (block.x, block.y) if entries)
         out.append(f"{keyword} {block.name}{sizes}")
-        out.append(_said("LANGNAME", block.long_name))
+        out.append(_line("LANGNAME", block.long_name))
         units = {"EINHEIT_X": block.unit_x, "EINHEIT_Y": block.unit_y, "EINHEIT_W": block.unit}
         used = ("EINHEIT_W",) if not block.x else ("EINHEIT_X", "EINHEIT_W") if not block.y else tuple(units)
-        out += [_said(word, units[word]) for word in used]
+        out += [_line(word, units[word]) for word in used]
         out += [f"*{word}   {axis}" for word, axis in (("SSTX", block.axis_x), ("SSTY", block.axis_y)) if axis]
         out += _numbers("ST/X", block.x)
         for place, row in enumerate(block.values):
@@ -86,8 +86,8 @@ def dcm_blocks(text: str, origin: str) -> tuple[list[DcmBlock], list[str]]:
     lines = _lines(text)
     first = lines.pop(0) if lines else None
     if first is None or first.word != _HEAD:
-        said = "the file is empty" if first is None else f"line {first.number}: {first.word[:60]!r}"
-        raise DataError(f"{origin}: {said}: a DCM file begins with {_HEAD} {_VERSION}")
+        place = "the file is empty" if first is None else f"line {first.number}: {first.word[:60]!r}"
+        raise DataError(f"{origin}: {place}: a DCM file begins with {_HEAD} {_VERSION}")
     if first.rest.split()[:1] != [_VERSION]:
         raise DataError(f"{origin}, line {first.number}: {_HEAD} {first.rest}: only {_VERSION} is read; export that")
     blocks: dict[str, DcmBlock] = {}
@@ -221,7 +221,7 @@ def _check_counts(block: DcmBlock, where: str) -> None:
             )
 
 
-def _said(word: str, text: str) -> str:
+def _line(word: str, text: str) -> str:
     return f'   {word:<13} "{text}"'
 
 

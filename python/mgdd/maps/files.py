@@ -198,10 +198,10 @@ def read_map(
         text = read_plain_text(file, only_utf8=form == "json")
         made = map_of_csv(text, str(file), decimal) if form == "csv" else _map_of_json(text, str(file))
     except (Error, TypeError, ValueError, KeyError) as error:
-        said = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
-        if isinstance(error, DataError | ParameterError) and said.startswith(str(file)):
+        message = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
+        if isinstance(error, DataError | ParameterError) and message.startswith(str(file)):
             raise
-        raise DataError(f"{file}: {said}") from error
+        raise DataError(f"{file}: {message}") from error
     if name is not None and name != made.name:
         raise ParameterError(f"{file}: holds {made.name!r}, not {name!r}")
     return made
@@ -238,7 +238,7 @@ def _of_labels(file: Path, name: str | None) -> CalibrationMap:
         raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
     wanted = next(iter(maps)) if name is None else name
     if wanted not in maps:
-        left_out = next((said for said in content.skipped if said.startswith(f"{wanted}: ")), None)
+        left_out = next((text for text in content.skipped if text.startswith(f"{wanted}: ")), None)
         near = left_out or did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
         raise ParameterError(f"{file}: no map {wanted!r}: {near}")
     return maps[wanted]

@@ -123,7 +123,7 @@ class MapForms(Result):
             name: (name, entries, *self._labels[name]) for name, entries in self._axes.items()
         }
         variables[self._name] = (dims, self._values, *self._labels[self._name])
-        for name, (said, *_) in NUMBERS.items():
+        for name, (long_name, *_) in NUMBERS.items():
             unit = (
                 self._labels[self._name].units
                 if name in of_value
@@ -131,9 +131,9 @@ class MapForms(Result):
                 if name == "objective"
                 else "-"
             )
-            variables[name] = (dims, self._cells[name], unit, said)
-        for name, (said, _) in TEXTS.items():
-            variables[name] = (dims, self._cells[name], "-", said)
+            variables[name] = (dims, self._cells[name], unit, long_name)
+        for name, (long_name, _) in TEXTS.items():
+            variables[name] = (dims, self._cells[name], "-", long_name)
         attrs: dict[str, Any] = {"map": self._name}
         if self._task is not None:
             attrs |= {"task_objective": self._task.objective, "task_maximize": int(self._task.maximize)}
@@ -184,10 +184,10 @@ class MapForms(Result):
             if not {"units", "long_name"} <= set(dataset[each].attrs):
                 raise DataError(f"{each} has no units or no long_name: say both in its attributes")
         values = variable.to_numpy()
-        said = np.full(values.shape, source or _source_of(variable), "U64")
+        sources = np.full(values.shape, source or _source_of(variable), "U64")
         if source is None and f"{own}_extrapolated" in dataset:
-            said[dataset[f"{own}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
-        cells: dict[str, Any] = {"source": np.where(np.isfinite(values), said, "unattainable")}
+            sources[dataset[f"{own}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
+        cells: dict[str, Any] = {"source": np.where(np.isfinite(values), sources, "unattainable")}
         task, provenance = None, {}
         if dataset.attrs.get("map") == own:
             cells = {each: dataset[each].to_numpy() for each in (*NUMBERS, *TEXTS) if each in dataset}
@@ -209,13 +209,13 @@ class MapForms(Result):
         return self._name, self._labels, exact, list(self._axes), self._task, self._provenance
 
     def __reduce__(self) -> tuple[Any, ...]:
-        said = {"labels": self._labels, "cells": self._cells, "task": self._task, "provenance": self._provenance}
-        return _rebuild, (type(self), self._axes, self._values, {"name": self._name, **said})
+        options = {"labels": self._labels, "cells": self._cells, "task": self._task, "provenance": self._provenance}
+        return _rebuild, (type(self), self._axes, self._values, {"name": self._name, **options})
 
 
 def _source_of(variable: xr.DataArray) -> str:
-    said = str(variable.attrs.get("source", ""))  # an attribute that other files use for texts of their own
-    return said if said in SOURCES and said not in WITHOUT_VALUE else "given"
+    source = str(variable.attrs.get("source", ""))  # an attribute that other files use for texts of their own
+    return source if source in SOURCES and source not in WITHOUT_VALUE else "given"
 
 
 def _under(attrs: Mapping[Any, Any], prefix: str) -> dict[str, Any]:
@@ -229,7 +229,7 @@ def _task_of(attrs: Mapping[Any, Any]) -> MapTask | None:
     return MapTask(objective=str(attrs["task_objective"]), limits=limits, maximize=bool(attrs.get("task_maximize", 1)))
 
 
-def _rebuild(cls: type[MapForms], axes: Any, values: Any, said: dict[str, Any]) -> MapForms:
+def _rebuild(cls: type[MapForms], axes: Any, values: Any, options: dict[str, Any]) -> MapForms:
     make: Any = cls
-    made: MapForms = make(axes, values, **said)
+    made: MapForms = make(axes, values, **options)
     return made

@@ -77,13 +77,13 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
         raise DataError(f"{origin}: no line {lack!r}: a map names its value and its axes, for example {example}")
     if _VALUE not in blocks:
         raise DataError(f"{origin}: no line 'table,value': the file ends before its values, or was cut off")
-    labels = {said[0]: (said[1], said[2]) for said in (heads[_VALUE], *names)}
+    labels = {head[0]: (head[1], head[2]) for head in (heads[_VALUE], *names)}
     grids: dict[str, Any] = {}
     axes: dict[str, NDArray[np.float64]] = {}
     for name, (number, rows) in blocks.items():
         ended = _END in heads or name != next(reversed(blocks))
         own, grids[name] = _read_grid(
-            origin, number, rows, [said[0] for said in names], decimal, is_text=name in TEXTS, ended=ended
+            origin, number, rows, [head[0] for head in names], decimal, is_text=name in TEXTS, ended=ended
         )
         axes = axes or own
         for axis, entries in own.items():
@@ -245,5 +245,5 @@ def _read(origin: str, line: int, cell: str, decimal: str, what: str, *, gap: bo
 
 
 def _limits(heads: Mapping[str, Any], origin: str, decimal: str) -> dict[str, float]:
-    said = heads.get("limit", {})
-    return {name: _read(origin, 0, text, decimal, f"limit {name}") for name, text in said.items()}
+    limits = heads.get("limit", {})
+    return {name: _read(origin, 0, text, decimal, f"limit {name}") for name, text in limits.items()}

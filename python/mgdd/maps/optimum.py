@@ -271,15 +271,15 @@ def _nothing_feasible(
     """Name the cells, and where the limits come nearest."""
     blind = empty & ~np.isfinite(excess[0]).any(axis=1)
     if blind.all() or (blind.any() and (blind == empty).all()):
-        said = [cell_at(data.axes, int(place)) for place in np.flatnonzero(blind)]
-        raise DataError(f"{_several(said)}: no point of the sweep is known: measure there or drop the rows")
+        names = [cell_at(data.axes, int(place)) for place in np.flatnonzero(blind)]
+        raise DataError(f"{_several(names)}: no point of the sweep is known: measure there or drop the rows")
     size = np.array([max(abs(cap), 1e-300) for cap in caps.values()])
     worst = np.max(excess[1:] / size[:, None, None], axis=0)
     worst = np.where(empty[:, None] & np.isfinite(worst), worst, np.inf)
     cell, point = np.unravel_index(int(np.argmin(worst)), worst.shape)
     near = ", ".join(f"{name} = {data.columns[name][cell, point]:.4g} (limit {cap:g})" for name, cap in caps.items())
-    said = [cell_at(data.axes, int(place)) for place in np.flatnonzero(empty)]
-    which = "any cell" if empty.all() else f"{empty.sum()} of {empty.size} cells: {_several(said)}"
+    names = [cell_at(data.axes, int(place)) for place in np.flatnonzero(empty)]
+    which = "any cell" if empty.all() else f"{empty.sum()} of {empty.size} cells: {_several(names)}"
     remedy = "raise a limit, widen the sweep" + (
         "" if empty.all() else f", or pass {argument('infeasible', repr('keep'))}"
     )

@@ -162,8 +162,8 @@ def _found(text: str, mark: str | None, origin: str) -> _Grid | None:
 
 def _names_columns(cells: list[str], width: int) -> bool:
     """Whether a line has a name for every column of a table of points."""
-    said = trimmed(cells)
-    return len(said) == width and not any(_like_number(cell) or cell.casefold() in _EMPTY for cell in said)
+    names = trimmed(cells)
+    return len(names) == width and not any(_like_number(cell) or cell.casefold() in _EMPTY for cell in names)
 
 
 def _cells(text: str, mark: str | None, origin: str) -> Rows:
@@ -192,18 +192,18 @@ def _preamble(lines: Rows) -> tuple[str, str, str, str]:
     above = title = unit = ""
     remarks: list[str] = []
     for place, (_, cells) in enumerate(lines):
-        said = [cell for cell in cells if cell.casefold() not in _EMPTY]
-        words, own = without_brackets(said[0]) if said else ("", "")
-        if place == len(lines) - 1 and len(said) == 1 and cells[0] != said[0]:
-            above = said[0]
-        elif len(said) == 2 and said[0].casefold().strip(" :") in _UNIT_KEYS:
-            unit = said[1].strip("[]() ")
-        elif len(said) == 1 and not words and own and (place or spelled_unit(own) is not None):
+        filled = [cell for cell in cells if cell.casefold() not in _EMPTY]
+        words, own = without_brackets(filled[0]) if filled else ("", "")
+        if place == len(lines) - 1 and len(filled) == 1 and cells[0] != filled[0]:
+            above = filled[0]
+        elif len(filled) == 2 and filled[0].casefold().strip(" :") in _UNIT_KEYS:
+            unit = filled[1].strip("[]() ")
+        elif len(filled) == 1 and not words and own and (place or spelled_unit(own) is not None):
             unit = own
-        elif len(said) == 1 and not title:
-            title = said[0]
-        elif said:
-            remarks.append(" ".join(said))
+        elif len(filled) == 1 and not title:
+            title = filled[0]
+        elif filled:
+            remarks.append(" ".join(filled))
     return above, title, unit, " ".join("; ".join(remarks).split())
 
 
@@ -211,13 +211,13 @@ def _with_units(row: tuple[int, list[str]], down: Heading, value: Heading, origi
     """Take the units of a row below the breakpoints: first that of the rows, then that of the values."""
     line, cells = row
     first, *others = ["" if cell.casefold() in _EMPTY else cell.strip("[](){} ") for cell in cells]
-    said = sorted({cell for cell in others if cell})
-    if len(said) > 1:
+    units = sorted({cell for cell in others if cell})
+    if len(units) > 1:
         raise DataError(
-            f"{origin}, line {line}: units {', '.join(map(repr, said[:3]))}: the values have one; correct them"
+            f"{origin}, line {line}: units {', '.join(map(repr, units[:3]))}: the values have one; correct them"
         )
     made = []
-    for heading, text in ((down, first), (value, said[0] if said else "")):
+    for heading, text in ((down, first), (value, units[0] if units else "")):
         unit = unit_from(text, heading.name) if text else heading.unit
         if not heading.unit.startswith(NOT_GIVEN) and unit != heading.unit:
             raise DataError(

@@ -129,8 +129,8 @@ def _index(table: Table, label: str | None, what: str) -> int | None:
     found = [k for k, (each, own) in enumerate(zip(labels, names, strict=True)) if label in (each, own)]
     if len(found) != 1:
         near = did_you_mean(label, (*labels, *names)) or f"the file has {', '.join(map(repr, labels))}"
-        said = "no column" if not found else "more than one column"
-        raise DataError(f"{table.source}: {said} {label!r} for {argument(what)}: {near}")
+        count = "no column" if not found else "more than one column"
+        raise DataError(f"{table.source}: {count} {label!r} for {argument(what)}: {near}")
     return found[0]
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from mgdd.io.column_names import spelled_unit
 from mgdd.maps.cells import can_be_name, spoken_name
-from mgdd.results.labels import VARIABLES, said_unit
+from mgdd.results.labels import VARIABLES, name_unit
 from mgdd.results.units import attribute_units
 
 NOT_GIVEN = "not given"
@@ -32,13 +32,13 @@ class Heading(NamedTuple):
 def unit_from(written: str, name: str) -> str:
     """Give a unit of a file as mgdd prints it; a name that says the same unit settles how."""
     if not written.strip():
-        return said_unit(name) if said_unit(name) != "-" else NOT_GIVEN
+        return name_unit(name) if name_unit(name) != "-" else NOT_GIVEN
     unit = _UNITS.get(written.strip(), written.strip())
     try:
-        same = attribute_units(unit) == attribute_units(said_unit(name))
+        same = attribute_units(unit) == attribute_units(name_unit(name))
     except ValueError:
         return f"{NOT_GIVEN} ({unit})"
-    return said_unit(name) if same else unit
+    return name_unit(name) if same else unit
 
 
 def unit_to(unit: str) -> str:
@@ -71,9 +71,9 @@ def heading_of(text: str, *, unit: str = "", fallback: str, taken: tuple[str, ..
 
 def _can_name(name: str, written: str) -> bool:
     """Whether a word can be a name: one such as ``nm`` would say that it is a torque."""
-    if not can_be_name(name) or "_" in name or said_unit(name) == "-":
+    if not can_be_name(name) or "_" in name or name_unit(name) == "-":
         return can_be_name(name)
-    return bool(written) and unit_from(written, name) == said_unit(name)
+    return bool(written) and unit_from(written, name) == name_unit(name)
 
 
 def _name_of_unit(written: str) -> str:
@@ -81,7 +81,7 @@ def _name_of_unit(written: str) -> str:
     unit = _UNITS.get(written, written)
     name = re.sub(r"\W+", "", unit).lower()
     try:
-        says_it = said_unit(name) != "-" and attribute_units(said_unit(name)) == attribute_units(unit)
+        says_it = name_unit(name) != "-" and attribute_units(name_unit(name)) == attribute_units(unit)
     except ValueError:
         return ""
     return name if says_it else ""

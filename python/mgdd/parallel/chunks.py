@@ -194,9 +194,9 @@ class _Run:
         self._plan.measured(chunk, answer.seconds)
 
     def _lost(self, chunk: Chunk, error: BaseException) -> WorkerLostError:
-        said = f"{type(error).__name__}: {error}".removesuffix(": ")
+        cause = f"{type(error).__name__}: {error}".removesuffix(": ")
         return WorkerLostError(
-            f"a worker was lost with {chunk} of {self._n} ({said}): this work may kill its worker, for example by its "
+            f"a worker was lost with {chunk} of {self._n} ({cause}): this work may kill its worker, for example by its "
             "memory: take fewer workers, and run the rest again"
         )
 

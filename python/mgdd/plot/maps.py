@@ -228,8 +228,8 @@ def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) 
         color = "white" if dark[i, j] else BLACK
         mark = _MARKS.get(str(source[i, j]), "")
         value = 0.0 if np.abs(values[i, j]) < 1e-4 * widest else values[i, j]  # what the solver left of a zero
-        said = f"{value:.3g}" if np.isfinite(value) and size else ""
-        text = minus(said) + (f" {mark}" if mark else "")
+        number = f"{value:.3g}" if np.isfinite(value) and size else ""
+        text = minus(number) + (f" {mark}" if mark else "")
         if text:
             ax.text(i, j, text, ha="center", va="center", fontsize=size or "x-small", color=color)
         if not same and support[i, j] > 0.0:
@@ -238,12 +238,12 @@ def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) 
             width = 1.4 if size else 0.8
             ax.add_patch(Rectangle((i - 0.46, j - 0.46), 0.92, 0.92, fill=False, edgecolor=frame, linewidth=width))
     if most > 0.0:
-        said, dot = (f"support {most:g} everywhere", "") if same else (f"support, at most {most:g}", "o")
-        lines.append(Line2D([], [], marker=dot, color=BLACK, linestyle="none", markersize=4.5, label=said))
-    said = "beyond" if "beyond" in data else "held by"
+        label, dot = (f"support {most:g} everywhere", "") if same else (f"support, at most {most:g}", "o")
+        lines.append(Line2D([], [], marker=dot, color=BLACK, linestyle="none", markersize=4.5, label=label))
+    frame_label = "beyond" if "beyond" in data else "held by"
     limits = sorted({str(text) for text in held.ravel() if str(text)})
     if limits:
-        lines.append(Rectangle((0, 0), 1, 1, fill=False, edgecolor=frame, label=f"{said} {', '.join(limits)}"))
+        lines.append(Rectangle((0, 0), 1, 1, fill=False, edgecolor=frame, label=f"{frame_label} {', '.join(limits)}"))
     used = sorted({str(text) for text in source.ravel() if str(text) in _MARKS})
     lines += [Line2D([], [], marker=f"${_MARKS[name]}$", color=BLACK, linestyle="none", label=name) for name in used]
     return lines

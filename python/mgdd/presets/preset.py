@@ -281,6 +281,6 @@ def _record(file: ParameterFile, table: str, sources: dict[str, str]) -> Any:
         for key, info in fields.items()
     }
     values = file.values(table, wanted)
-    said = file.tables.get(table, {})
-    sources.update({f"{table}.{key}": entry.source for key, entry in said.items() if entry.source is not None})
+    entries = file.tables.get(table, {})
+    sources.update({f"{table}.{key}": entry.source for key, entry in entries.items() if entry.source is not None})
     return kind().replace(**values)

@@ -367,8 +367,8 @@ def _limitations(s: Mapping[str, Any]) -> list[str]:
             out.append(
                 f"The wall-heat scale is not identifiable from these traces ({law}): {'; '.join(profile['reasons'])}."
             )
-    told = "wall_heat_scale is not identifiable from these traces"
-    out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(told))]
+    not_identifiable = "wall_heat_scale is not identifiable from these traces"
+    out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(not_identifiable))]
     for row in s["traces"]:
         out += [f"{row['file']}: {text}." for text in row["warnings"]]
     out.append(

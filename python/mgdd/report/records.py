@@ -60,17 +60,17 @@ def _urgency(check: object) -> int:
 
 def _text(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[str]:
     """Say how the figures were made, and what is not in the table."""
-    said = figures.attrs
-    cycles = said.get("cycles", 1)
+    attrs = figures.attrs
+    cycles = attrs.get("cycles", 1)
     yield (
-        f"{cycles} cycle{'s' if cycles != 1 else ''}, {said['motored']} motored. Pegging: {said['method']}; gamma of "
-        f"the heat release: {said['gamma']}; smoothing: {said['smoothing']}; heat window: {said['heat_window']}."
+        f"{cycles} cycle{'s' if cycles != 1 else ''}, {attrs['motored']} motored. Pegging: {attrs['method']}; gamma of "
+        f"the heat release: {attrs['gamma']}; smoothing: {attrs['smoothing']}; heat window: {attrs['heat_window']}."
     )
     if "cycle" not in traces.dims:
         return
     if traces.sizes["cycle"] < cycles:
         yield f"Clouds, maps and spectrum show {traces.sizes['cycle']} cycles, evenly over the record."
-    low, high = (1e-3 * edge for edge in said["knock_band_hz"])
+    low, high = (1e-3 * edge for edge in attrs["knock_band_hz"])
     at = float(figures["ringing_frequency_khz"])
     found = f"The pressure rings at {at:.2f} kHz" if at == at else "No frequency stands out of the pressure"
     mode = float(figures["tangential_mode_khz"])

@@ -184,8 +184,8 @@ def described(
 
 def title_of(obj: Any) -> str:
     """Name an object by its class, name and kind."""
-    said = [str(value) for name in ("name", "kind") if isinstance(value := getattr(obj, name, None), str)]
-    return " ".join([type(obj).__name__, *said])
+    labels = [str(value) for name in ("name", "kind") if isinstance(value := getattr(obj, name, None), str)]
+    return " ".join([type(obj).__name__, *labels])
 
 
 def fields_of(obj: Any) -> dict[str, Any]:

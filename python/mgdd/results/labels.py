@@ -218,7 +218,7 @@ def label_of(variable: xr.DataArray | xr.Variable) -> Label:
     return Label(*printed_units(str(variable.attrs["units"]), str(variable.attrs["long_name"])))
 
 
-def said_unit(name: str) -> str:
+def name_unit(name: str) -> str:
     """Return the unit that a name says for certain, whoever chose it; ``"-"`` for none.
 
     A letter at the end of a name, but for seconds, is a unit behind a word of its quantity alone.

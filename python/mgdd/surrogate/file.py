@@ -68,7 +68,7 @@ def surrogate_file(surrogate: Mapping[str, Any]) -> ParameterFile:
         "signals": written(_columns({name: signal.label for name, signal in signals.items()}), _LABELS),
         **{_SIGNAL + name: _signal(signal) for name, signal in signals.items()},
         "records": written(surrogate, _RECORDS),
-        "source": {name: Entry(value=_said(value)) for name, value in surrogate["source"].items()},
+        "source": {name: Entry(value=_plain(value)) for name, value in surrogate["source"].items()},
     }
     return ParameterFile(kind="surrogate", tables=tables)
 
@@ -154,8 +154,8 @@ def read_response(file: ParameterFile) -> dict[str, Any]:
         )
     file.expect(kinds=("response",), tables=("factors", "response", "points", "values", *kinds))
     factors = _labels(file, "factors", file.values("factors", _LABELS))
-    name, *said = file.values("response", wanted(_LABELS, form="text")).values()
-    label = Label(*said)
+    name, *label_texts = file.values("response", wanted(_LABELS, form="text")).values()
+    label = Label(*label_texts)
     columns = file.values("points", {factor: Wanted(each.units, "numbers") for factor, each in factors.items()})
     values = _array(file, "values", file.values("values", {name: Wanted(label.units, "numbers")})[name])
     points = np.column_stack([_array(file, factor, columns[factor], values.shape) for factor in factors])
@@ -240,9 +240,9 @@ def _by_count(file: ParameterFile, table: str, values: dict[str, Any], keys: str
     return dict(zip(counts.tolist(), numbers.tolist(), strict=True))
 
 
-def _said(value: object) -> Any:
+def _plain(value: object) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, tuple | list):
-        return [_said(item) for item in value]
+        return [_plain(item) for item in value]
     return value if isinstance(value, str | int | float) else str(value)

@@ -183,17 +183,17 @@ def _polynomial(
     basis = PolynomialBasis.of(degree, centre=points.min(axis=0) + half, scale=half)
     if select != "all":
         basis = basis.only(choose_terms(basis(points), values, basis.monomials, select))
-    terms, said = basis(points), basis.names(names)
+    terms, labels = basis(points), basis.names(names)
     n, p = terms.shape
     if n <= p:
         raise DataError(f"{n} points for {p} terms: at least {p + 1} are needed; add points or lower the degree")
     if np.linalg.matrix_rank(terms) < p:
         raise DataError(
-            f"the points do not tell the {p} terms apart ({', '.join(said)}): use {argument('select', repr('bic'))}, "
+            f"the points do not tell the {p} terms apart ({', '.join(labels)}): use {argument('select', repr('bic'))}, "
             "fewer factors or a lower degree, or add points with d_optimal"
         )
     coefficients = np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)
-    report = least_squares(lambda c: (terms @ c - values, terms), coefficients, names=said, data=values)
+    report = least_squares(lambda c: (terms @ c - values, terms), coefficients, names=labels, data=values)
     surface = PolynomialSurface(
         points=points,
         values=values,
@@ -253,8 +253,8 @@ def _response(
         attributes: Mapping[str, Any] = getattr(response, "attrs", {})
         if name in factors:  # arithmetic on a factor kept its name and unit
             name, attributes = "response", {}
-        said = {"units", "long_name"} <= set(attributes)
-        label = label_of(given) if said else Label("unit of the response", name)
+        labelled = {"units", "long_name"} <= set(attributes)
+        label = label_of(given) if labelled else Label("unit of the response", name)
     values = np.array(given, dtype=np.float64)
     if values.shape != (size,):
         raise ShapeError(f"{name} has shape {values.shape}: must have one value per point, ({size},)")
@@ -446,7 +446,7 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
     from scipy.stats import norm, rankdata
 
     fitted, weight = model.surface.fitted()
-    n, names, (unit, said) = model.values.size, tuple(model.factors), model.label
+    n, names, (unit, long_name) = model.values.size, tuple(model.factors), model.label
     bound = outlier_bound(n, model.surface.freedom)
     scores = norm.ppf((rankdata(studentised, method="ordinal") - 0.375) / (n + 0.25))
     columns = {
@@ -465,10 +465,10 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
         {
             "point": ("point", np.arange(n), "-", "point in run order"),
             **columns,
-            "measured": ("point", model.values, unit, f"{said}, measured"),
-            "fitted": ("point", fitted, unit, f"{said}, fitted"),
-            "left_out": ("point", left_out, unit, f"{said}, predicted from the other points"),
-            "residual": ("point", model.values - fitted, unit, f"{said}, measured minus fitted"),
+            "measured": ("point", model.values, unit, f"{long_name}, measured"),
+            "fitted": ("point", fitted, unit, f"{long_name}, fitted"),
+            "left_out": ("point", left_out, unit, f"{long_name}, predicted from the other points"),
+            "residual": ("point", model.values - fitted, unit, f"{long_name}, measured minus fitted"),
             "studentised": ("point", studentised, "-", "studentised residual"),
             "leverage": ("point", weight, "-", "leverage"),
             "normal_score": ("point", scores, "-", "normal score"),
@@ -477,9 +477,9 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
             "factor": ("factor", list(names), "-", "factor"),
             "step": ("step", np.arange(_STEPS), "-", "step of a cut"),
             "cut": (along, steps, own, "factor, the others at their medians"),
-            "cut_mean": (along, cut["mean"], unit, f"{said}, prediction"),
-            "cut_lower": (along, cut["lower"], unit, f"{said}, lower end of the interval"),
-            "cut_upper": (along, cut["upper"], unit, f"{said}, upper end of the interval"),
+            "cut_mean": (along, cut["mean"], unit, f"{long_name}, prediction"),
+            "cut_lower": (along, cut["lower"], unit, f"{long_name}, lower end of the interval"),
+            "cut_upper": (along, cut["upper"], unit, f"{long_name}, upper end of the interval"),
         },
         attrs={"response": model.name, "kind": model.kind, "level": 0.95},
     )

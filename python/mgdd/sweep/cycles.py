@@ -93,11 +93,11 @@ def _located(error: ParameterError, request: Request, columns: NDArray[np.float6
         return error
     text = str(error)[match.end() :]
     if len(request.names) > 1:
-        text += f" (at {said(request.names, columns[int(match[1])])})"
+        text += f" (at {case_text(request.names, columns[int(match[1])])})"
     return ParameterError(text, field=error.field, value=error.value, bound=error.bound)
 
 
-def said(names: Sequence[str], row: NDArray[np.float64]) -> str:
+def case_text(names: Sequence[str], row: NDArray[np.float64]) -> str:
     """Name a case by its inputs."""
     return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, row, strict=True))
 
@@ -282,7 +282,7 @@ def _finding(cases: Cases, void: _Void) -> Finding:
     text = f"{void.count} of {cases.n} cycles leave the physical range of the pressure and are NaN, the first at "
     (row,) = cases.rows(np.array([void.first]))
     remedy = "take a smaller step_cad, less wall heat or other points"
-    return Finding("unphysical", tuple(cases.names), text + said(cases.names, row), remedy)
+    return Finding("unphysical", tuple(cases.names), text + case_text(cases.names, row), remedy)
 
 
 def _chosen(what: str, given: str | Iterable[str] | None, known: Iterable[str]) -> tuple[str, ...]:

@@ -252,9 +252,9 @@ class PseudoWiener(SampledModel, Parameters):
         """Make the model of a file that `to_toml` or a fit wrote."""
         file.expect(kinds=_KINDS, tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
         units = {name: str(unit) for name, unit in _core.throttle.pseudo_wiener_units(file.kind).items()}
-        said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
+        parameters = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
         options = file.values("settings", wanted(("switching", "friction"), form="text"))
-        model = cls(file.kind, said, **options)
+        model = cls(file.kind, parameters, **options)
         file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
         return model
 

@@ -116,15 +116,15 @@ class Request:
         known = _core.identify.load_parameters()
         burns = []
         for index, trace in enumerate(measured):
-            said = {} if self.start_values is None else self.start_values[index]
-            for name in said:
+            start_values = {} if self.start_values is None else self.start_values[index]
+            for name in start_values:
                 if name not in known:
                     raise ParameterError(
                         f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
                     )
-            full = set(known) - {"start_pressure_bar"} <= set(said)  # then nothing is left to estimate
+            full = set(known) - {"start_pressure_bar"} <= set(start_values)  # then nothing is left to estimate
             burn = LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
-            for name, value in said.items():
+            for name, value in start_values.items():
                 setattr(burn, name, float(value))
             heat = self.known_heat_j[index]
             if heat is not None:
@@ -221,8 +221,8 @@ def default_free(cylinder: Cylinder) -> tuple[str, ...]:
 
 def earliest_burn_cad(trace: xr.Dataset) -> float:
     """Give the earliest start of a burn: the injection or spark that the trace states, else NaN."""
-    said = [float(trace.attrs[name]) for name in _EARLIEST if _has(trace, name)]
-    return min(said) if said else math.nan
+    angles = [float(trace.attrs[name]) for name in _EARLIEST if _has(trace, name)]
+    return min(angles) if angles else math.nan
 
 
 def _has(trace: xr.Dataset, name: str) -> bool:

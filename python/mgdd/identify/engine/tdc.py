@@ -116,8 +116,8 @@ class TdcEstimate(Result):
             else f"{self.low_cad:+.2f} to {self.high_cad:+.2f} possible"
         )
         shown = f"{self.tdc_offset_cad:+.2f} °CA too large ({how}; {self.cost})"
-        said = f"the {self.method} has the angles {shown}: suspect TDC"
-        return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off", *self.findings]
+        text = f"the {self.method} has the angles {shown}: suspect TDC"
+        return [f"{text}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off", *self.findings]
 
     def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.calibration import tdc_scan

@@ -83,7 +83,7 @@ def fit_groups(
         found, terms = _without(hunt, by_delay.found, terms)
         if STOPS in terms:
             found = hunt.fine(found.values, list(dict.fromkeys([*names_of(found), *STOPS])))
-        findings = _told(found, terms, by_delay, delays)
+        findings = _findings(found, terms, by_delay, delays)
         report = FitReport.from_core(found.report, problem.angle)
         n = independent_values(problem, report)
         weights = delay_weights(by_delay.rivals, found.values["delay_samples"], n)
@@ -228,7 +228,7 @@ def _criterion(found: Search, size: int, n: float) -> float:
     return 2.0 * n * math.log(max(found.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
-def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
+def _findings(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
     """Say what the model has and what it is worth, and how other delays fare."""
     by_delay, rms = delays.rmse, found.rmse
     has = ", ".join(_SHOWN[term] for term in terms if term in _SHOWN) or "none"
@@ -239,13 +239,13 @@ def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried
         return [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
     each = ", ".join(f"{delay:g}: {error:.3g}" for delay, error in sorted(by_delay.items()))
     text += f"; delay {found.values['delay_samples']:g} samples (deg RMS by delay: {each})"
-    told = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
-    kept = found.values["delay_samples"]
-    told += delay_at_end(kept, tried, LONGEST_DELAY)
+    findings = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
+    chosen_delay = found.values["delay_samples"]
+    findings += delay_at_end(chosen_delay, tried, LONGEST_DELAY)
     if len(delays.ties) > 1:
         ties = " and ".join(f"{delay:g}" for delay in delays.ties)
         text = f"delays of {ties} samples fit alike; taken is the shortest with the lag of a motor"
-        told.append(
+        findings.append(
             Finding("delay_open", ("delay_samples", *LAG), text, "add steps of the duty, or give delay_samples")
         )
-    return told
+    return findings
