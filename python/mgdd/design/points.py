@@ -250,7 +250,7 @@ def _check(method: str, n: int | None, model: str, n_starts: int, seed: int) -> 
             raise ParameterError.of(name, value, f"one of {', '.join(known)}")
     if method == "factorial":
         if n is not None:
-            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial say how many points it has")
+            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial determine the number of points")
     elif n is None or isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= 1_000_000:
         raise ParameterError.of(argument("n"), n, f"a whole number in [1, 1000000] for method {method!r}")
     for name, count, least in (("n_starts", n_starts, 1), ("seed", seed, 0)):

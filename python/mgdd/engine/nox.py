@@ -311,7 +311,7 @@ class ThermalNoFit(NamedTuple):
     points : int
         Cycles.
     residual_ln : float
-        Standard deviation of ln NOx about the fit [-]; NaN where nothing is left to tell it.
+        Standard deviation of ln NOx about the fit [-]; NaN without a remaining degree of freedom.
     lambda_low, lambda_high : float
         Interval of the mixture at 95 % [-]; NaN where it was not fitted.
     doubts : tuple of str
@@ -350,12 +350,12 @@ def _fitted(model: ThermalNo, mixtures: NDArray[np.float64], ratios: NDArray[np.
         low, high = (_edge(mixtures, errors - limit, range(best, end, step)) for end, step in ((-1, -1), (n_tried, 1)))
         if low == mixtures[0] or high == mixtures[-1]:
             doubts.append(
-                f"the cycles do not tell the mixture: 95 % between {low:.2f} and {high:.2f}, of {mixtures[0]:.2f} to "
+                f"the cycles leave the mixture open: 95 % between {low:.2f} and {high:.2f}, of {mixtures[0]:.2f} to "
                 f"{mixtures[-1]:.2f} that were tried: vary timing and fuel more"
             )
     else:
         doubts.append(
-            f"{n} cycle(s): the mixture stays {made.lambda_burned:g}; it takes {_FEWEST_FOR_LAMBDA} to tell it"
+            f"{n} cycle(s): the mixture stays {made.lambda_burned:g}; it takes {_FEWEST_FOR_LAMBDA} to estimate it"
         )
     if not _PLAUSIBLE[0] <= made.calibration <= _PLAUSIBLE[1]:
         doubts.append(f"a calibration of {made.calibration:.3g}: unit of nox_ppm, fuel or exhaust gas may be wrong")

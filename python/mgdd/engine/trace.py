@@ -314,7 +314,7 @@ def _bmep(
 ) -> float | None:
     """BMEP [bar] as given, or 4 pi torque over the displacement of a four-stroke engine."""
     if bmep is not None and torque is not None:
-        raise ParameterError("bmep_bar and brake_torque_nm both say the brake work: give one")
+        raise ParameterError("bmep_bar and brake_torque_nm both state the brake work: give one")
     if torque is None and (own := _number(trace, "bmep_bar", bmep)) is not None:
         return own
     torque = _number(trace, "brake_torque_nm", torque)

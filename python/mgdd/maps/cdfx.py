@@ -94,7 +94,7 @@ def cdfx_blocks(raw: bytes, origin: str) -> tuple[list[DcmBlock], list[str]]:
     for name, block in [*blocks.items()]:
         lacking = next((each for each in _lacking(block) if each), "")
         if lacking:
-            skipped.append(f"{name}: the breakpoints of its axis {lacking} do not stand in the file")
+            skipped.append(f"{name}: the breakpoints of its axis {lacking} are not in the file")
             del blocks[name]
             continue
         _check_counts(block, f"{origin}, line {block.line}")
@@ -124,7 +124,7 @@ def _check_counts(block: DcmBlock, where: str) -> None:
 def _plain(text: str) -> str:
     found = _FORBIDDEN.search(text)
     if found:
-        raise DataError(f"{text!r}: {found[0]!r} cannot stand in XML: remove it")
+        raise DataError(f"{text!r}: {found[0]!r} is not allowed in XML: remove it")
     return text
 
 

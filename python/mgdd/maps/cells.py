@@ -134,7 +134,7 @@ def checked_cells(
         conflict = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
         raise DataError(
             f"{conflict}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
-            "fill the cell or say why it is empty"
+            "fill the cell or set its source"
         )
     for column in cells.values():
         column.setflags(write=False)

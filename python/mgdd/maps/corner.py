@@ -35,7 +35,7 @@ def axes_of(
         )
         if turned:
             raise DataError(
-                f"{where}: the corner {corner!r} says that {down} runs down and {across} across: correct it, or "
+                f"{where}: the corner {corner!r} states that {down} runs down and {across} across: correct it, or "
                 f"leave {argument('rows')} and {argument('columns')} out"
             )
     found = []
@@ -126,7 +126,7 @@ def _chosen(down: str, across: str, rows: str | None, columns: str | None, where
             f"{argument('rows', repr(down))} if it runs down, or name both with {_choice('speed_rpm', 'fuel_mg')}"
         )
     raise DataError(
-        f"{where}: the corner says {down!r} and {across!r} and not which axis runs down: pass "
+        f"{where}: the corner names {down!r} and {across!r} and not which axis runs down: pass "
         f"{argument('rows', repr(down))} if {down} runs down, or {argument('columns', repr(down))} if it runs across"
     )
 

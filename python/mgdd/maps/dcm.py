@@ -212,12 +212,12 @@ def _check_counts(block: DcmBlock, where: str) -> None:
     }
     for word, (found, needed) in counts.items():
         if found != needed:
-            raise DataError(f"{where}: {block.name} has {found} {word}: its head says {needed}; add what is missing")
+            raise DataError(f"{where}: {block.name} has {found} {word}: its head states {needed}; add what is missing")
     for row, values in enumerate(block.values):
         if len(values) != wide:
             at = f" at ST/Y {block.y[row]:g}" if block.y else ""
             raise DataError(
-                f"{where}: {block.name} has {len(values)} values{at}: its head says {wide}; add what is missing"
+                f"{where}: {block.name} has {len(values)} values{at}: its head states {wide}; add what is missing"
             )
 
 

@@ -182,7 +182,7 @@ class MapForms(Result):
             raise DataError(f"{own}: the axis {lacking[0]} has no coordinates: add them")
         for each in (*dims, own):
             if not {"units", "long_name"} <= set(dataset[each].attrs):
-                raise DataError(f"{each} has no units or no long_name: say both in its attributes")
+                raise DataError(f"{each} has no units or no long_name: set both in its attributes")
         values = variable.to_numpy()
         sources = np.full(values.shape, source or _source_of(variable), "U64")
         if source is None and f"{own}_extrapolated" in dataset:

@@ -221,7 +221,7 @@ def _with_units(row: tuple[int, list[str]], down: Heading, value: Heading, origi
         unit = unit_from(text, heading.name) if text else heading.unit
         if not heading.unit.startswith(NOT_GIVEN) and unit != heading.unit:
             raise DataError(
-                f"{origin}, line {line}: unit {text!r} of {heading.name}: its name or label says {heading.unit!r}; "
+                f"{origin}, line {line}: unit {text!r} of {heading.name}: its name or label gives {heading.unit!r}; "
                 "correct one of them"
             )
         made.append(heading._replace(unit=unit))

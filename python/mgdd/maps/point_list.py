@@ -148,7 +148,7 @@ def _chosen(table: Table, numeric: Sequence[int], given: dict[str, int | None]) 
         choices = ", ".join(argument(what, repr("…")) for what in needed) or "fewer names"
         raise DataError(
             f"{table.source}: {len(free)} columns with numbers ({names}) for {len(needed)} of the axes and value of "
-            f"a map: say which with {choices}, or remove the others"
+            f"a map: choose one with {choices}, or remove the others"
         )
     found = given | dict(zip(needed, free if needed else (), strict=True))
     return [k for what in ("rows", "columns", "name") if (k := found[what]) is not None]

@@ -49,7 +49,7 @@ def stated(name: str, keyword: float | None, point: Any) -> float | None:
         return keyword if named is None else float(named)
     raise ParameterError(
         f"{name} = {keyword:g} and point['{name}'] = {named:g} contradict each other: give one",
-        field=name, value=keyword, bound=f"{named:g}, as the point says",
+        field=name, value=keyword, bound=f"{named:g}, as the point states",
     )  # fmt: skip
 
 

@@ -516,7 +516,7 @@ def draw(
         f"Calibration, {main.name}": _grid(main.fit.loads, Load.plot),
     }
     for law, profile in profiles.items():
-        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
+        out[f"What the traces show of wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
             draw_profile, profile.dataset, size=(13.0, 4.8)
         )
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in main.fit.loads]

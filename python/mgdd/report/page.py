@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
 _INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine", "records": "Records"}  # in a summary
-_NUMBERS = " The numbers stand in summary.json beside this page."
+_NUMBERS = " The numbers are in summary.json beside this page."
 _SHORT = 8  # rows of a table that is not folded
 
 

@@ -281,7 +281,7 @@ def _entry(name: str, entry: Sequence[Any]) -> tuple[tuple[str, ...], ArrayLike,
 
 def _check(name: str, units: object, long_name: object) -> None:
     if not isinstance(units, str) or not units.strip():
-        raise DataError(f"variable {name} has no units: say them ('-' if dimensionless)")
+        raise DataError(f"variable {name} has no units: give them ('-' if dimensionless)")
     if not isinstance(long_name, str) or not long_name.strip():
         raise DataError(f"variable {name} has no long_name: name it for axis labels")
     known = VARIABLES.get(name)

@@ -189,7 +189,7 @@ def _polynomial(
         raise DataError(f"{n} points for {p} terms: at least {p + 1} are needed; add points or lower the degree")
     if np.linalg.matrix_rank(terms) < p:
         raise DataError(
-            f"the points do not tell the {p} terms apart ({', '.join(labels)}): use {argument('select', repr('bic'))}, "
+            f"the points do not separate the {p} terms ({', '.join(labels)}): use {argument('select', repr('bic'))}, "
             "fewer factors or a lower degree, or add points with d_optimal"
         )
     coefficients = np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)
@@ -330,7 +330,7 @@ def _outliers(model: ResponseModel, studentised: NDArray[np.float64]) -> Iterato
     found = np.flatnonzero(np.abs(studentised) > bound)
     if found.size:
         worst = ", ".join(f"{k} ({studentised[k]:+.1f})" for k in found[:5])
-        text = f"point {worst} beyond ±{bound:.1f} standard deviations of what the other points say"
+        text = f"point {worst} beyond ±{bound:.1f} standard deviations of what the other points predict"
         yield Finding(
             "outlier", tuple(f"point {k}" for k in found), text, "look at the record; repeat it before it is dropped"
         )

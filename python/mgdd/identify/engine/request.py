@@ -274,7 +274,7 @@ def _known_heats(
 ) -> tuple[float | None, ...]:
     """Give the known fuel heat of each trace: as given, by its attribute or the stated ``fuel_mg``; all or none."""
     if fuel_heat_j is not None and fuel_mg is not None:
-        raise ParameterError("fuel_heat_j and point['fuel_mg'] both say the fuel: give one")
+        raise ParameterError("fuel_heat_j and point['fuel_mg'] both state the fuel: give one")
     heats: tuple[float | None, ...]
     if fuel_heat_j is None:
         per_mg = cylinder.lower_heating_value_mj_per_kg

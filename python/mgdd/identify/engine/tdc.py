@@ -123,7 +123,7 @@ class TdcEstimate(Result):
         from mgdd.plot.calibration import tdc_scan
 
         if "rmse_percent" not in self.dataset:
-            raise DataError("a motored estimate has no scan to draw: its offset and loss angle say all")
+            raise DataError("a motored estimate has no scan to draw: use its offset and loss angle")
         return tdc_scan(self, ax=ax)
 
 

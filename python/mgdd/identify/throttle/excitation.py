@@ -296,7 +296,7 @@ def design_excitation(
         raise ParameterError.of("side", side, "one of 'above', 'below', 'both'")
     known = prior_of(prior)
     if known.groups is None or known.limp_home_deg is None:
-        raise ParameterError("prior: knows no limp-home angle and friction; pass a Throttle, for example a preset")
+        raise ParameterError("prior: has no limp-home angle and friction; pass a Throttle, for example a preset")
     window = angle_window_deg
     if window is None:
         low, high = known.stops_deg

@@ -67,7 +67,7 @@ def fit_first_principle(
     if not share_known and ("electrical_s" in problem.free or problem.values["electrical_s"] > 0.0):
         problem = dataclasses.replace(problem, values={**problem.values, SHARE: TYPICAL_SHARE})
     if whole_shift(problem.values["delay_samples"]):
-        text = "within [0, 5] here; identify_throttle(log, 'first_principle') knows delays of up to 20 samples"
+        text = "within [0, 5] here; identify_throttle(log, 'first_principle') covers delays of up to 20 samples"
         raise ParameterError.of("delay_samples", problem.values["delay_samples"], text)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in problem.free if name in STATIC]
