@@ -94,12 +94,12 @@ class MotoredTdc(NamedTuple):
     findings: tuple[str, ...]
 
     @classmethod
-    def of_many(cls, found: Sequence[Self]) -> Self:
+    def of_many(cls, strokes: Sequence[Self]) -> Self:
         """Give what several records of one encoder say: their mean, with twice their scatter."""
-        numbers = np.array([each[:4] for each in found])
+        numbers = np.array([each[:4] for each in strokes])
         offset, half, wall, loss = map(float, numbers.mean(axis=0))
         half = math.hypot(half, 2.0 * float(numbers[:, 0].std()))
-        findings = dict.fromkeys(text for each in found for text in each.findings)
+        findings = dict.fromkeys(text for each in strokes for text in each.findings)
         return cls(offset, half, wall, loss, tuple(findings))
 
     def doubts(self) -> tuple[str, ...]:
@@ -152,19 +152,19 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
     for _ in range(_ROUNDS):  # the step is linear in a small offset only
         offset += float(strokes(offset).solved()[:, 1].mean())
         offset = min(max(offset, peak - _FARTHEST_CAD), peak + _FARTHEST_CAD)
-    own = strokes(offset)
-    found = own.solved()
+    pair = strokes(offset)
+    solution = pair.solved()
     moved = [
-        own.solved(gap=0.0),
-        own.solved(crevice=0.0),
+        pair.solved(gap=0.0),
+        pair.solved(crevice=0.0),
         strokes(offset, warmer_k=_CHARGE_K).solved(),
         strokes(offset, wall_k=_WALL_K).solved(),
     ]
-    off = [(each - found).mean(axis=0) for each in moved]
-    noise, scatter = _noise(own, found)
-    laws = _LAWS_FACTOR * float(found[:, 1].std(ddof=1))
+    off = [(each - solution).mean(axis=0) for each in moved]
+    noise, scatter = _noise(pair, solution)
+    laws = _LAWS_FACTOR * float(solution[:, 1].std(ddof=1))
     offset_half = math.hypot(*(each[1] for each in off), noise[1], laws, _REST_CAD)
-    scale = float(found[_HOHENBERG, 0])
+    scale = float(solution[_HOHENBERG, 0])
     loss = offset - peak
     low, high = _SOUND_SCALES
     findings = []
@@ -248,13 +248,13 @@ def _films(cylinder: Cylinder, speed_rpm: float, bar: Array, kelvin: Array, volu
     ]
 
 
-def _noise(strokes: _Strokes, found: Array) -> tuple[Array, Array]:
+def _noise(strokes: _Strokes, solution: Array) -> tuple[Array, Array]:
     """Give what may move the scale and the angle by Hohenberg's law: what the balance leaves, and its scatter alone.
 
     What is left is alike nearby where the balance does not hold, and then counts for less samples.
     """
     design = strokes.design(_HOHENBERG)
-    left = strokes.loss - strokes.gap - strokes.crevice - design @ found[_HOHENBERG]
+    left = strokes.loss - strokes.gap - strokes.crevice - design @ solution[_HOHENBERG]
     square = float(left @ left)
     alike = min(max(float(left[1:] @ left[:-1]) / square, 0.0), _ALIKE)
     whole = square / (left.size - 2) * (1.0 + alike) / (1.0 - alike)

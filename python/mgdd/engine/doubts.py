@@ -68,13 +68,13 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
 
 def copy_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> list[tuple[str, str]]:
     """Doubt a record (cycle, angle) in which samples stand twice, as where a buffer is written again."""
-    found = copies(np.atleast_2d(bar))
-    if found is None:
+    copy = copies(np.atleast_2d(bar))
+    if copy is None:
         return []
-    (old, at), (new, there) = found.first, found.again
+    (old, at), (new, there) = copy.first, copy.again
     again, before = round(angle[there], 3), round(angle[at], 3)
     text = (
-        f"{found.samples} samples in {len(found.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
+        f"{copy.samples} samples in {len(copy.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
         f"{again:g} °CA of cycle {new + 1} on those from {before:g} °CA of cycle {old + 1} on; scatter and means are "
         "not those of the engine"
     )
@@ -186,13 +186,13 @@ def lost_heat(
         return float(-gained.sum() / walls.sum())
 
     design = np.vander((angle[inside] - middle) / half, _DEGREE + 1) * bar[inside, None]
-    wanted = np.log(bar[inside]) * bar[inside]
-    terms = np.asarray(np.linalg.lstsq(design, wanted)[0], dtype=np.float64)
-    left = wanted - design @ terms
+    target = np.log(bar[inside]) * bar[inside]
+    terms = np.asarray(np.linalg.lstsq(design, target)[0], dtype=np.float64)
+    left = target - design @ terms
     variance = float(left @ left) / (inside.sum() - _DEGREE - 1) * np.linalg.inv(design.T @ design)
-    found = ratio(terms)
-    slope = np.array([(ratio(terms + 1e-4 * unit) - found) / 1e-4 for unit in np.eye(_DEGREE + 1)])
-    return found, float(np.sqrt(slope @ variance @ slope))
+    estimate = ratio(terms)
+    slope = np.array([(ratio(terms + 1e-4 * unit) - estimate) / 1e-4 for unit in np.eye(_DEGREE + 1)])
+    return estimate, float(np.sqrt(slope @ variance @ slope))
 
 
 def expansion_doubts(
@@ -204,10 +204,10 @@ def expansion_doubts(
     speed_rpm: float,
 ) -> list[tuple[str, str]]:
     """Doubt one fired cycle, mean of many or single, by the heat that late expansion loses."""
-    found = lost_heat(angle, bar, volume_l, mass_g, cylinder, speed_rpm)
-    if found is None:
+    estimate = lost_heat(angle, bar, volume_l, mass_g, cylinder, speed_rpm)
+    if estimate is None:
         return []
-    lost, error = found
+    lost, error = estimate
     most = _MOST_SPARK if cylinder.compression_ratio < _SPARK_RATIO else _MOST_DIESEL
     what = f"late expansion loses {lost:.2f} ±{error:.2f} times the wall heat of Hohenberg's law"
     if lost - _STDERRS * error > most:

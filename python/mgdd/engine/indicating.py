@@ -264,8 +264,8 @@ class Indicating:
 def _mean_db(level_db: NDArray[np.float64]) -> NDArray[np.float64]:
     """Level of the mean square over the cycles."""
     with np.errstate(divide="ignore"):
-        found: NDArray[np.float64] = 10.0 * np.log10(np.mean(10.0 ** (0.1 * level_db), axis=0))
-    return found
+        mean_db: NDArray[np.float64] = 10.0 * np.log10(np.mean(10.0 ** (0.1 * level_db), axis=0))
+    return mean_db
 
 
 _CYCLE_DEG = 720.0
@@ -328,8 +328,8 @@ def noise_levels(
     loss = np.interp(band, number, [table[key] for key in sorted(table)])
     shares = 10.0 ** (0.1 * (level_db - loss + a_weighting_db(hz)))
     with np.errstate(divide="ignore"):
-        found: NDArray[np.float64] = 10.0 * np.log10(shares[:, inside].sum(axis=1))
-    return found
+        band_db: NDArray[np.float64] = 10.0 * np.log10(shares[:, inside].sum(axis=1))
+    return band_db
 
 
 def a_weighting_db(hz: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -372,8 +372,8 @@ def _edge(mixtures: NDArray[np.float64], above: NDArray[np.float64], path: range
 
 def _columns(cycle: xr.Dataset, ivc: float, evo: float) -> list[NDArray[np.float64]]:
     """Give angle, pressure, volume, temperature and burned fraction of a closed cycle."""
-    known = getattr(cycle, "variables", ())
-    missing = [name for name in ("pressure_bar", "volume_l", "temperature_k") if name not in known]
+    variables = getattr(cycle, "variables", ())
+    missing = [name for name in ("pressure_bar", "volume_l", "temperature_k") if name not in variables]
     if missing:
         raise DataError(f"the cycle has no {missing[0]}: give one of simulate, or of analyze")
     if cycle["pressure_bar"].dims != (ANGLE,):

@@ -154,8 +154,8 @@ def _least_excess(
     worst = np.max([(columns[n] - limit) / max(1.0, abs(limit)) for n, limit in limits.items()], axis=0)
     at = int(np.argmin(worst))
     window = (grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)])
-    found = minimize_scalar(excess, bounds=window, args=(list(limits),), method="bounded", options={"xatol": 1e-6})
-    return float(found.x)
+    nearest = minimize_scalar(excess, bounds=window, args=(list(limits),), method="bounded", options={"xatol": 1e-6})
+    return float(nearest.x)
 
 
 def _refine(
@@ -198,11 +198,11 @@ def check_request(objective: str, limits: Iterable[str], also: Iterable[str] = (
     """Refuse an unknown objective or limit before any work; `also` are limits besides indicators."""
     if objective not in OBJECTIVES:
         raise ParameterError.of("objective", objective, f"one of {', '.join(OBJECTIVES)}")
-    known = [*_core.engine.indicator_units(), *also]
+    names = [*_core.engine.indicator_units(), *also]
     for name in limits:
-        if name not in known:
-            refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}"
-            raise ParameterError(hinted(refused, name, [other for other in known if unit_of(other) != _PLACE]))
+        if name not in names:
+            refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(names)}"
+            raise ParameterError(hinted(refused, name, [other for other in names if unit_of(other) != _PLACE]))
 
 
 def _check(point: OperatingPoint, low: float, high: float) -> None:

@@ -140,10 +140,10 @@ class PressureCheck(Result):
 
     def __getitem__(self, name: str) -> Check:
         """Return a check by name."""
-        found = next((check for check in self.checks if check.name == name), None)
-        if found is None:
+        named = next((check for check in self.checks if check.name == name), None)
+        if named is None:
             raise ParameterError(f"no check {name!r}: there are {', '.join(check.name for check in self.checks)}")
-        return found
+        return named
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -243,28 +243,28 @@ def check_pressure(
     try:
         made = as_trace(trace)
         name = str(made.attrs.get("file", name))
-        found = analyze(
+        figures = analyze(
             made, cylinder, point=point, pegging=pegging, pegging_exponent=pegging_exponent,
             inlet_pressure_kpa=inlet_pressure_kpa, bmep_bar=bmep_bar, brake_torque_nm=brake_torque_nm,
             n_cylinders=n_cylinders, fuel_mg=fuel_mg, traces=made.sizes.get(CYCLE, 1) == 1, quiet=True,
         )  # fmt: skip
     except DataError as error:
         return PressureCheck(name, (Check("file", "fail", str(error)),))
-    doubts = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
+    doubts = list(zip(figures.attrs["doubts"].splitlines(), figures.attrs["warnings"].splitlines(), strict=True))
     doubts = [(kind, text) for kind, text in doubts if not (kind == "reading" and _of_angle(text))]
     engine = cylinder_of(cylinder)
-    doubts += record_doubts(made, found, engine, point_of(point))
+    doubts += record_doubts(made, figures, engine, point_of(point))
     fuel_mg = stated("fuel_mg", fuel_mg, point)
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
-    known = [key for key, value in judged.items() if value or _known(made, key)]
-    skipped = _skipped(made, found, known) | hidden(made, found, engine)
+    given = [key for key, value in judged.items() if value or _known(made, key)]
+    skipped = _skipped(made, figures, given) | hidden(made, figures, engine)
     swing = _SWING if made.attrs.get("angle_from") == "time" else ""
     checks = [_check(check, kinds, doubts, skipped, swing) for check, kinds in _CHECKS.items()]
     if assumed:
         text = f"no engine is given: read with {assumed}"
         remedy = "give the engine: cylinder= in Python, --preset or --set bore_mm=... on the command line"
         checks.insert(0, Check(ENGINE, "open", text, remedy))
-    return PressureCheck(name, tuple(checks), found)
+    return PressureCheck(name, tuple(checks), figures)
 
 
 def _of_angle(text: str) -> bool:
@@ -293,16 +293,16 @@ def _check(
     return Check(name, verdict, "; ".join(first.values()), "; ".join(remedies))
 
 
-def _skipped(trace: xr.Dataset, found: xr.Dataset, known: list[str]) -> dict[str, tuple[str, str]]:
+def _skipped(trace: xr.Dataset, figures: xr.Dataset, given: list[str]) -> dict[str, tuple[str, str]]:
     """Name the checks that these data cannot decide, and what would."""
     out = {}
     cycles = trace.sizes.get(CYCLE, 1)
-    motored = int(found.attrs["motored"]) == max(cycles, 1)
+    motored = int(figures.attrs["motored"]) == max(cycles, 1)
     if motored:
         out["burn"] = out["work and heat"] = ("no cycle burns", "")
-    if not known and not motored:
+    if not given and not motored:
         out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
-    if not np.isfinite(found["imep_net_bar"]).all():
+    if not np.isfinite(figures["imep_net_bar"]).all():
         out["gas exchange"] = ("the record has no 720 degrees", "")
     if cycles == 1:
         out["cycles"] = out["crank angle"] = (_ONE, "")
@@ -319,17 +319,17 @@ _EXCHANGE_BAR, _PMEP_BAR, _STEP = (0.15, 8.0), (-3.0, 1.5), (0.6, 1.7)
 
 
 def record_doubts(
-    trace: xr.Dataset, found: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
+    trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
 ) -> list[tuple[str, str]]:
     """Give the doubts of a record beyond those of its analysis, each as its kind and its text."""
-    doubts = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, found) + _of_exchange(trace, found)
-    return doubts + _of_soft_top(trace, found, engine) + _of_tdc(trace, found, engine, point)
+    doubts = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, figures) + _of_exchange(trace, figures)
+    return doubts + _of_soft_top(trace, figures, engine) + _of_tdc(trace, figures, engine, point)
 
 
-def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list[tuple[str, str]]:
+def _of_soft_top(trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder) -> list[tuple[str, str]]:
     """Doubt a gain that falls off towards the peak, where burns of one form would show it."""
     angle, bar = _columns(trace)
-    if engine.compression_ratio >= _SPARK_RATIO or int(found.attrs["motored"]):
+    if engine.compression_ratio >= _SPARK_RATIO or int(figures.attrs["motored"]):
         return []
     top = top_of(angle, bar, 0.0)
     if not top.soft:
@@ -341,13 +341,13 @@ def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list
 
 
 def _of_tdc(
-    trace: xr.Dataset, found: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
+    trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
 ) -> list[tuple[str, str]]:
     """Place TDC of a motored record by its mean cycle."""
     angle, bar = _columns(trace)
-    if int(found.attrs["motored"]) < len(bar) or np.median(np.diff(angle)) > _COARSE_CAD:
+    if int(figures.attrs["motored"]) < len(bar) or np.median(np.diff(angle)) > _COARSE_CAD:
         return []
-    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
+    mean = bar.mean(axis=0) + float(np.mean(figures["pegging_bar"]))
     closed = (angle >= engine.ivc_cad) & (angle <= engine.evo_cad)
     doubts = motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point)).doubts()
     return [("strokes", "; ".join(doubts))] if doubts else []
@@ -364,13 +364,13 @@ def _slips(trace: xr.Dataset) -> list[tuple[str, str]]:
     return [(kind, text) for text in phase_warnings(angle, bar, over_time=False, source="trace")]
 
 
-def hidden(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> dict[str, tuple[str, str]]:
+def hidden(trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder) -> dict[str, tuple[str, str]]:
     """Say by check what faults these data would not show, and the size below which they stay hidden."""
     angle, bar = _columns(trace)
     step = float(np.median(np.diff(angle)))
     out = {}
-    if int(found.attrs["motored"]) < len(bar):
-        text = found.attrs["open"] or "a fired trace hardly shows an error of TDC"
+    if int(figures.attrs["motored"]) < len(bar):
+        text = figures.attrs["open"] or "a fired trace hardly shows an error of TDC"
         out["top dead centre"] = (text, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
         if engine.compression_ratio >= _SPARK_RATIO or len(bar) < _SOFT_CYCLES:
             text = "a gain that falls off above 0.7 of the peak looks like another burn"
@@ -389,14 +389,14 @@ def hidden(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> dict[str, 
     return out
 
 
-def _of_levels(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
+def _of_levels(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
     """Compare the cycles' levels early in compression with each other, pegged as they were analysed."""
     angle, bar = _columns(trace)
     if len(bar) < 4:
         return []
     start = max(float(angle[0]), -150.0)
     early = (angle >= start - 1e-9) & (angle <= start + 20.0)
-    level = bar[:, early].mean(axis=1) + np.atleast_1d(found["pegging_bar"].to_numpy())
+    level = bar[:, early].mean(axis=1) + np.atleast_1d(figures["pegging_bar"].to_numpy())
     off = level - np.median(level)
     usual = 1.4826 * float(np.median(np.abs(off)))
     out = []
@@ -415,12 +415,12 @@ def _of_levels(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
     return out
 
 
-def _of_exchange(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
+def _of_exchange(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
     """Judge levels and work between the valves' events, of records of 720 degrees."""
-    if not np.isfinite(found["imep_net_bar"]).all():
+    if not np.isfinite(figures["imep_net_bar"]).all():
         return []
     angle, bar = _columns(trace)
-    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
+    mean = bar.mean(axis=0) + float(np.mean(figures["pegging_bar"]))
 
     def level(low: float, high: float) -> float:
         return float(mean[(angle >= low) & (angle <= high)].mean())
@@ -430,7 +430,7 @@ def _of_exchange(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
     for text, value in (("intake", intake), ("exhaust", exhaust)):
         if not _EXCHANGE_BAR[0] < value < _EXCHANGE_BAR[1]:
             out.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
-    pmep = float(np.mean(found["pmep_bar"]))
+    pmep = float(np.mean(figures["pmep_bar"]))
     if not _PMEP_BAR[0] < pmep < _PMEP_BAR[1]:
         out.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
     if not out and not _STEP[0] < end / intake < _STEP[1]:

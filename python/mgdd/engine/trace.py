@@ -185,13 +185,13 @@ def analyze(
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake_pressure_kpa")
     if fractions not in ("net", "gross", "rassweiler_withrow"):
         raise ParameterError.of("fractions", fractions, "net, gross or rassweiler_withrow")
-    own = conditions(trace, point)
+    state = conditions(trace, point)
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
     intake = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
     options = {
         "pegging": pegging, "pegging_exponent": pegging_exponent,
-        "inlet_pressure_kpa": own.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
+        "inlet_pressure_kpa": state.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
         "gamma_source": source, "gamma": number,
         "heat_from_cad": window[0] if window else None, "heat_to_cad": window[1] if window else None,
         "earliest_burn_cad": _number(trace, "soi_cad", _number(trace, "spark_cad")),
@@ -214,12 +214,12 @@ def analyze(
     try:
         if is_of_cycles(trace):
             result = of_cycles(
-                _noting(chunks, doubted), cylinder, own, options, attrs, given, knock_threshold_bar, traces=traces
+                _noting(chunks, doubted), cylinder, state, options, attrs, given, knock_threshold_bar, traces=traces
             )
         elif knock_threshold_bar is not None:
             raise ParameterError("knock_threshold_bar is for a record of cycles, and this is one cycle: leave it out")
         elif traces:
-            result = _one(trace, cylinder, own, options, attrs, given)
+            result = _one(trace, cylinder, state, options, attrs, given)
         else:
             raise ParameterError("traces = False is for a record of cycles, and this is one cycle: leave it out")
     except DataError as error:

@@ -73,8 +73,8 @@ def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
     best = min(laws, key=lambda law: law.report.rmse if law.report.rmse == law.report.rmse else float("inf"))
     if not best.report.rmse < _MUCH_BETTER * fit.report.rmse:
         return []
-    rmse, own = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
-    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}"
+    rmse, fit_rmse = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
+    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {fit_rmse:.2f} % of {fit.kind}"
     remedy = (
         f"{argument('burn_shape')} and {argument('gamma_model')} choose the law, mgdd engine optimum compares a family"
     )
@@ -83,8 +83,8 @@ def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
 
 def law_row(fit: CylinderFit) -> dict[str, Any]:
     """Give one row of the comparison of burn laws: lists over the traces."""
-    known = any(math.isfinite(load.soi_cad) for load in fit.loads)
-    onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if known else {}
+    has_soi = any(math.isfinite(load.soi_cad) for load in fit.loads)
+    onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if has_soi else {}
     return {
         "law": fit.kind,
         **onset,

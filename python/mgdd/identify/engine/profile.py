@@ -284,14 +284,14 @@ def _dataset(fits: dict[float, CylinderFit]) -> xr.Dataset:
     scales = np.array(sorted(fits))
     ordered = [fits[scale] for scale in scales]
     files = [load.file for load in ordered[0].loads]
-    own = np.array([[load.rmse_percent for load in f.loads] for f in ordered])
+    trace_rmse = np.array([[load.rmse_percent for load in f.loads] for f in ordered])
     error = np.array([[load.imep_closed_error_percent for load in f.loads] for f in ordered])
     return labelled_dataset(
         {
             NAME: (NAME, scales),
             "file": ("file", files, "-", "trace"),
             "rmse_percent": (NAME, [100.0 * f.report.rmse for f in ordered]),
-            "rmse_percent_per_trace": ((NAME, "file"), own, "% of p_max", "pressure RMSE of each trace"),
+            "rmse_percent_per_trace": ((NAME, "file"), trace_rmse, "% of p_max", "pressure RMSE of each trace"),
             "imep_closed_error_percent": ((NAME, "file"), error),
         }
     )

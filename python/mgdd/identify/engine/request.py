@@ -79,8 +79,8 @@ class Request:
         heats = _known_heats(given, cylinder, fuel_heat_j, fuel_mg, chosen)
         noisy = any(_scatter_of_start(trace, cylinder) > _NOISY_START for trace in given)
         default = (*default_free(cylinder), *(("start_pressure_bar",) if noisy else ()))
-        known = _all_known(heats)
-        names = chosen if chosen is not None else tuple(n for n in default if n != "fuel_heat_j" or not known)
+        heat_known = _all_known(heats)
+        names = chosen if chosen is not None else tuple(n for n in default if n != "fuel_heat_j" or not heat_known)
         names = tuple(GAMMA_PARAMETER[cylinder.gamma_model] if name == "gamma" else name for name in names)
         if start_values is not None and len(start_values) != len(given):
             raise ParameterError(f"start_values has {len(start_values)} entries for {len(given)} traces")
@@ -105,24 +105,24 @@ class Request:
             angle, pressure = closed(trace, self.cylinder)
             if late_cad or more_bar:
                 pressure = np.interp(angle - late_cad, angle, pressure) + more_bar
-            own = conditions(trace, self.point)
+            point = conditions(trace, self.point)
             out.append(
-                _core.identify.MeasuredCycle(label=label, crank_angle_cad=angle, pressure_bar=pressure, point=own)
+                _core.identify.MeasuredCycle(label=label, crank_angle_cad=angle, pressure_bar=pressure, point=point)
             )
         return out
 
     def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[LoadBurn]:
         """Give the start of each burn: from the trace's heat release, then what is given, then what is known."""
-        known = _core.identify.load_parameters()
+        names = _core.identify.load_parameters()
         burns = []
         for index, trace in enumerate(measured):
             start_values = {} if self.start_values is None else self.start_values[index]
             for name in start_values:
-                if name not in known:
+                if name not in names:
                     raise ParameterError(
-                        f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
+                        f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(names)}"
                     )
-            full = set(known) - {"start_pressure_bar"} <= set(start_values)  # then nothing is left to estimate
+            full = set(names) - {"start_pressure_bar"} <= set(start_values)  # then nothing is left to estimate
             burn = LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
             for name, value in start_values.items():
                 setattr(burn, name, float(value))

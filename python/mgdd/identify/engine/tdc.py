@@ -210,17 +210,17 @@ def _of_motored(request: Request, cost: DegreeCost) -> TdcEstimate:
             )
         except DataError as error:
             raise error.reworded(f"{label}: {error}") from None
-    found = MotoredTdc.of_many(strokes)
+    motored = MotoredTdc.of_many(strokes)
     return TdcEstimate(
-        tdc_offset_cad=found.offset_cad,
-        low_cad=found.offset_cad - found.offset_half_cad,
-        high_cad=found.offset_cad + found.offset_half_cad,
+        tdc_offset_cad=motored.offset_cad,
+        low_cad=motored.offset_cad - motored.offset_half_cad,
+        high_cad=motored.offset_cad + motored.offset_half_cad,
         method="motored strokes",
         imep_closed_bar=cost.imep_bar,
         imep_error_bar=cost.error_bar,
-        loss_angle_cad=found.loss_angle_cad,
-        wall_heat_scale=found.wall_heat_scale,
-        findings=found.findings,
+        loss_angle_cad=motored.loss_angle_cad,
+        wall_heat_scale=motored.wall_heat_scale,
+        findings=motored.findings,
         dataset=labelled_dataset({}),
     )
 
@@ -278,18 +278,18 @@ def _with_gas(request: Request) -> Request:
     return replace(made, bounds={**_GAS, **made.bounds})
 
 
-def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
+def _best_at(request: Request, offset: float, neighbours: dict[float, CylinderFit]) -> CylinderFit:
     """Fit at one offset, from the heat release and from the neighbour that is fitted: the better of both."""
     moved = request.shifted(angle_cad=-offset)
-    found = []
+    fits = []
     try:
-        found.append(fit_request(moved))
+        fits.append(fit_request(moved))
     except DataError:  # a wrong angle may leave no heat release to start from; the neighbour has a burn
-        if not known:
+        if not neighbours:
             raise
-    if known:
-        found.append(_from(known[min(known, key=lambda other: abs(other - offset))], moved))
-    return min(found, key=_rmse)
+    if neighbours:
+        fits.append(_from(neighbours[min(neighbours, key=lambda other: abs(other - offset))], moved))
+    return min(fits, key=_rmse)
 
 
 def _from(near: CylinderFit, moved: Request) -> CylinderFit:

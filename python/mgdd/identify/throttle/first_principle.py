@@ -86,9 +86,9 @@ def fit_first_principle(
     starts = group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed)
     how: dict[str, Any] = {"records": [problem.record()], "stages": stages, "closed_deg": 0.0, "open_deg": 90.0}
     search = partial(_core.identify.fit_throttle_groups, starts=starts, substeps=SUBSTEPS, n_threads=threads_of(None))
-    found, stop = or_partial(lambda: search(**how))
-    report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
-    groups = dict(zip(GROUP_NAMES, found["values"], strict=True))
+    result, stop = or_partial(lambda: search(**how))
+    report = FitReport.from_core(result["reports"][result["best"]], problem.angle)
+    groups = dict(zip(GROUP_NAMES, result["values"], strict=True))
     model = FirstPrincipleModel(parameters=groups, substeps=SUBSTEPS, sample_s=problem.step_s)
     findings = (*problem.findings, *report.findings)
     report = with_nuisances(problem, model.parameters, report, substeps=SUBSTEPS, share_known=share_known)
@@ -102,8 +102,8 @@ def fit_first_principle(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
-        n_best=int(found["n_reached"]),
+        start_rmse=tuple(sorted(float(one.rmse) for one in result["reports"])),
+        n_best=int(result["n_reached"]),
         run=run,
         draw=draw_free_run,
     )

@@ -196,29 +196,29 @@ def identify_throttle(
         stops_deg=(closed_deg, open_deg), options=options,
     )  # fmt: skip
     tested = None if test is None else quality_of([free_run(fit.model, test)])
-    known = prior_of(fit.model)
-    home = known.limp_home_deg if estimated or limp_home is None else limp_home
+    prior = prior_of(fit.model)
+    home = prior.limp_home_deg if estimated or limp_home is None else limp_home
     content = record_content(
-        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=known.stops_deg
+        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=prior.stops_deg
     )
-    asked = open_questions(content, swing=known.swing, pairs=entangled(fit.report))
+    asked = open_questions(content, swing=prior.swing, pairs=entangled(fit.report))
     # The report names correlated pairs, too; here each comes with its remedy.
-    own = (found for found in fit.findings if found.code != "correlated")
+    of_fit = (found for found in fit.findings if found.code != "correlated")
     read: tuple[Finding, ...] = ()
     if limp_home_deg is None:
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    findings = unique((*own, *_carried_over(fit.train, tested), *read, *stops, *asked))
+    findings = unique((*of_fit, *_carried_over(fit.train, tested), *read, *stops, *asked))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 
 def _carried_over(train: FitQuality | None, test: FitQuality | None) -> tuple[Finding, ...]:
     """Report a fit that holds for its own log only."""
-    own, other = (None if quality is None else quality.nrmse_fit_percent for quality in (train, test))
-    if own is None or other is None or own - other < _LOST_PERCENT:
+    trained, tested = (None if quality is None else quality.nrmse_fit_percent for quality in (train, test))
+    if trained is None or tested is None or trained - tested < _LOST_PERCENT:
         return ()
     text = (
-        f"the fit meets its own log at {own:.1f} % and the test log at {other:.1f} %: what it has learned does "
+        f"the fit meets its own log at {trained:.1f} % and the test log at {tested:.1f} %: what it has learned does "
         "not carry over"
     )
     remedy = "fit fewer parameters, from more starts, or to a log that excites them all"
@@ -229,7 +229,7 @@ def _plateaus(log: xr.Dataset, home: float | None, stops_deg: tuple[float, float
     """Name an extreme angle that the plate meets again and again inside the travel: a stop that was not given."""
     angle = log["angle_deg"].to_numpy()
     low, high = float(angle.min()), float(angle.max())
-    found = []
+    findings = []
     for name, extreme, stop, share in (
         ("closed_deg", low, stops_deg[0], angle - low),
         ("open_deg", high, stops_deg[1], high - angle),
@@ -237,8 +237,8 @@ def _plateaus(log: xr.Dataset, home: float | None, stops_deg: tuple[float, float
         inside = abs(extreme - stop) > _SIDE_DEG and (home is None or abs(extreme - home) > _SIDE_DEG)
         if inside and _visits(share < _PLATEAU_DEG) >= _PLATEAU_VISITS:
             text = f"the plate stops at {extreme:.3g} deg again and again, {name} is {stop:g} deg"
-            found.append(Finding("unknown_stop", (name,), text, "if there is a stop, give it"))
-    return tuple(found)
+            findings.append(Finding("unknown_stop", (name,), text, "if there is a stop, give it"))
+    return tuple(findings)
 
 
 def _visits(there: NDArray[np.bool_]) -> int:

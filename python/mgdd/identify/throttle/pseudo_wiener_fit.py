@@ -113,14 +113,14 @@ def fit_pseudo_wiener(
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
     runs = [free_run(model, one) for one in logs]
-    found = [*wrapped.findings]
-    found += delay_at_end(parameters["delay_samples"], delays, 5.0)
+    findings = [*wrapped.findings]
+    findings += delay_at_end(parameters["delay_samples"], delays, 5.0)
     if errors.size > 1 and n_best < 2:
         text = "the best fit was found once only: a better one may exist"
-        found.append(Finding("found_once", (), text, "raise n_starts"))
+        findings.append(Finding("found_once", (), text, "raise n_starts"))
     if kind == "pw_r" and sides == "shared":
         text = "one set of values serves both sides of limp-home"
-        found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
+        findings.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
     train = quality_of(runs)
     fit = Fit(
         report=wrapped,
@@ -128,7 +128,7 @@ def fit_pseudo_wiener(
         kind=kind,
         train=train,
         unidentifiable=wrapped.unidentifiable,
-        findings=(*found, *below_ceiling(logs, train)),
+        findings=(*findings, *below_ceiling(logs, train)),
         source=source_of(logs[0]),
         start_rmse=tuple(errors.tolist()),
         n_best=int(n_best),

@@ -48,7 +48,7 @@ class Hunt:
         """Search once; an interrupt hands over what it has."""
         start = {name: value or (_ABSENT.get(name, 0.0) if name in free else 0.0) for name, value in values.items()}
         try:
-            found = self.problem.search(
+            search = self.problem.search(
                 start, free, substeps=substeps, tolerance=tolerance,
                 max_iterations=min(iterations, self.max_iterations),
             )  # fmt: skip
@@ -56,23 +56,23 @@ class Hunt:
             if isinstance(stop.partial, Search):
                 self.keep(stop.partial)
             raise
-        return self.keep(found)
+        return self.keep(search)
 
-    def keep(self, found: Search) -> Search:
+    def keep(self, search: Search) -> Search:
         """Count a search in."""
-        self.done.append(found)
-        if self.best is None or found.rmse < self.best.rmse:
-            self.best = found
-        return found
+        self.done.append(search)
+        if self.best is None or search.rmse < self.best.rmse:
+            self.best = search
+        return search
 
     def fine(self, values: Mapping[str, float], free: Sequence[str]) -> Search:
         """Search with the steps and the tolerance of what is handed over."""
         return self.search(values, free, FINE, self.max_iterations, self.tolerance)
 
 
-def independent_samples(found: Search) -> float:
+def independent_samples(search: Search) -> float:
     """Return how many independent samples the residual is worth: samples over its integrated correlation time."""
-    residual = np.asarray(found.report.residual)
+    residual = np.asarray(search.report.residual)
     return residual.size / _core.optimize.autocorrelation_time(residual)
 
 
@@ -82,9 +82,9 @@ def missed(smaller: Search, larger: Search, size: int, n: float) -> bool:
     return low < WORTH * high and 2.0 * n * math.log(high / low) > size * math.log(n)
 
 
-def names_of(found: Search) -> list[str]:
+def names_of(search: Search) -> list[str]:
     """Return the groups that a search estimated."""
-    return [name for name in found.report.names if name in found.values]
+    return [name for name in search.report.names if name in search.values]
 
 
 def best_of(searches: Iterable[Search]) -> Search:
@@ -164,7 +164,7 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     ramps = [{"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in free]
     begin = [*rough, *(rough[0]._replace(values={**rough[0].values, **ramp}) for ramp in ramps)]
     looks: dict[float, Search] = {}
-    found: dict[float, Search] = {}
+    fits: dict[float, Search] = {}
 
     def look(start: Search, delay: float) -> Search:
         values = _at_delay(start, delay, hunt.problem.step_s, free)
@@ -179,24 +179,24 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
                 looks[delay] = best_of([looks[delay], look(looks[other], delay)])
         enough = _RIVAL * max(best_of(looks.values()).rmse, FLOOR_DEG)
         for delay in near:
-            if looks[delay].rmse <= enough and delay not in found:
-                found[delay] = hunt.search(looks[delay].values, free, FINE, 25, 1e-6)
-        best = min(found, key=lambda delay: found[delay].rmse)
+            if looks[delay].rmse <= enough and delay not in fits:
+                fits[delay] = hunt.search(looks[delay].values, free, FINE, 25, 1e-6)
+        best = min(fits, key=lambda delay: fits[delay].rmse)
         at = list(delays).index(best)  # never the last of those looked at, while there are others
         near = [d for d in delays if d in looks or d in delays[max(at - 1, 0) : at + 2]]
     problem = hunt.problem
-    residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
+    residual = {delay: np.asarray(one.report.residual) for delay, one in fits.items()}
     floor = max(noise_of(problem.angle), FLOOR_DEG)
-    alike = _ALIKE * max(best_of(found.values()).rmse, FLOOR_DEG)
+    alike = _ALIKE * max(best_of(fits.values()).rmse, FLOOR_DEG)
     equals = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
-    ties = [delay for delay in equals if found[delay].rmse <= alike] or equals
-    complete = best_of(found.values()).rmse < AT_NOISE * floor  # nothing is missed that could make the plate come later
-    kept = min(
+    ties = [delay for delay in equals if fits[delay].rmse <= alike] or equals
+    complete = best_of(fits.values()).rmse < AT_NOISE * floor  # nothing is missed that could make the plate come later
+    best_delay = min(
         ties,
-        key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), complete and found[delay].rmse, delay),
+        key=lambda delay: (_unlike_a_motor(fits[delay].values["electrical_s"]), complete and fits[delay].rmse, delay),
     )
-    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **found}.items()}
-    return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
+    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **fits}.items()}
+    return Delays(found=fits[best_delay], rmse=rmse, ties=tuple(ties))
 
 
 def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
@@ -217,11 +217,11 @@ def _unlike_a_motor(lag_s: float) -> float:
     return math.log(max(low / lag, lag / high, 1.0))
 
 
-def _at_delay(found: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
+def _at_delay(search: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
     """Move a part of the latency between delay and lag."""
-    values = {**found.values, "delay_samples": float(delay)}
+    values = {**search.values, "delay_samples": float(delay)}
     if "electrical_s" in free:
-        lag = found.values["electrical_s"] + step_s * (found.values["delay_samples"] - delay)
+        lag = search.values["electrical_s"] + step_s * (search.values["delay_samples"] - delay)
         values["electrical_s"] = min(max(lag, 1e-4), 0.015)
     return values
 
@@ -265,16 +265,16 @@ def with_delay(
     )
 
 
-def delay_at_end(kept: float, tried: Sequence[float], longest_known: float) -> list[Finding]:
+def delay_at_end(delay: float, tried: Sequence[float], longest_known: float) -> list[Finding]:
     """Say that the delay which was taken is an end of what was tried."""
-    longest = kept == max(tried)
-    if len(tried) < 2 or not (longest or kept == min(tried) > 0.0):
+    longest = delay == max(tried)
+    if len(tried) < 2 or not (longest or delay == min(tried) > 0.0):
         return []
     most, more = ("longest", "longer") if longest else ("shortest", "shorter")
-    text = f"a delay of {kept:g} samples is the {most} that was tried: the true one may be {more}, and then"
+    text = f"a delay of {delay:g} samples is the {most} that was tried: the true one may be {more}, and then"
     text += " lag and time constant stand for the rest"
     remedy = "log at a longer sample time, of which a delay is fewer"
-    if kept < longest_known:
+    if delay < longest_known:
         remedy = f"give {more} delay_samples" + (f", or {remedy}" if longest else "")
     return [Finding("delay_at_end", (_NAME, *_STAND_IN), text, remedy)]
 
