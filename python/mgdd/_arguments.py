@@ -163,10 +163,10 @@ def _bound(
         rest = f"; give {', '.join(named[:3])}{', ...' if len(named) > 3 else ''} by name" if named else ""
         return TypeError(f"{name}() takes {len(places)} positional arguments, {len(given)} were given{rest}")
     bound = dict(zip(places, given, strict=False))
-    known = [argument.name for argument in arguments]
+    names = [argument.name for argument in arguments]
     for keyword, value in keywords.items():
-        if keyword not in known:
-            hint = did_you_mean(keyword, known) or f"known are {shortened(', '.join(known), _LONGEST_HOW)}"
+        if keyword not in names:
+            hint = did_you_mean(keyword, names) or f"known are {shortened(', '.join(names), _LONGEST_HOW)}"
             return TypeError(f"{name}() has no argument {keyword!r}: {hint}")
         if keyword in bound:
             return TypeError(f"{name}() got {keyword!r} twice, by place and by name")
@@ -204,8 +204,8 @@ def _fits(kind: ast.expr, value: Any) -> bool:
     items, outer = _items(kind), _name(kind.value)
     if outer == "Annotated":
         size = items[1].value if isinstance(items[1], ast.Constant) else ""
-        wanted = str(size)[10:-1] if str(size).startswith("FixedSize(") else ""
-        return _fits(items[0], value) and (not wanted or len(value) == int(wanted))
+        length = str(size)[10:-1] if str(size).startswith("FixedSize(") else ""
+        return _fits(items[0], value) and (not length or len(value) == int(length))
     if outer == "tuple":
         alike = _is_sequence(value) and len(value) == len(items)
         return alike and all(_fits(item, each) for item, each in zip(items, value, strict=True))

@@ -162,8 +162,8 @@ def names() -> tuple[str, ...]:
     def there(name: str, file: str) -> bool:
         return file in _PACKAGED.get(name, {}) or (folder is not None and (folder / name / file).is_file())
 
-    found = {name for name, files in FILES.items() if all(there(name, file) for file in files)}
-    return tuple(sorted({*found, *fetched()}))
+    complete = {name for name, files in FILES.items() if all(there(name, file) for file in files)}
+    return tuple(sorted({*complete, *fetched()}))
 
 
 def path(name: str, file: str) -> Path:
@@ -184,10 +184,10 @@ def path(name: str, file: str) -> Path:
             f"set {_VARIABLE} to a folder that holds {name}/{file}{fetching}; "
             f"data sets at hand: {', '.join(names())}",
         )
-    found = hashlib.sha256(packaged.read_bytes()).hexdigest()
-    if found != digest:
+    digest_of_file = hashlib.sha256(packaged.read_bytes()).hexdigest()
+    if digest_of_file != digest:
         raise DataError(
-            f"{packaged}: SHA-256 is {found}, shipped was {digest}: the file was changed; reinstall mgdd, or "
+            f"{packaged}: SHA-256 is {digest_of_file}, shipped was {digest}: the file was changed; reinstall mgdd, or "
             f"put your own version under {_VARIABLE}/{name}"
         )
     return packaged

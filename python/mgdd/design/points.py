@@ -164,12 +164,12 @@ def _filled(
             stacklevel=4,
         )
     sample = sampler_of("sobol" if method == "maximin" else method, m, generator)
-    points, found, drawn = draw_inside(
+    points, feasible_count, drawn = draw_inside(
         lambda count: own.of_unit(sample(count)), _POOL * n if by_distance else n, inside=inside, what=method
     )
     if by_distance:
         points = points[far_points(own.to_unit(points), n, existing=shares)]
-    return points, found / drawn
+    return points, feasible_count / drawn
 
 
 def _factorial(
@@ -202,8 +202,8 @@ def _d_optimal(
     if not good.any():
         raise DataError(f"feasible: none of {len(grid)} candidates is feasible (0 %): more levels or a wider region")
     candidates = grid[good]
-    found = d_optimal(basis(candidates), n, fixed=basis(before), n_starts=n_starts, generator=generator)
-    points = candidates[found.rows]
+    result = d_optimal(basis(candidates), n, fixed=basis(before), n_starts=n_starts, generator=generator)
+    points = candidates[result.rows]
     return (
         points[np.lexsort(points.T[::-1])],
         float(good.mean()),
@@ -211,9 +211,9 @@ def _d_optimal(
             "model": model,
             "n_terms": terms,
             "n_candidates": len(candidates),
-            "log_det": found.log_det,
-            "d_efficiency_percent": d_efficiency_percent(found.log_det, n=n + len(before), terms=terms),
-            "log_det_starts": [value for value in found.log_det_starts if np.isfinite(value)],
+            "log_det": result.log_det,
+            "d_efficiency_percent": d_efficiency_percent(result.log_det, n=n + len(before), terms=terms),
+            "log_det_starts": [value for value in result.log_det_starts if np.isfinite(value)],
         },
     )
 
@@ -245,9 +245,9 @@ def _levels(own: Factors, levels: int | Mapping[str, int] | None, usual: int) ->
 
 
 def _check(method: str, n: int | None, model: str, n_starts: int, seed: int) -> None:
-    for name, value, known in (("method", method, METHODS), ("model", model, MODELS)):
-        if value not in known:
-            raise ParameterError.of(name, value, f"one of {', '.join(known)}")
+    for name, value, choices in (("method", method, METHODS), ("model", model, MODELS)):
+        if value not in choices:
+            raise ParameterError.of(name, value, f"one of {', '.join(choices)}")
     if method == "factorial":
         if n is not None:
             raise ParameterError.of(argument("n"), n, "None: the levels of a factorial determine the number of points")

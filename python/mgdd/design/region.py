@@ -43,8 +43,8 @@ class _Modelled:
         room = np.empty((len(self.limits), size))
         for place, limit in enumerate(self.limits):
             if limit.name not in given:
-                known = ", ".join(map(str, given))
-                raise DataError(f"limits: the model gives no {limit.name}: it gives {known}; name one of these")
+                given_names = ", ".join(map(str, given))
+                raise DataError(f"limits: the model gives no {limit.name}: it gives {given_names}; name one of these")
             value = np.asarray(given[limit.name], dtype=np.float64)
             if value.shape != (size,):
                 raise ShapeError(f"{limit.name} of the model has shape {value.shape}: must be ({size},), one per point")
@@ -157,10 +157,10 @@ class FeasibleRegion:
         """
         if not callable(indicators):
             raise ParameterError.of("indicators", indicators, "a function of columns that returns columns")
-        kept = limits_of(limits)
-        if not kept:
+        checked = limits_of(limits)
+        if not checked:
             raise ParameterError.of("limits", limits, "at least one upper limit, for example {'p_max_bar': 150.0}")
-        return cls(_Modelled(indicators=indicators, limits=kept))
+        return cls(_Modelled(indicators=indicators, limits=checked))
 
     @classmethod
     def of_points(cls, points: Any, *, margin: float = 0.0, infeasible: Any = None) -> FeasibleRegion:
@@ -195,8 +195,8 @@ class FeasibleRegion:
         both = [row for row in refused.tolist() if row in driven.tolist()]
         if both:
             at = ", ".join(f"{name} {value:g}" for name, value in zip(names, both[0], strict=True))
-            own = argument("infeasible")
-            raise DataError(f"{own}: the point {at} is also among the points that were driven: keep it in one")
+            option = argument("infeasible")
+            raise DataError(f"{option}: the point {at} is also among the points that were driven: keep it in one")
         hull = hull_of(driven, names)
         return cls(_Measured(hull=hull, names=names, driven=driven, refused=refused, margin=float(margin)))
 

@@ -146,8 +146,8 @@ def _counted(raws: list[dict[str, Any]], n: int) -> dict[str, str]:
     for raw in raws:
         for kind, line in zip(raw["doubts"], raw["warnings"], strict=True):
             count, text, first = _COUNTED.fullmatch(line).groups()  # type: ignore[union-attr]
-            times, text, at = counts.get(kind, (0, text, before + int(first)))
-            counts[kind] = (times + int(count), text, at)
+            earlier, text, at = counts.get(kind, (0, text, before + int(first)))
+            counts[kind] = (earlier + int(count), text, at)
         before += len(raw["motored"])
     return {kind: f"{count} of {n} cycles: {text} (cycle {at})" for kind, (count, text, at) in counts.items()}
 

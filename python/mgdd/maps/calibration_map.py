@@ -98,22 +98,22 @@ class CalibrationMap(MapForms):
         self._name = checked_name("name", name)
         if not isinstance(axes, Mapping) or not 1 <= len(axes) <= 2:
             raise ParameterError.of("axes", axes, "one or two names with entries, as {'fuel_mg': [6, 20, 40]}")
-        own = {checked_name("axis", axis, (name,)): _column(axis, entries) for axis, entries in axes.items()}
-        shape = tuple(entries.size for entries in own.values())
+        columns = {checked_name("axis", axis, (name,)): _column(axis, entries) for axis, entries in axes.items()}
+        shape = tuple(entries.size for entries in columns.values())
         table = np.array(values, np.float64)
         if table.ndim and table.shape != shape:
-            raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(own)} make {shape}")
+            raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(columns)} make {shape}")
         self._values = np.ascontiguousarray(np.broadcast_to(table, shape))
-        self._table = _table(own, self._values)
+        self._table = _table(columns, self._values)
         given = dict(labels or {})
-        self._labels = {each: checked_label(each, given.pop(each, None)) for each in (*own, name)}
+        self._labels = {each: checked_label(each, given.pop(each, None)) for each in (*columns, name)}
         if given:
             raise ParameterError.of("labels", next(iter(given)), f"of {', '.join(self._labels)}")
-        self._cells = checked_cells(self._values, own, cells or {})
+        self._cells = checked_cells(self._values, columns, cells or {})
         self._task, self._provenance = task, _texts(provenance or {})
-        for array in (*own.values(), self._values):
+        for array in (*columns.values(), self._values):
             array.setflags(write=False)
-        self._axes = own
+        self._axes = columns
 
     @property
     def name(self) -> str:

@@ -122,9 +122,9 @@ def _check_counts(block: DcmBlock, where: str) -> None:
 
 
 def _plain(text: str) -> str:
-    found = _FORBIDDEN.search(text)
-    if found:
-        raise DataError(f"{text!r}: {found[0]!r} is not allowed in XML: remove it")
+    match = _FORBIDDEN.search(text)
+    if match:
+        raise DataError(f"{text!r}: {match[0]!r} is not allowed in XML: remove it")
     return text
 
 

@@ -84,15 +84,15 @@ def can_be_name(text: str) -> bool:
 
 def checked_label(name: str, given: tuple[str, str] | None) -> Label:
     """Give unit and long name of an axis or value; a unit that contradicts the ending of the name is refused."""
-    known = VARIABLES.get(name) or Label(name_unit(name), spoken_name(name))
-    label = known if given is None else Label(*map(str, given))
+    usual = VARIABLES.get(name) or Label(name_unit(name), spoken_name(name))
+    label = usual if given is None else Label(*map(str, given))
     try:
         written = attribute_units(label.units)
     except ValueError as error:
         raise DataError.of(f"unit of {name}", label.units, f"a unit: {error}") from None
-    if known.units != "-" and attribute_units(known.units) != written:
+    if usual.units != "-" and attribute_units(usual.units) != written:
         raise DataError.of(
-            f"unit of {name}", label.units, f"{known.units!r}, as the name says; convert the numbers or change the name"
+            f"unit of {name}", label.units, f"{usual.units!r}, as the name says; convert the numbers or change the name"
         )
     if not label.long_name.strip():
         raise DataError.of(f"long name of {name}", label.long_name, "a text that figures can print")

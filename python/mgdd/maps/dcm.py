@@ -137,12 +137,12 @@ def _skip(lines: list[_Line]) -> str:
 
 def _lines(text: str) -> list[_Line]:
     """Give word and rest of every line that is not empty; of the comments only those that name an axis."""
-    found = []
+    words = []
     for number, raw in enumerate(text.splitlines(), start=1):
         word, *rest = raw.split(None, 1) or [""]
         if word and (word[0] not in "*!." or word in _COMMENTS):
-            found.append(_Line(number, word, rest[0].strip() if rest else ""))
-    return found
+            words.append(_Line(number, word, rest[0].strip() if rest else ""))
+    return words
 
 
 def _block(head: _Line, lines: list[_Line], origin: str) -> tuple[DcmBlock | None, list[str]]:
@@ -165,9 +165,9 @@ def _block(head: _Line, lines: list[_Line], origin: str) -> tuple[DcmBlock | Non
         elif line.word == "ST/X":
             block.x += _floats(line.rest, at)
         elif line.word == "ST/Y":
-            found = _floats(line.rest, at)
-            block.y += found
-            rows += [[] for _ in found]
+            breakpoints = _floats(line.rest, at)
+            block.y += breakpoints
+            rows += [[] for _ in breakpoints]
         elif line.word == "WERT":
             if not rows:
                 rows.append([])
@@ -210,9 +210,9 @@ def _check_counts(block: DcmBlock, where: str) -> None:
         "ST/Y": (len(block.y), deep if len(block.sizes) > 1 else 0),
         "rows of WERT": (len(block.values), 0 if block.is_axis else deep),
     }
-    for word, (found, needed) in counts.items():
-        if found != needed:
-            raise DataError(f"{where}: {block.name} has {found} {word}: its head states {needed}; add what is missing")
+    for word, (count, needed) in counts.items():
+        if count != needed:
+            raise DataError(f"{where}: {block.name} has {count} {word}: its head states {needed}; add what is missing")
     for row, values in enumerate(block.values):
         if len(values) != wide:
             at = f" at ST/Y {block.y[row]:g}" if block.y else ""

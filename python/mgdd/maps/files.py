@@ -227,8 +227,8 @@ def _form_of(file: Path) -> str:
         return "labels"
     if text.startswith("{") or ending == ".json":
         return "json"
-    found = cells_as_text(file)
-    return "csv" if found is not None and not found[2] and is_map_csv(found[1]) else ""
+    cells = cells_as_text(file)
+    return "csv" if cells is not None and not cells[2] and is_map_csv(cells[1]) else ""
 
 
 def _of_labels(file: Path, name: str | None) -> CalibrationMap:
@@ -236,22 +236,22 @@ def _of_labels(file: Path, name: str | None) -> CalibrationMap:
     maps = content.maps
     if name is None and len(maps) != 1:
         raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
-    wanted = next(iter(maps)) if name is None else name
-    if wanted not in maps:
-        left_out = next((text for text in content.skipped if text.startswith(f"{wanted}: ")), None)
-        near = left_out or did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
-        raise ParameterError(f"{file}: no map {wanted!r}: {near}")
-    return maps[wanted]
+    label = next(iter(maps)) if name is None else name
+    if label not in maps:
+        left_out = next((text for text in content.skipped if text.startswith(f"{label}: ")), None)
+        near = left_out or did_you_mean(label, maps) or f"it holds {', '.join(maps) or 'none'}"
+        raise ParameterError(f"{file}: no map {label!r}: {near}")
+    return maps[label]
 
 
 def _of_any(
     file: Path, *, name: str | None, decimal: str, rows: str | None, columns: str | None, sheet: str | None
 ) -> CalibrationMap:
     """Read a grid or a table of points."""
-    found = cells_as_text(file, sheet)
-    if found is None:
+    cells = cells_as_text(file, sheet)
+    if cells is None:
         return map_of_points(read_any_table(file), name=name, rows=rows, columns=columns)
-    source, text, is_sheet = found
+    source, text, is_sheet = cells
     mark = "." if is_sheet else decimal  # the numbers of a sheet have no mark of their own
     grid = map_of_grid(text, source, name=name, decimal=mark, rows=rows, columns=columns, whole=is_sheet)
     if grid is not None:

@@ -66,8 +66,8 @@ class MapForms(Result):
             forgetting=SETTINGS["forgetting"] if forgetting is None else forgetting,
         )  # fmt: skip
         data = made.to_dataset()
-        known = np.isfinite(self._cells["sd"]) & (self._cells["sd"] > 0.0)
-        data["sd_cad"].values[:] = np.where(known, np.minimum(self._cells["sd"], prior), prior)
+        finite = np.isfinite(self._cells["sd"]) & (self._cells["sd"] > 0.0)
+        data["sd_cad"].values[:] = np.where(finite, np.minimum(self._cells["sd"], prior), prior)
         return TimingMap.from_dataset(data)
 
     def learned_from(self, timing: TimingMap) -> Self:
@@ -166,36 +166,36 @@ class MapForms(Result):
         mgdd.errors.DataError
             No such variable, or one without axes or units.
         """
-        own = str(dataset.attrs.get("map", "")) if name is None else name
-        if own not in dataset or not 1 <= dataset[own].ndim <= 2:
+        value = str(dataset.attrs.get("map", "")) if name is None else name
+        if value not in dataset or not 1 <= dataset[value].ndim <= 2:
             have = ", ".join(str(each) for each in dataset.data_vars if 1 <= dataset[each].ndim <= 2) or "none"
-            if not own:
+            if not value:
                 raise DataError(
                     f"the Dataset names no map: give the name of a variable over one or two axes (it has {have}); "
                     "of a sweep make a map first, with optimize_map or mgdd map optimize"
                 )
-            raise DataError(f"no variable {own!r} over one or two axes: the Dataset has {have}; give its name")
-        variable = dataset[own]
+            raise DataError(f"no variable {value!r} over one or two axes: the Dataset has {have}; give its name")
+        variable = dataset[value]
         dims = [str(dim) for dim in variable.dims]
         lacking = [dim for dim in dims if dim not in dataset.coords]
         if lacking:
-            raise DataError(f"{own}: the axis {lacking[0]} has no coordinates: add them")
-        for each in (*dims, own):
+            raise DataError(f"{value}: the axis {lacking[0]} has no coordinates: add them")
+        for each in (*dims, value):
             if not {"units", "long_name"} <= set(dataset[each].attrs):
                 raise DataError(f"{each} has no units or no long_name: set both in its attributes")
         values = variable.to_numpy()
         sources = np.full(values.shape, source or _source_of(variable), "U64")
-        if source is None and f"{own}_extrapolated" in dataset:
-            sources[dataset[f"{own}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
+        if source is None and f"{value}_extrapolated" in dataset:
+            sources[dataset[f"{value}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
         cells: dict[str, Any] = {"source": np.where(np.isfinite(values), sources, "unattainable")}
         task, provenance = None, {}
-        if dataset.attrs.get("map") == own:
+        if dataset.attrs.get("map") == value:
             cells = {each: dataset[each].to_numpy() for each in (*NUMBERS, *TEXTS) if each in dataset}
             task, provenance = _task_of(dataset.attrs), _under(dataset.attrs, "provenance_")
-        labels = {each: label_of(dataset[each]) for each in (*dims, own)}
+        labels = {each: label_of(dataset[each]) for each in (*dims, value)}
         axes = {dim: dataset[dim].to_numpy() for dim in dims}
         make: Any = cls
-        made: Self = make(axes, values, name=own, labels=labels, cells=cells, task=task, provenance=provenance)
+        made: Self = make(axes, values, name=value, labels=labels, cells=cells, task=task, provenance=provenance)
         return made
 
     def __eq__(self, other: object) -> bool:

@@ -43,7 +43,7 @@ def map_of_grid(
     text: str, origin: str, *, name: str | None, decimal: str, rows: str | None, columns: str | None, whole: bool
 ) -> CalibrationMap | None:
     """Read the grid in a text, or give None where there is none; only the rows of a sheet are known to be whole."""
-    grids = [found for mark in _MARKS if mark != decimal for found in [_found(text, mark, origin)] if found]
+    grids = [grid for mark in _MARKS if mark != decimal for grid in [_found(text, mark, origin)] if grid]
     if not grids:
         return None
     grid = max(grids, key=lambda each: each.width)  # the first of the widest
@@ -63,21 +63,21 @@ def map_of_grid(
         require_rise(origin, line, across.name, pair)
     y, values = [], []
     for at, row in grid.body:
-        found, where = trimmed(row), f"{origin}, line {at}"
-        if found and not _like_number(found[0]) and found[0].casefold() not in _EMPTY:
+        filled, where = trimmed(row), f"{origin}, line {at}"
+        if filled and not _like_number(filled[0]) and filled[0].casefold() not in _EMPTY:
             raise DataError(
-                f"{where}: {found[0][:60]!r} is not a breakpoint of {down.name}: remove the line, or begin it with #"
+                f"{where}: {filled[0][:60]!r} is not a breakpoint of {down.name}: remove the line, or begin it with #"
             )
         last = at == grid.body[-1][0] and not whole  # it may be cut off
-        if len(found) - 1 > len(x) or ((len(found) > 1 or last) and len(row) - 1 < len(x)):
+        if len(filled) - 1 > len(x) or ((len(filled) > 1 or last) and len(row) - 1 < len(x)):
             raise DataError(
                 f"{where}: {len(row) - 1} values: {len(x)} are needed, one per column; an empty cell keeps its mark"
                 f"{'; the file may be cut off here' if last else ''}"
             )
-        y.append(number_in(found[0], decimal, where, down.name))
+        y.append(number_in(filled[0], decimal, where, down.name))
         if len(y) > 1:
             require_rise(origin, at, down.name, y[-2:])
-        cells = [*found[1:], *[""] * (len(x) + 1 - len(found))]
+        cells = [*filled[1:], *[""] * (len(x) + 1 - len(filled))]
         values.append([number_in(cell, decimal, where, "a value", gap=True) for cell in cells])
     require_two(origin, {down.name: y, across.name: x})
     table = np.array(values)
@@ -169,20 +169,20 @@ def _names_columns(cells: list[str], width: int) -> bool:
 def _cells(text: str, mark: str | None, origin: str) -> Rows:
     """Give the cells of every line that says something; of blanks only those behind a corner separate."""
     if mark is None:
-        found = []
+        rows = []
         for number, line in enumerate(text.splitlines(), start=1):
             words = line.split()
             first = next((k for k, word in enumerate(words) if _like_number(word)), len(words))
-            found.append((number, [" ".join(words[:first]), *words[first:]] if first else words))
+            rows.append((number, [" ".join(words[:first]), *words[first:]] if first else words))
     else:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
         try:
-            found = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+            rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
         except csv.Error as error:
             raise DataError(f"{origin}, line {reader.line_num}: {error}: correct the quotes and cells there") from error
     return [
         (number, cells)
-        for number, cells in found
+        for number, cells in rows
         if any(cells) and not cells[0].startswith("#") and not "".join(cells).startswith("sep=")
     ]
 

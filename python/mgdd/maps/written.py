@@ -48,10 +48,10 @@ def unit_to(unit: str) -> str:
 
 def without_brackets(text: str) -> tuple[str, str]:
     """Split a label into its words and the unit: in brackets at its end, or all of it."""
-    found = _BRACKETS.search(text)
-    words = (text[: found.start()] if found else text).strip(" \t:,;=-")
-    if found:
-        return words, found[1].strip()
+    match = _BRACKETS.search(text)
+    words = (text[: match.start()] if match else text).strip(" \t:,;=-")
+    if match:
+        return words, match[1].strip()
     alone = text.strip()
     is_unit = alone in _UNITS or alone == "%" or (len(alone) > 1 and spelled_unit(alone) is not None)
     return ("", alone) if is_unit else (words, "")
@@ -65,8 +65,8 @@ def heading_of(text: str, *, unit: str = "", fallback: str, taken: tuple[str, ..
     plain = _UMLAUTS.get(plain[:1], plain[:1]) + plain[1:]
     candidates = (plain, re.sub(r"[^\w.\[\]%]+", "_", plain).strip("_"), _name_of_unit(written) if not words else "")
     name = next((each for each in candidates if each not in taken and _can_name(each, written)), fallback)
-    known = VARIABLES[name].long_name if name in VARIABLES else spoken_name(name)
-    return Heading(name, unit_from(written, name), words if words not in ("", name) else known)
+    usual = VARIABLES[name].long_name if name in VARIABLES else spoken_name(name)
+    return Heading(name, unit_from(written, name), words if words not in ("", name) else usual)
 
 
 def _can_name(name: str, written: str) -> bool:

@@ -58,7 +58,7 @@ def engine_of(
 ) -> tuple[Cylinder, OperatingPoint]:
     """Return the cylinder and the operating point that are meant; numbers by name replace those of the nominal one."""
     meant = _loaded(cylinder, "engine")
-    own, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
+    engine, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
     changes = {name: value for name, value in fields.items() if value is not None}
     for name, value in changes.items():
         stated(name, value, point)
@@ -69,7 +69,7 @@ def engine_of(
             "name as {'speed_rpm': 1200.0}, or a preset instead of the Cylinder"
         )
     whole = nominal if point is None else point
-    return own, whole.replace(**changes) if changes else whole
+    return engine, whole.replace(**changes) if changes else whole
 
 
 def throttle_of(given: Any) -> Throttle:

@@ -117,8 +117,8 @@ class Preset(Parameters):
 
     def _record(self, table: str) -> Cylinder | OperatingPoint | Throttle:
         if table not in self.records:
-            wanted = "throttle" if table == "throttle" else "engine"
-            raise ParameterError(_wrong_kind(self.name, self.kind, wanted))
+            kind = "throttle" if table == "throttle" else "engine"
+            raise ParameterError(_wrong_kind(self.name, self.kind, kind))
         return self.records[table]
 
     def to_parameters(self) -> ParameterFile:
@@ -276,11 +276,11 @@ def _wrong_kind(name: str, kind: str, wanted: str) -> str:
 def _record(file: ParameterFile, table: str, sources: dict[str, str]) -> Any:
     kind = _TABLES[table]
     fields = kind.fields()
-    wanted = {
+    keys = {
         key: Wanted(info["unit"], "text" if "choices" in info else "number", required=False)
         for key, info in fields.items()
     }
-    values = file.values(table, wanted)
+    values = file.values(table, keys)
     entries = file.tables.get(table, {})
     sources.update({f"{table}.{key}": entry.source for key, entry in entries.items() if entry.source is not None})
     return kind().replace(**values)

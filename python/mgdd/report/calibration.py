@@ -106,18 +106,18 @@ def calibration_report(
         "inlet_pressure_kpa": inlet_pressure_kpa,
     }
     absolute = [pegged(trace, cylinder, point_of(point), **how) for trace in listed(traces)]
-    known: dict[str, Any] = {"point": point, "fuel_heat_j": fuel_heat_j, "progress": step}
+    inputs: dict[str, Any] = {"point": point, "fuel_heat_j": fuel_heat_j, "progress": step}
     step("analyse the traces")
     analyses = [analyze(trace, cylinder, point=point, quiet=True) for trace in absolute]
-    timing, stop = _timing(absolute, cylinder, **known, **scheme)
+    timing, stop = _timing(absolute, cylinder, **inputs, **scheme)
     main = headline_of(timing)
     fits, scans = [main.fit], dict[str, WallHeatProfile]()
     tdc: TdcEstimate | None = None
     if stop is None:
         try:
-            fits = compare_laws(absolute, cylinder, **known, **scheme)
+            fits = compare_laws(absolute, cylinder, **inputs, **scheme)
             if profiles:
-                tdc = estimate_tdc(absolute, cylinder, span_cad=TDC_SPAN_CAD, **known)
+                tdc = estimate_tdc(absolute, cylinder, span_cad=TDC_SPAN_CAD, **inputs)
                 scans = _profiles(main, step)
         except KeyboardInterrupt:
             stop = Interrupted("interrupted: the models and their best timing are in .partial, not all checks of them")
@@ -388,15 +388,15 @@ def _limitations(s: Mapping[str, Any]) -> list[str]:
 def _headline(s: Mapping[str, Any]) -> tuple[str, ...]:
     rows = s["best_timing"]
     n = len(rows[0]["members"])
-    kept = sum(any(row["members"][at]["plausible"] for row in rows) for at in range(n))
-    if not kept:
+    good = sum(any(row["members"][at]["plausible"] for row in rows) for at in range(n))
+    if not good:
         return (
             (
                 f"None of {n} models is plausible for these traces: no best timing is given. The member that comes "
                 f"nearest is {s['law']}; what it fails stands below. Suspect geometry, TDC, pegging, speed or mass."
             ),
         )
-    return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=kept, n=n, misfit=ModelFamily().misfit_cad)
+    return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=good, n=n, misfit=ModelFamily().misfit_cad)
 
 
 def move_of(row: Mapping[str, Any]) -> str:
@@ -404,11 +404,11 @@ def move_of(row: Mapping[str, Any]) -> str:
     best = row["best"]
     if best is None:
         return f"{row['file']}: no plausible model, so no best timing."
-    kept, free = (_part(row, prefix) for prefix in ("", "free_"))
+    limited, free = (_part(row, prefix) for prefix in ("", "free_"))
     same = abs(best["shift_cad"] - best["free_shift_cad"]) < 0.05
     if same and undetermined(row["shift_cad"]) == undetermined(row["free_shift_cad"]):
         return f"{row['file']}: {free}; its own p_max kept, range {_ends(row['shift_cad'])} °CA."
-    return f"{row['file']}: {kept}, its own p_max kept; without that limit {free}."
+    return f"{row['file']}: {limited}, its own p_max kept; without that limit {free}."
 
 
 def _part(row: Mapping[str, Any], prefix: str) -> str:

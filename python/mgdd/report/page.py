@@ -116,7 +116,7 @@ def _inputs(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name, head in _INPUTS.items():
         if value := summary.get(name):
             pairs = value.items() if isinstance(value, Mapping) else ()
-            yield head, ", ".join(f"{key} {as_number(own)}" for key, own in pairs) or str(value)
+            yield head, ", ".join(f"{key} {as_number(entry)}" for key, entry in pairs) or str(value)
 
 
 def _first_and_last_fact(made_by: str) -> tuple[tuple[str, str], tuple[str, str]]:

@@ -72,12 +72,12 @@ def _text(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[str]:
         yield f"Clouds, maps and spectrum show {traces.sizes['cycle']} cycles, evenly over the record."
     low, high = (1e-3 * edge for edge in attrs["knock_band_hz"])
     at = float(figures["ringing_frequency_khz"])
-    found = f"The pressure rings at {at:.2f} kHz" if at == at else "No frequency stands out of the pressure"
+    ringing = f"The pressure rings at {at:.2f} kHz" if at == at else "No frequency stands out of the pressure"
     mode = float(figures["tangential_mode_khz"])
     knock = ""
     if "knock_share_percent" in figures:
         knock = f" {as_number(float(figures['knock_share_percent']))} % of the cycles knock."
-    yield f"{found} between {low:g} and {high:g} kHz; the first tangential mode of the bore is {mode:.2f} kHz.{knock}"
+    yield f"{ringing} between {low:g} and {high:g} kHz; the first tangential mode of the bore is {mode:.2f} kHz.{knock}"
 
 
 def _table(figures: xr.Dataset) -> Table:
@@ -89,8 +89,8 @@ def _table(figures: xr.Dataset) -> Table:
     names = [str(name).removeprefix("cycle_mean_") for name in figures if str(name).startswith("cycle_mean_")]
     table = []
     for name in names:
-        found = (figures.get(f"{before}{name}{after}") for before, after in _STATISTICS.values())
-        cells = ["–" if value is None else as_number(float(value)) for value in found]
+        statistics = (figures.get(f"{before}{name}{after}") for before, after in _STATISTICS.values())
+        cells = ["–" if value is None else as_number(float(value)) for value in statistics]
         if any(cell != "–" for cell in cells):
             table.append((label_of(figures[name]).long_name, *cells, label_of(figures[name]).units))
     return Table(columns=("figure", *_STATISTICS, "unit"), rows=tuple(table))

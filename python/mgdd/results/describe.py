@@ -48,19 +48,19 @@ def as_text(title: str, rows: Iterable[Row]) -> str:
         flow = textwrap.wrap(", ".join(cell.replace(" ", "\0") for cell in cells), _WIDTH - 2, break_long_words=False)
         lines = [f"  {line}".replace("\0", " ") for line in flow]
         if len(lines) > most:
-            kept = sum(line.count(", ") + line.endswith(",") for line in flow[: most - 1])
-            lines = [*lines[: most - 1], f"  … and {len(cells) - kept} more"]
+            shown = sum(line.count(", ") + line.endswith(",") for line in flow[: most - 1])
+            lines = [*lines[: most - 1], f"  … and {len(cells) - shown} more"]
     return printable("\n".join([head, *lines]))
 
 
 def as_html(title: str, rows: Iterable[Row], picture: str = "") -> str:
     """Lay out rows as an HTML table, for notebooks."""
-    known = list(rows)
-    lead = len(known) if len(known) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
-    rest = known[lead:_MANY]
-    fold = f"<details><summary>{len(known) - lead} more</summary>{_table(rest)}</details>" if rest else ""
-    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
-    return f"<div><p><b>{html.escape(title)}</b></p>{picture}{_table(known[:lead])}{fold}{more}</div>"
+    entries = list(rows)
+    lead = len(entries) if len(entries) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
+    rest = entries[lead:_MANY]
+    fold = f"<details><summary>{len(entries) - lead} more</summary>{_table(rest)}</details>" if rest else ""
+    more = f"<p>… and {len(entries) - _MANY} more</p>" if len(entries) > _MANY else ""
+    return f"<div><p><b>{html.escape(title)}</b></p>{picture}{_table(entries[:lead])}{fold}{more}</div>"
 
 
 def _table(rows: Sequence[Row]) -> str:
@@ -80,10 +80,10 @@ def picture_of(data: Any) -> str:
     """
     for name, variable in data.data_vars.items():
         values = variable.to_numpy() if variable.dtype.kind == "f" else np.empty(0)
-        known = values[np.isfinite(values)]
-        if known.size < 2 or not np.ptp(known) > 0.0:
+        finite = values[np.isfinite(values)]
+        if finite.size < 2 or not np.ptp(finite) > 0.0:
             continue
-        places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - known.min()) / np.ptp(known)
+        places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - finite.min()) / np.ptp(finite)
         if values.ndim == 1 and values.size >= (2 if places[0].dtype.kind == "f" else 10):
             drawing = _line_of(places[0] if places[0].dtype.kind == "f" else np.arange(values.size), shades)
         elif values.ndim == 2 and max(values.shape) <= _CELLS:
@@ -167,8 +167,8 @@ def described(
     head = title_of if title is None else title
 
     def known(obj: Any) -> list[Row]:
-        found = fields_of(obj) if rows is None else rows(obj)
-        return rows_of(found) if isinstance(found, Mapping) else list(found)
+        fields = fields_of(obj) if rows is None else rows(obj)
+        return rows_of(fields) if isinstance(fields, Mapping) else list(fields)
 
     def text(self: Any) -> str:
         return as_text(head(self), known(self))
@@ -215,8 +215,8 @@ def _shown(value: Any) -> str:
     if hasattr(value, "sizes") and hasattr(value, "dims"):
         return "Dataset (" + ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items()) + ")"
     if isinstance(value, Mapping | Sequence | set | frozenset):
-        named = value.items() if isinstance(value, Mapping) else [("", own) for own in value]
-        entries = [f"{name} {_shown(own)}".lstrip() for name, own in named]
+        named = value.items() if isinstance(value, Mapping) else [("", text) for text in value]
+        entries = [f"{name} {_shown(text)}".lstrip() for name, text in named]
         joined = ", ".join(entries) or "none"
         short = textwrap.shorten(joined, _LONG, placeholder=" …")
         return short if short == joined else f"{len(value)}: {short}"
@@ -224,18 +224,18 @@ def _shown(value: Any) -> str:
         return f"{value.name} <= {value.upper:g}"
     if callable(value):
         return getattr(value, "__qualname__", type(value).__qualname__)
-    own = repr(value)
-    return own if len(own) <= _LONG and "\n" not in own and " object at " not in own else title_of(value)
+    text = repr(value)
+    return text if len(text) <= _LONG and "\n" not in text and " object at " not in text else title_of(value)
 
 
 def _range(values: np.ndarray[Any, Any], shape: str) -> str:
     """Show an array by its least and its largest number."""
     if values.dtype.kind == "b":
         return f"{int(values.sum())} of {values.size} yes"
-    known = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
-    if not known.size:
+    finite = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
+    if not finite.size:
         return f"array{shape or ' without numbers'}"
-    low, high = _shown(known.min()), _shown(known.max())
+    low, high = _shown(finite.min()), _shown(finite.max())
     return f"{low if low == high else f'{low} to {high}'}{shape}"
 
 

@@ -201,9 +201,9 @@ def labelled_dataset(
         if array.ndim != len(dims):
             raise ShapeError(f"{name} has shape {array.shape}: {len(dims)} dimension(s) {dims} were declared")
         for dim, size in zip(dims, array.shape, strict=True):
-            known, first = sizes.setdefault(dim, (size, name))
-            if known != size:
-                raise ShapeError(f"{name} has {size} samples along {dim}: {first} has {known}")
+            earlier, first = sizes.setdefault(dim, (size, name))
+            if earlier != size:
+                raise ShapeError(f"{name} has {size} samples along {dim}: {first} has {earlier}")
         arrays[name] = (dims, array, unit_attributes(label.units, label.long_name))
     coords = {name: item for name, item in arrays.items() if item[0] == (name,)}
     for dim, (_, name) in sizes.items():
@@ -284,13 +284,13 @@ def _check(name: str, units: object, long_name: object) -> None:
         raise DataError(f"variable {name} has no units: give them ('-' if dimensionless)")
     if not isinstance(long_name, str) or not long_name.strip():
         raise DataError(f"variable {name} has no long_name: name it for axis labels")
-    known = VARIABLES.get(name)
+    usual = VARIABLES.get(name)
     try:
         written = attribute_units(units)
     except ValueError as error:
         raise DataError(f"variable {name} has units {error}") from None
-    if known is not None and attribute_units(known.units) != written:
-        raise DataError(f"variable {name} has units {units!r}: this name is reserved for {known.units!r}")
+    if usual is not None and attribute_units(usual.units) != written:
+        raise DataError(f"variable {name} has units {units!r}: this name is reserved for {usual.units!r}")
 
 
 def _check_attributes(owner: str, attrs: Mapping[Any, Any]) -> None:

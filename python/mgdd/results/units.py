@@ -47,15 +47,15 @@ _ENDING = re.compile(
 
 def unit_of(name: str) -> str:
     """Read the unit off the end of a name, ``"-"`` if it has none; a single letter is a name."""
-    found = _ENDING.search(f"_{name}") if len(name) > 1 else None
-    if found is None:
+    ending = _ENDING.search(f"_{name}") if len(name) > 1 else None
+    if ending is None:
         return "-"
-    over, per, unit = found["over"], found["per"], found["unit"]
+    over, per, unit = ending["over"], ending["per"], ending["unit"]
     if per:
         return f"{_UNITS[over] if over else 1}/{_UNITS[unit]}"
     if unit == "cad" and name.startswith("rms_"):
         return "°CA"  # a distance, not an angle
-    return (_ALONE.get(unit) or _UNITS[unit]) if unit else _WHOLE[found[0]]
+    return (_ALONE.get(unit) or _UNITS[unit]) if unit else _WHOLE[ending[0]]
 
 
 def without_unit(name: str) -> str:

@@ -171,12 +171,12 @@ def table_of(given: Any, names: Sequence[str], *, what: str) -> Any:
     timed = is_timed(table, time)
     if hasattr(table, "columns"):  # a DataFrame
         return table if time in table.columns or not timed else table.rename_axis(time).reset_index()
-    own = str(getattr(table, "name", None) or "")
-    own = own if own in names or len(names) < 2 else names[1]
+    column = str(getattr(table, "name", None) or "")
+    column = column if column in names or len(names) < 2 else names[1]
     if hasattr(table, "coords"):
-        return {**{str(name): table[name] for name in table.coords}, own: table}
+        return {**{str(name): table[name] for name in table.coords}, column: table}
     if timed:
-        return {time: table.index, own: table}
+        return {time: table.index, column: table}
     if getattr(table, "ndim", 0) == 2 and table.shape[1] == len(names):
         return dict(zip(names, np.asarray(table).T, strict=True))
     if isinstance(table, tuple | list) and len(table) == len(names) and all(np.ndim(each) == 1 for each in table):

@@ -75,11 +75,11 @@ def surrogate_file(surrogate: Mapping[str, Any]) -> ParameterFile:
 
 def _signal(signal: SignalModel) -> dict[str, Entry]:
     scores = {"lags": list(signal.lag_scores), "lag_scores": list(signal.lag_scores.values())}
-    own = written(vars(signal) | scores, _signal_keys(signal.label))
+    keys = written(vars(signal) | scores, _signal_keys(signal.label))
     if signal.sensor is None:
-        return own
+        return keys
     share = signal.sensor.delay_share
-    return own | written(vars(signal.sensor) | {"delays": list(share), "delay_share": list(share.values())}, _SENSOR)
+    return keys | written(vars(signal.sensor) | {"delays": list(share), "delay_share": list(share.values())}, _SENSOR)
 
 
 def read_surrogate(file: ParameterFile) -> dict[str, Any]:
@@ -94,13 +94,13 @@ def read_surrogate(file: ParameterFile) -> dict[str, Any]:
     if [_SIGNAL + name for name in labels] != per_signal:
         raise DataError(f"{file.origin}: [signals] names {', '.join(labels)}: each needs its table [signal_...]")
     shapes = {**dict.fromkeys(("lower", "upper", "centre", "scale"), (n,)), "root": (terms, terms)}
-    own = _shaped(file, "support", file.values("support", _SUPPORT), shapes)
-    basis = PolynomialBasis.of("quadratic", centre=own.pop("centre"), scale=own.pop("scale"))
+    fields = _shaped(file, "support", file.values("support", _SUPPORT), shapes)
+    basis = PolynomialBasis.of("quadratic", centre=fields.pop("centre"), scale=fields.pop("scale"))
     records = file.values("records", _RECORDS)
     rows = records["residuals"]
     return {
         "signals": {name: _signal_of(file, name, label, terms) for name, label in labels.items()},
-        "support": Support(inputs=names, basis=basis, **own),
+        "support": Support(inputs=names, basis=basis, **fields),
         "medians": dict(zip(names, median.tolist(), strict=True)),
         "input_labels": inputs,
         "nonnegative": tuple(records["nonnegative"]),
@@ -129,15 +129,15 @@ def response_file(model: Mapping[str, Any]) -> ParameterFile:
     """Give everything that the fields of a response model hold."""
     label, factors, surface = model["label"], model["factors"], model["surface"]
     kind = "polynomial" if isinstance(surface, PolynomialSurface) else "gaussian_process"
-    own = vars(surface)
+    fields = vars(surface)
     if isinstance(surface, PolynomialSurface):
-        own = vars(surface.support.basis) | vars(surface.support) | own
+        fields = vars(surface.support.basis) | vars(surface.support) | fields
     units = {name: Wanted(factor.units, "numbers") for name, factor in factors.items()}
     response = dict(zip(_LABELS, (model["name"], *label), strict=True))
     tables = {
         "factors": written(_columns(factors), _LABELS),
         "response": {part: Entry(value=value) for part, value in response.items()},
-        kind: written(own, _surface_keys(kind, label)),
+        kind: written(fields, _surface_keys(kind, label)),
         "points": written(dict(zip(factors, surface.points.T, strict=True)), units),
         "values": written({model["name"]: surface.values}, {model["name"]: Wanted(label.units, "numbers")}),
     }
@@ -146,11 +146,11 @@ def response_file(model: Mapping[str, Any]) -> ParameterFile:
 
 def read_response(file: ParameterFile) -> dict[str, Any]:
     """Give the fields of the response model of such a file."""
-    known = ("polynomial", "gaussian_process")
-    kinds = [kind for kind in known if kind in file.tables]
+    forms = ("polynomial", "gaussian_process")
+    kinds = [kind for kind in forms if kind in file.tables]
     if file.kind == "response" and len(kinds) != 1:
         raise DataError(
-            f"{file.origin}: holds {' and '.join(kinds) or 'neither'}: must hold one of [{'], ['.join(known)}]"
+            f"{file.origin}: holds {' and '.join(kinds) or 'neither'}: must hold one of [{'], ['.join(forms)}]"
         )
     file.expect(kinds=("response",), tables=("factors", "response", "points", "values", *kinds))
     factors = _labels(file, "factors", file.values("factors", _LABELS))
@@ -159,10 +159,10 @@ def read_response(file: ParameterFile) -> dict[str, Any]:
     columns = file.values("points", {factor: Wanted(each.units, "numbers") for factor, each in factors.items()})
     values = _array(file, "values", file.values("values", {name: Wanted(label.units, "numbers")})[name])
     points = np.column_stack([_array(file, factor, columns[factor], values.shape) for factor in factors])
-    own = {"points": points, "values": values}
+    fields = {"points": points, "values": values}
     (kind,) = kinds
     read = _polynomial if kind == "polynomial" else _process
-    surface = read(file, _surface_keys(kind, label), tuple(factors), own)
+    surface = read(file, _surface_keys(kind, label), tuple(factors), fields)
     return {"name": name, "label": label, "factors": factors, "surface": surface}
 
 

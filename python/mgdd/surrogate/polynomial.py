@@ -41,9 +41,9 @@ class PolynomialBasis:
             terms = terms * z[:, column]
         return np.asarray(terms, dtype=np.float64)
 
-    def only(self, kept: Sequence[int] | NDArray[np.intp]) -> PolynomialBasis:
+    def only(self, columns: Sequence[int] | NDArray[np.intp]) -> PolynomialBasis:
         """Return some of the terms."""
-        return PolynomialBasis(centre=self.centre, scale=self.scale, monomials=self.monomials[kept])
+        return PolynomialBasis(centre=self.centre, scale=self.scale, monomials=self.monomials[columns])
 
     def names(self, inputs: Sequence[str]) -> tuple[str, ...]:
         """Name the terms, for example ``1``, ``soi_cad``, ``soi_cad^2`` and ``soi_cad*fuel_mg``."""
@@ -178,27 +178,27 @@ def choose_terms(
     def with_factors(term: int) -> frozenset[int]:
         return frozenset({term}).union(*map(with_factors, needs[term]))
 
-    known: dict[frozenset[int], float] = {}
+    criteria: dict[frozenset[int], float] = {}
 
-    def worth(kept: frozenset[int]) -> float:
-        if kept not in known:
-            known[kept] = _criterion(terms[:, sorted(kept)], values, criterion)
-        return known[kept]
+    def worth(chosen: frozenset[int]) -> float:
+        if chosen not in criteria:
+            criteria[chosen] = _criterion(terms[:, sorted(chosen)], values, criterion)
+        return criteria[chosen]
 
-    def searched(kept: frozenset[int]) -> frozenset[int]:
+    def searched(some: frozenset[int]) -> frozenset[int]:
         while True:
-            needed: frozenset[int] = frozenset().union(*(needs[term] for term in kept))
-            trials: list[frozenset[int]] = [kept | with_factors(term) for term in range(len(rows)) if term not in kept]
-            trials += [kept - {term} for term in kept - needed if term != 0]
-            best = min([kept, *trials], key=worth)
-            if not worth(best) < worth(kept) - _LEAST_GAIN:
-                return kept
-            kept = best
+            needed: frozenset[int] = frozenset().union(*(needs[term] for term in some))
+            trials: list[frozenset[int]] = [some | with_factors(term) for term in range(len(rows)) if term not in some]
+            trials += [some - {term} for term in some - needed if term != 0]
+            best = min([some, *trials], key=worth)
+            if not worth(best) < worth(some) - _LEAST_GAIN:
+                return some
+            some = best
 
-    found = [searched(frozenset({0}))]
+    searches = [searched(frozenset({0}))]
     if np.isfinite(worth(frozenset(range(len(rows))))):
-        found.append(searched(frozenset(range(len(rows)))))
-    least = min(found, key=worth)
+        searches.append(searched(frozenset(range(len(rows)))))
+    least = min(searches, key=worth)
     return np.array(sorted(least), dtype=np.intp)
 
 

@@ -204,16 +204,16 @@ def prediction_table(
     variables |= {name: (POINT, columns[name], *labels[name]) for name in beside}
     outside: dict[str, int] = {}
     for model in models:
-        found = model.predict({name: columns[name].ravel() for name in model.factors}, level=level)
-        beyond = found["extrapolated"].to_numpy()
+        prediction = model.predict({name: columns[name].ravel() for name in model.factors}, level=level)
+        beyond = prediction["extrapolated"].to_numpy()
         outside[model.name] = int(beyond.sum())
         keep = np.ones(beyond.shape, dtype=bool) if extrapolate else ~beyond
         for ending, part in _PARTS.items():
-            values = np.where(keep, found[part].to_numpy(), np.nan).reshape(shape)
-            variables[f"{model.name}{ending}"] = (dims, values, *label_of(found[part]))
+            values = np.where(keep, prediction[part].to_numpy(), np.nan).reshape(shape)
+            variables[f"{model.name}{ending}"] = (dims, values, *label_of(prediction[part]))
         if extrapolate:
             where = beyond.reshape(shape).astype(np.int8)
-            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
+            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(prediction["extrapolated"]))
     table = labelled_dataset(variables, attrs={"level": level}).set_coords(beside)
     for model in models:
         table[model.name].attrs["source"] = "predicted"

@@ -33,11 +33,11 @@ def best_along(
     at: NDArray[np.float64],
     *,
     weights: Mapping[str, float],
-    kept: tuple[Limit, ...],
+    upper_limits: tuple[Limit, ...],
     nonnegative: tuple[str, ...],
 ) -> Optimum:
     """Maximise the weighted sum of signals over SOI where supported and within the limits, the rest of a point held."""
-    limits = {limit.name: limit.upper - limit.margin for limit in kept}
+    limits = {limit.name: limit.upper - limit.margin for limit in upper_limits}
     column = support.inputs.index("soi_cad")
     low, high = float(support.lower[column]), float(support.upper[column])
     nodes = np.linspace(low, high, 5)
@@ -78,7 +78,7 @@ def best_along(
         objective=" + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items()),
         value=float(goal(best)),
         values={name: float(curve(best)) for name, curve in curves.items()},
-        limits=kept,
+        limits=upper_limits,
         active_limits=tuple(n for n, curve in held.items() if abs(curve(best)) <= _TINY * max(1.0, abs(limits[n]))),
         at_bound=min(best - start, end - best) <= _TINY * (high - low),
         bounds={"soi_cad": (start, end)},
@@ -88,7 +88,7 @@ def best_along(
 
 def _inner_roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.float64]:
     """Return the ends of the range and the real roots between them, sorted."""
-    found = [low, high]
+    roots = [low, high]
     for curve in curves:
         slope = curve.deriv()
         for root in curve.trim(_TINY**2 * np.abs(curve.coef).max()).roots():
@@ -96,8 +96,8 @@ def _inner_roots(curves: list[Polynomial], low: float, high: float) -> NDArray[n
             for _ in range(3):  # Newton: a nearly straight curve spoils the digits of its companion matrix
                 at = at - float(curve(at) / slope(at)) if slope(at) != 0.0 else at
             if abs(np.imag(root)) < _TINY * (high - low) and low < at < high:
-                found.append(at)
-    return np.unique(found)
+                roots.append(at)
+    return np.unique(roots)
 
 
 def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np.bool_]) -> tuple[float, float]:
@@ -244,10 +244,10 @@ class EngineSurrogate(Parameters):
             No supported SOI meets the limits.
         """
         weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
-        kept = limits_of(limits)
+        upper_limits = limits_of(limits)
         if not weights:
             raise ParameterError("objective = {}: must name at least one signal")
-        for what, numbers in (("objective", weights), ("limits", {limit.name: limit.upper for limit in kept})):
+        for what, numbers in (("objective", weights), ("limits", {limit.name: limit.upper for limit in upper_limits})):
             for name, value in numbers.items():
                 if name not in self.signals:
                     raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {', '.join(self.signals)}")
@@ -258,7 +258,7 @@ class EngineSurrogate(Parameters):
             {name: signal.coefficients for name, signal in self.signals.items()},
             self.points(np.zeros(1), at)[0],
             weights=weights,
-            kept=kept,
+            upper_limits=upper_limits,
             nonnegative=self.nonnegative,
         )
 

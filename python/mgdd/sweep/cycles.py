@@ -55,14 +55,14 @@ class Request:
 
 def simulate_cases(request: Request, columns: NDArray[np.float64]) -> dict[str, NDArray[np.generic]]:
     """Simulate cases that differ in the named inputs, on one thread."""
-    wanted = dict.fromkeys(name for name in request.outputs if name not in NOX)
-    wanted |= dict.fromkeys(["t_max_k"] if set(NOX) & set(request.outputs) else [])
-    found = _batch(request, columns, [*wanted, *([] if _ALWAYS in wanted else [_ALWAYS])])
-    out: dict[str, NDArray[np.generic]] = {VOID: np.flatnonzero(np.isnan(found[_ALWAYS]))}
+    needed = dict.fromkeys(name for name in request.outputs if name not in NOX)
+    needed |= dict.fromkeys(["t_max_k"] if set(NOX) & set(request.outputs) else [])
+    outputs = _batch(request, columns, [*needed, *([] if _ALWAYS in needed else [_ALWAYS])])
+    out: dict[str, NDArray[np.generic]] = {VOID: np.flatnonzero(np.isnan(outputs[_ALWAYS]))}
     for name, proxy in zip(NOX, (request.nox.affine_log_ppm, request.nox.arrhenius_ppm), strict=True):
         if name in request.outputs:
-            out[name] = proxy(found["t_max_k"])
-    out |= {name: found[name] for name in request.outputs if name in found}
+            out[name] = proxy(outputs["t_max_k"])
+    out |= {name: outputs[name] for name in request.outputs if name in outputs}
     return out | _traces(request, columns)
 
 
@@ -78,12 +78,12 @@ def _batch(request: Request, columns: NDArray[np.float64], outputs: Sequence[str
     shared = (request.cylinder, request.point, request.soc_cad, request.names)
     scheme = (request.step_cad, request.integrator)
     try:
-        found: Mapping[str, NDArray[np.float64]] = _core.engine.batch(
+        columns_out: Mapping[str, NDArray[np.float64]] = _core.engine.batch(
             *shared, columns, outputs, *scheme, threads=1, form=request.form
         )
     except ParameterError as error:
         raise _located(error, request, columns) from None
-    return found
+    return columns_out
 
 
 def _located(error: ParameterError, request: Request, columns: NDArray[np.float64]) -> ParameterError:
@@ -285,13 +285,13 @@ def _finding(cases: Cases, void: _Void) -> Finding:
     return Finding("unphysical", tuple(cases.names), text + case_text(cases.names, row), remedy)
 
 
-def _chosen(what: str, given: str | Iterable[str] | None, known: Iterable[str]) -> tuple[str, ...]:
-    known = tuple(known)
-    names = known if given is None else (given,) if isinstance(given, str) else tuple(given)
+def _chosen(what: str, given: str | Iterable[str] | None, choices: Iterable[str]) -> tuple[str, ...]:
+    choices = tuple(choices)
+    names = choices if given is None else (given,) if isinstance(given, str) else tuple(given)
     for name in names:
-        if name not in known:
-            hint = did_you_mean(name, known) or "known are"
-            raise ParameterError.of(argument(what), name, f"a known name: {hint} {', '.join(known)}")
+        if name not in choices:
+            hint = did_you_mean(name, choices) or "known are"
+            raise ParameterError.of(argument(what), name, f"a known name: {hint} {', '.join(choices)}")
     if len(set(names)) < len(names):
         raise ParameterError.of(argument(what), ", ".join(names), "names that differ")
     return names
@@ -475,6 +475,6 @@ def _values(name: str, given: Any) -> NDArray[np.float64]:
 
 
 def _require_different(name: str, values: NDArray[np.float64]) -> None:
-    found, counts = np.unique(values, return_counts=True)
+    entries, counts = np.unique(values, return_counts=True)
     if (counts > 1).any():
-        raise ParameterError.of(name, float(found[counts > 1][0]), "on the axis once; it is given several times")
+        raise ParameterError.of(name, float(entries[counts > 1][0]), "on the axis once; it is given several times")

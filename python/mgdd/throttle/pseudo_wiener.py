@@ -113,8 +113,8 @@ class PseudoWiener(SampledModel, Parameters):
     @property
     def units(self) -> Mapping[str, str]:
         """Unit of every parameter."""
-        known = _core.throttle.pseudo_wiener_units(self.kind)
-        return MappingProxyType({name: str(known[name]) for name in self.parameters})
+        units = _core.throttle.pseudo_wiener_units(self.kind)
+        return MappingProxyType({name: str(units[name]) for name in self.parameters})
 
     def replace(self, **changes: float) -> PseudoWiener:
         """Give a copy with other numbers.

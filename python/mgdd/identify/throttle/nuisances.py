@@ -147,14 +147,14 @@ class _Slopes:
         As `block_sandwich` of the core does it for blocks that the correlation of the residual asks for.
         """
         whole = self.slopes.T @ self.slopes
-        block_slope = np.zeros(self.norms.size)
+        variances = np.zeros(self.norms.size)
         for shift in (0, rows // 2):
             for first in range(-shift, residual.size, rows):
                 block = slice(max(first, 0), first + rows)
                 slopes = self.slopes[block]
                 left = (1.0 + _RIDGE) * whole - slopes.T @ slopes
-                block_slope += 0.5 * np.linalg.lstsq(left, slopes.T @ residual[block], rcond=1e-12)[0] ** 2
-        return np.asarray((1.0 - rows / residual.size) * block_slope / self.norms**2)
+                variances += 0.5 * np.linalg.lstsq(left, slopes.T @ residual[block], rcond=1e-12)[0] ** 2
+        return np.asarray((1.0 - rows / residual.size) * variances / self.norms**2)
 
 
 def _angle(problem: GroupsProblem, values: Mapping[str, float], substeps: int) -> NDArray[np.float64]:
