@@ -56,7 +56,7 @@ def unbound(
     keywords: Mapping[str, Any],
     how: Mapping[str, str],
 ) -> TypeError | None:
-    """Say why a call does not fit the signature of a Python function; `how` has kind and meaning of its parameters."""
+    """Return why a call does not fit the signature of a Python function; `how` has kind and meaning of its parameters."""
     places = [each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
     arguments = [
         _Argument(
@@ -75,7 +75,7 @@ def unbound(
 def refusal(
     name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
 ) -> TypeError | ParameterError:
-    """Say why a call fits none of its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
+    """Return why a call fits none of its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
 
     The latter names the argument that has the wrong kind; the first one of a `method` is ``self``.
     """
@@ -109,7 +109,7 @@ def refusal(
 def unit_refusal(
     name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
 ) -> ParameterError | None:
-    """Say which number carries a unit where a plain one is wanted; None where none does. Arguments as for `refusal`."""
+    """Report which number has a unit where a plain one is needed; None where none does. Arguments as for `refusal`."""
     error = refusal(name, signatures, given, keywords, method)
     return error if isinstance(error, ParameterError) else None
 
@@ -296,7 +296,7 @@ def _plural(kind: ast.expr) -> str:
 
 
 def _remedy(argument: _Argument, value: Any) -> str:
-    """Say what to do, where what was given tells."""
+    """Give the remedy, where the value shows it."""
     if has_units(value):
         return f"; {_PLAIN}"
     for name in dict.fromkeys((argument.name, *(_name(choice).lower() for choice in _choices(argument.kind)))):

@@ -110,7 +110,7 @@ def _answering(function: FunctionType, name: str, doc: str | None) -> Any:
                 raise better from None
             raise
 
-    # With the globals of its module, by which doctest knows whose examples are whose.
+    # With the globals of its module, by which doctest assigns examples to modules.
     answering = FunctionType(call.__code__, function.__globals__, function.__name__, None, call.__closure__)
     return functools.wraps(function)(answering)
 
@@ -139,7 +139,7 @@ def _look(
 
 
 def _of_a_record(name: str, unknown: str, names: Sequence[str]) -> TypeError | None:
-    """Say how a setting of an engine, a point or a throttle is given to a function that takes the whole record."""
+    """Explain how a setting of an engine, a point or a throttle is given to a function that takes the whole record."""
     from mgdd import _core
 
     for argument, (room, record, form) in _RECORDS.items():

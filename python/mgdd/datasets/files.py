@@ -194,7 +194,7 @@ def path(name: str, file: str) -> Path:
 
 
 def place(name: str) -> str:
-    """Say where a data set is, or how it gets here."""
+    """Describe where a data set is, or how to get it."""
     if name in names():
         return str(path(name, FILES[name][0]).parent)
     fetched_by = f"mgdd data get {name} --fetch -o FILE"

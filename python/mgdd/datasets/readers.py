@@ -117,7 +117,7 @@ def read(
     Raises
     ------
     FileNotFoundError
-        The set is in none of these places; the message says where its files belong.
+        The set is in none of these places; the message states where its files belong.
     mgdd.errors.ParameterError
         An unknown name, an option of another set, or a set without a public address to fetch.
     mgdd.errors.DataError

@@ -39,7 +39,7 @@ def d_optimal(
 
     Fedorov's exchange in the form of Cook and Nachtsheim: each point in turn gives way to the candidate that raises
     the determinant most, until none does. A local optimum, hence several random starts. Rows, shape (c, p) and (k, p),
-    hold the p terms of the model at points that may be chosen and that stay; a DataError says that they do not
+    hold the p terms of the model at points that may be chosen and that stay; a DataError reports that they do not
     determine the terms.
 
     Fedorov (1972), Theory of Optimal Experiments.

@@ -46,7 +46,7 @@ def design_points(
     ----------
     factors : mapping of str to tuple, sequence or set of float
         Per factor its range (low, high), three or more levels, or a set of levels where there are two. A name that ends
-        in its unit says it.
+        in its unit gives it.
     n : int, optional
         Points to add; all methods but ``"factorial"`` need it.
     method : {"sobol", "halton", "lhs", "maximin", "factorial", "d_optimal"}
@@ -269,7 +269,7 @@ class Factor:
 
     @property
     def label(self) -> Label:
-        """Unit and long name, as far as the name says them."""
+        """Unit and long name, as far as the name gives them."""
         return named_label(self.name)
 
     def of_unit(self, share: NDArray[np.float64]) -> NDArray[np.float64]:

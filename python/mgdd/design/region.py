@@ -50,7 +50,7 @@ class _Modelled:
                 raise ShapeError(f"{limit.name} of the model has shape {value.shape}: must be ({size},), one per point")
             allowed = limit.upper - limit.margin
             scale = limit.scale if limit.scale > 0.0 else abs(limit.upper) or 1.0
-            # A model that fails at a point (NaN) says nothing for it: as far outside as can be.
+            # A model that fails at a point (NaN) does not support it: as far outside as can be.
             room[place] = np.where(np.isfinite(value), (allowed - value) / scale, -np.inf)
             values[limit.name] = value
         nearest = np.argmin(room, axis=0)
@@ -201,7 +201,7 @@ class FeasibleRegion:
         return cls(_Measured(hull=hull, names=names, driven=driven, refused=refused, margin=float(margin)))
 
     def contains(self, points: Any) -> NDArray[np.bool_]:
-        """Say which points are feasible.
+        """Return which points are feasible.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class FeasibleRegion:
         return self._judged(points)[1].distance >= -EDGE
 
     def evaluate(self, points: Any) -> xr.Dataset:
-        """Say how far points lie inside, and what bounds them.
+        """Return how far points lie inside, and what bounds them.
 
         Parameters
         ----------

@@ -209,7 +209,7 @@ def sensitivities(
     -------
     xarray.Dataset
         ``d_NAME`` for the names of `simulate`, per unit of the parameter: ``d_pressure_bar(crank_angle_cad,
-        parameter)`` and the indicators over ``parameter``. Coordinate ``parameter_units`` says the units.
+        parameter)`` and the indicators over ``parameter``. Coordinate ``parameter_units`` gives the units.
 
     Raises
     ------

@@ -62,7 +62,7 @@ class DegreeCost(NamedTuple):
         return f"1 °CA moves the closed IMEP by {self.error_bar:.2g} bar{share}"
 
     def of_fired(self) -> str:
-        """Say what a fired trace leaves open."""
+        """Report what a fired trace leaves open."""
         return f"a fired trace hardly shows an error of TDC, and {self}"
 
 
@@ -81,7 +81,7 @@ def degree_cost(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder) -> De
 
 
 class MotoredTdc(NamedTuple):
-    """What motored strokes say: by how much the angles are too large, and what no sound engine has.
+    """What motored strokes show: by how much the angles are too large, and what no sound engine has.
 
     The half is how far the offset may be off to each side; the wall heat is over Hohenberg's, the loss angle that of
     the peak before TDC.
@@ -95,7 +95,7 @@ class MotoredTdc(NamedTuple):
 
     @classmethod
     def of_many(cls, strokes: Sequence[Self]) -> Self:
-        """Give what several records of one encoder say: their mean, with twice their scatter."""
+        """Combine several records of one encoder: their mean, with twice their scatter."""
         numbers = np.array([each[:4] for each in strokes])
         offset, half, wall, loss = map(float, numbers.mean(axis=0))
         half = math.hypot(half, 2.0 * float(numbers[:, 0].std()))
@@ -103,7 +103,7 @@ class MotoredTdc(NamedTuple):
         return cls(offset, half, wall, loss, tuple(findings))
 
     def doubts(self) -> tuple[str, ...]:
-        """Say that the angles are outside the range, and what no sound engine has."""
+        """Report that the angles are outside the range, and what no sound engine has."""
         if abs(self.offset_cad) <= self.offset_half_cad:
             return self.findings
         shown = f"{self.offset_cad:+.2f} ± {self.offset_half_cad:.2f}"

@@ -69,7 +69,7 @@ def find_optimum(
     mgdd.errors.ParameterError
         An unknown objective or limit, a motored point, bounds outside [-60, 20].
     mgdd.errors.ConvergenceError
-        No timing in the range meets the limits; the message says how near it comes.
+        No timing in the range meets the limits; the message states how near it comes.
 
     Examples
     --------

@@ -192,7 +192,7 @@ def check_pressure(
     fuel_mg: float | None = None,
     assumed: str = "",
 ) -> PressureCheck:
-    """Check a pressure file before its figures are believed.
+    """Check a pressure file before its figures are used.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def check_pressure(
     Notes
     -----
     Bounds come from spark- and compression-ignition engines that share no code with the package, over four wall-heat
-    laws: ``docs/validation.md`` says how many faults of which size are met, and which are out of reach. An error of TDC
+    laws: ``docs/validation.md`` has how many faults of which size are met, and which are out of reach. An error of TDC
     of a fired trace is out of reach and stays ``open``, see `mgdd.identify.estimate_tdc`.
 
     Examples
@@ -268,7 +268,7 @@ def check_pressure(
 
 
 def _of_angle(text: str) -> bool:
-    """Whether a line of the reader is one that the record says again."""
+    """Whether a line of the reader is one that the record repeats."""
     return "crank angle slips" in text or "a turn of the shaft is missing" in text
 
 
@@ -310,7 +310,7 @@ def _skipped(trace: xr.Dataset, figures: xr.Dataset, given: list[str]) -> dict[s
 
 
 _COARSE_CAD = 2.5
-# A soft saturation is told from a burn by spark alone, and by so many cycles; a shift of a degree matters.
+# A soft saturation is distinguished from a burn by spark alone, and by so many cycles; a shift of a degree matters.
 _SPARK_RATIO, _SOFT_CYCLES, _WANTED_CAD = 14.0, 10, 1.0
 # Level of a cycle [bar]: off the median by more than this and six robust deviations, or drifting from first to last.
 _OFF_BAR, _OFF_SCATTERS, _DRIFT_BAR, _DRIFT_STDERRS = 0.1, 6.0, 0.1, 5.0
@@ -365,7 +365,7 @@ def _slips(trace: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def hidden(trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder) -> dict[str, tuple[str, str]]:
-    """Say by check what faults these data would not show, and the size below which they stay hidden."""
+    """Report by check what faults these data would not show, and the size below which they stay hidden."""
     angle, bar = _columns(trace)
     step = float(np.median(np.diff(angle)))
     out = {}

@@ -68,7 +68,7 @@ def analyze(
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
-        Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
+        Speed, temperatures and trapped mass where the trace has none. Without a mass it is p V/(R T) at IVC, with
         ``ivc_temperature_k`` or the intake temperature + 40 K. Numbers by name are of this record: their ``fuel_mg``
         and ``intake_pressure_kpa`` judge the trace as the keywords do. A preset or an OperatingPoint may be of another
         load: its fuel judges nothing, its intake pressure a factor of 3.

@@ -303,7 +303,7 @@ def _peak_khz(
     """Highest peak in the band of the mean spectrum of n cycles that stands out of both shoulders; NaN if none does."""
     from scipy.special import gammaincinv
 
-    apart = max((band_khz[1] - band_khz[0]) * span_ms, 1.0)  # frequencies that the window tells apart
+    apart = max((band_khz[1] - band_khz[0]) * span_ms, 1.0)  # frequencies that the window resolves
     above = max(_ABOVE, gammaincinv(n, 1.0 - _BY_NOISE / apart) / gammaincinv(n, 0.5))
     peaks = 1 + np.flatnonzero((mean[1:-1] >= mean[:-2]) & (mean[1:-1] > mean[2:]))
     peaks = peaks[(khz[peaks] > band_khz[0]) & (khz[peaks] < band_khz[1])]

@@ -24,7 +24,7 @@ _TIMING = "°CA aTDC"
 
 
 class MapPoints(NamedTuple):
-    """What a map says at points.
+    """What a map gives at points.
 
     Parameters
     ----------
@@ -41,15 +41,15 @@ class MapPoints(NamedTuple):
 class CalibrationMap(MapForms):
     """A table over one or two axes as a control unit holds it: (bi)linear between its cells, held at its edges.
 
-    It does not change. Beside its value each cell knows its source, its support, its standard deviation, the range in
+    It does not change. Beside its value each cell has its source, its support, its standard deviation, the range in
     which the value may lie and the limit that holds it.
 
     Parameters
     ----------
     axes : mapping of str to array_like
-        One or two, strictly increasing, two entries at least; the ending of a name says its unit.
+        One or two, strictly increasing, two entries at least; the ending of a name gives its unit.
     values : array_like
-        One axis of the array per axis; a number for all cells. NaN only where the source says why.
+        One axis of the array per axis; a number for all cells. NaN only where the source gives the reason.
     name : str
         What the values are, for example ``soc_cad``.
     labels : mapping of str to (str, str), optional

@@ -139,7 +139,7 @@ def _add_numbers(parent: ET.Element, numbers: Sequence[float]) -> None:
 
 
 def _parsed(raw: bytes, origin: str) -> ET.Element:
-    """Parse XML that declares nothing, at most 64 levels deep; each element knows its line, an axis its comment."""
+    """Parse XML that declares nothing, at most 64 levels deep; each element has its line, an axis its comment."""
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
 
     def refused(message: str) -> DataError:
@@ -190,7 +190,7 @@ def _parsed(raw: bytes, origin: str) -> ET.Element:
 
 
 def _block(instance: ET.Element, origin: str) -> tuple[DcmBlock | None, str]:
-    """Read an instance, or say why it is skipped."""
+    """Read an instance, or report why it is skipped."""
     name, kind, line = _text(instance, "SHORT-NAME"), _text(instance, "CATEGORY"), int(instance.get("line", "0"))
     if not name:
         return None, f"line {line}: SW-INSTANCE without SHORT-NAME"

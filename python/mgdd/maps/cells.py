@@ -1,4 +1,4 @@
-"""What a calibration map knows of each cell beside its value, and the one check of it."""
+"""What a calibration map holds of each cell beside its value, and the one check of it."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from mgdd.results.units import attribute_units, unit_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# Where a value comes from; the last two say why there is none.
+# Where a value comes from; the last two give why there is none.
 SOURCES = (
     "given", "measured", "predicted", "extrapolated", "optimised", "smoothed", "interpolated", "held", "learned",
     "infeasible", "unattainable",
 )  # fmt: skip
 WITHOUT_VALUE = SOURCES[-2:]
-# Columns of numbers: long name, what stands where nothing is said, and the least that may stand there.
+# Columns of numbers: long name, the default, and the least allowed value.
 NUMBERS: Mapping[str, tuple[str, float, float]] = {
     "support": ("points behind the value", 0.0, 0.0),
     "sd": ("standard deviation", np.nan, 0.0),
@@ -104,7 +104,7 @@ def checked_cells(
     axes: Mapping[str, NDArray[np.float64]],
     given: Mapping[str, ArrayLike],
 ) -> dict[str, NDArray[Any]]:
-    """Give every column with the shape of the values; NaN is a value only where the source says why."""
+    """Give every column with the shape of the values; NaN is allowed only where the source gives the reason."""
     for name in given:
         if name not in NUMBERS and name not in TEXTS:
             near = did_you_mean(name, (*NUMBERS, *TEXTS)) or f"known are {', '.join((*NUMBERS, *TEXTS))}"

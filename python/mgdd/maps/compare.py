@@ -101,7 +101,7 @@ def compare_maps(
 
 
 def apply_map(table: CalibrationMap | xr.Dataset, sweep: xr.Dataset) -> xr.Dataset:
-    """Read what a sweep says at the values of a map: what the map achieves.
+    """Read a sweep at the values of a map: what the map achieves.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def apply_map(table: CalibrationMap | xr.Dataset, sweep: xr.Dataset) -> xr.Datas
     -------
     xarray.Dataset
         The map and every variable of the sweep over the operating axes, linear between the points of the sweep; NaN
-        where the map has no value. A map that knows its objective has ``loss`` too: how far the objective lies from
+        where the map has no value. A map that has its objective has ``loss`` too: how far the objective lies from
         that of `optimize_map` under the limits of the map.
 
     Raises

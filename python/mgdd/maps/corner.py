@@ -109,7 +109,7 @@ def _side(part: str) -> tuple[str, str]:
 
 
 def _chosen(down: str, across: str, rows: str | None, columns: str | None, where: str) -> tuple[str, str]:
-    """Let the arguments say which of two labels runs down."""
+    """Let the arguments decide which of two labels runs down."""
     first_down = set()
     for name, is_down in ((rows, True), (columns, False)):
         fits = (name is not None and _fits(down, name), name is not None and _fits(across, name))

@@ -37,7 +37,7 @@ _COMMENTS = {"*SSTX": "axis_x", "*SSTY": "axis_y", "*SST": "axis_x"}
 class DcmBlock:
     """A value, curve or map of a file: one row of values per entry of y; axes and texts that it lacks are empty.
 
-    `sizes` are the entries of the axes as the head gives them; `is_axis` says that it holds breakpoints alone, in x.
+    `sizes` are the entries of the axes as the head gives them; `is_axis` marks one with breakpoints alone, in x.
     """
 
     name: str
@@ -82,7 +82,7 @@ def dcm_text(blocks: Sequence[DcmBlock], comments: Sequence[str]) -> str:
 
 
 def dcm_blocks(text: str, origin: str) -> tuple[list[DcmBlock], list[str]]:
-    """Read values, curves, maps and breakpoints, and name what is skipped: other blocks, keywords that nobody knows."""
+    """Read values, curves, maps and breakpoints, and name what is skipped: other blocks, unknown keywords."""
     lines = _lines(text)
     first = lines.pop(0) if lines else None
     if first is None or first.word != _HEAD:

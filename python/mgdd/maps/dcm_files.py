@@ -111,7 +111,7 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     Parameters
     ----------
     path : path-like
-        DCM, format 2.0, UTF-8 or Windows-1252, or CDFX (ASAM CDF 2.0); its content says which. Axes have the names that
+        DCM, format 2.0, UTF-8 or Windows-1252, or CDFX (ASAM CDF 2.0); decided by its content. Axes have the names that
         ``*SSTX`` and ``*SSTY`` give, or the axis that several maps share, where an axis can be called so, else ``x``
         and ``y``.
 

@@ -43,7 +43,7 @@ def write_map(
     values: Mapping[str, tuple[float, str]] | None = None,
     encoding: str = "utf-8",
 ) -> None:
-    """Write a map in the form that the ending of the file says; DCM and CDFX hold several, and single values.
+    """Write a map in the form that the ending of the file selects; DCM and CDFX hold several, and single values.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def read_map(
         Decimal mark of a text file.
     rows : str, optional
         Axis that runs down a grid, by its label in the corner or by the name that it gets; in a table the column of the
-        first axis; as the file says if left out.
+        first axis; as the file states if left out.
     columns : str, optional
         The same of the axis that runs across, the second one.
     sheet : str, optional
@@ -142,7 +142,7 @@ def read_map(
     -------
     CalibrationMap
         Equal to the one that was written; of other files what they hold. Cells that are empty are ``unattainable``;
-        points of a table that are repeated count with their mean, which ``provenance`` says.
+        points of a table that are repeated count with their mean, which ``provenance`` states.
 
     Warns
     -----
@@ -156,7 +156,7 @@ def read_map(
     mgdd.errors.ParameterError
         A name that the file does not have, `rows` or `columns` where a file names its axes.
     mgdd.errors.DataError
-        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than its names say, another number
+        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than by its names, another number
         of values, a corner that leaves open which axis runs down, or points that are no grid; the message names file,
         line or field, and remedy.
     ImportError
@@ -208,7 +208,7 @@ def read_map(
 
 
 def _form_of(file: Path) -> str:
-    """Tell a form by its content, by the ending of the file only where that says nothing; "" for grids and points."""
+    """Detect a form by its content, by the ending of the file only where that is open; "" for grids and points."""
     with file.open("rb") as stream:
         head = stream.read(_HEAD)
     ending = file.suffix.lower()

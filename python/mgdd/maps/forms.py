@@ -45,7 +45,7 @@ class MapForms(Result):
         Returns
         -------
         mgdd.guide.TimingMap
-            With the values as best timings, at most as certain as `sd` says: a cell without it has ``prior_sd_cad``. It
+            With the values as best timings, at most as certain as by `sd`: a cell without it has ``prior_sd_cad``. It
             has no support yet: that counts confirmed optima.
 
         Raises
@@ -153,7 +153,7 @@ class MapForms(Result):
             The variable; the map that the Dataset names, if left out.
         source : str, optional
             Source of the cells of any other Dataset than a map. If left out: the attribute ``source`` of the variable,
-            where it is one of those of a map, and ``extrapolated`` where the variable ``NAME_extrapolated`` says so;
+            where it is one of those of a map, and ``extrapolated`` where the variable ``NAME_extrapolated`` is set;
             otherwise ``given``. Cells without a value are ``unattainable``.
 
         Returns

@@ -84,7 +84,7 @@ def optimize_map(
     mgdd.errors.DataError
         A sweep with other axes, repeated breakpoints or too few points.
     mgdd.errors.ConvergenceError
-        Cells in which nothing keeps the limits; the message says how near the nearest comes.
+        Cells in which nothing keeps the limits; the message states how near the nearest comes.
 
     Notes
     -----

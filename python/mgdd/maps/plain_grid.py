@@ -167,7 +167,7 @@ def _names_columns(cells: list[str], width: int) -> bool:
 
 
 def _cells(text: str, mark: str | None, origin: str) -> Rows:
-    """Give the cells of every line that says something; of blanks only those behind a corner separate."""
+    """Give the cells of every line with content; of blanks only those behind a corner separate."""
     if mark is None:
         rows = []
         for number, line in enumerate(text.splitlines(), start=1):

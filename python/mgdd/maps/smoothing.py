@@ -64,8 +64,8 @@ def smooth_map(
     Returns
     -------
     CalibrationMap
-        Values with the source ``smoothed``, none outside of its range; ``active_limit`` says what holds a value:
-        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis. ``provenance`` says the
+        Values with the source ``smoothed``, none outside of its range; ``active_limit`` names what holds a value:
+        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis. ``provenance`` gives the
         largest move, and which cells were filled.
 
     Warns
@@ -165,7 +165,7 @@ def _within(smoothed: Array, values: Array, tolerance: float) -> Array:
 
 
 def _outside(optimum: CalibrationMap, finite: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Say which cells lie outside of the convex hull of those with a value."""
+    """Return which cells lie outside of the convex hull of those with a value."""
     points = np.stack([entries.ravel() for entries in np.meshgrid(*optimum.axes.values(), indexing="ij")], axis=1)
     base = points[finite]
     varies = np.ptp(base, axis=0) > 0.0
@@ -235,7 +235,7 @@ def _check_ranges(
 def _half_widths(
     values: Array, low: Array, high: Array, ranged: NDArray[np.bool_], finite: NDArray[np.bool_]
 ) -> tuple[float, Array]:
-    """Return the median half width and that of each cell; without ranges the values themselves say what is much."""
+    """Return the median half width and that of each cell; without ranges the values themselves set the scale."""
     if not ranged.any():
         return (scale := float(np.ptp(values[finite])) or 1.0), np.where(finite, scale, np.inf)
     width = np.where(ranged, np.maximum(high - values, values - low), np.nan)
@@ -340,7 +340,7 @@ def _solve(
 
 
 def _holds(values: Array, low: Array, high: Array, pairs: _Pairs, near: float) -> NDArray[np.str_]:
-    """Say what holds each value: an end of its range first, then a slope."""
+    """Return what holds each value: an end of its range first, then a slope."""
     held = np.full(values.size, "", "U64")
     steep = np.abs(values[pairs.second] - values[pairs.first]) >= pairs.most * (1.0 - 1e-4)
     for column in (pairs.first, pairs.second):

@@ -12,7 +12,7 @@ from mgdd.results.labels import VARIABLES, name_unit
 from mgdd.results.units import attribute_units
 
 NOT_GIVEN = "not given"
-# Units as calibration tools write them; everything else stands as it is. Where an angle counts from they do not say.
+# Units as calibration tools write them; everything else stands as it is. Where an angle counts from they do not state.
 _UNITS = {
     "°KW": "°CA", "°CRK": "°CA", "deg CA": "°CA", "degCA": "°CA", "1/min": "rpm", "U/min": "rpm", "min-1": "rpm",
     "RPM": "rpm", "Nm": "N m", "N·m": "N m", "N*m": "N m", "°C": "degC", "grad C": "degC", "°": "deg",
@@ -22,7 +22,7 @@ _BRACKETS = re.compile(r"[\[({]([^\[\](){}]*)[\])}]\s*$")
 
 
 class Heading(NamedTuple):
-    """What a file says of an axis or a value: how a map calls it, its unit, and its name in words."""
+    """What a file gives of an axis or a value: how a map calls it, its unit, and its name in words."""
 
     name: str
     unit: str
@@ -30,7 +30,7 @@ class Heading(NamedTuple):
 
 
 def unit_from(written: str, name: str) -> str:
-    """Give a unit of a file as mgdd prints it; a name that says the same unit settles how."""
+    """Give a unit of a file as mgdd prints it; a name with the same unit settles how."""
     if not written.strip():
         return name_unit(name) if name_unit(name) != "-" else NOT_GIVEN
     unit = _UNITS.get(written.strip(), written.strip())
@@ -70,14 +70,14 @@ def heading_of(text: str, *, unit: str = "", fallback: str, taken: tuple[str, ..
 
 
 def _can_name(name: str, written: str) -> bool:
-    """Whether a word can be a name: one such as ``nm`` would say that it is a torque."""
+    """Whether a word can be a name: one such as ``nm`` would mean a torque."""
     if not can_be_name(name) or "_" in name or name_unit(name) == "-":
         return can_be_name(name)
     return bool(written) and unit_from(written, name) == name_unit(name)
 
 
 def _name_of_unit(written: str) -> str:
-    """Give the name that says nothing but its unit, ``nm`` for Nm."""
+    """Give the name that is nothing but its unit, ``nm`` for Nm."""
     unit = _UNITS.get(written, written)
     name = re.sub(r"\W+", "", unit).lower()
     try:

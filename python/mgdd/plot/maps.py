@@ -117,7 +117,7 @@ def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axe
     Returns
     -------
     matplotlib.axes.Axes
-        The axes. Cells stand at their number, with their breakpoints as ticks. A letter says where a value comes from:
+        The axes. Cells stand at their number, with their breakpoints as ticks. A letter shows where a value comes from:
         p predicted, e extrapolated, i interpolated, h held, l learned; a cross stands where there is none, and a frame
         where a limit holds it.
 

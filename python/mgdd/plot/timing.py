@@ -38,7 +38,7 @@ def timing(sweep: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         The efficiency axes. The mark is the vertex of the parabola through the highest sample and its
-        neighbours, or that sample itself where it ends the sweep; the legend then says so.
+        neighbours, or that sample itself where it ends the sweep; the legend then states so.
 
     Raises
     ------

@@ -43,7 +43,7 @@ def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoin
 
 
 def stated(name: str, keyword: float | None, point: Any) -> float | None:
-    """Return what a caller says of this record, by keyword or by name in its point; None where neither does."""
+    """Return what a caller states of this record, by keyword or by name in its point; None where neither does."""
     named = point.get(name) if isinstance(point, Mapping) else None
     if named is None or keyword is None or float(keyword) == float(named):
         return keyword if named is None else float(named)

@@ -1,4 +1,4 @@
-"""A calibration as a report: measured traces, cycle models, their best timing, and what the traces do not say."""
+"""A calibration as a report: measured traces, cycle models, their best timing, and what the traces do not identify."""
 
 from __future__ import annotations
 
@@ -400,7 +400,7 @@ def _headline(s: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def move_of(row: Mapping[str, Any]) -> str:
-    """Say of a trace how far to move the timing, what that gains, and how sure that is."""
+    """State how far to move the timing of a trace, what that gains, and how sure that is."""
     best = row["best"]
     if best is None:
         return f"{row['file']}: no plausible model, so no best timing."
@@ -412,7 +412,7 @@ def move_of(row: Mapping[str, Any]) -> str:
 
 
 def _part(row: Mapping[str, Any], prefix: str) -> str:
-    """Say the move of one question; a range that spans zero says none."""
+    """Describe the move of one question; a range that spans zero gives none."""
     best, ends = row["best"], row[f"{prefix}shift_cad"]
     if undetermined(ends):
         return f"no direction is determined, range {_ends(ends)} °CA"

@@ -140,7 +140,7 @@ def _section(section: Section) -> dict[str, Any]:
 
 
 def _axes(figure: Figure) -> list[dict[str, Any]]:
-    """Say where axes lie, in shares of a drawn figure, and what they show, so that the page can read the pointer."""
+    """Return where axes lie, in shares of a drawn figure, and what they show, so that the page can read the pointer."""
     out = []
     for ax in figure.axes:
         shown: dict[str, Any] = {}

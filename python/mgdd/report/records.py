@@ -59,7 +59,7 @@ def _urgency(check: object) -> int:
 
 
 def _text(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[str]:
-    """Say how the figures were made, and what is not in the table."""
+    """State how the figures were made, and what is not in the table."""
     attrs = figures.attrs
     cycles = attrs.get("cycles", 1)
     yield (

@@ -132,7 +132,7 @@ def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
 
 
 def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Row]:
-    """Make rows of names and values; units as given, else as the results' labels or the names say."""
+    """Make rows of names and values; units as given, else as the results' labels or the names give."""
     out = []
     for name, value in values.items():
         if isinstance(value, Mapping) and value and all(_is_scalar(item) for item in value.values()):

@@ -26,7 +26,7 @@ class Finding:
     text : str
         What was found, as a sentence without a full stop.
     remedy : str
-        What to do about it; empty where the text says all.
+        What to do about it; empty where the text is enough.
     """
 
     code: str

@@ -63,7 +63,7 @@ class FitQuality:
     Parameters
     ----------
     nrmse_fit_percent : float or None
-        ``100 (1 - |y - yh| / |y - mean y|)`` [%]: 100 is perfect, 0 as good as the mean; None where it says nothing.
+        ``100 (1 - |y - yh| / |y - mean y|)`` [%]: 100 is perfect, 0 as good as the mean; None where it is undefined.
     rmse : float
         Root of the mean squared error, in `unit`.
     unit : str
@@ -279,7 +279,7 @@ class Fit(Result):
         if give is None:
             raise DataError(f"{type(self.model).__name__} has no parameter file: keep the parameters of to_dict()")
         own = give()
-        if "parameters" not in own.tables:  # a response, whose file has its points: they say what the fit would
+        if "parameters" not in own.tables:  # a response, whose file has its points: they give what the fit would
             return str(own.to_toml())
         units = dict.fromkeys(("fit_percent_train", "fit_percent_test"), "%")
         units["rmse_test"] = "-" if self.test is None else self.test.unit

@@ -1,4 +1,4 @@
-"""Labelled results: xarray Datasets in which every variable says its unit and its long name, ready for netCDF.
+"""Labelled results: xarray Datasets in which every variable has its unit and its long name, ready for netCDF.
 
 The units of the names that several modules share stand once, in `VARIABLES`.
 """
@@ -33,7 +33,7 @@ class Label(NamedTuple):
     Parameters
     ----------
     units : str
-        Unit as figures print it, ``"-"`` if dimensionless; attributes hold it as `labelled_dataset` says.
+        Unit as figures print it, ``"-"`` if dimensionless; attributes hold it as `labelled_dataset` describes.
     long_name : str
         Name for axis labels.
     """
@@ -219,7 +219,7 @@ def label_of(variable: xr.DataArray | xr.Variable) -> Label:
 
 
 def name_unit(name: str) -> str:
-    """Return the unit that a name says for certain, whoever chose it; ``"-"`` for none.
+    """Return the unit that a name gives for certain, whoever chose it; ``"-"`` for none.
 
     A letter at the end of a name, but for seconds, is a unit behind a word of its quantity alone.
     """

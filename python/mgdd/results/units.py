@@ -1,4 +1,4 @@
-"""Units: what a name says by its ending, what a figure prints, and what stands in the attributes of a Dataset.
+"""Units: what a name gives by its ending, what a figure prints, and what stands in the attributes of a Dataset.
 
 A physical name ends in its unit, as ``tau_s``, ``bore_mm`` or ``spring_above_nm_per_rad`` do. Figures and tables print
 units as they are typeset; attributes hold them as an expression that a units library such as pint parses.

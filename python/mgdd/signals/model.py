@@ -186,7 +186,7 @@ def table_of(given: Any, names: Sequence[str], *, what: str) -> Any:
 
 
 def is_timed(given: Any, time: str = "time_s") -> bool:
-    """Say whether a signal carries its time: as a column, a coordinate or an index."""
+    """Return whether a signal has its time: as a column, a coordinate or an index."""
     index: Any = getattr(given, "index", None)
     if hasattr(index, "dtype") and (index.name == time or (index.name is None and index.dtype.kind == "f")):
         return True

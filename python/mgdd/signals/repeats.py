@@ -1,4 +1,4 @@
-"""What bits alone say of a measured channel: cycles that are copies, stretches that recur, samples that stand still.
+"""What bits alone show of a measured channel: cycles that are copies, stretches that recur, samples that stand still.
 
 Noise makes every sample its own: values that recur over a stretch, where the rounding does not explain it, were
 written twice. No model of what was measured is needed, and a copy with new noise is not seen.
@@ -114,7 +114,7 @@ def _joined(left: NDArray[np.uint64], right: NDArray[np.uint64]) -> NDArray[np.u
 def still(rows: NDArray[np.float64], noise: float, near: int) -> Still | None:
     """Find samples of a record (cycle, sample) that stand still longer than rounding makes them.
 
-    How often two neighbours are equal the other cycles say, within `near` samples of the place; of a single cycle its
+    How often two neighbours are equal the other cycles show, within `near` samples of the place; of a single cycle its
     resolution and its noise do.
     """
     n, m = rows.shape

@@ -1,4 +1,4 @@
-"""Polynomial of a response: its terms, where it was fitted, which terms it needs, and what it says of new points."""
+"""Polynomial of a response: its terms, where it was fitted, which terms it needs, and its prediction at new points."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Support:
         object.__setattr__(self, "root", np.ascontiguousarray(self.root))
 
     def leverage(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Say how far points are from the middle of the records, in the metric of the fit."""
+        """Return how far points are from the middle of the records, in the metric of the fit."""
         return self._leverage_of(self.basis(np.asarray(points, dtype=np.float64)))
 
     def contains(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.bool_]:

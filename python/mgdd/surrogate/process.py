@@ -1,4 +1,4 @@
-"""Gaussian process of a response: what it says between its points, and its fit by scikit-learn."""
+"""Gaussian process of a response: its prediction between its points, and its fit by scikit-learn."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def matern(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProcessSurface:
-    """What a Gaussian process says between its points.
+    """Prediction of a Gaussian process between its points.
 
     Length scales in the units of the factors; offset, signal and noise in that of the response. Needs no scikit-learn.
 
@@ -65,7 +65,7 @@ class ProcessSurface:
         return self.offset + across @ self._weights, np.sqrt(np.maximum(variance, 0.0))
 
     def supports(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return True: the hull alone says where the points end."""
+        """Return True: the hull alone bounds the points."""
         return np.ones(len(points), dtype=np.bool_)
 
     def fitted(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

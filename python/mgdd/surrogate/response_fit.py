@@ -76,7 +76,7 @@ def fit_response(
         noise; needs ``pip install "mgdd[gp]"``).
     factors : sequence of str, optional
         Columns to use. If left out: the inputs of a sweep or of read points, which are the axes of its grid or
-        coordinates over its points; all but the response where `points` says of none that it is an input.
+        coordinates over its points; all but the response where `points` marks none as an input.
     degree : int
         Of the full polynomial, 1 to 4.
     select : {"bic", "press", "all"}

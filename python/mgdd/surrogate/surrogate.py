@@ -234,7 +234,7 @@ class EngineSurrogate(Parameters):
         -------
         Optimum
             Input ``soi_cad``; ``values`` holds every signal there, ``bounds`` the supported range around it, and
-            ``at_bound`` says that the records, not the engine, hold it.
+            ``at_bound`` marks that the records, not the engine, hold it.
 
         Raises
         ------

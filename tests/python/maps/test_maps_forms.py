@@ -88,7 +88,7 @@ def test_the_corner_names_the_axes(
         ("speed [rpm] / fuel [mg]", {}, r"pass rows='speed \[rpm\]' if speed \[rpm\] runs down"),
         ("speed [rpm]", {}, "names one axis, and not whether it runs down or across"),
         ("speed [rpm] / fuel [mg]", {"rows": "load_percent"}, "not which axis runs down"),
-        (r"rpm\mg", {"rows": "fuel_mg"}, "says that rpm runs down and mg across: correct it, or leave rows and"),
+        (r"rpm\mg", {"rows": "fuel_mg"}, "states that rpm runs down and mg across: correct it, or leave rows and"),
         (r"speed_rpm [1/s]\mg", {}, "unit of speed_rpm = '1/s': must be 'rpm'"),
     ],
 )
@@ -210,7 +210,7 @@ BAD = [
     ("<html><body/></html>", "begins with <html>"),
     ("speed_rpm,fuel_mg,x\n900,6,1\n900,10,2\n1400,6,3\n", "no point at speed_rpm = 1400, fuel_mg = 10: 1 of 4 cells"),
     ("speed_rpm,fuel_mg,x\n900,6,1\n,10,2\n1400,6,3\n", "line 3: the breakpoint of 'speed_rpm' is empty"),
-    ("a,b,c,d\n900,6,1,0\n900,10,2,0\n", "4 columns with numbers .* say which with rows='…', columns='…', name='…'"),
+    ("a,b,c,d\n900,6,1,0\n900,10,2,0\n", "4 columns with numbers .* choose one with rows='…', columns='…', name='…'"),
 ]  # fmt: skip
 
 

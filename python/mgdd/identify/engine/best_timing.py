@@ -46,7 +46,7 @@ def best_timing(
     """Give each load's best timing by every model of a family, and the range of the plausible ones.
 
     Traces alone do not determine wall heat and gamma, so one model's best timing would be false precision: the range
-    says what the plausible models leave open, the best member what to try first.
+    states what the plausible models leave open, the best member what to try first.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def _answer(
     except ConvergenceError:
         if not member.why_not[at]:
             raise
-        free = limited = None  # an implausible member has no say, so it must not stop the others
+        free = limited = None  # an implausible member does not count, so it must not stop the others
     base = float(now[objective])
     return MemberTiming(
         member=member,
@@ -211,7 +211,7 @@ def headline_of(rows: Sequence[BestTiming]) -> Member:
 
 
 def doubts_of(rows: Sequence[BestTiming], tdc: TdcEstimate | None = None) -> list[str]:
-    """Say what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
+    """Report what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
     out = [str(finding) for finding in headline_of(rows).fit.findings]
     for row in rows:
         ends = sum(answer.at_bound for answer in row.plausible)

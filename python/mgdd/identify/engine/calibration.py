@@ -104,7 +104,7 @@ _PER_TRACE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """A fit, and what says how far it may be believed; the profile is None where the wall heat was not fitted."""
+    """A fit with its reliability; the profile is None where the wall heat was not fitted."""
 
     fit: CylinderFit
     profile: WallHeatProfile | None
@@ -159,7 +159,7 @@ class Calibration:
         return common
 
     def summary(self) -> str:
-        """Say all of it in words."""
+        """Return a short summary."""
         fit, profile, tdc = self.fit, self.profile, self.tdc
         out = [f"Calibration with {fit.kind}: {fit.report.message}", "", *_loads(fit)]
         for name, value, error in zip(fit.report.names, fit.report.values, fit.report.stderr, strict=True):

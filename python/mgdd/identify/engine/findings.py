@@ -216,7 +216,7 @@ def _work(fit: CylinderFit) -> Iterator[Finding]:
     )
 
 
-# How far gamma, pressure and angle of a usual bench may be off, where nobody has said better.
+# How far gamma, pressure and angle of a usual bench may be off, without better knowledge.
 WIDTHS: Mapping[str, float] = MappingProxyType({"gamma": 0.03, "pegging_bar": 0.1, "tdc_cad": 0.3})
 _FUEL = 0.05  # of the stated fuel that may not burn, or not be there
 _STEPS = 30  # of a search that starts near its end

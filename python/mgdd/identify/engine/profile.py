@@ -32,7 +32,7 @@ _CORRELATION = float(_core.identify.correlation_limit)
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class WallHeatProfile(Result):
-    """What the traces say about the wall-heat scale.
+    """What the traces show of the wall-heat scale.
 
     Parameters
     ----------

@@ -104,7 +104,7 @@ class TdcEstimate(Result):
         return not self.low_cad <= 0.0 <= self.high_cad
 
     def doubts(self) -> list[str]:
-        """Say in words that the angles are outside the range, and what no sound engine has."""
+        """Report that the angles are outside the range, and what no sound engine has."""
         if not self.suspect:
             return list(self.findings)
         edge = "tdc_offset_cad" in self.dataset and abs(self.tdc_offset_cad) >= abs(

@@ -24,7 +24,7 @@ RANGED = (
 
 
 def undetermined(shift_cad: Sequence[float]) -> bool:
-    """Say whether a range of moves leaves open if earlier or later is better."""
+    """Return whether a range of moves leaves open if earlier or later is better."""
     return shift_cad[0] <= 0.0 <= shift_cad[1]
 
 

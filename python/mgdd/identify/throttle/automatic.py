@@ -47,7 +47,7 @@ STOPS = ("stop_duty_per_deg", "stop_damping")
 _ABSENT = {name: REFINEMENTS[name] for term in (DROP, PRESLIDING, GAP) for name in term}
 _SHOWN = {LAG: "lag", DROP: "Stribeck drop", PRESLIDING: "presliding", GAP: "gap"}
 _STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
-_AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
+_AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log shows that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
 _FIRST_LOOK = 6  # delays; the next are tried while one of the last two is the best
@@ -198,7 +198,7 @@ def _structure(
 def _stopped(
     hunt: Hunt, fixed: Mapping[str, float], plain: Search, terms: list[tuple[str, ...]]
 ) -> tuple[Search, list[tuple[str, ...]]]:
-    """Let the stops yield where the plate has touched one and the log does not say that they are rigid."""
+    """Let the stops yield where the plate has touched one and the log does not show that they are rigid."""
     problem = hunt.problem
     low, high = problem.stops_deg
     touched = problem.angle.min() < low + _TOUCHED_DEG or problem.angle.max() > high - _TOUCHED_DEG
@@ -229,7 +229,7 @@ def _criterion(search: Search, size: int, n: float) -> float:
 
 
 def _findings(fit: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
-    """Say what the model has and what it is worth, and how other delays fare."""
+    """Report what the model has and what it is worth, and how other delays fare."""
     by_delay, rms = delays.rmse, fit.rmse
     has = ", ".join(_SHOWN[term] for term in terms if term in _SHOWN) or "none"
     stops = ", stops that yield" if STOPS in terms else ""

@@ -253,7 +253,7 @@ def design_excitation(
     kind : {"chirp", "multisine", "prbs", "amplitude_random_steps", "staircase", "triangle"}
         The signal; its other parameters keep their defaults, except a chirp below limp-home: 0.5 to 8 Hz.
     prior : Throttle or Model
-        What is known of the throttle; it must know limp-home and friction.
+        What is known of the throttle; it must have limp-home and friction.
     side : {"above", "below", "both"}
         Side of limp-home to be identified.
     duration_s : float, optional
@@ -278,9 +278,9 @@ def design_excitation(
     Raises
     ------
     ParameterError
-        An unknown kind or side, a prior that knows no limp-home or friction, and all of `check_excitation`.
+        An unknown kind or side, a prior without limp-home or friction, and all of `check_excitation`.
     ConvergenceError
-        Nothing useful stays inside the limits; the message says what the smallest one still violates.
+        Nothing useful stays inside the limits; the message states what the smallest one still violates.
 
     Examples
     --------

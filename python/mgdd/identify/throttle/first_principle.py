@@ -35,7 +35,7 @@ def fit_first_principle(
 
     A regression on the torque balance of the moving samples gives the start; the free run is then fitted in stages
     (dynamics, static groups, all), from several starts. A side of limp-home the log does not visit keeps its start
-    values and is named. `mgdd.identify.identify_throttle` chooses the structure, and knows delays.
+    values and is named. `mgdd.identify.identify_throttle` chooses the structure, and covers delays.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _EARLY = 0.75  # of the log, for both models; they are compared on the rest
 _BETTER_PERCENT = 0.3  # PW-R must gain that much to replace the groups, which have physical meaning
-_STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups know stiffer ones below limp-home
+_STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups have stiffer ones below limp-home
 _LONGEST_DELAY = 5.0  # that PW-R has [samples]
 _LEAST_SAMPLES, _LEAST_DEG = 100, 1.0
 
@@ -166,7 +166,7 @@ def fit_kind(
     stops_deg: tuple[float, float],
     options: FitOptions | None,
 ) -> Fit:
-    """Fit a kind with what the front knows; what is None keeps the fit's own default."""
+    """Fit a kind with what the caller gives; what is None keeps the fit's own default."""
     if kind not in PSEUDO_WIENER:
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
         fit = fit_auto if kind == "auto" else fit_groups

@@ -1,4 +1,4 @@
-"""One call for every throttle model: check the log, fit, test on another log, and say what stays open."""
+"""One call for every throttle model: check the log, fit, test on another log, and report what stays open."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_off(log: xr.Dataset) -> float:
 
 
 def doubts(log: xr.Dataset, model: Model, home: float) -> tuple[Finding, ...]:
-    """Say where limp-home was read off, and doubt it after the fit.
+    """Report where limp-home was read off, and doubt it after the fit.
 
     At rest without duty, friction holds the plate within ramp friction/preload of limp-home, and anywhere if it
     exceeds the preload; under a duty it may rest anywhere.
@@ -129,12 +129,12 @@ def identify_throttle(
         Kind of the model. ``first_principle``: the groups of the plant, with as much of electrical lag, delay, Stribeck
         drop, presliding and gap as the log supports. ``pw_r``, ``pw_w``, ``pw_p``: pseudo-Wiener with friction inside,
         strict Wiener, Wiener with play. ``auto`` (the default): the groups, or PW-R fitted from them where that runs
-        better on a quarter of the log that neither has seen; the findings say why.
+        better on a quarter of the log that neither has seen; the findings give the reason.
     test : Dataset, DataFrame or mapping of columns, optional
         Another log, for the quality ``test``.
     limp_home_deg : float, optional
         Limp-home angle [deg], if it is known. None: the groups estimate it from a log that has been on both sides;
-        otherwise the record starts at rest there, and the findings say which angle was read off it.
+        otherwise the record starts at rest there, and the findings state which angle was read off it.
     two_sided : bool
         Fit a set of parameters above and one below limp-home (the groups have both always); the log must have been on
         both sides.

@@ -25,7 +25,7 @@ _CROSSING_DEG = 0.5
 _STOP_DEG = 0.5
 _LEAST_SHARE = 0.05
 _LEAST_SIDE_S = 0.1
-# Below this the inertia adds less than a tenth of the friction of the throttles we know.
+# Below this the inertia adds less than a tenth of the friction of known throttles.
 _FAST_DEG_PER_S = 60.0
 _TRIANGLE_HZ = 0.05
 

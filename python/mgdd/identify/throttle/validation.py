@@ -198,7 +198,7 @@ def validate_throttle(
     Parameters
     ----------
     model : Model or Fit
-        The model; a fit also says which of its parameters are entangled.
+        The model; a fit also reports which of its parameters are entangled.
     log : Dataset, DataFrame or mapping of columns
         The log.
     horizons_s : sequence of float

@@ -129,7 +129,7 @@ def certainly_less(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> bo
 RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
 _MOVED = 0.25  # samples by which a delay may differ before the time constant is searched anew
 _RIVAL = 1.5  # a delay whose coarse search ends that far above the best is not fitted finely
-_ALIKE = 1.25  # delays whose errors differ by more are not treated as equal, whatever their blocks say
+_ALIKE = 1.25  # delays whose errors differ by more are not treated as equal, whatever their blocks show
 _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
 
 
@@ -266,7 +266,7 @@ def with_delay(
 
 
 def delay_at_end(delay: float, tried: Sequence[float], longest_known: float) -> list[Finding]:
-    """Say that the delay which was taken is an end of what was tried."""
+    """Report that the chosen delay is an end of those tried."""
     longest = delay == max(tried)
     if len(tried) < 2 or not (longest or delay == min(tried) > 0.0):
         return []
