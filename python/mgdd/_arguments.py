@@ -56,7 +56,7 @@ def unbound(
     keywords: Mapping[str, Any],
     how: Mapping[str, str],
 ) -> TypeError | None:
-    """Return why a call does not fit the signature of a Python function; `how` has kind and meaning of its parameters."""
+    """Return why a call misfits the signature of a Python function; `how` has kind and meaning of its parameters."""
     places = [each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
     arguments = [
         _Argument(
@@ -75,7 +75,7 @@ def unbound(
 def refusal(
     name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
 ) -> TypeError | ParameterError:
-    """Return why a call fits none of its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
+    """Return why a call misfits its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
 
     The latter names the argument that has the wrong kind; the first one of a `method` is ``self``.
     """

@@ -26,7 +26,7 @@ class Origin(NamedTuple):
     sha256: str
 
 
-# As the records say where they are from; the hydrogen-diesel set is an export of our own and has no address.
+# The origins that the records state; the hydrogen-diesel set is an export of our own and has no address.
 ORIGINS: dict[str, dict[str, Origin]] = {
     "cascaded_tanks": {
         "dataBenchmark.csv": Origin(

@@ -25,7 +25,7 @@ _PEAK_CAD, _START_CAD, _FARTHEST_CAD = 8.0, 20.0, 5.0
 _LEAST_BAR = 0.05  # a level below zero is found elsewhere
 # Of the motored gas, which is air: gamma within 0.003 from 400 to 950 K.
 _GAS_J_PER_KGK, _GAMMA_300K, _GAMMA_SLOPE_PER_K = 287.0, 1.40, 9.5e-5
-# What nobody states, and how far it may be off: the charge at IVC over the intake [K], which no burned gas heats; the
+# What is not stated, and how far it may be off: the charge at IVC over the intake [K], which no burned gas heats; the
 # wall of a motored engine, colder than that of a fired one [K]; a crevice over the clearance volume; and a gap at the
 # rings of a bore of 90 mm [m2] with its discharge.
 _WARMED_K, _CHARGE_K, _WALL_K = 20.0, 25.0, 50.0

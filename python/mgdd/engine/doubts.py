@@ -19,7 +19,7 @@ _QUIET_CAD = (-140.0, -60.0)
 _NEAR_CAD = 3.0
 # A parabola spends 0.29 of the time within 6 % of its top within 0.5 % of it. Sound tops by spark or of two burns spend
 # at most 0.46 in a cycle, 0.41 in the median of many; one cut at 0.93 of the peak, with noise behind, at least 0.5.
-# Fewer than _FEWEST samples within 6 % tell nothing.
+# Fewer than _FEWEST samples within 6 % show nothing.
 _NEAR_TOP, _BELOW, _FLAT, _FEWEST = 0.005, 0.06, 0.48, 8
 # Where noise is more, within as many of its deviations; cycles whose top lies within twice that share a level.
 _TOP_NOISE, _SHARERS = 1.8, (3, 0.1)

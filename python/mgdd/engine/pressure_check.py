@@ -80,7 +80,7 @@ _SWINGS = (
 _SWING = (
     "take the angle of an encoder: it is made of time at one speed, and a speed that swings within a turn does this"
 )
-ENGINE = "engine"  # the check that is there only where the geometry is nobody's
+ENGINE = "engine"  # the check that is there only without a given geometry
 _ONE = "one cycle: nothing to compare it with"
 
 
@@ -128,7 +128,7 @@ class PressureCheck(Result):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict; ``open`` where no check was made, or where nobody gave the engine."""
+        """The worst verdict; ``open`` where no check was made, or without a given engine."""
         worst = max((check.verdict for check in self.checks), key=_WORST.index)
         decided = self.made and all(check.name != ENGINE for check in self.checks)
         return "no fault found" if worst == "open" and decided else worst

@@ -233,7 +233,7 @@ def analyze(
     return result.assign_attrs(
         warnings="\n".join([*doubted, *result.attrs["warnings"].splitlines()]),
         doubts="\n".join([*("reading" for _ in doubted), *result.attrs["doubts"].splitlines()]),
-        open="" if simulated else result.attrs["open"],  # nobody read its angles
+        open="" if simulated else result.attrs["open"],  # its angles were not measured
     )
 
 

@@ -94,7 +94,7 @@ def _encoded(text: str, path: str | os.PathLike[str], encoding: str) -> str:
             f"{path}, line {line}: {letter!r} in {row!r} is not a letter of {encoding}: change the text, or write it "
             f"with {argument('encoding', repr('utf-8'))}"
         ) from error
-    if encoding != "utf-8" and Path(path).suffix.lower() == ".dcm":  # XML says its encoding itself
+    if encoding != "utf-8" and Path(path).suffix.lower() == ".dcm":  # XML states its encoding itself
         with contextlib.suppress(DataError):
             if decoded(raw, str(path)) == text:
                 return text

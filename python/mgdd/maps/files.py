@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".cdfx", ".nc")
-_HEAD = 1 << 16  # bytes that tell a form
+_HEAD = 1 << 16  # bytes that identify a form
 
 
 def write_map(

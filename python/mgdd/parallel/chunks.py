@@ -77,7 +77,7 @@ class Plan:
             return 1
         left = self._n - self._next
         by_time = math.floor(_WANTED_S / self._cost_s) if self._cost_s > 0.0 else left
-        fair = math.ceil(left / (2 * self._workers))  # the last chunks get small: nobody waits long for the others
+        fair = math.ceil(left / (2 * self._workers))  # the last chunks get small: the workers end together
         return max(1, min(by_time, fair, self._largest, _GROWTH * self._measured))
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mgdd.results.result import Result
 
 CYCLE = "cycle"
-_LINES = 60  # of a cloud; the band says the rest
+_LINES = 60  # of a cloud; the band shows the rest
 _MARKS = {"misfire": ("x", ORANGE), "partial_burn": ("+", BLUE)}
 _FREQUENCY = "frequency_khz"
 _RINGING, _MODE = "ringing_frequency_khz", "tangential_mode_khz"

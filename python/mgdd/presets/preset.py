@@ -19,7 +19,7 @@ from mgdd.results.describe import core_rows, described
 
 _TABLES: Mapping[str, Any] = MappingProxyType({"cylinder": Cylinder, "point": OperatingPoint, "throttle": Throttle})
 _OF_KIND: Mapping[str, tuple[str, ...]] = MappingProxyType({"engine": ("cylinder", "point"), "throttle": ("throttle",)})
-# What a file of one's own must say, by kind, in the first table of the kind: nobody's parts have a default.
+# What a user's file must state, by kind, in the first table of the kind: nobody's parts have a default.
 _REQUIRED: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engine": ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad"),

@@ -176,7 +176,7 @@ def saved(what: Any, path: str | os.PathLike[str]) -> None:
 class NumbersResult(Result):
     """A result that is a record of numbers and texts: its `dataset` has them as variables without a dimension."""
 
-    _units: ClassVar[Mapping[str, str]] = MappingProxyType({})  # of numbers whose names do not say it
+    _units: ClassVar[Mapping[str, str]] = MappingProxyType({})  # of numbers whose names do not give it
 
     def _rows(self) -> list[Row]:
         return rows_of(fields_of(self), self._units)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-# Printed units that only say whose unit it is, and counts: without a dimension in an attribute.
+# Printed units that only name whose unit it is, and counts: without a dimension in an attribute.
 _WHOSE = ("unit of ", "in the unit of ", "not given")
 _COUNTS = frozenset({"-", "cycle", "cycles", "sample", "samples"})
 _REMARK = re.compile(r" per unit of .*$| of .*$| \([^)]*\)$| per duty$")
@@ -35,7 +35,7 @@ _UNITS = {
     "kpa": "kPa", "pa": "Pa", "k": "K", "j": "J", "mj": "MJ", "kw": "kW", "kwh": "kWh", "v": "V", "vs": "V s", "a": "A",
     "ohm": "ohm", "mh": "mH", "ppm": "ppm", "percent": "%", "duty": "duty",
 }  # fmt: skip
-_ALONE = {"cad": "°CA aTDC", "duty": "-", "h": "H", "ns": "ns"}  # what these say without a quotient
+_ALONE = {"cad": "°CA aTDC", "duty": "-", "h": "H", "ns": "ns"}  # what these mean without a quotient
 _WHOLE = {
     "_deg_per_s2_per_duty": "deg/s² per duty", "_bar2_cad": "bar² °CA", "_bar_cad": "bar °CA", "_duration_cad": "°CA",
     "_scatter_cad": "°CA", "_rms_cad": "°CA", "_mean_j": "unit of J", "_samples": "samples", "_cycles": "cycles",

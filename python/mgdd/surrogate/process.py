@@ -149,7 +149,7 @@ def fit_process(
     few = 1 if len(values) <= _ONE_THREAD else None
     threads: Any = import_extra("threadpoolctl", "gp", purpose)
     with threads.threadpool_limits(few), warnings.catch_warnings():
-        # A parameter at its bound is said as a finding.
+        # A parameter at its bound is reported as a finding.
         warnings.simplefilter("ignore", import_extra("sklearn.exceptions", "gp", purpose).ConvergenceWarning)
         regressor.fit((points - points.mean(axis=0)) / half, (values - offset) / spread)
     logs = np.asarray(regressor.kernel_.theta, dtype=np.float64)  # of the variances and lengths: signal, lengths, noise

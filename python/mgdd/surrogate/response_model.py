@@ -101,7 +101,7 @@ class ResponseModel(Parameters):
         """Convex hull of the points; None where they have none: then their ranges count."""
         try:
             return hull_of(self.points, tuple(self.factors))
-        except DataError:  # said by `fit_response` as a finding
+        except DataError:  # reported by `fit_response` as a finding
             return None
 
     def predict(self, points: Any, *, level: float = 0.95) -> xr.Dataset:

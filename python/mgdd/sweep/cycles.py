@@ -335,7 +335,7 @@ def input_labels() -> Mapping[str, Label]:
 
 
 def rank_of(name: str) -> int:
-    """Return the rank of an input in a grid: the higher, the less of a cycle has to be computed anew when it changes."""
+    """Return the rank of an input in a grid: the higher, the less of a cycle has to be computed anew by a change."""
     if name == _TIMING:
         return 3
     if name == "fuel_mg" or name.startswith(_BURN):

@@ -255,7 +255,7 @@ class PseudoWiener(SampledModel, Parameters):
         parameters = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
         options = file.values("settings", wanted(("switching", "friction"), form="text"))
         model = cls(file.kind, parameters, **options)
-        file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
+        file.values("parameters", wanted(model.parameters, units))  # the numbers determine which of them there are
         return model
 
     def __eq__(self, other: object) -> bool:

@@ -124,7 +124,7 @@ def wall_heat_profile(
     ('wall_heat_scale',)
     """
     if NAME not in fit.report.names:
-        raise ParameterError(f"{NAME} was not free in this fit: free it, then ask for its profile")
+        raise ParameterError(f"{NAME} was not free in this fit: free it, then take its profile")
     bad = [scale for scale in scales if not 0.0 <= scale <= UPPER]
     if bad:
         raise ParameterError(f"scales: {bad[0]:g} must be in [0, {UPPER:g}]")

@@ -1,4 +1,4 @@
-"""What a calibration is asked for: traces pegged and cut to the closed part, what is free, known and bounded."""
+"""Settings of a calibration: traces pegged and cut to the closed part, what is free, known and bounded."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _STEP_CAD = 0.25
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class TdcEstimate(Result):
-    """Where top dead centre stands in the angles of a trace.
+    """Where top dead centre lies in the angles of a trace.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def estimate_tdc(
     span_cad: float = 3.0,
     progress: Callable[[str], None] | None = None,
 ) -> TdcEstimate:
-    """Estimate where firing TDC stands in the angles of traces from one encoder.
+    """Estimate where firing TDC lies in the angles of traces from one encoder.
 
     Parameters
     ----------
