@@ -124,7 +124,7 @@ def has_units(value: Any) -> bool:
 
 def _arguments(signature: str, function: str) -> list[_Argument]:
     inside = signature[signature.index("(") + 1 : signature.rindex(") -> ")]
-    out, keyword_only = [], False
+    arguments, keyword_only = [], False
     for part in _split(inside):
         if part in ("*", "/"):
             keyword_only = keyword_only or part == "*"
@@ -132,8 +132,8 @@ def _arguments(signature: str, function: str) -> list[_Argument]:
         text, equals, _ = part.partition(" = ")
         name, _, kind = text.partition(": ")
         name = function if name == "arg1" else name.lstrip("*")  # of a setter: the property
-        out.append(_Argument(name, ast.parse(kind or "object", mode="eval").body, not equals, keyword_only))
-    return out
+        arguments.append(_Argument(name, ast.parse(kind or "object", mode="eval").body, not equals, keyword_only))
+    return arguments
 
 
 def _split(text: str) -> list[str]:

@@ -42,7 +42,7 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
     """Doubt the samples of cycles (cycle, angle), counted from `first`: what stands still, and a peak cut off."""
     rows, noise, step = np.atleast_2d(bar), _noise(angle, bar), float(np.median(np.diff(angle)))
     many = len(rows) > 1
-    out = []
+    doubts = []
     top = top_of(angle, rows, noise)
     if top.cut:
         text = (
@@ -50,7 +50,7 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
             f"{100.0 * top.ratio:.0f} % at it, a peak 30 %: a saturated amplifier or the end of its range; peak, work "
             "and heat are not those of the gas"
         )
-        out.append(("clipped", text))
+        doubts.append(("clipped", text))
     stands = still(rows, noise, max(1, round(_NEAR_CAD / step)))
     on_top = stands is not None and top.cut and rows[stands.cycle, stands.first] > 0.97 * top.level_bar
     if stands is not None and not on_top:
@@ -62,8 +62,8 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
             f"{stands.last - stands.first + 1} equal samples: a stuck sensor, lost samples or a channel that froze; "
             f"work and heat are not those of the gas{which}"
         )
-        out.append(("stuck", text))
-    return out
+        doubts.append(("stuck", text))
+    return doubts
 
 
 def copy_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> list[tuple[str, str]]:

@@ -80,8 +80,8 @@ def find_optimum(
     """
     require_plain("bounds_cad", bounds_cad)
     cylinder, point = engine_of(cylinder, point, speed_rpm=speed_rpm, fuel_mg=fuel_mg)
-    kept = limits_of(limits)
-    caps = {limit.name: limit.upper - limit.margin for limit in kept}
+    checked = limits_of(limits)
+    caps = {limit.name: limit.upper - limit.margin for limit in checked}
     low, high = bounds_cad or (max(DEFAULT_CAD[0], cylinder.ivc_cad), min(DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
     check_request(objective, caps)
     _check(point, low, high)
@@ -119,7 +119,7 @@ def find_optimum(
         objective=objective,
         value=float(now[objective][0]),
         values={name: float(column[0]) for name, column in now.items() if name != "soc_cad"},
-        limits=kept,
+        limits=checked,
         active_limits=active,
         at_bound=soc in (low, high),
         bounds={"soc_cad": (low, high)},
@@ -132,10 +132,10 @@ def find_optimum(
 
 
 def _feasible(columns: dict[str, np.ndarray], limits: Mapping[str, float]) -> np.ndarray:
-    out = np.ones(columns["p_max_bar"].size, bool)
+    inside = np.ones(columns["p_max_bar"].size, bool)
     for name, limit in limits.items():
-        out &= columns[name] <= limit
-    return out
+        inside &= columns[name] <= limit
+    return inside
 
 
 def _broken(columns: dict[str, np.ndarray], limits: Mapping[str, float]) -> list[str]:

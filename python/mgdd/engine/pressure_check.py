@@ -295,18 +295,18 @@ def _check(
 
 def _skipped(trace: xr.Dataset, figures: xr.Dataset, given: list[str]) -> dict[str, tuple[str, str]]:
     """Name the checks that these data cannot decide, and what would."""
-    out = {}
+    reasons = {}
     cycles = trace.sizes.get(CYCLE, 1)
     motored = int(figures.attrs["motored"]) == max(cycles, 1)
     if motored:
-        out["burn"] = out["work and heat"] = ("no cycle burns", "")
+        reasons["burn"] = reasons["work and heat"] = ("no cycle burns", "")
     if not given and not motored:
-        out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
+        reasons["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
     if not np.isfinite(figures["imep_net_bar"]).all():
-        out["gas exchange"] = ("the record has no 720 degrees", "")
+        reasons["gas exchange"] = ("the record has no 720 degrees", "")
     if cycles == 1:
-        out["cycles"] = out["crank angle"] = (_ONE, "")
-    return out
+        reasons["cycles"] = reasons["crank angle"] = (_ONE, "")
+    return reasons
 
 
 _COARSE_CAD = 2.5
@@ -368,25 +368,25 @@ def hidden(trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder) -> dict[str
     """Report by check what faults these data would not show, and the size below which they stay hidden."""
     angle, bar = _columns(trace)
     step = float(np.median(np.diff(angle)))
-    out = {}
+    limits = {}
     if int(figures.attrs["motored"]) < len(bar):
         text = figures.attrs["open"] or "a fired trace hardly shows an error of TDC"
-        out["top dead centre"] = (text, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
+        limits["top dead centre"] = (text, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
         if engine.compression_ratio >= _SPARK_RATIO or len(bar) < _SOFT_CYCLES:
             text = "a gain that falls off above 0.7 of the peak looks like another burn"
             few = "10 fired cycles or more" if engine.compression_ratio < _SPARK_RATIO else "a dead-weight calibration"
-            out["amplifier"] = (text, f"{few} would show it")
+            limits["amplifier"] = (text, f"{few} would show it")
     placed = phases(angle, bar)
     if placed is None:
         if len(bar) > 1:
-            out["crank angle"] = ("compression before the burn is too short to place the cycles", "")
+            limits["crank angle"] = ("compression before the burn is too short to place the cycles", "")
     elif placed.visible_cad > min(step, _WANTED_CAD):
         lost = int(placed.visible_cad / step)
         text = (
             f"a cycle that lies less than {placed.visible_cad:.2g} °CA off, {max(lost, 1)} lost sample(s), is not seen"
         )
-        out["crank angle"] = (text, "")
-    return out
+        limits["crank angle"] = (text, "")
+    return limits
 
 
 def _of_levels(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
@@ -399,20 +399,20 @@ def _of_levels(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
     level = bar[:, early].mean(axis=1) + np.atleast_1d(figures["pegging_bar"].to_numpy())
     off = level - np.median(level)
     usual = 1.4826 * float(np.median(np.abs(off)))
-    out = []
+    doubts = []
     odd = np.flatnonzero(np.abs(off) > max(_OFF_BAR, _OFF_SCATTERS * usual))
     if odd.size and odd.size < 0.2 * len(bar):
         worst = int(odd[np.argmax(np.abs(off[odd]))])
         text = f"{odd.size} of {len(bar)} cycles start at another level: cycle {worst + 1} by {off[worst]:+.2g} bar"
-        out.append(("odd_level", text))
+        doubts.append(("odd_level", text))
     count = np.arange(len(bar)) - 0.5 * (len(bar) - 1)
     slope = float(count @ off / (count @ count))
     rest = off - off.mean() - slope * count
     stderr = math.sqrt(float(rest @ rest) / max(len(bar) - 2, 1) / float(count @ count))
     drift = slope * (len(bar) - 1)
     if abs(drift) > max(_DRIFT_BAR, _DRIFT_STDERRS * stderr * (len(bar) - 1)):
-        out.append(("drift", f"the level moves by {drift:+.2g} bar from cycle 1 to cycle {len(bar)}"))
-    return out
+        doubts.append(("drift", f"the level moves by {drift:+.2g} bar from cycle 1 to cycle {len(bar)}"))
+    return doubts
 
 
 def _of_exchange(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
@@ -426,13 +426,13 @@ def _of_exchange(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]
         return float(mean[(angle >= low) & (angle <= high)].mean())
 
     intake, exhaust, end = level(-300.0, -200.0), level(220.0, 300.0), level(-190.0, -170.0)
-    out = []
+    doubts = []
     for text, value in (("intake", intake), ("exhaust", exhaust)):
         if not _EXCHANGE_BAR[0] < value < _EXCHANGE_BAR[1]:
-            out.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
+            doubts.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
     pmep = float(np.mean(figures["pmep_bar"]))
     if not _PMEP_BAR[0] < pmep < _PMEP_BAR[1]:
-        out.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
-    if not out and not _STEP[0] < end / intake < _STEP[1]:
-        out.append(("exchange", f"the intake stroke runs at {intake:.3g} bar and ends at {end:.3g} bar"))
-    return out
+        doubts.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
+    if not doubts and not _STEP[0] < end / intake < _STEP[1]:
+        doubts.append(("exchange", f"the intake stroke runs at {intake:.3g} bar and ends at {end:.3g} bar"))
+    return doubts

@@ -287,14 +287,14 @@ def spectrum_of(
     size = 2 ** math.ceil(math.log2(2 * count))
     total = np.zeros(size // 2 + 1)
     khz = np.arange(total.size) * (per_ms / size)
-    kept = np.empty((len(bar) if keep else 0, khz.size))
+    spectra = np.empty((len(bar) if keep else 0, khz.size))
     for at in range(0, len(bar), _TOGETHER):
         window = bar[at : at + _TOGETHER, inside]
         _, density = periodogram(window, per_ms, window=("tukey", _TAPER), nfft=size, detrend="linear")
         total += density.sum(axis=0)
         if keep:
-            kept[at : at + _TOGETHER] = density
-    return Spectrum(khz, total, count / per_ms, kept)
+            spectra[at : at + _TOGETHER] = density
+    return Spectrum(khz, total, count / per_ms, spectra)
 
 
 def _peak_khz(

@@ -75,8 +75,8 @@ def compare_maps(
             )
     axes = {name: _common(name, entries, second.axes[name], grid) for name, entries in first.axes.items()}
     points = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
-    one, two = first.lookup(points), second.lookup(points)
-    difference = two.values - one.values
+    first_values, second_values = first.lookup(points), second.lookup(points)
+    difference = second_values.values - first_values.values
     sd = np.hypot(first.sd_at(points), second.sd_at(points))
     finite = difference[np.isfinite(difference)]
     beyond = np.abs(difference) > (np.inf if tolerance is None else tolerance)
@@ -86,11 +86,11 @@ def compare_maps(
     return labelled_dataset(
         {
             **{axis: (axis, entries, *first.labels[axis]) for axis, entries in axes.items()},
-            "first": (dims, one.values, unit, f"{name}, first map"),
-            "second": (dims, two.values, unit, f"{name}, second map"),
+            "first": (dims, first_values.values, unit, f"{name}, first map"),
+            "second": (dims, second_values.values, unit, f"{name}, second map"),
             "difference": (dims, difference, *of_unit, f"{name}, second minus first"),
             "sd": (dims, sd, *of_unit, "standard deviation of the difference"),
-            "held_outside": (dims, one.held_outside | two.held_outside, "-", "held at an edge"),
+            "held_outside": (dims, first_values.held_outside | second_values.held_outside, "-", "held at an edge"),
             "beyond": (dims, beyond, "-", "beyond the tolerance"),
             "largest_difference": ((), float(largest), *of_unit, "largest difference by size"),
             "rms_difference": ((), _rms(finite), *of_unit, "root mean square difference"),

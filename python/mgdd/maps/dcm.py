@@ -63,22 +63,22 @@ class _Line(NamedTuple):
 
 def dcm_text(blocks: Sequence[DcmBlock], comments: Sequence[str]) -> str:
     """Give the text of a file; numbers come back bit for bit."""
-    out = [*(f"* {comment}" for comment in comments), "", f"{_HEAD} {_VERSION}", ""]
+    lines = [*(f"* {comment}" for comment in comments), "", f"{_HEAD} {_VERSION}", ""]
     for block in blocks:
         keyword = "KENNFELD" if block.y else "KENNLINIE" if block.x else "FESTWERT"
         sizes = "".join(f" {len(entries)}" for entries in (block.x, block.y) if entries)
-        out.append(f"{keyword} {block.name}{sizes}")
-        out.append(_line("LANGNAME", block.long_name))
+        lines.append(f"{keyword} {block.name}{sizes}")
+        lines.append(_line("LANGNAME", block.long_name))
         units = {"EINHEIT_X": block.unit_x, "EINHEIT_Y": block.unit_y, "EINHEIT_W": block.unit}
         used = ("EINHEIT_W",) if not block.x else ("EINHEIT_X", "EINHEIT_W") if not block.y else tuple(units)
-        out += [_line(word, units[word]) for word in used]
-        out += [f"*{word}   {axis}" for word, axis in (("SSTX", block.axis_x), ("SSTY", block.axis_y)) if axis]
-        out += _numbers("ST/X", block.x)
+        lines += [_line(word, units[word]) for word in used]
+        lines += [f"*{word}   {axis}" for word, axis in (("SSTX", block.axis_x), ("SSTY", block.axis_y)) if axis]
+        lines += _numbers("ST/X", block.x)
         for place, row in enumerate(block.values):
-            out += _numbers("ST/Y", block.y[place : place + 1])
-            out += _numbers("WERT", row)
-        out += ["END", ""]
-    return "\n".join(out)
+            lines += _numbers("ST/Y", block.y[place : place + 1])
+            lines += _numbers("WERT", row)
+        lines += ["END", ""]
+    return "\n".join(lines)
 
 
 def dcm_blocks(text: str, origin: str) -> tuple[list[DcmBlock], list[str]]:

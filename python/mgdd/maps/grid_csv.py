@@ -41,9 +41,9 @@ def csv_of_map(table: CalibrationMap) -> str:
             continue
         rows += [[], ["table", name], *_grid(table, column)]
     rows += [[], [_END]]
-    out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerows(rows)
-    return out.getvalue()
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
 
 
 def is_map_csv(text: str) -> bool:

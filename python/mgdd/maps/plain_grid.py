@@ -193,13 +193,13 @@ def _preamble(lines: Rows) -> tuple[str, str, str, str]:
     remarks: list[str] = []
     for place, (_, cells) in enumerate(lines):
         filled = [cell for cell in cells if cell.casefold() not in _EMPTY]
-        words, own = without_brackets(filled[0]) if filled else ("", "")
+        words, bracket = without_brackets(filled[0]) if filled else ("", "")
         if place == len(lines) - 1 and len(filled) == 1 and cells[0] != filled[0]:
             above = filled[0]
         elif len(filled) == 2 and filled[0].casefold().strip(" :") in _UNIT_KEYS:
             unit = filled[1].strip("[]() ")
-        elif len(filled) == 1 and not words and own and (place or spelled_unit(own) is not None):
-            unit = own
+        elif len(filled) == 1 and not words and bracket and (place or spelled_unit(bracket) is not None):
+            unit = bracket
         elif len(filled) == 1 and not title:
             title = filled[0]
         elif filled:

@@ -44,7 +44,7 @@ def data(data: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
             over = data[next(iter(needed))]
             if draw in (pressure, throttle_run) or min(over.shape) >= _LEAST:
                 return draw(data, ax=ax)
-    numbers = [str(name) for name, own in data.data_vars.items() if own.dtype.kind in "fiu"]
+    numbers = [str(name) for name, variable in data.data_vars.items() if variable.dtype.kind in "fiu"]
     lines = [name for name in numbers if data[name].ndim == 1 and data[name].size > 1]
     if lines:
         return _curves(data, lines, ax)

@@ -265,11 +265,11 @@ def _check_kind(kind: str | None) -> None:
         raise ParameterError.of("kind", kind, f"one of {', '.join(_OF_KIND)}")
 
 
-def _wrong_kind(name: str, kind: str, wanted: str) -> str:
+def _wrong_kind(name: str, kind: str, needed: str) -> str:
     article = {"engine": "an engine", "throttle": "a throttle"}
     return (
-        f"preset {name!r} is {article[kind]}, not {article[wanted]}: shipped {wanted}s are "
-        f"{', '.join(available(wanted))}"
+        f"preset {name!r} is {article[kind]}, not {article[needed]}: shipped {needed}s are "
+        f"{', '.join(available(needed))}"
     )
 
 

@@ -167,12 +167,12 @@ def _profiles(main: Member, progress: Callable[[str], None]) -> dict[str, WallHe
     request = replace(main.fit.request, cylinder=main.fit.model, start_values=starts_of(main.fit))
     gamma = GAMMA_PARAMETER[main.gamma_model]
     burn = tuple(name for name in request.free if name not in (gamma, "wall_heat_scale"))
-    out = {}
+    tables = {}
     for text, common in (("held", ()), ("refitted", (gamma,))):
         fit = fit_request(replace(request, free=("wall_heat_scale", *common, *burn)))
         value = f" at {main.gamma:.4g}" if text == "held" else ""
-        out[f"{main.law}, {main.gamma_model} gamma {text}{value}"] = wall_heat_profile(fit, progress=progress)
-    return out
+        tables[f"{main.law}, {main.gamma_model} gamma {text}{value}"] = wall_heat_profile(fit, progress=progress)
+    return tables
 
 
 _PROVENANCE = (
@@ -507,7 +507,7 @@ def draw(
     analyses: Sequence[xr.Dataset], main: Member, profiles: Mapping[str, WallHeatProfile], timing: Sequence[BestTiming]
 ) -> dict[str, Figure]:
     """Draw the figures by caption; nothing is registered with pyplot."""
-    out = {
+    figures = {
         "Best timing by every member of the family, without a pressure limit": family_strips(timing),
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
         "log p over log V with the polytropic slopes of compression and expansion": _grid(
@@ -516,12 +516,12 @@ def draw(
         f"Calibration, {main.name}": _grid(main.fit.loads, Load.plot),
     }
     for law, profile in profiles.items():
-        out[f"What the traces show of wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
+        figures[f"What the traces show of wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
             draw_profile, profile.dataset, size=(13.0, 4.8)
         )
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in main.fit.loads]
-    out[f"Efficiency and NOx proxies over timing, {main.name}"] = _grid(sweeps, plot.timing, label=True)
-    return out
+    figures[f"Efficiency and NOx proxies over timing, {main.name}"] = _grid(sweeps, plot.timing, label=True)
+    return figures
 
 
 def _grid(datasets: Sequence[Any], function: Any, *, label: bool = False) -> Figure:

@@ -141,16 +141,16 @@ def _section(section: Section) -> dict[str, Any]:
 
 def _axes(figure: Figure) -> list[dict[str, Any]]:
     """Return where axes lie, in shares of a drawn figure, and what they show, so that the page can read the pointer."""
-    out = []
+    places = []
     for ax in figure.axes:
         shown: dict[str, Any] = {}
         for way in "xy":
             beside = getattr(ax, f"get_shared_{way}_axes")().get_siblings(ax)  # one of them may have the label
-            label = next(filter(None, (getattr(own, f"get_{way}label")() for own in (ax, *beside))), way)
+            label = next(filter(None, (getattr(axes, f"get_{way}label")() for axes in (ax, *beside))), way)
             shown[way] = [*getattr(ax, f"get_{way}lim")(), getattr(ax, f"get_{way}scale")(), label]
         if ax.axison and {shown["x"][2], shown["y"][2]} <= {"linear", "log"}:
-            out.append({"place": [*map(float, ax.get_position().extents)], **shown})
-    return out
+            places.append({"place": [*map(float, ax.get_position().extents)], **shown})
+    return places
 
 
 def _png(figure: Figure) -> str:

@@ -107,13 +107,13 @@ def _line_of(x: Any, shades: Any) -> str:
 def _cells_of(shades: Any) -> str:
     width, height = 240 // len(shades), 50 // len(shades[0])
     dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
-    out = ""
+    html = ""
     for (i, j), shade in np.ndenumerate(shades):
         if np.isfinite(shade):
-            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), own):.0f}" for own in dark_to_pale)
+            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), channel):.0f}" for channel in dark_to_pale)
             size = f"width='{width}' height='{height}'"
-            out += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
-    return out
+            html += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
+    return html
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
@@ -133,30 +133,30 @@ def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
 
 def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Row]:
     """Make rows of names and values; units as given, else as the results' labels or the names give."""
-    out = []
+    lines = []
     for name, value in values.items():
         if isinstance(value, Mapping) and value and all(_is_scalar(item) for item in value.values()):
             owner, shared = "" if name in PLAIN else f"{name}.", unit_of(name)
             for key, item in value.items():
                 (row,) = rows_of({str(key): item}, units)
                 unit = row.unit if shared == "-" or row.value == "–" else shared
-                out.append(Row(f"{owner}{row.name}", row.value, unit))
+                lines.append(Row(f"{owner}{row.name}", row.value, unit))
         else:
             unit = (units or {}).get(name) or (VARIABLES[name].units if name in VARIABLES else unit_of(name))
             shown = _shown(value)
-            out.append(Row(name, shown, unit if shown != "–" else "-"))
-    return out
+            lines.append(Row(name, shown, unit if shown != "–" else "-"))
+    return lines
 
 
 def dataset_text(data: Any) -> str:
     """Lay out a Dataset as text: its size, and the value or the range of every variable."""
     over = " × ".join(f"{size} {dim}" for dim, size in data.sizes.items())
     shown: dict[str, Any] = {}
-    for name, own in sorted(data.data_vars.items(), key=lambda item: item[1].ndim):  # numbers before ranges
-        values = own.to_numpy()
+    for name, each in sorted(data.data_vars.items(), key=lambda item: item[1].ndim):  # numbers before ranges
+        values = each.to_numpy()
         few = values.size <= _FEW and values.ndim == 1
-        shown[str(name)] = own.item() if not own.ndim else values if few else _range(values, "")
-    units = {str(name): label_of(own).units for name, own in data.data_vars.items() if "units" in own.attrs}
+        shown[str(name)] = each.item() if not each.ndim else values if few else _range(values, "")
+    units = {str(name): label_of(each).units for name, each in data.data_vars.items() if "units" in each.attrs}
     return as_text(f"Dataset over {over}" if over else "Dataset", rows_of(shown, units))
 
 
@@ -254,9 +254,9 @@ def _markup_of_core(self: Any) -> str:
 
 def _wrapped(plain: Callable[[Any], str]) -> Callable[[Any], str]:
     def text(self: Any) -> str:
-        own = plain(self)
-        lines = textwrap.wrap(own, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-        return own if len(own) <= _WIDTH else "\n".join(lines)
+        text = plain(self)
+        lines = textwrap.wrap(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        return text if len(text) <= _WIDTH else "\n".join(lines)
 
     return text
 

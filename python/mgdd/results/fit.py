@@ -230,10 +230,10 @@ class Fit(Result):
         DataError
             A model that does not predict, as a cylinder: `mgdd.engine.simulate` takes it.
         """
-        own = getattr(self.model, "predict", None)
-        if own is None:
+        predict = getattr(self.model, "predict", None)
+        if predict is None:
             raise DataError(f"{type(self.model).__name__} has no predict: simulate it, with the model of this fit")
-        made: xr.Dataset = own(*given, **options)
+        made: xr.Dataset = predict(*given, **options)
         return made
 
     def to_dict(self) -> dict[str, Any]:

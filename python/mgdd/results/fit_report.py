@@ -220,8 +220,8 @@ class FitReport(Result):
         dict
             Arrays become lists; infinite and NaN numbers become None.
         """
-        own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
-        plain = {field: to_jsonable(getattr(self, field)) for field in own}
+        fields = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
+        plain = {field: to_jsonable(getattr(self, field)) for field in fields}
         return plain | {"findings": [finding.to_dict() for finding in self.findings]}
 
     @property

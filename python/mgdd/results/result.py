@@ -202,12 +202,12 @@ def _sorted(name: str, value: Any, numbers: dict[str, Any], texts: dict[str, Any
     elif isinstance(value, Real | np.bool_):
         numbers[name] = value
     elif isinstance(value, Mapping):
-        for key, own in value.items():
-            _sorted(str(key) if name in PLAIN else f"{name}_{key}", own, numbers, texts)
-    elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(own, Real) for own in value):
-        for key, own in zip(("low", "high"), value, strict=True):
-            numbers[f"{name}_{key}"] = own
-    elif isinstance(value, tuple) and value and all(isinstance(own, str) for own in value):
+        for key, entry in value.items():
+            _sorted(str(key) if name in PLAIN else f"{name}_{key}", entry, numbers, texts)
+    elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(entry, Real) for entry in value):
+        for key, entry in zip(("low", "high"), value, strict=True):
+            numbers[f"{name}_{key}"] = entry
+    elif isinstance(value, tuple) and value and all(isinstance(entry, str) for entry in value):
         texts[name] = "\n".join(value)
 
 

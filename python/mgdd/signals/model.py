@@ -108,11 +108,11 @@ class SampledModel(ABC):
         return self._labelled(time[horizon:], {self.output_name: measured[:-horizon] + run[horizon:] - run[:-horizon]})
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: dict(own) if isinstance(own, MappingProxyType) else own for name, own in vars(self).items()}
+        return {key: dict(item) if isinstance(item, MappingProxyType) else item for key, item in vars(self).items()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, own in state.items():
-            object.__setattr__(self, name, MappingProxyType(own) if isinstance(own, dict) else own)
+        for name, value in state.items():
+            object.__setattr__(self, name, MappingProxyType(value) if isinstance(value, dict) else value)
 
     def state_of(self, given: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Return the whole state of a free run from what is given of it."""
@@ -204,7 +204,7 @@ def as_signal(given: Any, names: Sequence[str], *, what: str, optional: Sequence
     for name in optional:
         if name in table:
             (columns[name],) = columns_of(table, [name], what=what)
-    return labelled_dataset({name: (names[0], own) for name, own in columns.items()})
+    return labelled_dataset({name: (names[0], column) for name, column in columns.items()})
 
 
 def check_horizon(horizon: int, size: int) -> None:

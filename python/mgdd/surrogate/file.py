@@ -167,7 +167,7 @@ def read_response(file: ParameterFile) -> dict[str, Any]:
 
 
 def _polynomial(
-    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], own: dict[str, Any]
+    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], fields: dict[str, Any]
 ) -> PolynomialSurface:
     given = file.values("polynomial", keys)
     m, p = len(names), len(given["coefficients"])
@@ -179,23 +179,23 @@ def _polynomial(
         )
     support = Support(
         inputs=names,
-        lower=own["points"].min(axis=0),
-        upper=own["points"].max(axis=0),
+        lower=fields["points"].min(axis=0),
+        upper=fields["points"].max(axis=0),
         leverage_limit=given["leverage_limit"],
         basis=PolynomialBasis(centre=given["centre"], scale=given["scale"], monomials=monomials),
         root=given["root"],
     )
-    return PolynomialSurface(support=support, coefficients=given["coefficients"], noise_sd=given["noise_sd"], **own)
+    return PolynomialSurface(support=support, coefficients=given["coefficients"], noise_sd=given["noise_sd"], **fields)
 
 
 def _process(
-    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], own: dict[str, Any]
+    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], fields: dict[str, Any]
 ) -> ProcessSurface:
     given = file.values("gaussian_process", keys)
     given = _shaped(file, "gaussian_process", given, {"length_scales": (len(names),)})
     if not (given["length_scales"] > 0.0).all() or not given["signal_sd"] > 0.0 or not given["noise_sd"] >= 0.0:
         raise DataError(f"{file.origin}: [gaussian_process]: length scales and signal_sd must be > 0, noise_sd >= 0")
-    return ProcessSurface(**given, **own)
+    return ProcessSurface(**given, **fields)
 
 
 def _columns(labels: Mapping[str, Label]) -> dict[str, list[str]]:
@@ -233,10 +233,10 @@ def _whole(file: ParameterFile, what: str, values: Any) -> NDArray[np.intp]:
     return array.astype(np.intp)
 
 
-def _by_count(file: ParameterFile, table: str, values: dict[str, Any], keys: str, own: str) -> dict[int, float]:
+def _by_count(file: ParameterFile, table: str, values: dict[str, Any], keys: str, entry: str) -> dict[int, float]:
     """Take counts of cycles and what belongs to each."""
     counts = _whole(file, f"[{table}] {keys}", values.pop(keys))
-    numbers = _array(file, f"[{table}] {own}", values.pop(own), counts.shape)
+    numbers = _array(file, f"[{table}] {entry}", values.pop(entry), counts.shape)
     return dict(zip(counts.tolist(), numbers.tolist(), strict=True))
 
 

@@ -47,11 +47,11 @@ class PolynomialBasis:
 
     def names(self, inputs: Sequence[str]) -> tuple[str, ...]:
         """Name the terms, for example ``1``, ``soi_cad``, ``soi_cad^2`` and ``soi_cad*fuel_mg``."""
-        out = []
+        terms = []
         for monomial in self.monomials.tolist():
             powers = Counter(inputs[place - 1] for place in monomial if place > 0)
-            out.append("*".join(name if power == 1 else f"{name}^{power}" for name, power in powers.items()) or "1")
-        return tuple(out)
+            terms.append("*".join(name if power == 1 else f"{name}^{power}" for name, power in powers.items()) or "1")
+        return tuple(terms)
 
 
 @described
@@ -171,7 +171,7 @@ def choose_terms(
     rows: list[Monomial] = [tuple(row) for row in monomials.tolist()]
     place = {row: index for index, row in enumerate(rows)}
     # The factors of a term: the monomials of one degree less that it contains.
-    above = [[tuple(sorted((*row[:k], 0, *row[k + 1 :]))) for k, own in enumerate(row) if own > 0] for row in rows]
+    above = [[tuple(sorted((*row[:k], 0, *row[k + 1 :]))) for k, power in enumerate(row) if power > 0] for row in rows]
     needs = [frozenset(place[factor] for factor in factors if factor in place) for factors in above]
 
     @cache

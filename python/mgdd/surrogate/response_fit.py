@@ -208,14 +208,14 @@ def _parted(
     points: NDArray[np.float64], values: NDArray[np.float64], fitter: Fitter, folds: int, seed: int
 ) -> NDArray[np.float64]:
     """Predict each random part from a fit to the others."""
-    out = np.empty(values.size)
+    predicted = np.empty(values.size)
     order = np.random.default_rng(seed).permutation(values.size)
     for part in np.array_split(order, folds):
         others = np.setdiff1d(order, part)
         if not (np.ptp(points[others], axis=0) > 0.0).all() or not np.ptp(values[others]) > 0.0:
             raise DataError(f"folds = {folds}: without one part a factor or the response does not vary; use more folds")
-        out[part] = fitter(points[others], values[others])[0].predict(points[part])[0]
-    return out
+        predicted[part] = fitter(points[others], values[others])[0].predict(points[part])[0]
+    return predicted
 
 
 def _quality(measured: NDArray[np.float64], model: NDArray[np.float64], label: Label) -> FitQuality:

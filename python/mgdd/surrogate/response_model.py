@@ -30,12 +30,12 @@ RESERVED = ("point", "mean", "mean_sd", "sd", "lower", "upper", "extrapolated")
 
 def _rows(model: ResponseModel) -> dict[str, Any]:
     surface = model.surface
-    own: dict[str, Any] = {"factors": tuple(model.factors), "points": model.values.size, "noise_sd": surface.noise_sd}
+    rows: dict[str, Any] = {"factors": tuple(model.factors), "points": model.values.size, "noise_sd": surface.noise_sd}
     if isinstance(surface, PolynomialSurface):
-        own["terms"] = model.terms
+        rows["terms"] = model.terms
     else:
-        own["length_scale"] = dict(zip(model.factors, surface.length_scales.tolist(), strict=True))
-    return own
+        rows["length_scale"] = dict(zip(model.factors, surface.length_scales.tolist(), strict=True))
+    return rows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

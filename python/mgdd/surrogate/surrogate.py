@@ -112,10 +112,10 @@ def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np
 
 
 def _kept(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
-    out = np.ones(at.size, dtype=np.bool_)
+    feasible = np.ones(at.size, dtype=np.bool_)
     for curve in curves:
-        out &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())
-    return out
+        feasible &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())
+    return feasible
 
 
 STEERED = "soi_cad"
@@ -265,15 +265,15 @@ class EngineSurrogate(Parameters):
     def quality(self) -> xr.Dataset:
         """Tabulate how well each surface does."""
         models = list(self.signals.values())
-        own = "unit of the signal"
+        unit = "unit of the signal"
         return labelled_dataset(
             {
                 "signal": ("signal", list(self.signals), "-", "signal"),
                 "r2": ("signal", [m.r2 for m in models], "-", "R² of all records"),
                 "r2_held_out": ("signal", [m.r2_held_out for m in models], "-", "R² of the held-out records"),
                 "lag_cycles": ("signal", [m.lag_cycles for m in models], "cycles", "lag from command to log"),
-                "residual_sd": ("signal", [m.residual_sd for m in models], own, "residual standard deviation"),
-                "cyclic_sd": ("signal", [m.cyclic_sd for m in models], own, "cyclic standard deviation"),
+                "residual_sd": ("signal", [m.residual_sd for m in models], unit, "residual standard deviation"),
+                "cyclic_sd": ("signal", [m.cyclic_sd for m in models], unit, "cyclic standard deviation"),
             }
         )
 

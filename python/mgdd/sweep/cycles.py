@@ -58,12 +58,12 @@ def simulate_cases(request: Request, columns: NDArray[np.float64]) -> dict[str, 
     needed = dict.fromkeys(name for name in request.outputs if name not in NOX)
     needed |= dict.fromkeys(["t_max_k"] if set(NOX) & set(request.outputs) else [])
     outputs = _batch(request, columns, [*needed, *([] if _ALWAYS in needed else [_ALWAYS])])
-    out: dict[str, NDArray[np.generic]] = {VOID: np.flatnonzero(np.isnan(outputs[_ALWAYS]))}
+    result: dict[str, NDArray[np.generic]] = {VOID: np.flatnonzero(np.isnan(outputs[_ALWAYS]))}
     for name, proxy in zip(NOX, (request.nox.affine_log_ppm, request.nox.arrhenius_ppm), strict=True):
         if name in request.outputs:
-            out[name] = proxy(outputs["t_max_k"])
-    out |= {name: outputs[name] for name in request.outputs if name in outputs}
-    return out | _traces(request, columns)
+            result[name] = proxy(outputs["t_max_k"])
+    result |= {name: outputs[name] for name in request.outputs if name in outputs}
+    return result | _traces(request, columns)
 
 
 def angles_of(request: Request) -> NDArray[np.float64]:
@@ -426,12 +426,12 @@ class Cases:
 
     def coordinates(self) -> dict[str, tuple[Any, ...]]:
         """Give the coordinates as `labelled_dataset` takes them."""
-        out: dict[str, tuple[Any, ...]] = {}
+        variables: dict[str, tuple[Any, ...]] = {}
         if self._numbers is not None:
-            out[POINT] = (POINT, self._numbers, "-", "number of the point")
+            variables[POINT] = (POINT, self._numbers, "-", "number of the point")
         for name, values in self.inputs.items():
-            out[name] = (name if self._numbers is None else POINT, values, *input_labels()[name])
-        return out
+            variables[name] = (name if self._numbers is None else POINT, values, *input_labels()[name])
+        return variables
 
 
 def cases_of(over: Any, *, points: bool) -> Cases:

@@ -204,22 +204,22 @@ def headline_of(rows: Sequence[BestTiming]) -> Member:
     """Give the member that stands for all loads: plausible for the most of them, then with the least score."""
 
     def rank(at: int) -> tuple[int, float]:
-        own = [row.members[at] for row in rows]
-        return -sum(answer.plausible for answer in own), own[0].member.score
+        members = [row.members[at] for row in rows]
+        return -sum(answer.plausible for answer in members), members[0].member.score
 
     return rows[0].members[min(range(len(rows[0].members)), key=rank)].member
 
 
 def doubts_of(rows: Sequence[BestTiming], tdc: TdcEstimate | None = None) -> list[str]:
     """Report what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
-    out = [str(finding) for finding in headline_of(rows).fit.findings]
+    reasons = [str(finding) for finding in headline_of(rows).fit.findings]
     for row in rows:
         ends = sum(answer.at_bound for answer in row.plausible)
         if ends:
-            out.append(
+            reasons.append(
                 f"{row.file}: the best timing of {ends} plausible model(s) lies at the end of the searched range: "
                 "widen bounds_cad, or suspect TDC"
             )
         if not row.plausible:
-            out.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
-    return out + (tdc.doubts() if tdc is not None else [])
+            reasons.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
+    return reasons + (tdc.doubts() if tdc is not None else [])

@@ -235,12 +235,12 @@ def _left_out(request: Request, fit: CylinderFit) -> tuple[float, ...]:
     common, n = common_of(request), len(request.traces)
     if n < 2 or not common:
         return tuple(load.rmse_percent for load in fit.loads)
-    out = []
+    reasons = []
     for i in range(n):
         others = fit_request(request.subset([k for k in range(n) if k != i]))
         held = request.cylinder.replace(**{name: float(getattr(others.model, name)) for name in common})
-        out.append(fit_request(of_law(request.subset([i]), held, ())).loads[0].rmse_percent)
-    return tuple(out)
+        reasons.append(fit_request(of_law(request.subset([i]), held, ())).loads[0].rmse_percent)
+    return tuple(reasons)
 
 
 def _score(member: Member, family: ModelFamily, least: float) -> float:

@@ -194,7 +194,7 @@ def _moved(
     """Estimate the scale again with one assumption lower and higher by its width."""
     start = replace(fit.request, cylinder=fit.model, start_values=starts_of(fit))
     gamma = GAMMA_PARAMETER[fit.model.gamma_model]
-    out = {}
+    errors = {}
     for name, width in widths.items():
         if name == "gamma" and gamma in fit.request.free:
             continue
@@ -203,8 +203,8 @@ def _moved(
             if progress is not None:
                 progress(f"{fit.kind}: refit with {_NAMES[name]} {side:+g}{_UNITS[name]}")
             pair.append(float(fit_request(_with_offset(start, name, side, gamma)).model.wall_heat_scale))
-        out[name] = (pair[0], pair[1])
-    return out
+        errors[name] = (pair[0], pair[1])
+    return errors
 
 
 def _with_offset(request: Request, name: str, offset: float, gamma: str) -> Request:

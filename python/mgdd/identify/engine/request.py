@@ -283,8 +283,8 @@ def _known_heats(
         if free is not None and "fuel_heat_j" in free:
             return (None,) * len(traces)
     else:
-        one = isinstance(fuel_heat_j, int | float | np.number)
-        heats = (fuel_heat_j,) * len(traces) if one else tuple(fuel_heat_j)  # type: ignore[arg-type, assignment]
+        is_number = isinstance(fuel_heat_j, int | float | np.number)
+        heats = (fuel_heat_j,) * len(traces) if is_number else tuple(fuel_heat_j)  # type: ignore[arg-type, assignment]
         if free is not None and "fuel_heat_j" in free:
             raise ParameterError("fuel_heat_j is free and given: leave it out of free to hold it, or do not give it")
     if len(heats) != len(traces):

@@ -78,7 +78,7 @@ class TdcEstimate(Result):
 
     def __post_init__(self) -> None:
         labels = {name: unit_attributes("°CA", f"{end} possible offset") for name, end in _ENDS}
-        ends = {name: ((), getattr(self, name), own) for name, own in labels.items()}
+        ends = {name: ((), getattr(self, name), label) for name, label in labels.items()}
         object.__setattr__(self, "dataset", self.dataset.assign(ends))
 
     @property

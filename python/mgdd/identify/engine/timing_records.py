@@ -101,8 +101,8 @@ class MemberTiming:
         """Give law, gamma and wall heat of the member and its answer as plain values."""
         names = ("law", "gamma_model", "gamma", "wall_heat_model", "wall_heat_scale")
         model = {name: getattr(self.member, name) for name in names}
-        own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
-        return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
+        return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **fields}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

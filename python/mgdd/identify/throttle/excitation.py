@@ -190,10 +190,10 @@ def _violations(
     max_rate_deg_per_s: float | None,
     max_current_a: float | None,
 ) -> tuple[Finding, ...]:
-    out: list[Finding] = []
+    findings: list[Finding] = []
 
     def add(name: str, text: str, remedy: str) -> None:
-        out.append(Finding("limit_exceeded", (name,), text, remedy))
+        findings.append(Finding("limit_exceeded", (name,), text, remedy))
 
     if content.angle_high_deg > window[1]:
         add(
@@ -216,7 +216,7 @@ def _violations(
     if max_current_a is not None and peak_current_a > max_current_a:
         text = f"the motor takes {peak_current_a:.2f} A, above {max_current_a:g}"
         add("max_current_a", text, "lower the amplitude")
-    return tuple(out)
+    return tuple(findings)
 
 
 EXCITATIONS = ("chirp", "multisine", "prbs", "amplitude_random_steps", "staircase", "triangle")

@@ -201,14 +201,14 @@ def identify_throttle(
     content = record_content(
         log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=prior.stops_deg
     )
-    asked = open_questions(content, swing=prior.swing, pairs=entangled(fit.report))
+    questions = open_questions(content, swing=prior.swing, pairs=entangled(fit.report))
     # The report names correlated pairs, too; here each comes with its remedy.
-    of_fit = (found for found in fit.findings if found.code != "correlated")
+    of_fit = (finding for finding in fit.findings if finding.code != "correlated")
     read: tuple[Finding, ...] = ()
     if limp_home_deg is None:
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    findings = unique((*of_fit, *_carried_over(fit.train, tested), *read, *stops, *asked))
+    findings = unique((*of_fit, *_carried_over(fit.train, tested), *read, *stops, *questions))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 

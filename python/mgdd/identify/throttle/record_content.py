@@ -126,10 +126,10 @@ def open_questions(
     lh = content.limp_home_deg
     where = "" if math.isnan(lh) else f" ({lh:.3g} deg)"
     ramp = f"a triangle of ±{swing:.2g} duty at {_TRIANGLE_HZ:g} Hz across limp-home{where}"
-    out: list[Finding] = []
+    findings: list[Finding] = []
 
     def add(code: str, text: str, remedy: str, *names: str) -> None:
-        out.append(Finding(code, names, text, remedy))
+        findings.append(Finding(code, names, text, remedy))
 
     if content.travel_open_deg + content.travel_closed_deg < _LEAST_TRAVEL_DEG:
         text = "the plate hardly moves: nothing but a lower bound of the breakaway duty can be learned"
@@ -176,7 +176,7 @@ def open_questions(
             f"the plate rests on an end stop {share:.0f} % of the time, which identifies nothing",
             "lower offset or amplitude",
         )
-    return tuple(out)
+    return tuple(findings)
 
 
 def _kind(name: str) -> str:

@@ -240,8 +240,8 @@ def validate_throttle(
     run = free_run(plain_model, log)
     skip = discarded(step, time.size)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
-    one = angle[1:] - plain_model.predict(log, 1)["angle_deg"].to_numpy()
-    tests = residual_tests(one[skip:], duty[:-1][skip:])
+    one_step = angle[1:] - plain_model.predict(log, 1)["angle_deg"].to_numpy()
+    tests = residual_tests(one_step[skip:], duty[:-1][skip:])
     throttle = prior_of(plain_model)
     limp_home = throttle.limp_home_deg if limp_home_deg is None else limp_home_deg
     content = record_content(time, angle, limp_home_deg=limp_home, stops_deg=throttle.stops_deg)

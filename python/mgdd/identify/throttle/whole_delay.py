@@ -205,8 +205,8 @@ def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
     least = max(float(loss[best].mean()), FLOOR_DEG**2)
     return [
         delay
-        for delay, own in sorted(loss.items())
-        if max(float(own.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], own)
+        for delay, losses in sorted(loss.items())
+        if max(float(losses.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], losses)
     ]
 
 
