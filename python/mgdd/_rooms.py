@@ -143,8 +143,8 @@ def _of_a_record(name: str, unknown: str, names: Sequence[str]) -> TypeError | N
     from mgdd import _core
 
     for argument, (room, record, form) in _RECORDS.items():
-        if unknown and argument in names and unknown in (known := getattr(getattr(_core, room), record).fields()):
-            unit = "" if known[unknown]["unit"] == "-" else f" [{known[unknown]['unit']}]"
+        if unknown and argument in names and unknown in (fields := getattr(getattr(_core, room), record).fields()):
+            unit = "" if fields[unknown]["unit"] == "-" else f" [{fields[unknown]['unit']}]"
             how = form.format(unknown)
             return TypeError(
                 f"{name}() has no argument {unknown!r}: it is a setting{unit} of the {argument}: give {how}"

@@ -171,8 +171,8 @@ def path(name: str, file: str) -> Path:
     folder = _data_dir()
     if folder is not None and (folder / name / file).is_file():
         return folder / name / file
-    if (kept := find_fetched(name, file)) is not None:
-        return kept
+    if (fetched_file := find_fetched(name, file)) is not None:
+        return fetched_file
     packaged = _PACKAGE / file
     digest = _PACKAGED.get(name, {}).get(file)
     if digest is None or not packaged.is_file():

@@ -258,8 +258,8 @@ class FeasibleRegion:
             "active_limit": ("point", judged.active, "-", "nearest limit"),
             "extrapolated": ("point", judged.extrapolated, "-", "outside of all measured points"),
         }
-        own = {name: ("point", values, *named_label(name)) for name, values in judged.indicators.items()}
-        return labelled_dataset({**own, **variables})
+        outputs = {name: ("point", values, *named_label(name)) for name, values in judged.indicators.items()}
+        return labelled_dataset({**outputs, **variables})
 
     def _judged(self, points: Any) -> tuple[dict[str, NDArray[np.float64]], _Judged]:
         names = self.rule.names if isinstance(self.rule, _Measured) else column_names(points, "points")

@@ -315,8 +315,8 @@ def _bmep(
     """BMEP [bar] as given, or 4 pi torque over the displacement of a four-stroke engine."""
     if bmep is not None and torque is not None:
         raise ParameterError("bmep_bar and brake_torque_nm both state the brake work: give one")
-    if torque is None and (own := _number(trace, "bmep_bar", bmep)) is not None:
-        return own
+    if torque is None and (bmep_bar := _number(trace, "bmep_bar", bmep)) is not None:
+        return bmep_bar
     torque = _number(trace, "brake_torque_nm", torque)
     if torque is None:
         return None

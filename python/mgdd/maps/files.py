@@ -102,11 +102,11 @@ def write_map(
         raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file or a .cdfx file")
     if encoding != "utf-8":
         raise ParameterError.of("encoding", encoding, "'utf-8' in this form; a .dcm or .cdfx file may have others")
-    (own,) = maps
+    (single,) = maps
     if ending == ".nc":
-        write_netcdf(own.to_dataset(), path)
+        write_netcdf(single.to_dataset(), path)
     else:
-        write_whole_text(path, csv_of_map(own) if ending == ".csv" else _json_of(own))
+        write_whole_text(path, csv_of_map(single) if ending == ".csv" else _json_of(single))
 
 
 def read_map(

@@ -43,7 +43,7 @@ def map_of_grid(
     text: str, origin: str, *, name: str | None, decimal: str, rows: str | None, columns: str | None, whole: bool
 ) -> CalibrationMap | None:
     """Read the grid in a text, or give None where there is none; only the rows of a sheet are known to be whole."""
-    grids = [grid for mark in _MARKS if mark != decimal for grid in [_found(text, mark, origin)] if grid]
+    grids = [grid for mark in _MARKS if mark != decimal for grid in [_grid_in(text, mark, origin)] if grid]
     if not grids:
         return None
     grid = max(grids, key=lambda each: each.width)  # the first of the widest
@@ -102,10 +102,10 @@ def require_two(origin: str, axes: Mapping[str, Sized]) -> None:
 
 def value_heading(name: str | None, label: str, unit: str = "") -> Heading:
     """Give what the values are: called as asked for, else as the file labels them, else ``value``."""
-    words, own = without_brackets(label)
+    words, bracket = without_brackets(label)
     if name is None:
         return heading_of(label, unit=unit, fallback="value")
-    made = heading_of(name, unit=unit or own, fallback=name)
+    made = heading_of(name, unit=unit or bracket, fallback=name)
     return made._replace(long_name=words) if words and words != name else made
 
 
@@ -134,7 +134,7 @@ def _like_number(cell: str) -> bool:
     return _LIKE_NUMBER.match(cell) is not None
 
 
-def _found(text: str, mark: str | None, origin: str) -> _Grid | None:
+def _grid_in(text: str, mark: str | None, origin: str) -> _Grid | None:
     """Find the row of breakpoints: numbers behind a corner that is none, above rows that begin with a number."""
     lines = _cells(text, mark, origin)
     for place, (line, cells) in enumerate(lines):

@@ -126,7 +126,7 @@ def _index(table: Table, label: str | None, what: str) -> int | None:
         return None
     labels = table.header or ()
     names = [heading_of(each, unit=table.unit(k) or "", fallback="").name for k, each in enumerate(labels)]
-    places = [k for k, (each, own) in enumerate(zip(labels, names, strict=True)) if label in (each, own)]
+    places = [k for k, (each, name) in enumerate(zip(labels, names, strict=True)) if label in (each, name)]
     if len(places) != 1:
         near = did_you_mean(label, (*labels, *names)) or f"the file has {', '.join(map(repr, labels))}"
         count = "no column" if not places else "more than one column"
@@ -193,9 +193,9 @@ def _of_matrix(table: ArrayTable, name: str | None, rows: str | None, columns: s
     members = matrices[matrix]
     shape = (table.lengths[members[0]], len(members))
     chosen = []
-    for side, size, asked in (("rows", shape[0], rows), ("columns", shape[1], columns)):
+    for side, size, named in (("rows", shape[0], rows), ("columns", shape[1], columns)):
         fit = [k for k in vectors if table.lengths[k] == size]
-        index = _index(table, asked, side) if asked is not None else fit[0] if len(fit) == 1 else None
+        index = _index(table, named, side) if named is not None else fit[0] if len(fit) == 1 else None
         if index is None or index not in fit:
             names = ", ".join(labels[k] for k in fit) or "none"
             raise DataError(

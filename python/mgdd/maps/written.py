@@ -59,8 +59,8 @@ def without_brackets(text: str) -> tuple[str, str]:
 
 def heading_of(text: str, *, unit: str = "", fallback: str, taken: tuple[str, ...] = ()) -> Heading:
     """Read a label such as ``speed [rpm]``, ``rpm`` or ``speed_rpm``; `fallback` is the name where it has none."""
-    words, own = without_brackets(text)
-    written = unit or own
+    words, bracket = without_brackets(text)
+    written = unit or bracket
     plain = unicodedata.normalize("NFKC", words).strip()
     plain = _UMLAUTS.get(plain[:1], plain[:1]) + plain[1:]
     candidates = (plain, re.sub(r"[^\w.\[\]%]+", "_", plain).strip("_"), _name_of_unit(written) if not words else "")

@@ -140,10 +140,10 @@ class _Run:
                     self._progress(self._done, self._n)
         except KeyboardInterrupt:
             self._settle()
-            return Interrupted(f"interrupted: {self._kept()}")
+            return Interrupted(f"interrupted: {self._finished()}")
         except WorkerLostError as lost:
             self._settle()
-            lost.args = (f"{lost}; {self._kept()}",)
+            lost.args = (f"{lost}; {self._finished()}",)
             return lost
         except BaseException:
             self._settle(keep=False)
@@ -200,7 +200,7 @@ class _Run:
             "memory: take fewer workers, and run the rest again"
         )
 
-    def _kept(self) -> str:
+    def _finished(self) -> str:
         if not self._done:
             return "nothing was finished"
         return f"{self._done} of {self._n} are finished, they are in .partial"

@@ -92,8 +92,8 @@ def _loaded(given: Any, kind: str) -> Any:
     return load(given, kind=kind) if isinstance(given, str | os.PathLike) else given
 
 
-def _refusal(argument: str, given: Any, wanted: str, kind: str) -> ParameterError:
-    bound = f"{wanted}, a preset, or the name of one: {', '.join(available(kind))}"
+def _refusal(argument: str, given: Any, needed: str, kind: str) -> ParameterError:
+    bound = f"{needed}, a preset, or the name of one: {', '.join(available(kind))}"
     part = getattr(given, argument, None)
     remedy = f"; give its .{argument}" if isinstance(part, Cylinder | Throttle) else ""
     return ParameterError(

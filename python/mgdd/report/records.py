@@ -102,9 +102,9 @@ def _figures(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[tuple[str, Fig
     yield "Heat release with burn angles", drawn(_burn, traces, size=_SIZE)
     if "cycle" not in traces.dims:
         return
-    work = next(name for name in ("imep_net_bar", "imep_gross_bar", "imep_closed_bar") if _known(figures, name))
+    work = next(name for name in ("imep_net_bar", "imep_gross_bar", "imep_closed_bar") if _has_number(figures, name))
     for name in (work, "ca50_cad", "p_max_bar", "mapo_bar"):
-        if _known(figures, name):
+        if _has_number(figures, name):
             caption = f"{label_of(figures[name]).long_name}: from cycle to cycle, histogram, return map"
             yield caption, drawn(plot.cycles, figures, size=_WIDE, figure=name)
     if _SPECTRUM in traces:
@@ -114,7 +114,7 @@ def _figures(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[tuple[str, Fig
     yield "Net heat release of every cycle", drawn(plot.cycles, traces, size=_TALL, figure=heat)
 
 
-def _known(figures: xr.Dataset, name: str) -> bool:
+def _has_number(figures: xr.Dataset, name: str) -> bool:
     return bool(np.isfinite(figures[name]).any())
 
 

@@ -166,15 +166,15 @@ def described(
     """Give a class a short text and an HTML form."""
     head = title_of if title is None else title
 
-    def known(obj: Any) -> list[Row]:
+    def listed(obj: Any) -> list[Row]:
         fields = fields_of(obj) if rows is None else rows(obj)
         return rows_of(fields) if isinstance(fields, Mapping) else list(fields)
 
     def text(self: Any) -> str:
-        return as_text(head(self), known(self))
+        return as_text(head(self), listed(self))
 
     def markup(self: Any) -> str:
-        return as_html(head(self), known(self))
+        return as_html(head(self), listed(self))
 
     for name, function in (("__repr__", text), ("_repr_html_", markup)):
         function.__name__, function.__qualname__ = name, f"{cls.__name__}.{name}"

@@ -162,9 +162,9 @@ class ResponseModel(Parameters):
 
     def extrapolated(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which points, shape (n, m), lie outside of those that were fitted."""
-        own = self.points
+        measured = self.points
         if self.hull is None:
-            inside = np.all((points >= own.min(axis=0)) & (points <= own.max(axis=0)), axis=1)
+            inside = np.all((points >= measured.min(axis=0)) & (points <= measured.max(axis=0)), axis=1)
         else:
             inside = self.hull.depth(points)[0] >= -EDGE
         return np.asarray(~(inside & self.surface.supports(points)), dtype=np.bool_)

@@ -59,8 +59,8 @@ def best_along(
     others = np.delete(np.arange(len(support.inputs)), column)
     inside = np.all((points[0, others] >= support.lower[others]) & (points[0, others] <= support.upper[others]))
     candidates = np.unique(np.r_[edges, _inner_roots([*held.values(), goal.deriv()], low, high)])
-    supported = inside & _kept(rules, candidates)
-    feasible = supported & _kept(list(held.values()), candidates)
+    supported = inside & _within(rules, candidates)
+    feasible = supported & _within(list(held.values()), candidates)
     if not feasible.any():
         if not supported.any():
             raise ConvergenceError(f"no soi_cad in [{low:.4g}, {high:.4g}] is supported: change the other inputs")
@@ -72,7 +72,7 @@ def best_along(
             "raise a limit"
         )
     best = float(candidates[int(np.argmax(np.where(feasible, goal(candidates), -np.inf)))])
-    start, end = _range_around(best, edges, inside & _kept(rules, 0.5 * (edges[1:] + edges[:-1])))
+    start, end = _range_around(best, edges, inside & _within(rules, 0.5 * (edges[1:] + edges[:-1])))
     return Optimum(
         inputs={"soi_cad": best},
         objective=" + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items()),
@@ -111,7 +111,7 @@ def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np
     return float(edges[first]), float(edges[last])
 
 
-def _kept(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _within(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
     feasible = np.ones(at.size, dtype=np.bool_)
     for curve in curves:
         feasible &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())

@@ -139,7 +139,7 @@ def wall_heat_profile(
         if scale not in fits:
             if progress is not None:
                 progress(f"{fit.kind}: refit at wall-heat scale {scale:.3g}")
-            near = fits[min(fits, key=lambda known: abs(known - scale))]
+            near = fits[min(fits, key=lambda other: abs(other - scale))]
             held = near.model.replace(wall_heat_scale=scale)
             fits[scale] = fit_request(replace(fit.request, cylinder=held, free=free, start_values=starts_of(near)))
         return fits[scale]

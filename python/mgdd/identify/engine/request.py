@@ -151,14 +151,14 @@ class Request:
                 out[name] = (earliest, math.inf)
         return out
 
-    def subset(self, kept: Sequence[int]) -> Self:
+    def subset(self, places: Sequence[int]) -> Self:
         """Give the same request for some of the traces."""
         return replace(
             self,
-            traces=tuple(self.traces[i] for i in kept),
-            labels=tuple(self.labels[i] for i in kept),
-            known_heat_j=tuple(self.known_heat_j[i] for i in kept),
-            start_values=None if self.start_values is None else tuple(self.start_values[i] for i in kept),
+            traces=tuple(self.traces[i] for i in places),
+            labels=tuple(self.labels[i] for i in places),
+            known_heat_j=tuple(self.known_heat_j[i] for i in places),
+            start_values=None if self.start_values is None else tuple(self.start_values[i] for i in places),
         )
 
     def shifted(self, *, angle_cad: float = 0.0, pressure_bar: float = 0.0) -> Self:

@@ -88,7 +88,7 @@ class TdcEstimate(Result):
         motored = {name: getattr(self, name) for name in ("loss_angle_cad", "wall_heat_scale")}
         return {
             **{name: getattr(self, name) for name in names},
-            **{name: None if math.isnan(own) else own for name, own in motored.items()},
+            **{name: None if math.isnan(value) else value for name, value in motored.items()},
             "findings": list(self.findings),
             "others_cad": list(self.others_cad),
         }

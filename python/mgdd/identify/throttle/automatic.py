@@ -80,7 +80,7 @@ def fit_groups(
     try:
         rough, terms = _structure(hunt, fixed_values, sorted(delays), chosen.n_starts, chosen.seed)
         by_delay = whole_delay(hunt, rough, sorted(delays))
-        search, terms = _without(hunt, by_delay.found, terms)
+        search, terms = _without(hunt, by_delay.best, terms)
         if STOPS in terms:
             search = hunt.fine(search.values, list(dict.fromkeys([*names_of(search), *STOPS])))
         findings = _findings(search, terms, by_delay, delays)
@@ -95,7 +95,7 @@ def fit_groups(
             raise
         interrupted = stop
         if report is None:
-            search = hunt.best if by_delay is None else by_delay.found
+            search = hunt.best if by_delay is None else by_delay.best
             report = FitReport.from_core(search.report, problem.angle)
     if by_delay is not None and len(by_delay.rmse) > 1:
         delay = search.values["delay_samples"]

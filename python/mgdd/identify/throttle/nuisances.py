@@ -118,13 +118,13 @@ class _Slopes:
         problem: GroupsProblem,
         values: Mapping[str, float],
         report: FitReport,
-        known: NDArray[np.int_],
+        finite: NDArray[np.int_],
         substeps: int,
     ) -> _Slopes:
         """Take central differences: wide enough that a plate which sticks a sample sooner is not a slope."""
         begin = {**values, **dict(zip(report.names, report.values, strict=True))}
         columns = []
-        for name in (report.names[index] for index in known):
+        for name in (report.names[index] for index in finite):
             ends = [begin[name] + way * _STEP * max(abs(begin[name]), _USUAL.get(name, 0.0)) for way in (1.0, -1.0)]
             if name not in ("limp_home_deg", *_START):
                 ends[1] = max(ends[1], 0.0)

@@ -137,14 +137,14 @@ _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between de
 class Delays:
     """The delay that was taken, what its rivals reach, and which of them the log does not separate from the best."""
 
-    found: Search
+    best: Search
     rmse: Mapping[float, float]
     ties: tuple[float, ...]
 
     @property
     def rivals(self) -> dict[float, float]:
         """Errors by delay [deg], equals with that of the delay taken."""
-        return {**self.rmse, **dict.fromkeys(self.ties, self.rmse[self.found.values["delay_samples"]])}
+        return {**self.rmse, **dict.fromkeys(self.ties, self.rmse[self.best.values["delay_samples"]])}
 
 
 def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
@@ -196,7 +196,7 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
         key=lambda delay: (_unlike_a_motor(fits[delay].values["electrical_s"]), complete and fits[delay].rmse, delay),
     )
     rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **fits}.items()}
-    return Delays(found=fits[best_delay], rmse=rmse, ties=tuple(ties))
+    return Delays(best=fits[best_delay], rmse=rmse, ties=tuple(ties))
 
 
 def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
