@@ -287,7 +287,7 @@ class ThermalNo:
 
         def ratios(mixtures: NDArray[np.float64]) -> NDArray[np.float64]:
             models = [replace(self, lambda_burned=float(mixture), calibration=1.0) for mixture in mixtures]
-            return np.log(measured) - np.log([[_raw(model, *one)["nox_ppm"] for one in made] for model in models])
+            return np.log(measured) - np.log([[_raw(model, *case)["nox_ppm"] for case in made] for model in models])
 
         if measured.size < _FEWEST_FOR_LAMBDA:
             alone = np.array([self.lambda_burned])

@@ -113,8 +113,8 @@ def fit_groups(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(one.rmse for one in hunt.done)),
-        n_best=sum(one.rmse <= 1.005 * search.rmse for one in hunt.done),
+        start_rmse=tuple(sorted(entry.rmse for entry in hunt.done)),
+        n_best=sum(entry.rmse <= 1.005 * search.rmse for entry in hunt.done),
         run=run,
         draw=draw_free_run,
     )

@@ -102,7 +102,7 @@ def fit_first_principle(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(float(one.rmse) for one in result["reports"])),
+        start_rmse=tuple(sorted(float(start_report.rmse) for start_report in result["reports"])),
         n_best=int(result["n_reached"]),
         run=run,
         draw=draw_free_run,

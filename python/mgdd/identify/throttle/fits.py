@@ -67,7 +67,7 @@ def fit_auto(
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
         # The groups may start PW-R in a valley of their own: it is also searched from no delay.
-        best = min((_pw_r(one, log, iterations) for one in _starts(other.model)), key=_rmse) if better else groups
+        best = min((_pw_r(each, log, iterations) for each in _starts(other.model)), key=_rmse) if better else groups
         if better and _rmse(best) > _rmse(groups):  # one event of the last quarter, not the model
             better, best = False, groups
     except Interrupted as stop:

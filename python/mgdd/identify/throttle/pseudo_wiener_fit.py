@@ -77,11 +77,11 @@ def fit_pseudo_wiener(
     identified from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
     """
     chosen = fit_options(options, n_starts=_STARTS.get(kind, 1), seed=1, max_iterations=150)
-    logs = [as_log(one) for one in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]
+    logs = [as_log(record) for record in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]
     if not logs:
         raise DataError("no logs: a fit needs at least one")
     sample_s = _sample(logs)
-    columns = [(one["duty"].to_numpy(), one["angle_deg"].to_numpy()) for one in logs]
+    columns = [(record["duty"].to_numpy(), record["angle_deg"].to_numpy()) for record in logs]
     limp_home = float(columns[0][1][0]) if limp_home_deg is None else float(limp_home_deg)
     base = PseudoWiener(kind) if start_values is None else start_values
     if base.kind != kind:
@@ -112,7 +112,7 @@ def fit_pseudo_wiener(
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
-    runs = [free_run(model, one) for one in logs]
+    runs = [free_run(model, record) for record in logs]
     findings = [*wrapped.findings]
     findings += delay_at_end(parameters["delay_samples"], delays, 5.0)
     if errors.size > 1 and n_best < 2:
@@ -140,4 +140,4 @@ def fit_pseudo_wiener(
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:
     names = [f"log {k}" for k in range(1, len(logs) + 1)]
-    return common_step([one["time_s"].to_numpy() for one in logs], names)
+    return common_step([record["time_s"].to_numpy() for record in logs], names)

@@ -111,9 +111,9 @@ def block_losses(
     samples = np.bincount(of_sample)
     moving = np.array([np.ptp(angle[of_sample == k]) > _MOVED_DEG for k in range(samples.size)])
     moving = moving if moving.any() else np.ones(samples.size, dtype=bool)
-    square = {key: (np.bincount(of_sample, weights=one**2) / samples)[moving] for key, one in residual.items()}
-    usual = max(min(float(np.median(one)) for one in square.values()), floor_deg**2)
-    return {key: np.minimum(one, _SPREAD**2 * usual) for key, one in square.items()}
+    square = {key: (np.bincount(of_sample, weights=error**2) / samples)[moving] for key, error in residual.items()}
+    usual = max(min(float(np.median(error)) for error in square.values()), floor_deg**2)
+    return {key: np.minimum(error, _SPREAD**2 * usual) for key, error in square.items()}
 
 
 def certainly_less(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> bool:
@@ -185,7 +185,7 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
         at = list(delays).index(best)  # never the last of those looked at, while there are others
         near = [d for d in delays if d in looks or d in delays[max(at - 1, 0) : at + 2]]
     problem = hunt.problem
-    residual = {delay: np.asarray(one.report.residual) for delay, one in fits.items()}
+    residual = {delay: np.asarray(fit.report.residual) for delay, fit in fits.items()}
     floor = max(noise_of(problem.angle), FLOOR_DEG)
     alike = _ALIKE * max(best_of(fits.values()).rmse, FLOOR_DEG)
     equals = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
@@ -195,7 +195,7 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
         ties,
         key=lambda delay: (_unlike_a_motor(fits[delay].values["electrical_s"]), complete and fits[delay].rmse, delay),
     )
-    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **fits}.items()}
+    rmse = {delay: max(fit.rmse, FLOOR_DEG) for delay, fit in {**looks, **fits}.items()}
     return Delays(best=fits[best_delay], rmse=rmse, ties=tuple(ties))
 
 
