@@ -56,7 +56,7 @@ def unbound(
     keywords: Mapping[str, Any],
     how: Mapping[str, str],
 ) -> TypeError | None:
-    """Say why a call does not fit the signature of a Python function; `how` has kind and meaning of its parameters."""
+    """Return why a call misfits the signature of a Python function; `how` has kind and meaning of its parameters."""
     places = [each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
     arguments = [
         _Argument(
@@ -75,7 +75,7 @@ def unbound(
 def refusal(
     name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
 ) -> TypeError | ParameterError:
-    """Say why a call fits none of its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
+    """Return why a call misfits its signatures, as pybind11 writes them: TypeError as of Python, or ParameterError.
 
     The latter names the argument that has the wrong kind; the first one of a `method` is ``self``.
     """
@@ -94,7 +94,7 @@ def refusal(
     furthest = max(place for place, _, _ in culprits)
     last = [(argument, value) for place, argument, value in culprits if place == furthest]
     argument, value = last[0]
-    bound_text = " or ".join(dict.fromkeys(_said(each.kind) for each, _ in last))
+    bound_text = " or ".join(dict.fromkeys(_type_text(each.kind) for each, _ in last))
     if has_units(value):
         bound_text = _BOUND
     remedy = _remedy(argument, value)
@@ -109,7 +109,7 @@ def refusal(
 def unit_refusal(
     name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
 ) -> ParameterError | None:
-    """Say which number carries a unit where a plain one is wanted; None where none does. Arguments as for `refusal`."""
+    """Report which number has a unit where a plain one is needed; None where none does. Arguments as for `refusal`."""
     error = refusal(name, signatures, given, keywords, method)
     return error if isinstance(error, ParameterError) else None
 
@@ -124,7 +124,7 @@ def has_units(value: Any) -> bool:
 
 def _arguments(signature: str, function: str) -> list[_Argument]:
     inside = signature[signature.index("(") + 1 : signature.rindex(") -> ")]
-    out, keyword_only = [], False
+    arguments, keyword_only = [], False
     for part in _split(inside):
         if part in ("*", "/"):
             keyword_only = keyword_only or part == "*"
@@ -132,8 +132,8 @@ def _arguments(signature: str, function: str) -> list[_Argument]:
         text, equals, _ = part.partition(" = ")
         name, _, kind = text.partition(": ")
         name = function if name == "arg1" else name.lstrip("*")  # of a setter: the property
-        out.append(_Argument(name, ast.parse(kind or "object", mode="eval").body, not equals, keyword_only))
-    return out
+        arguments.append(_Argument(name, ast.parse(kind or "object", mode="eval").body, not equals, keyword_only))
+    return arguments
 
 
 def _split(text: str) -> list[str]:
@@ -163,10 +163,10 @@ def _bound(
         rest = f"; give {', '.join(named[:3])}{', ...' if len(named) > 3 else ''} by name" if named else ""
         return TypeError(f"{name}() takes {len(places)} positional arguments, {len(given)} were given{rest}")
     bound = dict(zip(places, given, strict=False))
-    known = [argument.name for argument in arguments]
+    names = [argument.name for argument in arguments]
     for keyword, value in keywords.items():
-        if keyword not in known:
-            hint = did_you_mean(keyword, known) or f"known are {shortened(', '.join(known), _LONGEST_HOW)}"
+        if keyword not in names:
+            hint = did_you_mean(keyword, names) or f"known are {shortened(', '.join(names), _LONGEST_HOW)}"
             return TypeError(f"{name}() has no argument {keyword!r}: {hint}")
         if keyword in bound:
             return TypeError(f"{name}() got {keyword!r} twice, by place and by name")
@@ -204,8 +204,8 @@ def _fits(kind: ast.expr, value: Any) -> bool:
     items, outer = _items(kind), _name(kind.value)
     if outer == "Annotated":
         size = items[1].value if isinstance(items[1], ast.Constant) else ""
-        wanted = str(size)[10:-1] if str(size).startswith("FixedSize(") else ""
-        return _fits(items[0], value) and (not wanted or len(value) == int(wanted))
+        length = str(size)[10:-1] if str(size).startswith("FixedSize(") else ""
+        return _fits(items[0], value) and (not length or len(value) == int(length))
     if outer == "tuple":
         alike = _is_sequence(value) and len(value) == len(items)
         return alike and all(_fits(item, each) for item, each in zip(items, value, strict=True))
@@ -268,20 +268,20 @@ def _is_sequence(value: Any) -> bool:
     return not isinstance(value, str | bytes) and hasattr(value, "__len__") and hasattr(value, "__getitem__")
 
 
-def _said(kind: ast.expr) -> str:
+def _type_text(kind: ast.expr) -> str:
     if isinstance(kind, ast.BinOp):
         names = [choice for choice in _choices(kind) if _name(choice) != "SupportsIndex"]
-        return " or ".join(_said(choice) for choice in names)
+        return " or ".join(_type_text(choice) for choice in names)
     if not isinstance(kind, ast.Subscript):
         name = _name(kind)
         return _NAMED.get(name, _article(name))
     items, outer = _items(kind), _name(kind.value)
     if outer == "Annotated":
         size = str(items[1].value) if isinstance(items[1], ast.Constant) else ""
-        said = _said(items[0])
-        return said.replace("a sequence of", f"a sequence of {size[10:-1]}") if size.startswith("FixedSize(") else said
+        text = _type_text(items[0])
+        return text.replace("a sequence of", f"a sequence of {size[10:-1]}") if size.startswith("FixedSize(") else text
     if outer == "tuple":
-        return f"({', '.join(_said(item) for item in items)})"
+        return f"({', '.join(_type_text(item) for item in items)})"
     if outer == "Mapping":
         return f"a mapping of names to {_plural(items[1])}"
     return f"a sequence of {_plural(items[0])}"
@@ -291,12 +291,12 @@ def _plural(kind: ast.expr) -> str:
     plurals = {_NUMBER: "numbers", _WHOLE: "whole numbers", "str": "names"}
     first = _choices(kind)[0]
     if isinstance(first, ast.Subscript):
-        return f"entries that are {_said(kind)}"
+        return f"entries that are {_type_text(kind)}"
     return plurals.get(_name(first), f"{_name(first)}s")
 
 
 def _remedy(argument: _Argument, value: Any) -> str:
-    """Say what to do, where what was given tells."""
+    """Give the remedy, where the value shows it."""
     if has_units(value):
         return f"; {_PLAIN}"
     for name in dict.fromkeys((argument.name, *(_name(choice).lower() for choice in _choices(argument.kind)))):

@@ -1,4 +1,4 @@
-"""The known names that somebody may have meant by another one: one way for arguments, modules, columns and files.
+"""The known names that a wrong one may mean: one way for arguments, modules, columns and files.
 
 No public part of the package.
 """
@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 
 _LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length
-# Letters that are more than chance, and names that are an answer rather than a list.
+# Letters that are more than a coincidence, and names that are an answer rather than a list.
 _SHORTEST_STEM, _MOST_NAMES = 3, 4
 # Words of the field, and of other libraries, by what stands for them here.
 _MEANS = {
@@ -49,7 +49,7 @@ _MEANS = {
     }.items()
     for word in words.split()
 }
-# Of a guess they say nothing: counts are whole numbers without them, a file has its form by its ending.
+# In a guess they carry no meaning: counts are whole numbers without them, a file has its form by its ending.
 _IDLE = frozenset(("n", "num", "number", "of", "get", "the", "csv", "file", "data"))
 
 

@@ -36,10 +36,10 @@ class _Room(ModuleType):
         return sorted(self.__all__)
 
     def __call__(self, *given: Any, **keywords: Any) -> Any:
-        own = self.__name__.rpartition(".")[2]
-        if own not in self.__all__:
+        name = self.__name__.rpartition(".")[2]
+        if name not in self.__all__:
             raise TypeError(f"{self.__name__} is a module, of {', '.join(self.__all__)}")
-        return vars(self)[own](*given, **keywords)  # `mgdd.sweep(...)` is `mgdd.sweep.sweep(...)`
+        return vars(self)[name](*given, **keywords)  # `mgdd.sweep(...)` is `mgdd.sweep.sweep(...)`
 
 
 def furnish(name: str) -> None:
@@ -50,9 +50,9 @@ def furnish(name: str) -> None:
         thing = getattr(room, each)
         home = sys.modules.get(getattr(thing, "__module__", None) or "")
         if isinstance(thing, FunctionType):
-            own = _answering(thing, each, thing.__doc__)
+            wrapped = _answering(thing, each, thing.__doc__)
             for place in (room, home):  # by its name in either it is pickled
-                setattr(place, each, own)
+                setattr(place, each, wrapped)
         elif isinstance(vars(thing).get("__init__"), FunctionType) and not getattr(thing, "_is_protocol", False):
             thing.__init__ = _answering(thing.__init__, each, thing.__doc__)
 
@@ -64,7 +64,7 @@ def missing(room: ModuleType, name: str) -> Exception:
         return AttributeError(text, name=name, obj=room)
     hint = "" if room.__name__ == "mgdd" else did_you_mean(name, room.__all__)
     if not hint:
-        places = {known: at for known, at in _places().items() if known[0].isupper() == name[0].isupper()}
+        places = {item: at for item, at in _places().items() if item[0].isupper() == name[0].isupper()}
         close = [place for near in near_names(name, places) for place in places[near]]
         hint = f"did you mean {' or '.join(close)}?" if close else f"it has {', '.join(room.__all__)}"
     # Of an AttributeError `from ... import` would drop the text.
@@ -87,14 +87,14 @@ def _places() -> dict[str, list[str]]:
     from pathlib import Path
 
     places: dict[str, list[str]] = {}
-    own = Path(__file__).parent
-    for listed in (*own.glob("[a-z]*/__init__.py"), *own.parent.glob(f"{own.name}_*/__init__.py")):
-        beside, folder = listed.parent.parent != own, listed.parent.name
+    package = Path(__file__).parent
+    for listed in (*package.glob("[a-z]*/__init__.py"), *package.parent.glob(f"{package.name}_*/__init__.py")):
+        beside, folder = listed.parent.parent != package, listed.parent.name
         if beside:
             places[folder] = [f"the package {folder}"]
-        found = re.search(r"__all__ = \[(.*?)\]", listed.read_text(encoding="utf-8"), re.DOTALL)
-        for name in re.findall(r'"(\w+)"', found[1] if found else ""):
-            places.setdefault(name, []).append(f"{folder}.{name}" if beside else f"{own.name}.{folder}.{name}")
+        match = re.search(r"__all__ = \[(.*?)\]", listed.read_text(encoding="utf-8"), re.DOTALL)
+        for name in re.findall(r'"(\w+)"', match[1] if match else ""):
+            places.setdefault(name, []).append(f"{folder}.{name}" if beside else f"{package.name}.{folder}.{name}")
     return places
 
 
@@ -110,9 +110,9 @@ def _answering(function: FunctionType, name: str, doc: str | None) -> Any:
                 raise better from None
             raise
 
-    # With the globals of its module, by which doctest knows whose examples are whose.
-    own = FunctionType(call.__code__, function.__globals__, function.__name__, None, call.__closure__)
-    return functools.wraps(function)(own)
+    # With the globals of its module, by which doctest assigns examples to modules.
+    answering = FunctionType(call.__code__, function.__globals__, function.__name__, None, call.__closure__)
+    return functools.wraps(function)(answering)
 
 
 def _look(
@@ -129,22 +129,22 @@ def _look(
     if isinstance(error, TypeError) and error.__traceback__ is not None and error.__traceback__.tb_next is None:
         names = [each.name for each in parameters]
         unknown = next((each for each in keywords if each not in names), "")
-        return _of_a_record(name, unknown, names) or unbound(name, parameters, given, keywords, _said(doc))
+        return _of_a_record(name, unknown, names) or unbound(name, parameters, given, keywords, _parameter_kinds(doc))
     if isinstance(error, Error):
         places = [each.name for each in parameters if each.kind is each.POSITIONAL_OR_KEYWORD][: len(given)]
-        kinds = [f"{each.annotation} {_said(doc).get(each.name, '')}" for each in parameters[: len(places)]]
+        kinds = [f"{each.annotation} {_parameter_kinds(doc).get(each.name, '')}" for each in parameters[: len(places)]]
         if any(_belongs_elsewhere(value, place, kinds) for place, value in enumerate(given[: len(places)])):
             error.args = (f"{error}; did you mean {name}({', '.join(places)}) in this order?",)
     return None
 
 
 def _of_a_record(name: str, unknown: str, names: Sequence[str]) -> TypeError | None:
-    """Say how a setting of an engine, a point or a throttle is given to a function that takes the whole record."""
+    """Explain how a setting of an engine, a point or a throttle is given to a function that takes the whole record."""
     from mgdd import _core
 
     for argument, (room, record, form) in _RECORDS.items():
-        if unknown and argument in names and unknown in (known := getattr(getattr(_core, room), record).fields()):
-            unit = "" if known[unknown]["unit"] == "-" else f" [{known[unknown]['unit']}]"
+        if unknown and argument in names and unknown in (fields := getattr(getattr(_core, room), record).fields()):
+            unit = "" if fields[unknown]["unit"] == "-" else f" [{fields[unknown]['unit']}]"
             how = form.format(unknown)
             return TypeError(
                 f"{name}() has no argument {unknown!r}: it is a setting{unit} of the {argument}: give {how}"
@@ -153,17 +153,17 @@ def _of_a_record(name: str, unknown: str, names: Sequence[str]) -> TypeError | N
 
 
 def _belongs_elsewhere(value: Any, place: int, kinds: Sequence[str]) -> bool:
-    own = {base.__name__ for base in type(value).__mro__ if base.__module__ != "builtins"}
-    fits = [bool(own & set(re.findall(r"\w+", kind))) for kind in kinds]
+    types = {base.__name__ for base in type(value).__mro__ if base.__module__ != "builtins"}
+    fits = [bool(types & set(re.findall(r"\w+", kind))) for kind in kinds]
     return any(fits) and not fits[place]
 
 
-def _said(doc: str) -> dict[str, str]:
+def _parameter_kinds(doc: str) -> dict[str, str]:
     """Kind and first sentence of each parameter of a numpydoc text."""
     from inspect import cleandoc
 
-    said: dict[str, str] = {}
+    kinds: dict[str, str] = {}
     for names, kind, text in re.findall(r"^([\w, ]+?)( : .+)?\n((?: {4}.*\n)+)", cleandoc(doc), re.MULTILINE):
         first = " ".join(text.split()).partition(". ")[0].rstrip(".")
-        said |= dict.fromkeys(names.split(", "), f"{kind.removeprefix(' : ')}: {first}".removeprefix(": "))
-    return said
+        kinds |= dict.fromkeys(names.split(", "), f"{kind.removeprefix(' : ')}: {first}".removeprefix(": "))
+    return kinds

@@ -18,9 +18,9 @@ def takes_settings_of(core: Any, *, without: tuple[str, ...] = ()) -> Callable[[
     """Show the settings of `core`, but for some, in place of the ``**settings`` of a class."""
 
     def decorate(cls: Class) -> Class:
-        own = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
-        named = [each for each in own.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
-        fields = {name: each for name, each in core.fields().items() if name not in own and name not in without}
+        parameters = inspect.signature(cls.__init__).parameters  # type: ignore[misc]
+        named = [each for each in parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        fields = {name: each for name, each in core.fields().items() if name not in parameters and name not in without}
         given = inspect.signature(core).parameters
         cls.__init__.__signature__ = inspect.Signature([*named, *(given[name] for name in fields)])  # type: ignore[misc]
         if cls.__doc__:

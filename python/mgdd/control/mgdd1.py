@@ -1,4 +1,4 @@
-"""MGDD-1: one duty, moved along the slope of what a model says, whatever the model is."""
+"""MGDD-1: one duty, moved along the slope that a model predicts, whatever the model is."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Mgdd1:
     >>> bool(track(Mgdd1(), "step:20:60", seed=1)["static_error_deg"] < 0.5)
     True
 
-    A guide that knows no more than that the plate follows the duty within some 50 ms:
+    A guide that has no more than that the plate follows the duty within some 50 ms:
 
     >>> class Lag:
     ...     n_states, sample_s = 1, 1e-3

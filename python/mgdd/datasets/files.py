@@ -26,7 +26,7 @@ class Origin(NamedTuple):
     sha256: str
 
 
-# As the records say where they are from; the hydrogen-diesel set is an export of our own and has no address.
+# The origins that the records state; the hydrogen-diesel set is an export of our own and has no address.
 ORIGINS: dict[str, dict[str, Origin]] = {
     "cascaded_tanks": {
         "dataBenchmark.csv": Origin(
@@ -162,8 +162,8 @@ def names() -> tuple[str, ...]:
     def there(name: str, file: str) -> bool:
         return file in _PACKAGED.get(name, {}) or (folder is not None and (folder / name / file).is_file())
 
-    found = {name for name, files in FILES.items() if all(there(name, file) for file in files)}
-    return tuple(sorted({*found, *fetched()}))
+    complete = {name for name, files in FILES.items() if all(there(name, file) for file in files)}
+    return tuple(sorted({*complete, *fetched()}))
 
 
 def path(name: str, file: str) -> Path:
@@ -171,8 +171,8 @@ def path(name: str, file: str) -> Path:
     folder = _data_dir()
     if folder is not None and (folder / name / file).is_file():
         return folder / name / file
-    if (kept := find_fetched(name, file)) is not None:
-        return kept
+    if (fetched_file := find_fetched(name, file)) is not None:
+        return fetched_file
     packaged = _PACKAGE / file
     digest = _PACKAGED.get(name, {}).get(file)
     if digest is None or not packaged.is_file():
@@ -184,17 +184,17 @@ def path(name: str, file: str) -> Path:
             f"set {_VARIABLE} to a folder that holds {name}/{file}{fetching}; "
             f"data sets at hand: {', '.join(names())}",
         )
-    found = hashlib.sha256(packaged.read_bytes()).hexdigest()
-    if found != digest:
+    digest_of_file = hashlib.sha256(packaged.read_bytes()).hexdigest()
+    if digest_of_file != digest:
         raise DataError(
-            f"{packaged}: SHA-256 is {found}, shipped was {digest}: the file was changed; reinstall mgdd, or "
+            f"{packaged}: SHA-256 is {digest_of_file}, shipped was {digest}: the file was changed; reinstall mgdd, or "
             f"put your own version under {_VARIABLE}/{name}"
         )
     return packaged
 
 
 def place(name: str) -> str:
-    """Say where a data set is, or how it gets here."""
+    """Describe where a data set is, or how to get it."""
     if name in names():
         return str(path(name, FILES[name][0]).parent)
     fetched_by = f"mgdd data get {name} --fetch -o FILE"

@@ -117,7 +117,7 @@ def read(
     Raises
     ------
     FileNotFoundError
-        The set is in none of these places; the message says where its files belong.
+        The set is in none of these places; the message states where its files belong.
     mgdd.errors.ParameterError
         An unknown name, an option of another set, or a set without a public address to fetch.
     mgdd.errors.DataError
@@ -179,9 +179,9 @@ def _hd_traces() -> list[xr.Dataset]:
 
 def _h2df_cycles(*, checked: bool, mask_held: bool) -> xr.Dataset:
     file = path("h2df_502", *FILES["h2df_502"])
-    if checked and (found := hashlib.sha256(file.read_bytes()).hexdigest()) != _H2DF_SHA256:
+    if checked and (digest := hashlib.sha256(file.read_bytes()).hexdigest()) != _H2DF_SHA256:
         raise DataError(
-            f"{file}: SHA-256 is {found}, known is {_H2DF_SHA256}: the file is another export; pass checked=False "
+            f"{file}: SHA-256 is {digest}, known is {_H2DF_SHA256}: the file is another export; pass checked=False "
             "to read it all the same"
         )
     table = read_table(file)

@@ -1,6 +1,6 @@
 """Design of experiments: which points to run, inside what an engine may be driven at, and beside what was run.
 
-`design_points` chooses them; a `FeasibleRegion` says where they may lie: inside limits that a model predicts, or
+`design_points` chooses them; a `FeasibleRegion` defines where they may lie: inside limits that a model predicts, or
 between points that were measured. `mgdd.surrogate.fit_response` fits a model to what was measured there.
 """
 

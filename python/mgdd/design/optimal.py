@@ -39,7 +39,7 @@ def d_optimal(
 
     Fedorov's exchange in the form of Cook and Nachtsheim: each point in turn gives way to the candidate that raises
     the determinant most, until none does. A local optimum, hence several random starts. Rows, shape (c, p) and (k, p),
-    hold the p terms of the model at points that may be chosen and that stay; a DataError says that they do not
+    hold the p terms of the model at points that may be chosen and that stay; a DataError reports that they do not
     determine the terms.
 
     Fedorov (1972), Theory of Optimal Experiments.
@@ -52,15 +52,15 @@ def d_optimal(
             f"{len(candidates)} feasible candidates determine {rank} of the {p} terms of the model: choose a smaller "
             "model, more levels or a wider region"
         )
-    found = [_search(candidates, _start(candidates, n, fixed, generator), fixed) for _ in range(n_starts)]
-    best = max(found, key=lambda each: each[1][-1])
+    searches = [_search(candidates, _start(candidates, n, fixed, generator), fixed) for _ in range(n_starts)]
+    best = max(searches, key=lambda each: each[1][-1])
     if not np.isfinite(best[1][-1]):
         raise DataError(f"none of {n_starts} starts determines the {p} terms of the model: add points or starts")
     return Exchange(
         rows=best[0],
         log_det=best[1][-1],
         history=tuple(best[1]),
-        log_det_starts=tuple(history[-1] for _, history in found),
+        log_det_starts=tuple(history[-1] for _, history in searches),
     )
 
 
@@ -74,8 +74,8 @@ def _start(
 ) -> NDArray[np.intp]:
     """Return a third of the rows at random, the others where the prediction is worst."""
     rows = generator.integers(len(candidates), size=max(1, n // 3)).tolist()
-    own = np.vstack([fixed, candidates[rows]])
-    spread = np.linalg.inv(own.T @ own + _RIDGE * np.eye(own.shape[1]))
+    rows_of_all = np.vstack([fixed, candidates[rows]])
+    spread = np.linalg.inv(rows_of_all.T @ rows_of_all + _RIDGE * np.eye(rows_of_all.shape[1]))
     variance = np.sum((candidates @ spread) * candidates, axis=1)
     while len(rows) < n:
         row = int(np.argmax(variance))
@@ -90,8 +90,8 @@ def _search(
     rows = start.copy()
     history = [_log_det(candidates[rows], fixed)]
     for _ in range(_SWEEPS if np.isfinite(history[0]) else 0):
-        own = np.vstack([fixed, candidates[rows]])
-        spread = np.linalg.inv(own.T @ own)
+        rows_of_all = np.vstack([fixed, candidates[rows]])
+        spread = np.linalg.inv(rows_of_all.T @ rows_of_all)
         variance = np.sum((candidates @ spread) * candidates, axis=1)
         before = rows.copy()
         for place in range(rows.size):
@@ -123,6 +123,6 @@ def _changed(
 
 
 def _log_det(rows: NDArray[np.float64], fixed: NDArray[np.float64]) -> float:
-    own = np.vstack([fixed, rows])
-    sign, value = np.linalg.slogdet(own.T @ own)
+    rows_of_all = np.vstack([fixed, rows])
+    sign, value = np.linalg.slogdet(rows_of_all.T @ rows_of_all)
     return float(value) if sign > 0.0 else float("-inf")

@@ -46,7 +46,7 @@ def design_points(
     ----------
     factors : mapping of str to tuple, sequence or set of float
         Per factor its range (low, high), three or more levels, or a set of levels where there are two. A name that ends
-        in its unit says it.
+        in its unit gives it.
     n : int, optional
         Points to add; all methods but ``"factorial"`` need it.
     method : {"sobol", "halton", "lhs", "maximin", "factorial", "d_optimal"}
@@ -107,13 +107,13 @@ def design_points(
     >>> sorted(three["soi_cad"].values.tolist())
     [-20.0, -20.0, -8.0, -8.0, 4.0, 4.0]
     """
-    own = factors_of(factors)
+    checked = factors_of(factors)
     _check(method, n, model, n_starts, seed)
-    counts = _levels(own, levels, 3 if method == "factorial" else 5)
-    before = np.empty((0, len(own.items))) if existing is None else own.existing(existing)
+    counts = _levels(checked, levels, 3 if method == "factorial" else 5)
+    before = np.empty((0, len(checked.items))) if existing is None else checked.existing(existing)
 
     def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        return inside_of(feasible, own.columns(points))
+        return inside_of(feasible, checked.columns(points))
 
     if len(before):
         good = inside(before)
@@ -126,21 +126,21 @@ def design_points(
     generator = np.random.default_rng(seed)
     attrs: dict[str, Any] = {"method": method, "seed": seed}
     if method == "factorial":
-        points, share = _factorial(own, counts, inside)
+        points, share = _factorial(checked, counts, inside)
     elif method == "d_optimal":
-        points, share, more = _d_optimal(own, int(n or 0), before, counts, inside, model, n_starts, generator)
+        points, share, more = _d_optimal(checked, int(n or 0), before, counts, inside, model, n_starts, generator)
         attrs |= more
     else:
-        points, share = _filled(own, int(n or 0), before, inside, method, n_starts, generator, feasible is None)
+        points, share = _filled(checked, int(n or 0), before, inside, method, n_starts, generator, feasible is None)
     attrs["feasible_share"] = share
-    nearest = least_distance(own.to_unit(np.vstack([before, points])))
+    nearest = least_distance(checked.to_unit(np.vstack([before, points])))
     if np.isfinite(nearest):
         attrs["least_distance"] = nearest
-    return own.dataset(points, first=len(before), attrs=attrs)
+    return checked.dataset(points, first=len(before), attrs=attrs)
 
 
 def _filled(
-    own: Factors,
+    factors: Factors,
     n: int,
     before: NDArray[np.float64],
     inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
@@ -149,12 +149,12 @@ def _filled(
     generator: np.random.Generator,
     free: bool,
 ) -> tuple[NDArray[np.float64], float]:
-    m, shares = len(own.items), own.to_unit(before)
+    m, shares = len(factors.items), factors.to_unit(before)
     if method == "lhs" and free:
         if len(before):
-            return own.of_unit(extend_hypercube(shares, n, generator, n_starts=n_starts)), 1.0
+            return factors.of_unit(extend_hypercube(shares, n, generator, n_starts=n_starts)), 1.0
         sample = sampler_of("lhs", m, generator)
-        return own.of_unit(best_of(lambda: sample(n), shares, n_starts)), 1.0
+        return factors.of_unit(best_of(lambda: sample(n), shares, n_starts)), 1.0
     by_distance = method == "maximin" or len(before) > 0
     if method == "sobol" and free and not by_distance and n & (n - 1):
         warnings.warn(
@@ -164,18 +164,18 @@ def _filled(
             stacklevel=4,
         )
     sample = sampler_of("sobol" if method == "maximin" else method, m, generator)
-    points, found, drawn = draw_inside(
-        lambda count: own.of_unit(sample(count)), _POOL * n if by_distance else n, inside=inside, what=method
+    points, feasible_count, drawn = draw_inside(
+        lambda count: factors.of_unit(sample(count)), _POOL * n if by_distance else n, inside=inside, what=method
     )
     if by_distance:
-        points = points[far_points(own.to_unit(points), n, existing=shares)]
-    return points, found / drawn
+        points = points[far_points(factors.to_unit(points), n, existing=shares)]
+    return points, feasible_count / drawn
 
 
 def _factorial(
-    own: Factors, counts: Mapping[str, int], inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]]
+    factors: Factors, counts: Mapping[str, int], inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 ) -> tuple[NDArray[np.float64], float]:
-    points = own.grid(counts)
+    points = factors.grid(counts)
     good = inside(points)
     if not good.any():
         raise DataError(f"feasible: none of the {len(points)} combinations is feasible (0 %): more levels or limits")
@@ -183,7 +183,7 @@ def _factorial(
 
 
 def _d_optimal(
-    own: Factors,
+    factors: Factors,
     n: int,
     before: NDArray[np.float64],
     counts: Mapping[str, int],
@@ -192,18 +192,18 @@ def _d_optimal(
     n_starts: int,
     generator: np.random.Generator,
 ) -> tuple[NDArray[np.float64], float, dict[str, Any]]:
-    half = 0.5 * own.span
-    basis = PolynomialBasis.of(model, centre=own.low + half, scale=half)
+    half = 0.5 * factors.span
+    basis = PolynomialBasis.of(model, centre=factors.low + half, scale=half)
     terms = len(basis.monomials)
     if n + len(before) < terms:
         raise ParameterError.of(argument("n"), n, f">= {terms - len(before)}: the {model} model has {terms} terms")
-    grid = _candidates(own, counts, basis.monomials.shape[1], generator)
+    grid = _candidates(factors, counts, basis.monomials.shape[1], generator)
     good = inside(grid)
     if not good.any():
         raise DataError(f"feasible: none of {len(grid)} candidates is feasible (0 %): more levels or a wider region")
     candidates = grid[good]
-    found = d_optimal(basis(candidates), n, fixed=basis(before), n_starts=n_starts, generator=generator)
-    points = candidates[found.rows]
+    result = d_optimal(basis(candidates), n, fixed=basis(before), n_starts=n_starts, generator=generator)
+    points = candidates[result.rows]
     return (
         points[np.lexsort(points.T[::-1])],
         float(good.mean()),
@@ -211,32 +211,32 @@ def _d_optimal(
             "model": model,
             "n_terms": terms,
             "n_candidates": len(candidates),
-            "log_det": found.log_det,
-            "d_efficiency_percent": d_efficiency_percent(found.log_det, n=n + len(before), terms=terms),
-            "log_det_starts": [value for value in found.log_det_starts if np.isfinite(value)],
+            "log_det": result.log_det,
+            "d_efficiency_percent": d_efficiency_percent(result.log_det, n=n + len(before), terms=terms),
+            "log_det_starts": [value for value in result.log_det_starts if np.isfinite(value)],
         },
     )
 
 
 def _candidates(
-    own: Factors, counts: Mapping[str, int], degree: int, generator: np.random.Generator
+    factors: Factors, counts: Mapping[str, int], degree: int, generator: np.random.Generator
 ) -> NDArray[np.float64]:
     """Return the grid; where it is too large one of fewer levels, and Sobol points where that is not enough."""
     # By two at a time: an odd number of levels keeps the middle.
     for most in (*range(max(counts.values()), degree, -2), degree + 1):
-        fewer = {f.name: min(counts[f.name], most) if f.levels is None else counts[f.name] for f in own.items}
+        fewer = {f.name: min(counts[f.name], most) if f.levels is None else counts[f.name] for f in factors.items}
         if np.prod(list(map(float, fewer.values()))) <= _MOST_GRID:
-            return own.grid(fewer)
-    return own.of_unit(sampler_of("sobol", len(own.items), generator)(_DRAWN_CANDIDATES))
+            return factors.grid(fewer)
+    return factors.of_unit(sampler_of("sobol", len(factors.items), generator)(_DRAWN_CANDIDATES))
 
 
-def _levels(own: Factors, levels: int | Mapping[str, int] | None, usual: int) -> dict[str, int]:
-    given = levels if isinstance(levels, Mapping) else dict.fromkeys(own.names, usual if levels is None else levels)
-    unknown = [name for name in given if name not in own.names]
+def _levels(factors: Factors, levels: int | Mapping[str, int] | None, usual: int) -> dict[str, int]:
+    given = levels if isinstance(levels, Mapping) else dict.fromkeys(factors.names, usual if levels is None else levels)
+    unknown = [name for name in given if name not in factors.names]
     if unknown:
-        raise ParameterError.of("levels", unknown[0], f"names of factors: {', '.join(own.names)}")
+        raise ParameterError.of("levels", unknown[0], f"names of factors: {', '.join(factors.names)}")
     out = {}
-    for factor in own.items:
+    for factor in factors.items:
         count = given.get(factor.name, usual)
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 2 <= count <= 1000:
             raise ParameterError.of(f"levels: {factor.name}", count, "a whole number in [2, 1000]")
@@ -245,12 +245,12 @@ def _levels(own: Factors, levels: int | Mapping[str, int] | None, usual: int) ->
 
 
 def _check(method: str, n: int | None, model: str, n_starts: int, seed: int) -> None:
-    for name, value, known in (("method", method, METHODS), ("model", model, MODELS)):
-        if value not in known:
-            raise ParameterError.of(name, value, f"one of {', '.join(known)}")
+    for name, value, choices in (("method", method, METHODS), ("model", model, MODELS)):
+        if value not in choices:
+            raise ParameterError.of(name, value, f"one of {', '.join(choices)}")
     if method == "factorial":
         if n is not None:
-            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial say how many points it has")
+            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial determine the number of points")
     elif n is None or isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= 1_000_000:
         raise ParameterError.of(argument("n"), n, f"a whole number in [1, 1000000] for method {method!r}")
     for name, count, least in (("n_starts", n_starts, 1), ("seed", seed, 0)):
@@ -269,7 +269,7 @@ class Factor:
 
     @property
     def label(self) -> Label:
-        """Unit and long name, as far as the name says them."""
+        """Unit and long name, as far as the name gives them."""
         return named_label(self.name)
 
     def of_unit(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -326,13 +326,13 @@ class Factors:
         """Read the points of an earlier design, and refuse those outside the ranges."""
         points = points_of(table, self.names, what=argument("existing"))
         shares = self.to_unit(points)
-        out = (shares < -EDGE) | (shares > 1.0 + EDGE)
-        if out.any():
-            row, column = (int(place) for place in np.argwhere(out)[0])
+        outside = (shares < -EDGE) | (shares > 1.0 + EDGE)
+        if outside.any():
+            row, column = (int(place) for place in np.argwhere(outside)[0])
             factor = self.items[column]
             raise DataError(
                 f"{argument('existing')}: {factor.name} = {points[row, column]:g} of point {row}: must be "
-                f"in [{factor.low:g}, {factor.high:g}]; {int(out.any(axis=1).sum())} of {len(points)} "
+                f"in [{factor.low:g}, {factor.high:g}]; {int(outside.any(axis=1).sum())} of {len(points)} "
                 "points lie outside the factors: widen them or drop these points"
             )
         return points

@@ -43,14 +43,14 @@ class _Modelled:
         room = np.empty((len(self.limits), size))
         for place, limit in enumerate(self.limits):
             if limit.name not in given:
-                known = ", ".join(map(str, given))
-                raise DataError(f"limits: the model gives no {limit.name}: it gives {known}; name one of these")
+                given_names = ", ".join(map(str, given))
+                raise DataError(f"limits: the model gives no {limit.name}: it gives {given_names}; name one of these")
             value = np.asarray(given[limit.name], dtype=np.float64)
             if value.shape != (size,):
                 raise ShapeError(f"{limit.name} of the model has shape {value.shape}: must be ({size},), one per point")
             allowed = limit.upper - limit.margin
             scale = limit.scale if limit.scale > 0.0 else abs(limit.upper) or 1.0
-            # A model that fails at a point (NaN) says nothing for it: as far outside as can be.
+            # A model that fails at a point (NaN) does not support it: as far outside as can be.
             room[place] = np.where(np.isfinite(value), (allowed - value) / scale, -np.inf)
             values[limit.name] = value
         nearest = np.argmin(room, axis=0)
@@ -157,10 +157,10 @@ class FeasibleRegion:
         """
         if not callable(indicators):
             raise ParameterError.of("indicators", indicators, "a function of columns that returns columns")
-        kept = limits_of(limits)
-        if not kept:
+        checked = limits_of(limits)
+        if not checked:
             raise ParameterError.of("limits", limits, "at least one upper limit, for example {'p_max_bar': 150.0}")
-        return cls(_Modelled(indicators=indicators, limits=kept))
+        return cls(_Modelled(indicators=indicators, limits=checked))
 
     @classmethod
     def of_points(cls, points: Any, *, margin: float = 0.0, infeasible: Any = None) -> FeasibleRegion:
@@ -195,13 +195,13 @@ class FeasibleRegion:
         both = [row for row in refused.tolist() if row in driven.tolist()]
         if both:
             at = ", ".join(f"{name} {value:g}" for name, value in zip(names, both[0], strict=True))
-            own = argument("infeasible")
-            raise DataError(f"{own}: the point {at} is also among the points that were driven: keep it in one")
+            option = argument("infeasible")
+            raise DataError(f"{option}: the point {at} is also among the points that were driven: keep it in one")
         hull = hull_of(driven, names)
         return cls(_Measured(hull=hull, names=names, driven=driven, refused=refused, margin=float(margin)))
 
     def contains(self, points: Any) -> NDArray[np.bool_]:
-        """Say which points are feasible.
+        """Return which points are feasible.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class FeasibleRegion:
         return self._judged(points)[1].distance >= -EDGE
 
     def evaluate(self, points: Any) -> xr.Dataset:
-        """Say how far points lie inside, and what bounds them.
+        """Return how far points lie inside, and what bounds them.
 
         Parameters
         ----------
@@ -258,8 +258,8 @@ class FeasibleRegion:
             "active_limit": ("point", judged.active, "-", "nearest limit"),
             "extrapolated": ("point", judged.extrapolated, "-", "outside of all measured points"),
         }
-        own = {name: ("point", values, *named_label(name)) for name, values in judged.indicators.items()}
-        return labelled_dataset({**own, **variables})
+        outputs = {name: ("point", values, *named_label(name)) for name, values in judged.indicators.items()}
+        return labelled_dataset({**outputs, **variables})
 
     def _judged(self, points: Any) -> tuple[dict[str, NDArray[np.float64]], _Judged]:
         names = self.rule.names if isinstance(self.rule, _Measured) else column_names(points, "points")

@@ -41,21 +41,21 @@ def draw_inside(
     sample: Sampler, n: int, *, inside: Callable[[NDArray[np.float64]], NDArray[np.bool_]], what: str
 ) -> tuple[NDArray[np.float64], int, int]:
     """Draw points until n of them are feasible: those, and how many of how many were."""
-    kept: list[NDArray[np.float64]] = []
-    found = drawn = 0
+    parts: list[NDArray[np.float64]] = []
+    count = drawn = 0
     most = _MOST_FIRST + _MOST_PER_POINT * n
-    while found < n and drawn < most:
-        share = max(found / drawn, 0.02) if drawn else 1.0
-        points = sample(min(max(16, int(np.ceil(1.1 * (n - found) / share))), most) if drawn else n)
+    while count < n and drawn < most:
+        share = max(count / drawn, 0.02) if drawn else 1.0
+        points = sample(min(max(16, int(np.ceil(1.1 * (n - count) / share))), most) if drawn else n)
         good = inside(points)
-        kept.append(points[good])
-        found, drawn = found + int(good.sum()), drawn + len(points)
-    if found < n:
+        parts.append(points[good])
+        count, drawn = count + int(good.sum()), drawn + len(points)
+    if count < n:
         raise DataError(
-            f"feasible: {found} of {drawn} points drawn by {what} are feasible ({100.0 * found / drawn:.2g} %), {n} "
+            f"feasible: {count} of {drawn} points drawn by {what} are feasible ({100.0 * count / drawn:.2g} %), {n} "
             "are needed: widen the limits or the region, or narrow the factors around what is feasible"
         )
-    return np.concatenate(kept)[:n], found, drawn
+    return np.concatenate(parts)[:n], count, drawn
 
 
 def far_points(pool: NDArray[np.float64], n: int, *, existing: NDArray[np.float64]) -> NDArray[np.intp]:

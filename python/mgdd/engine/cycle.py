@@ -120,10 +120,10 @@ def simulate(
 
 def _doubts(raw: dict[str, Any], point: OperatingPoint) -> tuple[str, ...]:
     """Name states of no piston engine: the usual cause is an input in another unit."""
-    found = raw["indicators"]
+    indicators = raw["indicators"]
     checks = (
-        (found["t_max_k"] > 3500.0, f"t_max_k = {found['t_max_k']:.4g} K"),
-        (found["p_max_bar"] > 500.0, f"p_max_bar = {found['p_max_bar']:.4g} bar"),
+        (indicators["t_max_k"] > 3500.0, f"t_max_k = {indicators['t_max_k']:.4g} K"),
+        (indicators["p_max_bar"] > 500.0, f"p_max_bar = {indicators['p_max_bar']:.4g} bar"),
         (raw["temperature_k"][0] < 230.0, f"temperature at IVC = {raw['temperature_k'][0]:.4g} K"),
         (
             point.fuel_mg * 10.0 > raw["trapped_mass_g"] * 1e3,
@@ -209,7 +209,7 @@ def sensitivities(
     -------
     xarray.Dataset
         ``d_NAME`` for the names of `simulate`, per unit of the parameter: ``d_pressure_bar(crank_angle_cad,
-        parameter)`` and the indicators over ``parameter``. Coordinate ``parameter_units`` says the units.
+        parameter)`` and the indicators over ``parameter``. Coordinate ``parameter_units`` gives the units.
 
     Raises
     ------
@@ -267,13 +267,13 @@ def convergence(
     cylinder, point = engine_of(cylinder, point)
     raw = _core.engine.convergence(cylinder, point, soc_cad, step_cad, integrator)
     value, extrapolated, error, order, units = zip(*raw.values(), strict=True)
-    own = "unit of the indicator"
+    unit = "unit of the indicator"
     return labelled_dataset(
         {
             "indicator": ("indicator", list(raw), "-", "indicator"),
-            "value": ("indicator", list(value), own, "value at the step"),
-            "extrapolated": ("indicator", list(extrapolated), own, "limit of vanishing step"),
-            "error": ("indicator", list(error), own, "step-size error"),
+            "value": ("indicator", list(value), unit, "value at the step"),
+            "extrapolated": ("indicator", list(extrapolated), unit, "limit of vanishing step"),
+            "error": ("indicator", list(error), unit, "step-size error"),
             "order": ("indicator", list(order), "-", "observed order"),
             "indicator_units": ("indicator", list(units), "-", "unit of the indicator"),
         },

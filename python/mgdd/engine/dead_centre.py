@@ -25,7 +25,7 @@ _PEAK_CAD, _START_CAD, _FARTHEST_CAD = 8.0, 20.0, 5.0
 _LEAST_BAR = 0.05  # a level below zero is found elsewhere
 # Of the motored gas, which is air: gamma within 0.003 from 400 to 950 K.
 _GAS_J_PER_KGK, _GAMMA_300K, _GAMMA_SLOPE_PER_K = 287.0, 1.40, 9.5e-5
-# What nobody states, and how far it may be off: the charge at IVC over the intake [K], which no burned gas heats; the
+# What is not stated, and how far it may be off: the charge at IVC over the intake [K], which no burned gas heats; the
 # wall of a motored engine, colder than that of a fired one [K]; a crevice over the clearance volume; and a gap at the
 # rings of a bore of 90 mm [m2] with its discharge.
 _WARMED_K, _CHARGE_K, _WALL_K = 20.0, 25.0, 50.0
@@ -62,7 +62,7 @@ class DegreeCost(NamedTuple):
         return f"1 °CA moves the closed IMEP by {self.error_bar:.2g} bar{share}"
 
     def of_fired(self) -> str:
-        """Say what a fired trace leaves open."""
+        """Report what a fired trace leaves open."""
         return f"a fired trace hardly shows an error of TDC, and {self}"
 
 
@@ -81,7 +81,7 @@ def degree_cost(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder) -> De
 
 
 class MotoredTdc(NamedTuple):
-    """What motored strokes say: by how much the angles are too large, and what no sound engine has.
+    """What motored strokes show: by how much the angles are too large, and what no sound engine has.
 
     The half is how far the offset may be off to each side; the wall heat is over Hohenberg's, the loss angle that of
     the peak before TDC.
@@ -94,16 +94,16 @@ class MotoredTdc(NamedTuple):
     findings: tuple[str, ...]
 
     @classmethod
-    def of_many(cls, found: Sequence[Self]) -> Self:
-        """Give what several records of one encoder say: their mean, with twice their scatter."""
-        numbers = np.array([each[:4] for each in found])
+    def of_many(cls, strokes: Sequence[Self]) -> Self:
+        """Combine several records of one encoder: their mean, with twice their scatter."""
+        numbers = np.array([each[:4] for each in strokes])
         offset, half, wall, loss = map(float, numbers.mean(axis=0))
         half = math.hypot(half, 2.0 * float(numbers[:, 0].std()))
-        findings = dict.fromkeys(text for each in found for text in each.findings)
+        findings = dict.fromkeys(text for each in strokes for text in each.findings)
         return cls(offset, half, wall, loss, tuple(findings))
 
     def doubts(self) -> tuple[str, ...]:
-        """Say that the angles are outside the range, and what no sound engine has."""
+        """Report that the angles are outside the range, and what no sound engine has."""
         if abs(self.offset_cad) <= self.offset_half_cad:
             return self.findings
         shown = f"{self.offset_cad:+.2f} ± {self.offset_half_cad:.2f}"
@@ -152,19 +152,19 @@ def motored_tdc(angle_cad: Array, pressure_bar: Array, cylinder: Cylinder, point
     for _ in range(_ROUNDS):  # the step is linear in a small offset only
         offset += float(strokes(offset).solved()[:, 1].mean())
         offset = min(max(offset, peak - _FARTHEST_CAD), peak + _FARTHEST_CAD)
-    own = strokes(offset)
-    found = own.solved()
+    pair = strokes(offset)
+    solution = pair.solved()
     moved = [
-        own.solved(gap=0.0),
-        own.solved(crevice=0.0),
+        pair.solved(gap=0.0),
+        pair.solved(crevice=0.0),
         strokes(offset, warmer_k=_CHARGE_K).solved(),
         strokes(offset, wall_k=_WALL_K).solved(),
     ]
-    off = [(each - found).mean(axis=0) for each in moved]
-    noise, scatter = _noise(own, found)
-    laws = _LAWS_FACTOR * float(found[:, 1].std(ddof=1))
+    off = [(each - solution).mean(axis=0) for each in moved]
+    noise, scatter = _noise(pair, solution)
+    laws = _LAWS_FACTOR * float(solution[:, 1].std(ddof=1))
     offset_half = math.hypot(*(each[1] for each in off), noise[1], laws, _REST_CAD)
-    scale = float(found[_HOHENBERG, 0])
+    scale = float(solution[_HOHENBERG, 0])
     loss = offset - peak
     low, high = _SOUND_SCALES
     findings = []
@@ -248,13 +248,13 @@ def _films(cylinder: Cylinder, speed_rpm: float, bar: Array, kelvin: Array, volu
     ]
 
 
-def _noise(strokes: _Strokes, found: Array) -> tuple[Array, Array]:
+def _noise(strokes: _Strokes, solution: Array) -> tuple[Array, Array]:
     """Give what may move the scale and the angle by Hohenberg's law: what the balance leaves, and its scatter alone.
 
     What is left is alike nearby where the balance does not hold, and then counts for less samples.
     """
     design = strokes.design(_HOHENBERG)
-    left = strokes.loss - strokes.gap - strokes.crevice - design @ found[_HOHENBERG]
+    left = strokes.loss - strokes.gap - strokes.crevice - design @ solution[_HOHENBERG]
     square = float(left @ left)
     alike = min(max(float(left[1:] @ left[:-1]) / square, 0.0), _ALIKE)
     whole = square / (left.size - 2) * (1.0 + alike) / (1.0 - alike)

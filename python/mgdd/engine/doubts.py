@@ -19,7 +19,7 @@ _QUIET_CAD = (-140.0, -60.0)
 _NEAR_CAD = 3.0
 # A parabola spends 0.29 of the time within 6 % of its top within 0.5 % of it. Sound tops by spark or of two burns spend
 # at most 0.46 in a cycle, 0.41 in the median of many; one cut at 0.93 of the peak, with noise behind, at least 0.5.
-# Fewer than _FEWEST samples within 6 % tell nothing.
+# Fewer than _FEWEST samples within 6 % show nothing.
 _NEAR_TOP, _BELOW, _FLAT, _FEWEST = 0.005, 0.06, 0.48, 8
 # Where noise is more, within as many of its deviations; cycles whose top lies within twice that share a level.
 _TOP_NOISE, _SHARERS = 1.8, (3, 0.1)
@@ -42,7 +42,7 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
     """Doubt the samples of cycles (cycle, angle), counted from `first`: what stands still, and a peak cut off."""
     rows, noise, step = np.atleast_2d(bar), _noise(angle, bar), float(np.median(np.diff(angle)))
     many = len(rows) > 1
-    out = []
+    doubts = []
     top = top_of(angle, rows, noise)
     if top.cut:
         text = (
@@ -50,7 +50,7 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
             f"{100.0 * top.ratio:.0f} % at it, a peak 30 %: a saturated amplifier or the end of its range; peak, work "
             "and heat are not those of the gas"
         )
-        out.append(("clipped", text))
+        doubts.append(("clipped", text))
     stands = still(rows, noise, max(1, round(_NEAR_CAD / step)))
     on_top = stands is not None and top.cut and rows[stands.cycle, stands.first] > 0.97 * top.level_bar
     if stands is not None and not on_top:
@@ -62,19 +62,19 @@ def sample_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64], first: i
             f"{stands.last - stands.first + 1} equal samples: a stuck sensor, lost samples or a channel that froze; "
             f"work and heat are not those of the gas{which}"
         )
-        out.append(("stuck", text))
-    return out
+        doubts.append(("stuck", text))
+    return doubts
 
 
 def copy_doubts(angle: NDArray[np.float64], bar: NDArray[np.float64]) -> list[tuple[str, str]]:
     """Doubt a record (cycle, angle) in which samples stand twice, as where a buffer is written again."""
-    found = copies(np.atleast_2d(bar))
-    if found is None:
+    copy = copies(np.atleast_2d(bar))
+    if copy is None:
         return []
-    (old, at), (new, there) = found.first, found.again
+    (old, at), (new, there) = copy.first, copy.again
     again, before = round(angle[there], 3), round(angle[at], 3)
     text = (
-        f"{found.samples} samples in {len(found.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
+        f"{copy.samples} samples in {len(copy.cycles)} of {len(bar)} cycles are bit for bit those of others: from "
         f"{again:g} °CA of cycle {new + 1} on those from {before:g} °CA of cycle {old + 1} on; scatter and means are "
         "not those of the engine"
     )
@@ -186,13 +186,13 @@ def lost_heat(
         return float(-gained.sum() / walls.sum())
 
     design = np.vander((angle[inside] - middle) / half, _DEGREE + 1) * bar[inside, None]
-    wanted = np.log(bar[inside]) * bar[inside]
-    terms = np.asarray(np.linalg.lstsq(design, wanted)[0], dtype=np.float64)
-    left = wanted - design @ terms
+    target = np.log(bar[inside]) * bar[inside]
+    terms = np.asarray(np.linalg.lstsq(design, target)[0], dtype=np.float64)
+    left = target - design @ terms
     variance = float(left @ left) / (inside.sum() - _DEGREE - 1) * np.linalg.inv(design.T @ design)
-    found = ratio(terms)
-    slope = np.array([(ratio(terms + 1e-4 * unit) - found) / 1e-4 for unit in np.eye(_DEGREE + 1)])
-    return found, float(np.sqrt(slope @ variance @ slope))
+    estimate = ratio(terms)
+    slope = np.array([(ratio(terms + 1e-4 * unit) - estimate) / 1e-4 for unit in np.eye(_DEGREE + 1)])
+    return estimate, float(np.sqrt(slope @ variance @ slope))
 
 
 def expansion_doubts(
@@ -204,10 +204,10 @@ def expansion_doubts(
     speed_rpm: float,
 ) -> list[tuple[str, str]]:
     """Doubt one fired cycle, mean of many or single, by the heat that late expansion loses."""
-    found = lost_heat(angle, bar, volume_l, mass_g, cylinder, speed_rpm)
-    if found is None:
+    estimate = lost_heat(angle, bar, volume_l, mass_g, cylinder, speed_rpm)
+    if estimate is None:
         return []
-    lost, error = found
+    lost, error = estimate
     most = _MOST_SPARK if cylinder.compression_ratio < _SPARK_RATIO else _MOST_DIESEL
     what = f"late expansion loses {lost:.2f} ±{error:.2f} times the wall heat of Hohenberg's law"
     if lost - _STDERRS * error > most:

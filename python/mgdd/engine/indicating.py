@@ -264,8 +264,8 @@ class Indicating:
 def _mean_db(level_db: NDArray[np.float64]) -> NDArray[np.float64]:
     """Level of the mean square over the cycles."""
     with np.errstate(divide="ignore"):
-        found: NDArray[np.float64] = 10.0 * np.log10(np.mean(10.0 ** (0.1 * level_db), axis=0))
-    return found
+        mean_db: NDArray[np.float64] = 10.0 * np.log10(np.mean(10.0 ** (0.1 * level_db), axis=0))
+    return mean_db
 
 
 _CYCLE_DEG = 720.0
@@ -302,13 +302,13 @@ def pressure_levels(
     spacing = speed_rpm / 120.0
     number = np.arange(_FIRST, _LAST + 1)
     low, high = (1e3 * 10.0 ** ((number + side) / _PER_DECADE) for side in (-0.5, 0.5))
-    kept = (high - low >= spacing) & (high <= spacing * samples / 2)
-    edges = np.append(low[kept], high[kept][-1:])
+    usable = (high - low >= spacing) & (high <= spacing * samples / 2)
+    edges = np.append(low[usable], high[usable][-1:])
     at = np.searchsorted(spacing * np.arange(1, lines.shape[1] + 1), edges)
     sums = np.concatenate([np.zeros((len(bar), 1)), np.cumsum(squares, axis=1)], axis=1)
     with np.errstate(divide="ignore"):
         levels = 10.0 * np.log10(np.diff(sums[:, at], axis=1) / _REFERENCE_PA**2)
-    return 1e3 * 10.0 ** (number[kept] / _PER_DECADE), levels
+    return 1e3 * 10.0 ** (number[usable] / _PER_DECADE), levels
 
 
 def noise_levels(
@@ -328,8 +328,8 @@ def noise_levels(
     loss = np.interp(band, number, [table[key] for key in sorted(table)])
     shares = 10.0 ** (0.1 * (level_db - loss + a_weighting_db(hz)))
     with np.errstate(divide="ignore"):
-        found: NDArray[np.float64] = 10.0 * np.log10(shares[:, inside].sum(axis=1))
-    return found
+        band_db: NDArray[np.float64] = 10.0 * np.log10(shares[:, inside].sum(axis=1))
+    return band_db
 
 
 def a_weighting_db(hz: NDArray[np.float64]) -> NDArray[np.float64]:

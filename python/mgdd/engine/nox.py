@@ -287,7 +287,7 @@ class ThermalNo:
 
         def ratios(mixtures: NDArray[np.float64]) -> NDArray[np.float64]:
             models = [replace(self, lambda_burned=float(mixture), calibration=1.0) for mixture in mixtures]
-            return np.log(measured) - np.log([[_raw(model, *one)["nox_ppm"] for one in made] for model in models])
+            return np.log(measured) - np.log([[_raw(model, *case)["nox_ppm"] for case in made] for model in models])
 
         if measured.size < _FEWEST_FOR_LAMBDA:
             alone = np.array([self.lambda_burned])
@@ -311,7 +311,7 @@ class ThermalNoFit(NamedTuple):
     points : int
         Cycles.
     residual_ln : float
-        Standard deviation of ln NOx about the fit [-]; NaN where nothing is left to tell it.
+        Standard deviation of ln NOx about the fit [-]; NaN without a remaining degree of freedom.
     lambda_low, lambda_high : float
         Interval of the mixture at 95 % [-]; NaN where it was not fitted.
     doubts : tuple of str
@@ -350,12 +350,12 @@ def _fitted(model: ThermalNo, mixtures: NDArray[np.float64], ratios: NDArray[np.
         low, high = (_edge(mixtures, errors - limit, range(best, end, step)) for end, step in ((-1, -1), (n_tried, 1)))
         if low == mixtures[0] or high == mixtures[-1]:
             doubts.append(
-                f"the cycles do not tell the mixture: 95 % between {low:.2f} and {high:.2f}, of {mixtures[0]:.2f} to "
+                f"the cycles leave the mixture open: 95 % between {low:.2f} and {high:.2f}, of {mixtures[0]:.2f} to "
                 f"{mixtures[-1]:.2f} that were tried: vary timing and fuel more"
             )
     else:
         doubts.append(
-            f"{n} cycle(s): the mixture stays {made.lambda_burned:g}; it takes {_FEWEST_FOR_LAMBDA} to tell it"
+            f"{n} cycle(s): the mixture stays {made.lambda_burned:g}; it takes {_FEWEST_FOR_LAMBDA} to estimate it"
         )
     if not _PLAUSIBLE[0] <= made.calibration <= _PLAUSIBLE[1]:
         doubts.append(f"a calibration of {made.calibration:.3g}: unit of nox_ppm, fuel or exhaust gas may be wrong")
@@ -372,8 +372,8 @@ def _edge(mixtures: NDArray[np.float64], above: NDArray[np.float64], path: range
 
 def _columns(cycle: xr.Dataset, ivc: float, evo: float) -> list[NDArray[np.float64]]:
     """Give angle, pressure, volume, temperature and burned fraction of a closed cycle."""
-    known = getattr(cycle, "variables", ())
-    missing = [name for name in ("pressure_bar", "volume_l", "temperature_k") if name not in known]
+    variables = getattr(cycle, "variables", ())
+    missing = [name for name in ("pressure_bar", "volume_l", "temperature_k") if name not in variables]
     if missing:
         raise DataError(f"the cycle has no {missing[0]}: give one of simulate, or of analyze")
     if cycle["pressure_bar"].dims != (ANGLE,):

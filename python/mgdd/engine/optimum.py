@@ -69,7 +69,7 @@ def find_optimum(
     mgdd.errors.ParameterError
         An unknown objective or limit, a motored point, bounds outside [-60, 20].
     mgdd.errors.ConvergenceError
-        No timing in the range meets the limits; the message says how near it comes.
+        No timing in the range meets the limits; the message states how near it comes.
 
     Examples
     --------
@@ -80,8 +80,8 @@ def find_optimum(
     """
     require_plain("bounds_cad", bounds_cad)
     cylinder, point = engine_of(cylinder, point, speed_rpm=speed_rpm, fuel_mg=fuel_mg)
-    kept = limits_of(limits)
-    caps = {limit.name: limit.upper - limit.margin for limit in kept}
+    checked = limits_of(limits)
+    caps = {limit.name: limit.upper - limit.margin for limit in checked}
     low, high = bounds_cad or (max(DEFAULT_CAD[0], cylinder.ivc_cad), min(DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
     check_request(objective, caps)
     _check(point, low, high)
@@ -119,7 +119,7 @@ def find_optimum(
         objective=objective,
         value=float(now[objective][0]),
         values={name: float(column[0]) for name, column in now.items() if name != "soc_cad"},
-        limits=kept,
+        limits=checked,
         active_limits=active,
         at_bound=soc in (low, high),
         bounds={"soc_cad": (low, high)},
@@ -132,10 +132,10 @@ def find_optimum(
 
 
 def _feasible(columns: dict[str, np.ndarray], limits: Mapping[str, float]) -> np.ndarray:
-    out = np.ones(columns["p_max_bar"].size, bool)
+    inside = np.ones(columns["p_max_bar"].size, bool)
     for name, limit in limits.items():
-        out &= columns[name] <= limit
-    return out
+        inside &= columns[name] <= limit
+    return inside
 
 
 def _broken(columns: dict[str, np.ndarray], limits: Mapping[str, float]) -> list[str]:
@@ -154,8 +154,8 @@ def _least_excess(
     worst = np.max([(columns[n] - limit) / max(1.0, abs(limit)) for n, limit in limits.items()], axis=0)
     at = int(np.argmin(worst))
     window = (grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)])
-    found = minimize_scalar(excess, bounds=window, args=(list(limits),), method="bounded", options={"xatol": 1e-6})
-    return float(found.x)
+    nearest = minimize_scalar(excess, bounds=window, args=(list(limits),), method="bounded", options={"xatol": 1e-6})
+    return float(nearest.x)
 
 
 def _refine(
@@ -198,11 +198,11 @@ def check_request(objective: str, limits: Iterable[str], also: Iterable[str] = (
     """Refuse an unknown objective or limit before any work; `also` are limits besides indicators."""
     if objective not in OBJECTIVES:
         raise ParameterError.of("objective", objective, f"one of {', '.join(OBJECTIVES)}")
-    known = [*_core.engine.indicator_units(), *also]
+    names = [*_core.engine.indicator_units(), *also]
     for name in limits:
-        if name not in known:
-            refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}"
-            raise ParameterError(hinted(refused, name, [other for other in known if unit_of(other) != _PLACE]))
+        if name not in names:
+            refused = f"limits: {name!r} is not an indicator: must be one of {', '.join(names)}"
+            raise ParameterError(hinted(refused, name, [other for other in names if unit_of(other) != _PLACE]))
 
 
 def _check(point: OperatingPoint, low: float, high: float) -> None:

@@ -80,7 +80,7 @@ _SWINGS = (
 _SWING = (
     "take the angle of an encoder: it is made of time at one speed, and a speed that swings within a turn does this"
 )
-ENGINE = "engine"  # the check that is there only where the geometry is nobody's
+ENGINE = "engine"  # the check that is there only without a given geometry
 _ONE = "one cycle: nothing to compare it with"
 
 
@@ -128,7 +128,7 @@ class PressureCheck(Result):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict; ``open`` where no check was made, or where nobody gave the engine."""
+        """The worst verdict; ``open`` where no check was made, or without a given engine."""
         worst = max((check.verdict for check in self.checks), key=_WORST.index)
         decided = self.made and all(check.name != ENGINE for check in self.checks)
         return "no fault found" if worst == "open" and decided else worst
@@ -140,10 +140,10 @@ class PressureCheck(Result):
 
     def __getitem__(self, name: str) -> Check:
         """Return a check by name."""
-        found = next((check for check in self.checks if check.name == name), None)
-        if found is None:
+        named = next((check for check in self.checks if check.name == name), None)
+        if named is None:
             raise ParameterError(f"no check {name!r}: there are {', '.join(check.name for check in self.checks)}")
-        return found
+        return named
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -192,7 +192,7 @@ def check_pressure(
     fuel_mg: float | None = None,
     assumed: str = "",
 ) -> PressureCheck:
-    """Check a pressure file before its figures are believed.
+    """Check a pressure file before its figures are used.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def check_pressure(
     Notes
     -----
     Bounds come from spark- and compression-ignition engines that share no code with the package, over four wall-heat
-    laws: ``docs/validation.md`` says how many faults of which size are met, and which are out of reach. An error of TDC
+    laws: ``docs/validation.md`` has how many faults of which size are met, and which are out of reach. An error of TDC
     of a fired trace is out of reach and stays ``open``, see `mgdd.identify.estimate_tdc`.
 
     Examples
@@ -243,74 +243,74 @@ def check_pressure(
     try:
         made = as_trace(trace)
         name = str(made.attrs.get("file", name))
-        found = analyze(
+        figures = analyze(
             made, cylinder, point=point, pegging=pegging, pegging_exponent=pegging_exponent,
             inlet_pressure_kpa=inlet_pressure_kpa, bmep_bar=bmep_bar, brake_torque_nm=brake_torque_nm,
             n_cylinders=n_cylinders, fuel_mg=fuel_mg, traces=made.sizes.get(CYCLE, 1) == 1, quiet=True,
         )  # fmt: skip
     except DataError as error:
         return PressureCheck(name, (Check("file", "fail", str(error)),))
-    said = list(zip(found.attrs["doubts"].splitlines(), found.attrs["warnings"].splitlines(), strict=True))
-    said = [(kind, text) for kind, text in said if not (kind == "reading" and _of_angle(text))]
+    doubts = list(zip(figures.attrs["doubts"].splitlines(), figures.attrs["warnings"].splitlines(), strict=True))
+    doubts = [(kind, text) for kind, text in doubts if not (kind == "reading" and _of_angle(text))]
     engine = cylinder_of(cylinder)
-    said += record_doubts(made, found, engine, point_of(point))
+    doubts += record_doubts(made, figures, engine, point_of(point))
     fuel_mg = stated("fuel_mg", fuel_mg, point)
     judged = {"bmep_bar": bmep_bar, "brake_torque_nm": brake_torque_nm, "fuel_mg": fuel_mg}
-    known = [key for key, value in judged.items() if value or _known(made, key)]
-    skipped = _skipped(made, found, known) | hidden(made, found, engine)
+    given = [key for key, value in judged.items() if value or _has_number(made, key)]
+    skipped = _skipped(made, figures, given) | hidden(made, figures, engine)
     swing = _SWING if made.attrs.get("angle_from") == "time" else ""
-    checks = [_check(check, kinds, said, skipped, swing) for check, kinds in _CHECKS.items()]
+    checks = [_check(check, kinds, doubts, skipped, swing) for check, kinds in _CHECKS.items()]
     if assumed:
         text = f"no engine is given: read with {assumed}"
         remedy = "give the engine: cylinder= in Python, --preset or --set bore_mm=... on the command line"
         checks.insert(0, Check(ENGINE, "open", text, remedy))
-    return PressureCheck(name, tuple(checks), found)
+    return PressureCheck(name, tuple(checks), figures)
 
 
 def _of_angle(text: str) -> bool:
-    """Whether a line of the reader is one that the record says again."""
+    """Whether a line of the reader is one that the record repeats."""
     return "crank angle slips" in text or "a turn of the shaft is missing" in text
 
 
-def _known(trace: xr.Dataset, name: str) -> bool:
+def _has_number(trace: xr.Dataset, name: str) -> bool:
     return name in trace.attrs and not math.isnan(float(trace.attrs[name]))
 
 
 def _check(
-    name: str, kinds: tuple[str, ...], said: list[tuple[str, str]], skipped: dict[str, tuple[str, str]], swing: str
+    name: str, kinds: tuple[str, ...], doubts: list[tuple[str, str]], skipped: dict[str, tuple[str, str]], swing: str
 ) -> Check:
-    """Put all that was said of one check together; `swing` is the first cause of what an uneven turn looks like."""
-    own = [(kind, text) for kind, text in said if kind in kinds]
-    if not own:
+    """Combine the doubts of one check; `swing` is the first cause of what looks like an uneven turn."""
+    findings = [(kind, text) for kind, text in doubts if kind in kinds]
+    if not findings:
         return Check(name, "open", *skipped[name]) if name in skipped else Check(name, "no fault found")
-    verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in own) else "doubt"
-    remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in own if kind in _REMEDIES)
-    if swing and any(kind in _SWINGS for kind, _ in own):
+    verdict: Verdict = "fail" if any(kind in _FATAL for kind, _ in findings) else "doubt"
+    remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in findings if kind in _REMEDIES)
+    if swing and any(kind in _SWINGS for kind, _ in findings):
         remedies = {swing: None, **remedies}
     first: dict[str, str] = {}
-    for kind, text in own:  # each line of the reader is a doubt of its own
+    for kind, text in findings:  # each line of the reader is a doubt of its own
         first.setdefault(text if kind == "reading" else kind, text)
     return Check(name, verdict, "; ".join(first.values()), "; ".join(remedies))
 
 
-def _skipped(trace: xr.Dataset, found: xr.Dataset, known: list[str]) -> dict[str, tuple[str, str]]:
+def _skipped(trace: xr.Dataset, figures: xr.Dataset, given: list[str]) -> dict[str, tuple[str, str]]:
     """Name the checks that these data cannot decide, and what would."""
-    out = {}
+    reasons = {}
     cycles = trace.sizes.get(CYCLE, 1)
-    motored = int(found.attrs["motored"]) == max(cycles, 1)
+    motored = int(figures.attrs["motored"]) == max(cycles, 1)
     if motored:
-        out["burn"] = out["work and heat"] = ("no cycle burns", "")
-    if not known and not motored:
-        out["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
-    if not np.isfinite(found["imep_net_bar"]).all():
-        out["gas exchange"] = ("the record has no 720 degrees", "")
+        reasons["burn"] = reasons["work and heat"] = ("no cycle burns", "")
+    if not given and not motored:
+        reasons["work and heat"] = ("no brake work and no fuel is stated", "state bmep_bar, brake_torque_nm or fuel_mg")
+    if not np.isfinite(figures["imep_net_bar"]).all():
+        reasons["gas exchange"] = ("the record has no 720 degrees", "")
     if cycles == 1:
-        out["cycles"] = out["crank angle"] = (_ONE, "")
-    return out
+        reasons["cycles"] = reasons["crank angle"] = (_ONE, "")
+    return reasons
 
 
 _COARSE_CAD = 2.5
-# A soft saturation is told from a burn by spark alone, and by so many cycles; a shift of a degree matters.
+# A soft saturation is distinguished from a burn by spark alone, and by so many cycles; a shift of a degree matters.
 _SPARK_RATIO, _SOFT_CYCLES, _WANTED_CAD = 14.0, 10, 1.0
 # Level of a cycle [bar]: off the median by more than this and six robust deviations, or drifting from first to last.
 _OFF_BAR, _OFF_SCATTERS, _DRIFT_BAR, _DRIFT_STDERRS = 0.1, 6.0, 0.1, 5.0
@@ -319,17 +319,17 @@ _EXCHANGE_BAR, _PMEP_BAR, _STEP = (0.15, 8.0), (-3.0, 1.5), (0.6, 1.7)
 
 
 def record_doubts(
-    trace: xr.Dataset, found: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
+    trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
 ) -> list[tuple[str, str]]:
     """Give the doubts of a record beyond those of its analysis, each as its kind and its text."""
-    said = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, found) + _of_exchange(trace, found)
-    return said + _of_soft_top(trace, found, engine) + _of_tdc(trace, found, engine, point)
+    doubts = copy_doubts(*_columns(trace)) + _slips(trace) + _of_levels(trace, figures) + _of_exchange(trace, figures)
+    return doubts + _of_soft_top(trace, figures, engine) + _of_tdc(trace, figures, engine, point)
 
 
-def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list[tuple[str, str]]:
+def _of_soft_top(trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder) -> list[tuple[str, str]]:
     """Doubt a gain that falls off towards the peak, where burns of one form would show it."""
     angle, bar = _columns(trace)
-    if engine.compression_ratio >= _SPARK_RATIO or int(found.attrs["motored"]):
+    if engine.compression_ratio >= _SPARK_RATIO or int(figures.attrs["motored"]):
         return []
     top = top_of(angle, bar, 0.0)
     if not top.soft:
@@ -341,13 +341,13 @@ def _of_soft_top(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> list
 
 
 def _of_tdc(
-    trace: xr.Dataset, found: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
+    trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder, point: OperatingPoint | None
 ) -> list[tuple[str, str]]:
     """Place TDC of a motored record by its mean cycle."""
     angle, bar = _columns(trace)
-    if int(found.attrs["motored"]) < len(bar) or np.median(np.diff(angle)) > _COARSE_CAD:
+    if int(figures.attrs["motored"]) < len(bar) or np.median(np.diff(angle)) > _COARSE_CAD:
         return []
-    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
+    mean = bar.mean(axis=0) + float(np.mean(figures["pegging_bar"]))
     closed = (angle >= engine.ivc_cad) & (angle <= engine.evo_cad)
     doubts = motored_tdc(angle[closed], mean[closed], engine, conditions(trace, point)).doubts()
     return [("strokes", "; ".join(doubts))] if doubts else []
@@ -364,75 +364,75 @@ def _slips(trace: xr.Dataset) -> list[tuple[str, str]]:
     return [(kind, text) for text in phase_warnings(angle, bar, over_time=False, source="trace")]
 
 
-def hidden(trace: xr.Dataset, found: xr.Dataset, engine: Cylinder) -> dict[str, tuple[str, str]]:
-    """Say by check what faults these data would not show, and the size below which they stay hidden."""
+def hidden(trace: xr.Dataset, figures: xr.Dataset, engine: Cylinder) -> dict[str, tuple[str, str]]:
+    """Report by check what faults these data would not show, and the size below which they stay hidden."""
     angle, bar = _columns(trace)
     step = float(np.median(np.diff(angle)))
-    out = {}
-    if int(found.attrs["motored"]) < len(bar):
-        said = found.attrs["open"] or "a fired trace hardly shows an error of TDC"
-        out["top dead centre"] = (said, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
+    limits = {}
+    if int(figures.attrs["motored"]) < len(bar):
+        text = figures.attrs["open"] or "a fired trace hardly shows an error of TDC"
+        limits["top dead centre"] = (text, "mgdd.identify.estimate_tdc scans it; a motored record shows it")
         if engine.compression_ratio >= _SPARK_RATIO or len(bar) < _SOFT_CYCLES:
             text = "a gain that falls off above 0.7 of the peak looks like another burn"
             few = "10 fired cycles or more" if engine.compression_ratio < _SPARK_RATIO else "a dead-weight calibration"
-            out["amplifier"] = (text, f"{few} would show it")
+            limits["amplifier"] = (text, f"{few} would show it")
     placed = phases(angle, bar)
     if placed is None:
         if len(bar) > 1:
-            out["crank angle"] = ("compression before the burn is too short to place the cycles", "")
+            limits["crank angle"] = ("compression before the burn is too short to place the cycles", "")
     elif placed.visible_cad > min(step, _WANTED_CAD):
         lost = int(placed.visible_cad / step)
         text = (
             f"a cycle that lies less than {placed.visible_cad:.2g} °CA off, {max(lost, 1)} lost sample(s), is not seen"
         )
-        out["crank angle"] = (text, "")
-    return out
+        limits["crank angle"] = (text, "")
+    return limits
 
 
-def _of_levels(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
+def _of_levels(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
     """Compare the cycles' levels early in compression with each other, pegged as they were analysed."""
     angle, bar = _columns(trace)
     if len(bar) < 4:
         return []
     start = max(float(angle[0]), -150.0)
     early = (angle >= start - 1e-9) & (angle <= start + 20.0)
-    level = bar[:, early].mean(axis=1) + np.atleast_1d(found["pegging_bar"].to_numpy())
+    level = bar[:, early].mean(axis=1) + np.atleast_1d(figures["pegging_bar"].to_numpy())
     off = level - np.median(level)
     usual = 1.4826 * float(np.median(np.abs(off)))
-    out = []
+    doubts = []
     odd = np.flatnonzero(np.abs(off) > max(_OFF_BAR, _OFF_SCATTERS * usual))
     if odd.size and odd.size < 0.2 * len(bar):
         worst = int(odd[np.argmax(np.abs(off[odd]))])
         text = f"{odd.size} of {len(bar)} cycles start at another level: cycle {worst + 1} by {off[worst]:+.2g} bar"
-        out.append(("odd_level", text))
+        doubts.append(("odd_level", text))
     count = np.arange(len(bar)) - 0.5 * (len(bar) - 1)
     slope = float(count @ off / (count @ count))
     rest = off - off.mean() - slope * count
     stderr = math.sqrt(float(rest @ rest) / max(len(bar) - 2, 1) / float(count @ count))
     drift = slope * (len(bar) - 1)
     if abs(drift) > max(_DRIFT_BAR, _DRIFT_STDERRS * stderr * (len(bar) - 1)):
-        out.append(("drift", f"the level moves by {drift:+.2g} bar from cycle 1 to cycle {len(bar)}"))
-    return out
+        doubts.append(("drift", f"the level moves by {drift:+.2g} bar from cycle 1 to cycle {len(bar)}"))
+    return doubts
 
 
-def _of_exchange(trace: xr.Dataset, found: xr.Dataset) -> list[tuple[str, str]]:
+def _of_exchange(trace: xr.Dataset, figures: xr.Dataset) -> list[tuple[str, str]]:
     """Judge levels and work between the valves' events, of records of 720 degrees."""
-    if not np.isfinite(found["imep_net_bar"]).all():
+    if not np.isfinite(figures["imep_net_bar"]).all():
         return []
     angle, bar = _columns(trace)
-    mean = bar.mean(axis=0) + float(np.mean(found["pegging_bar"]))
+    mean = bar.mean(axis=0) + float(np.mean(figures["pegging_bar"]))
 
     def level(low: float, high: float) -> float:
         return float(mean[(angle >= low) & (angle <= high)].mean())
 
     intake, exhaust, end = level(-300.0, -200.0), level(220.0, 300.0), level(-190.0, -170.0)
-    out = []
+    doubts = []
     for text, value in (("intake", intake), ("exhaust", exhaust)):
         if not _EXCHANGE_BAR[0] < value < _EXCHANGE_BAR[1]:
-            out.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
-    pmep = float(np.mean(found["pmep_bar"]))
+            doubts.append(("exchange", f"the mean pressure of the {text} stroke is {value:.3g} bar"))
+    pmep = float(np.mean(figures["pmep_bar"]))
     if not _PMEP_BAR[0] < pmep < _PMEP_BAR[1]:
-        out.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
-    if not out and not _STEP[0] < end / intake < _STEP[1]:
-        out.append(("exchange", f"the intake stroke runs at {intake:.3g} bar and ends at {end:.3g} bar"))
-    return out
+        doubts.append(("exchange", f"the gas exchange has a mean pressure of {pmep:.3g} bar"))
+    if not doubts and not _STEP[0] < end / intake < _STEP[1]:
+        doubts.append(("exchange", f"the intake stroke runs at {intake:.3g} bar and ends at {end:.3g} bar"))
+    return doubts

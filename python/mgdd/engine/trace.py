@@ -68,7 +68,7 @@ def analyze(
     cylinder : Cylinder, Preset, str or path-like
         As in `simulate`: geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, Preset, str, path-like or mapping of str to float, optional
-        Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
+        Speed, temperatures and trapped mass where the trace has none. Without a mass it is p V/(R T) at IVC, with
         ``ivc_temperature_k`` or the intake temperature + 40 K. Numbers by name are of this record: their ``fuel_mg``
         and ``intake_pressure_kpa`` judge the trace as the keywords do. A preset or an OperatingPoint may be of another
         load: its fuel judges nothing, its intake pressure a factor of 3.
@@ -167,9 +167,9 @@ def analyze(
     9.4
     14.9
     """
-    cylinder, said = cylinder_of(cylinder), point
+    cylinder, stated_point = cylinder_of(cylinder), point
     point = point_of(point)
-    named = stated("fuel_mg", fuel_mg, said)
+    named = stated("fuel_mg", fuel_mg, stated_point)
     fuel_mg = named if named or fuel_mg is not None else None  # a point without fuel is motored
     if isinstance(trace, Iterator):
         trace, chunks = _first_of(trace, traces=traces)
@@ -178,20 +178,20 @@ def analyze(
         chunks = iter([trace])
     doubted: list[str] = []  # by who read it, and logged there
     simulated = "motored_pressure_bar" in trace.variables
-    whole = None if isinstance(said, Mapping) else point  # what a mapping leaves out is a default, not this record's
+    whole = None if isinstance(stated_point, Mapping) else point  # what it leaves out is a default, not this record's
     if inlet_pressure_kpa is None:
-        inlet_pressure_kpa = stated("intake_pressure_kpa", None, said)
+        inlet_pressure_kpa = stated("intake_pressure_kpa", None, stated_point)
     if pegging == "inlet" and inlet_pressure_kpa is None and whole is None:
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake_pressure_kpa")
     if fractions not in ("net", "gross", "rassweiler_withrow"):
         raise ParameterError.of("fractions", fractions, "net, gross or rassweiler_withrow")
-    own = conditions(trace, point)
+    state = conditions(trace, point)
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
     intake = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
     options = {
         "pegging": pegging, "pegging_exponent": pegging_exponent,
-        "inlet_pressure_kpa": own.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
+        "inlet_pressure_kpa": state.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
         "gamma_source": source, "gamma": number,
         "heat_from_cad": window[0] if window else None, "heat_to_cad": window[1] if window else None,
         "earliest_burn_cad": _number(trace, "soi_cad", _number(trace, "spark_cad")),
@@ -214,12 +214,12 @@ def analyze(
     try:
         if is_of_cycles(trace):
             result = of_cycles(
-                _noting(chunks, doubted), cylinder, own, options, attrs, given, knock_threshold_bar, traces=traces
+                _noting(chunks, doubted), cylinder, state, options, attrs, given, knock_threshold_bar, traces=traces
             )
         elif knock_threshold_bar is not None:
             raise ParameterError("knock_threshold_bar is for a record of cycles, and this is one cycle: leave it out")
         elif traces:
-            result = _one(trace, cylinder, own, options, attrs, given)
+            result = _one(trace, cylinder, state, options, attrs, given)
         else:
             raise ParameterError("traces = False is for a record of cycles, and this is one cycle: leave it out")
     except DataError as error:
@@ -233,7 +233,7 @@ def analyze(
     return result.assign_attrs(
         warnings="\n".join([*doubted, *result.attrs["warnings"].splitlines()]),
         doubts="\n".join([*("reading" for _ in doubted), *result.attrs["doubts"].splitlines()]),
-        open="" if simulated else result.attrs["open"],  # nobody read its angles
+        open="" if simulated else result.attrs["open"],  # its angles were not measured
     )
 
 
@@ -267,8 +267,8 @@ def _one(
     made = _core.engine.TraceOptions(**options)
     angle, bar = trace[ANGLE].values, trace["pressure_bar"].values
     raw = _core.engine.analyze(angle, bar, cylinder, point, made)
-    said = list(zip(raw["doubts"], raw["warnings"], strict=True)) + expansion_of(raw, cylinder, point)
-    said = sample_doubts(angle, bar) + said
+    doubts = list(zip(raw["doubts"], raw["warnings"], strict=True)) + expansion_of(raw, cylinder, point)
+    doubts = sample_doubts(angle, bar) + doubts
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
@@ -282,8 +282,8 @@ def _one(
             "mass_source": raw["mass_source"],
             "heat_window": given or ("found" if raw["window_found"] else "no burn found"),
             "motored": int(raw["motored"]),
-            "warnings": "\n".join(text for _, text in said),
-            "doubts": "\n".join(kind for kind, _ in said),
+            "warnings": "\n".join(text for _, text in doubts),
+            "doubts": "\n".join(kind for kind, _ in doubts),
             "open": "" if raw["motored"] else degree_cost(raw[ANGLE], raw["pressure_bar"], cylinder).of_fired(),
         },
     )
@@ -314,9 +314,9 @@ def _bmep(
 ) -> float | None:
     """BMEP [bar] as given, or 4 pi torque over the displacement of a four-stroke engine."""
     if bmep is not None and torque is not None:
-        raise ParameterError("bmep_bar and brake_torque_nm both say the brake work: give one")
-    if torque is None and (own := _number(trace, "bmep_bar", bmep)) is not None:
-        return own
+        raise ParameterError("bmep_bar and brake_torque_nm both state the brake work: give one")
+    if torque is None and (bmep_bar := _number(trace, "bmep_bar", bmep)) is not None:
+        return bmep_bar
     torque = _number(trace, "brake_torque_nm", torque)
     if torque is None:
         return None

@@ -69,22 +69,22 @@ def of_cycles(
     numbers: list[np.ndarray] = []
     angle, total, spectrum, n = np.empty(0), np.empty((0, 0)), None, 0
     for trace in parts:
-        own, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
-        angle = angle if raws else own
-        if not np.array_equal(own, angle):
+        own_angle, pressure = trace[ANGLE].values, trace["pressure_bar"].transpose(CYCLE, ANGLE).to_numpy()
+        angle = angle if raws else own_angle
+        if not np.array_equal(own_angle, angle):
             raise DataError(f"the chunk from cycle {n + 1} on has other crank angles than the first: read it again")
         try:
-            raws.append(_core.engine.analyze_cycles(own, pressure, cylinder, point, alone, traces))
+            raws.append(_core.engine.analyze_cycles(own_angle, pressure, cylinder, point, alone, traces))
         except DataError as error:
             raise error.reworded(f"from cycle {n + 1} on, {error}" if n else str(error)) from None
-        for kind, text in sample_doubts(own, pressure, n + 1):
+        for kind, text in sample_doubts(own_angle, pressure, n + 1):
             samples.setdefault(kind, text)
         numbers.append(trace[CYCLE].values if CYCLE in trace.coords else np.arange(n + 1, n + 1 + len(pressure)))
         total = np.vstack([*total, pressure]).sum(axis=0, keepdims=True)  # one row after the other, as in one part
         n += len(pressure)
         if np.isfinite(raws[-1]["scalars"]["mapo_bar"]).any():
-            found = spectrum_of(own, pressure, options, point.speed_rpm, keep=traces)
-            spectrum = found if spectrum is None else found._replace(total=spectrum.total + found.total)
+            spectra = spectrum_of(own_angle, pressure, options, point.speed_rpm, keep=traces)
+            spectrum = spectra if spectrum is None else spectra._replace(total=spectrum.total + spectra.total)
     raw = raws[0]
     motored = int(sum(sum(each["motored"]) for each in raws))
     mean = _core.engine.analyze(angle, total[0] / n, cylinder, point, _core.engine.TraceOptions(**options))
@@ -141,15 +141,15 @@ def expansion_of(raw: dict[str, Any], cylinder: Cylinder, point: OperatingPoint)
 
 def _counted(raws: list[dict[str, Any]], n: int) -> dict[str, str]:
     """Give the warnings of all parts by their kind, counted together: how many of n cycles, and the first of them."""
-    found: dict[str, tuple[int, str, int]] = {}
+    counts: dict[str, tuple[int, str, int]] = {}
     before = 0
     for raw in raws:
         for kind, line in zip(raw["doubts"], raw["warnings"], strict=True):
             count, text, first = _COUNTED.fullmatch(line).groups()  # type: ignore[union-attr]
-            known, text, at = found.get(kind, (0, text, before + int(first)))
-            found[kind] = (known + int(count), text, at)
+            earlier, text, at = counts.get(kind, (0, text, before + int(first)))
+            counts[kind] = (earlier + int(count), text, at)
         before += len(raw["motored"])
-    return {kind: f"{count} of {n} cycles: {text} (cycle {at})" for kind, (count, text, at) in found.items()}
+    return {kind: f"{count} of {n} cycles: {text} (cycle {at})" for kind, (count, text, at) in counts.items()}
 
 
 def _label(name: str, which: str) -> tuple[str, str]:
@@ -252,9 +252,9 @@ def ringing(
         "ringing_frequency_khz": ((), math.nan),
         "tangential_mode_khz": ((), _tangential_khz(bore_mm, float(np.median(scalars["t_max_k"])))),
     }
-    known = np.isfinite(mapo)
+    finite = np.isfinite(mapo)
     if threshold_bar is not None:
-        share = 100.0 * float(np.mean(mapo[known] > threshold_bar)) if known.any() else math.nan
+        share = 100.0 * float(np.mean(mapo[finite] > threshold_bar)) if finite.any() else math.nan
         figures["knock_share_percent"] = ((), share)
     if spectrum is None:
         return figures, {}
@@ -287,14 +287,14 @@ def spectrum_of(
     size = 2 ** math.ceil(math.log2(2 * count))
     total = np.zeros(size // 2 + 1)
     khz = np.arange(total.size) * (per_ms / size)
-    kept = np.empty((len(bar) if keep else 0, khz.size))
+    spectra = np.empty((len(bar) if keep else 0, khz.size))
     for at in range(0, len(bar), _TOGETHER):
         window = bar[at : at + _TOGETHER, inside]
         _, density = periodogram(window, per_ms, window=("tukey", _TAPER), nfft=size, detrend="linear")
         total += density.sum(axis=0)
         if keep:
-            kept[at : at + _TOGETHER] = density
-    return Spectrum(khz, total, count / per_ms, kept)
+            spectra[at : at + _TOGETHER] = density
+    return Spectrum(khz, total, count / per_ms, spectra)
 
 
 def _peak_khz(
@@ -303,7 +303,7 @@ def _peak_khz(
     """Highest peak in the band of the mean spectrum of n cycles that stands out of both shoulders; NaN if none does."""
     from scipy.special import gammaincinv
 
-    apart = max((band_khz[1] - band_khz[0]) * span_ms, 1.0)  # frequencies that the window tells apart
+    apart = max((band_khz[1] - band_khz[0]) * span_ms, 1.0)  # frequencies that the window resolves
     above = max(_ABOVE, gammaincinv(n, 1.0 - _BY_NOISE / apart) / gammaincinv(n, 0.5))
     peaks = 1 + np.flatnonzero((mean[1:-1] >= mean[:-2]) & (mean[1:-1] > mean[2:]))
     peaks = peaks[(khz[peaks] > band_khz[0]) & (khz[peaks] < band_khz[1])]

@@ -11,7 +11,7 @@ from mgdd.io.files import write_whole_text
 from mgdd.io.pressure import CYCLE
 from mgdd.io.pressure_checks import check_trace
 from mgdd.io.throttle_checks import check_throttle_log
-from mgdd.results.labels import ANGLE, check_labels, label_of, said_unit
+from mgdd.results.labels import ANGLE, check_labels, label_of, name_unit
 
 if TYPE_CHECKING:
     import os
@@ -125,7 +125,7 @@ def write_long(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write the columns of `long_columns` by `write_columns`; a unit that no name says stands in brackets behind it."""
     columns = long_columns(dataset)
     heads = [
-        name if said_unit(name) == units != "-" else _bracketed(name, units) for name, (_, units, _) in columns.items()
+        name if name_unit(name) == units != "-" else _bracketed(name, units) for name, (_, units, _) in columns.items()
     ]
     write_columns(dict(zip(heads, (values for values, _, _ in columns.values()), strict=True)), path)
 

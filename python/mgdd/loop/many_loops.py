@@ -20,7 +20,7 @@ from mgdd.loop.virtual_engine import VirtualEngine
 from mgdd.parallel.chunks import pieces, run_chunks
 from mgdd.parallel.finished import hand_over, or_partial
 from mgdd.parallel.pool import MakesExecutor, threads_of
-from mgdd.results.labels import labelled_dataset, said_unit
+from mgdd.results.labels import labelled_dataset, name_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,7 +158,7 @@ def monte_carlo(
         if functions and name in _OF_AN_ENGINE:
             continue
         label = (
-            (said_unit(name), of_input[name]) if name in of_input else _SUMMARY.get(name) or limit_label(name, names)
+            (name_unit(name), of_input[name]) if name in of_input else _SUMMARY.get(name) or limit_label(name, names)
         )
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *label)
     for name in dict.fromkeys(name for own in given for name in own.exceed_above):

@@ -24,7 +24,7 @@ _TIMING = "°CA aTDC"
 
 
 class MapPoints(NamedTuple):
-    """What a map says at points.
+    """What a map gives at points.
 
     Parameters
     ----------
@@ -41,15 +41,15 @@ class MapPoints(NamedTuple):
 class CalibrationMap(MapForms):
     """A table over one or two axes as a control unit holds it: (bi)linear between its cells, held at its edges.
 
-    It does not change. Beside its value each cell knows its source, its support, its standard deviation, the range in
+    It does not change. Beside its value each cell has its source, its support, its standard deviation, the range in
     which the value may lie and the limit that holds it.
 
     Parameters
     ----------
     axes : mapping of str to array_like
-        One or two, strictly increasing, two entries at least; the ending of a name says its unit.
+        One or two, strictly increasing, two entries at least; the ending of a name gives its unit.
     values : array_like
-        One axis of the array per axis; a number for all cells. NaN only where the source says why.
+        One axis of the array per axis; a number for all cells. NaN only where the source gives the reason.
     name : str
         What the values are, for example ``soc_cad``.
     labels : mapping of str to (str, str), optional
@@ -98,22 +98,22 @@ class CalibrationMap(MapForms):
         self._name = checked_name("name", name)
         if not isinstance(axes, Mapping) or not 1 <= len(axes) <= 2:
             raise ParameterError.of("axes", axes, "one or two names with entries, as {'fuel_mg': [6, 20, 40]}")
-        own = {checked_name("axis", axis, (name,)): _column(axis, entries) for axis, entries in axes.items()}
-        shape = tuple(entries.size for entries in own.values())
+        columns = {checked_name("axis", axis, (name,)): _column(axis, entries) for axis, entries in axes.items()}
+        shape = tuple(entries.size for entries in columns.values())
         table = np.array(values, np.float64)
         if table.ndim and table.shape != shape:
-            raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(own)} make {shape}")
+            raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(columns)} make {shape}")
         self._values = np.ascontiguousarray(np.broadcast_to(table, shape))
-        self._table = _table(own, self._values)
-        said = dict(labels or {})
-        self._labels = {each: checked_label(each, said.pop(each, None)) for each in (*own, name)}
-        if said:
-            raise ParameterError.of("labels", next(iter(said)), f"of {', '.join(self._labels)}")
-        self._cells = checked_cells(self._values, own, cells or {})
+        self._table = _table(columns, self._values)
+        given = dict(labels or {})
+        self._labels = {each: checked_label(each, given.pop(each, None)) for each in (*columns, name)}
+        if given:
+            raise ParameterError.of("labels", next(iter(given)), f"of {', '.join(self._labels)}")
+        self._cells = checked_cells(self._values, columns, cells or {})
         self._task, self._provenance = task, _texts(provenance or {})
-        for array in (*own.values(), self._values):
+        for array in (*columns.values(), self._values):
             array.setflags(write=False)
-        self._axes = own
+        self._axes = columns
 
     @property
     def name(self) -> str:
@@ -240,8 +240,8 @@ class CalibrationMap(MapForms):
     def __repr__(self) -> str:
         size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
         kinds, counts = np.unique(self._cells["source"], return_counts=True)
-        said = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
-        return f"<CalibrationMap {self._name} [{self.unit}], {size}, {said}>"
+        sources = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
+        return f"<CalibrationMap {self._name} [{self.unit}], {size}, {sources}>"
 
     def _title(self) -> str:
         return repr(self)[1:-1]

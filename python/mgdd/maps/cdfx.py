@@ -77,9 +77,9 @@ def cdfx_blocks(raw: bytes, origin: str) -> tuple[list[DcmBlock], list[str]]:
     root = _parsed(raw, origin)
     if root.tag != "MSRSW":
         raise DataError(f"{origin}: begins with <{root.tag}>: a CDFX file with <MSRSW>; export it as ASAM CDF 2.0")
-    said = _text(root, "CATEGORY")
-    if said not in ("", _FORMAT):
-        raise DataError(f"{origin}: <CATEGORY> {said[:60]!r}: only {_FORMAT}, ASAM CDF 2.0, is read; export that")
+    category = _text(root, "CATEGORY")
+    if category not in ("", _FORMAT):
+        raise DataError(f"{origin}: <CATEGORY> {category[:60]!r}: only {_FORMAT}, ASAM CDF 2.0, is read; export that")
     blocks: dict[str, DcmBlock] = {}
     skipped: list[str] = []
     for instance in root.iter("SW-INSTANCE"):
@@ -94,7 +94,7 @@ def cdfx_blocks(raw: bytes, origin: str) -> tuple[list[DcmBlock], list[str]]:
     for name, block in [*blocks.items()]:
         lacking = next((each for each in _lacking(block) if each), "")
         if lacking:
-            skipped.append(f"{name}: the breakpoints of its axis {lacking} do not stand in the file")
+            skipped.append(f"{name}: the breakpoints of its axis {lacking} are not in the file")
             del blocks[name]
             continue
         _check_counts(block, f"{origin}, line {block.line}")
@@ -122,9 +122,9 @@ def _check_counts(block: DcmBlock, where: str) -> None:
 
 
 def _plain(text: str) -> str:
-    found = _FORBIDDEN.search(text)
-    if found:
-        raise DataError(f"{text!r}: {found[0]!r} cannot stand in XML: remove it")
+    match = _FORBIDDEN.search(text)
+    if match:
+        raise DataError(f"{text!r}: {match[0]!r} is not allowed in XML: remove it")
     return text
 
 
@@ -139,11 +139,11 @@ def _add_numbers(parent: ET.Element, numbers: Sequence[float]) -> None:
 
 
 def _parsed(raw: bytes, origin: str) -> ET.Element:
-    """Parse XML that declares nothing, at most 64 levels deep; each element knows its line, an axis its comment."""
+    """Parse XML that declares nothing, at most 64 levels deep; each element has its line, an axis its comment."""
     parser, builder, depth = expat.ParserCreate(), ET.TreeBuilder(), 0
 
-    def refused(said: str) -> DataError:
-        return DataError(f"{origin}, line {parser.CurrentLineNumber}: {said}")
+    def refused(message: str) -> DataError:
+        return DataError(f"{origin}, line {parser.CurrentLineNumber}: {message}")
 
     def start(tag: str, _: Any) -> None:
         nonlocal depth
@@ -179,9 +179,9 @@ def _parsed(raw: bytes, origin: str) -> ET.Element:
         parser.Parse(raw, True)
         return builder.close()
     except expat.ExpatError as error:
-        said = expat.ErrorString(error.code)
+        message = expat.ErrorString(error.code)
         raise DataError(
-            f"{origin}, line {error.lineno}: not valid XML: {said}: the file was cut off or damaged; write it again"
+            f"{origin}, line {error.lineno}: not valid XML: {message}: the file was cut off or damaged; write it again"
         ) from error
     except (LookupError, ValueError, AssertionError) as error:  # an encoding that is none
         if isinstance(error, DataError):
@@ -190,7 +190,7 @@ def _parsed(raw: bytes, origin: str) -> ET.Element:
 
 
 def _block(instance: ET.Element, origin: str) -> tuple[DcmBlock | None, str]:
-    """Read an instance, or say why it is skipped."""
+    """Read an instance, or report why it is skipped."""
     name, kind, line = _text(instance, "SHORT-NAME"), _text(instance, "CATEGORY"), int(instance.get("line", "0"))
     if not name:
         return None, f"line {line}: SW-INSTANCE without SHORT-NAME"
@@ -210,8 +210,8 @@ def _block(instance: ET.Element, origin: str) -> tuple[DcmBlock | None, str]:
     block.unit, block.values = unit, rows
     axes = holder.findall("SW-AXIS-CONTS/SW-AXIS-CONT")
     if len(axes) != _AXES[kind]:
-        said = f"{name} has {len(axes)} SW-AXIS-CONT: a {kind} has {_AXES[kind]}; add what is missing"
-        raise DataError(f"{origin}, line {line}: {said}")
+        message = f"{name} has {len(axes)} SW-AXIS-CONT: a {kind} has {_AXES[kind]}; add what is missing"
+        raise DataError(f"{origin}, line {line}: {message}")
     block.sizes = [len(rows[0]), len(rows)][: len(axes)]
     for letter, axis in zip("xy", axes, strict=False):
         points, own_unit = _rows(axis, origin)

@@ -1,4 +1,4 @@
-"""What a calibration map knows of each cell beside its value, and the one check of it."""
+"""What a calibration map holds of each cell beside its value, and the one check of it."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError, did_you_mean
-from mgdd.results.labels import VARIABLES, Label, said_unit
+from mgdd.results.labels import VARIABLES, Label, name_unit
 from mgdd.results.units import attribute_units, unit_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# Where a value comes from; the last two say why there is none.
+# Where a value comes from; the last two give why there is none.
 SOURCES = (
     "given", "measured", "predicted", "extrapolated", "optimised", "smoothed", "interpolated", "held", "learned",
     "infeasible", "unattainable",
 )  # fmt: skip
 WITHOUT_VALUE = SOURCES[-2:]
-# Columns of numbers: long name, what stands where nothing is said, and the least that may stand there.
+# Columns of numbers: long name, the default, and the least allowed value.
 NUMBERS: Mapping[str, tuple[str, float, float]] = {
     "support": ("points behind the value", 0.0, 0.0),
     "sd": ("standard deviation", np.nan, 0.0),
@@ -84,15 +84,15 @@ def can_be_name(text: str) -> bool:
 
 def checked_label(name: str, given: tuple[str, str] | None) -> Label:
     """Give unit and long name of an axis or value; a unit that contradicts the ending of the name is refused."""
-    known = VARIABLES.get(name) or Label(said_unit(name), spoken_name(name))
-    label = known if given is None else Label(*map(str, given))
+    usual = VARIABLES.get(name) or Label(name_unit(name), spoken_name(name))
+    label = usual if given is None else Label(*map(str, given))
     try:
         written = attribute_units(label.units)
     except ValueError as error:
         raise DataError.of(f"unit of {name}", label.units, f"a unit: {error}") from None
-    if known.units != "-" and attribute_units(known.units) != written:
+    if usual.units != "-" and attribute_units(usual.units) != written:
         raise DataError.of(
-            f"unit of {name}", label.units, f"{known.units!r}, as the name says; convert the numbers or change the name"
+            f"unit of {name}", label.units, f"{usual.units!r}, as the name says; convert the numbers or change the name"
         )
     if not label.long_name.strip():
         raise DataError.of(f"long name of {name}", label.long_name, "a text that figures can print")
@@ -104,7 +104,7 @@ def checked_cells(
     axes: Mapping[str, NDArray[np.float64]],
     given: Mapping[str, ArrayLike],
 ) -> dict[str, NDArray[Any]]:
-    """Give every column with the shape of the values; NaN is a value only where the source says why."""
+    """Give every column with the shape of the values; NaN is allowed only where the source gives the reason."""
     for name in given:
         if name not in NUMBERS and name not in TEXTS:
             near = did_you_mean(name, (*NUMBERS, *TEXTS)) or f"known are {', '.join((*NUMBERS, *TEXTS))}"
@@ -131,10 +131,10 @@ def checked_cells(
     if bad.any():
         at = int(np.argmax(bad))
         source = str(cells["source"].ravel()[at])
-        said = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
+        conflict = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
         raise DataError(
-            f"{said}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
-            "fill the cell or say why it is empty"
+            f"{conflict}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
+            "fill the cell or set its source"
         )
     for column in cells.values():
         column.setflags(write=False)
@@ -149,7 +149,7 @@ def cell_at(axes: Mapping[str, NDArray[np.float64]], place: int) -> str:
 
 def spoken_name(name: str) -> str:
     """Give a name in words, without the unit at its end."""
-    parts, unit = name.split("_"), said_unit(name)
+    parts, unit = name.split("_"), name_unit(name)
     ends = [k for k in range(1, len(parts)) if unit != "-" and unit_of("_" + "_".join(parts[k:])) == unit]
     return " ".join(parts[: max(ends)] if ends else parts)
 

@@ -67,33 +67,33 @@ def compare_maps(
             f"one map stands over {', '.join(first.axes)}, the other over {', '.join(second.axes)}: the same axes in "
             "the same order are needed"
         )
-    for own, other in zip((*first.axes, first.name), (*second.axes, second.name), strict=True):
-        if first.labels[own].units != second.labels[other].units:
+    for label, other in zip((*first.axes, first.name), (*second.axes, second.name), strict=True):
+        if first.labels[label].units != second.labels[other].units:
             raise DataError(
-                f"{own} has unit {first.labels[own].units!r} in one map and {second.labels[other].units!r} in the "
+                f"{label} has unit {first.labels[label].units!r} in one map and {second.labels[other].units!r} in the "
                 "other: convert one"
             )
     axes = {name: _common(name, entries, second.axes[name], grid) for name, entries in first.axes.items()}
     points = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
-    one, two = first.lookup(points), second.lookup(points)
-    difference = two.values - one.values
+    first_values, second_values = first.lookup(points), second.lookup(points)
+    difference = second_values.values - first_values.values
     sd = np.hypot(first.sd_at(points), second.sd_at(points))
-    known = difference[np.isfinite(difference)]
+    finite = difference[np.isfinite(difference)]
     beyond = np.abs(difference) > (np.inf if tolerance is None else tolerance)
-    largest = known[np.argmax(np.abs(known))] if known.size else np.nan
+    largest = finite[np.argmax(np.abs(finite))] if finite.size else np.nan
     dims, unit, name = tuple(axes), first.unit, first.labels[first.name].long_name
     of_unit = (unit.removesuffix(" aTDC"),)  # a difference of angles has no zero
     return labelled_dataset(
         {
             **{axis: (axis, entries, *first.labels[axis]) for axis, entries in axes.items()},
-            "first": (dims, one.values, unit, f"{name}, first map"),
-            "second": (dims, two.values, unit, f"{name}, second map"),
+            "first": (dims, first_values.values, unit, f"{name}, first map"),
+            "second": (dims, second_values.values, unit, f"{name}, second map"),
             "difference": (dims, difference, *of_unit, f"{name}, second minus first"),
             "sd": (dims, sd, *of_unit, "standard deviation of the difference"),
-            "held_outside": (dims, one.held_outside | two.held_outside, "-", "held at an edge"),
+            "held_outside": (dims, first_values.held_outside | second_values.held_outside, "-", "held at an edge"),
             "beyond": (dims, beyond, "-", "beyond the tolerance"),
             "largest_difference": ((), float(largest), *of_unit, "largest difference by size"),
-            "rms_difference": ((), _rms(known), *of_unit, "root mean square difference"),
+            "rms_difference": ((), _rms(finite), *of_unit, "root mean square difference"),
             "n_beyond": ((), int(beyond.sum()), "-", "cells beyond the tolerance"),
         },
         attrs={"map": "difference", "of": first.name} | ({} if tolerance is None else {"tolerance": float(tolerance)}),
@@ -101,7 +101,7 @@ def compare_maps(
 
 
 def apply_map(table: CalibrationMap | xr.Dataset, sweep: xr.Dataset) -> xr.Dataset:
-    """Read what a sweep says at the values of a map: what the map achieves.
+    """Read a sweep at the values of a map: what the map achieves.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def apply_map(table: CalibrationMap | xr.Dataset, sweep: xr.Dataset) -> xr.Datas
     -------
     xarray.Dataset
         The map and every variable of the sweep over the operating axes, linear between the points of the sweep; NaN
-        where the map has no value. A map that knows its objective has ``loss`` too: how far the objective lies from
+        where the map has no value. A map that has its objective has ``loss`` too: how far the objective lies from
         that of `optimize_map` under the limits of the map.
 
     Raises
@@ -137,38 +137,38 @@ def apply_map(table: CalibrationMap | xr.Dataset, sweep: xr.Dataset) -> xr.Datas
     [0.0008, 0.0008]
     """
     table = map_of(table)
-    own = (*table.axes, table.name)
-    names = tuple(str(each) for each in sweep.data_vars if set(own) == set(map(str, sweep[each].dims)))
+    dims_of_map = (*table.axes, table.name)
+    names = tuple(str(each) for each in sweep.data_vars if set(dims_of_map) == set(map(str, sweep[each].dims)))
     if not names:
-        raise DataError(f"the sweep has no variable over {', '.join(own)}: it does not belong to this map")
+        raise DataError(f"the sweep has no variable over {', '.join(dims_of_map)}: it does not belong to this map")
     data = sweep_columns(sweep, table.name, names, names[0])
     if set(data.axes) != set(table.axes) or any(
         not np.array_equal(data.axes[name], entries) for name, entries in table.axes.items()
     ):
         raise DataError(f"{', '.join(table.axes)}: the sweep has other breakpoints than the map")
     at = np.transpose(table.values, [list(table.axes).index(name) for name in data.axes]).ravel()
-    known = np.isfinite(at)
-    if (at[known] < data.over[0]).any() or (at[known] > data.over[-1]).any():
+    finite = np.isfinite(at)
+    if (at[finite] < data.over[0]).any() or (at[finite] > data.over[-1]).any():
         low, high = data.over[0], data.over[-1]
         raise DataError(f"{table.name}: the map leaves the sweep, {low:g} to {high:g}: widen the sweep")
-    place = np.where(known, at, data.over[0])
+    place = np.where(finite, at, data.over[0])
     interval = np.clip(np.searchsorted(data.over, place, side="right") - 1, 0, data.over.size - 2)
     share = (place - data.over[interval]) / np.diff(data.over)[interval]
     dims = tuple(data.axes)
     out: dict[str, tuple[Any, ...]] = {name: (name, entries, *data.labels[name]) for name, entries in data.axes.items()}
     out[table.name] = (dims, at.reshape(data.shape), *table.labels[table.name])
-    found = {name: np.where(known, between(data.columns[name], share, interval), np.nan) for name in names}
-    for name, column in found.items():
+    achieved = {name: np.where(finite, between(data.columns[name], share, interval), np.nan) for name in names}
+    for name, column in achieved.items():
         out[name] = (dims, column.reshape(data.shape), *data.labels[name])
     task = table.task
-    if task is not None and task.objective in found and set(task.limits) <= set(names):
+    if task is not None and task.objective in achieved and set(task.limits) <= set(names):
         best = optimize_map(
             sweep[list(names)], task.objective, over=table.name, limits=task.limits, maximize=task.maximize,
             infeasible="keep",
         )  # fmt: skip
         order = [list(best.axes).index(name) for name in data.axes]
         sign = 1.0 if task.maximize else -1.0
-        loss = sign * (np.transpose(best.cells["objective"], order).ravel() - found[task.objective])
+        loss = sign * (np.transpose(best.cells["objective"], order).ravel() - achieved[task.objective])
         unit = data.labels[task.objective].units
         out["loss"] = (dims, loss.reshape(data.shape), unit, f"loss of {data.labels[task.objective].long_name}")
     return labelled_dataset(out)
@@ -191,13 +191,13 @@ def _rms(values: Any) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
 
 
-def achieved_figures(table: CalibrationMap, found: xr.Dataset) -> dict[str, dict[str, Any]]:
+def achieved_figures(table: CalibrationMap, achieved: xr.Dataset) -> dict[str, dict[str, Any]]:
     """Give mean, ends and place of the highest of what `apply_map` found: of loss, objective and limits, or all."""
     task = table.task
-    wanted = [] if task is None else [name for name in ("loss", task.objective, *task.limits) if name in found]
+    named = [] if task is None else [name for name in ("loss", task.objective, *task.limits) if name in achieved]
     figures: dict[str, dict[str, Any]] = {}
-    for name in wanted or [str(name) for name in found.data_vars if name != table.name]:
-        values = found[name].transpose(*table.axes).to_numpy()
+    for name in named or [str(name) for name in achieved.data_vars if name != table.name]:
+        values = achieved[name].transpose(*table.axes).to_numpy()
         if not np.isfinite(values).any():
             continue
         places = np.unravel_index(int(np.nanargmax(values)), values.shape)

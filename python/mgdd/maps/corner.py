@@ -35,15 +35,15 @@ def axes_of(
         )
         if turned:
             raise DataError(
-                f"{where}: the corner {corner!r} says that {down} runs down and {across} across: correct it, or "
+                f"{where}: the corner {corner!r} states that {down} runs down and {across} across: correct it, or "
                 f"leave {argument('rows')} and {argument('columns')} out"
             )
-    found = []
+    headings = []
     for text, name, fallback in ((down, rows, "y"), (across, columns, "x")):
         made = heading_of(text, fallback=fallback, taken=taken)
         if name is not None and name.casefold() not in (text.casefold(), without_brackets(text)[0].casefold()):
-            own = heading_of(name, unit=without_brackets(text)[1], fallback=name)
-            made = own._replace(long_name=without_brackets(text)[0] or own.long_name)
+            named = heading_of(name, unit=without_brackets(text)[1], fallback=name)
+            made = named._replace(long_name=without_brackets(text)[0] or named.long_name)
         if not text and name is None:
             side, example = ("rows", "speed_rpm") if fallback == "y" else ("columns", "fuel_mg")
             warnings.warn(
@@ -52,11 +52,11 @@ def axes_of(
                 UserWarning,
                 stacklevel=2,
             )
-        found.append(made)
+        headings.append(made)
         taken = (*taken, made.name)
-    if found[0].name == found[1].name:
-        raise DataError(f"{where}: both axes are called {found[0].name}: name them with {_choice('…', '…')}")
-    return found[0], found[1]
+    if headings[0].name == headings[1].name:
+        raise DataError(f"{where}: both axes are called {headings[0].name}: name them with {_choice('…', '…')}")
+    return headings[0], headings[1]
 
 
 def _choice(down: str, across: str) -> str:
@@ -86,13 +86,13 @@ def _parts(corner: str) -> tuple[str, str, bool]:
 
 
 def _split(text: str) -> tuple[list[str], str]:
-    masked = _BRACKETED.sub(lambda found: "\0" * len(found[0]), text)
+    masked = _BRACKETED.sub(lambda marks: "\0" * len(marks[0]), text)
     if without_brackets(text)[0] == "":
         return [text], ""  # a unit alone, as 1/min
     for separator in _SEPARATORS:
-        found = [*re.finditer(separator, masked)]
-        if len(found) == 1:
-            parts = [text[: found[0].start()].strip(), text[found[0].end() :].strip()]
+        marks = [*re.finditer(separator, masked)]
+        if len(marks) == 1:
+            parts = [text[: marks[0].start()].strip(), text[marks[0].end() :].strip()]
             if all(parts):
                 return parts, separator
     return [text], ""
@@ -100,16 +100,16 @@ def _split(text: str) -> tuple[list[str], str]:
 
 def _side(part: str) -> tuple[str, str]:
     """Give a label without its arrow, and where that points."""
-    found = _MARKED.fullmatch(part)
-    mark = (found["before"] or found["after"]) if found else None
-    if found is None or not mark or not found["text"].strip():
+    match = _MARKED.fullmatch(part)
+    mark = (match["before"] or match["after"]) if match else None
+    if match is None or not mark or not match["text"].strip():
         return part, ""
     side = "down" if re.fullmatch(_DOWN.replace(r"(?<![^\s])", ""), mark, re.IGNORECASE) else "across"
-    return found["text"].strip(), side
+    return match["text"].strip(), side
 
 
 def _chosen(down: str, across: str, rows: str | None, columns: str | None, where: str) -> tuple[str, str]:
-    """Let the arguments say which of two labels runs down."""
+    """Let the arguments decide which of two labels runs down."""
     first_down = set()
     for name, is_down in ((rows, True), (columns, False)):
         fits = (name is not None and _fits(down, name), name is not None and _fits(across, name))
@@ -126,7 +126,7 @@ def _chosen(down: str, across: str, rows: str | None, columns: str | None, where
             f"{argument('rows', repr(down))} if it runs down, or name both with {_choice('speed_rpm', 'fuel_mg')}"
         )
     raise DataError(
-        f"{where}: the corner says {down!r} and {across!r} and not which axis runs down: pass "
+        f"{where}: the corner names {down!r} and {across!r} and not which axis runs down: pass "
         f"{argument('rows', repr(down))} if {down} runs down, or {argument('columns', repr(down))} if it runs across"
     )
 

@@ -37,7 +37,7 @@ _COMMENTS = {"*SSTX": "axis_x", "*SSTY": "axis_y", "*SST": "axis_x"}
 class DcmBlock:
     """A value, curve or map of a file: one row of values per entry of y; axes and texts that it lacks are empty.
 
-    `sizes` are the entries of the axes as the head gives them; `is_axis` says that it holds breakpoints alone, in x.
+    `sizes` are the entries of the axes as the head gives them; `is_axis` marks one with breakpoints alone, in x.
     """
 
     name: str
@@ -63,31 +63,31 @@ class _Line(NamedTuple):
 
 def dcm_text(blocks: Sequence[DcmBlock], comments: Sequence[str]) -> str:
     """Give the text of a file; numbers come back bit for bit."""
-    out = [*(f"* {comment}" for comment in comments), "", f"{_HEAD} {_VERSION}", ""]
+    lines = [*(f"* {comment}" for comment in comments), "", f"{_HEAD} {_VERSION}", ""]
     for block in blocks:
         keyword = "KENNFELD" if block.y else "KENNLINIE" if block.x else "FESTWERT"
         sizes = "".join(f" {len(entries)}" for entries in (block.x, block.y) if entries)
-        out.append(f"{keyword} {block.name}{sizes}")
-        out.append(_said("LANGNAME", block.long_name))
+        lines.append(f"{keyword} {block.name}{sizes}")
+        lines.append(_line("LANGNAME", block.long_name))
         units = {"EINHEIT_X": block.unit_x, "EINHEIT_Y": block.unit_y, "EINHEIT_W": block.unit}
         used = ("EINHEIT_W",) if not block.x else ("EINHEIT_X", "EINHEIT_W") if not block.y else tuple(units)
-        out += [_said(word, units[word]) for word in used]
-        out += [f"*{word}   {axis}" for word, axis in (("SSTX", block.axis_x), ("SSTY", block.axis_y)) if axis]
-        out += _numbers("ST/X", block.x)
+        lines += [_line(word, units[word]) for word in used]
+        lines += [f"*{word}   {axis}" for word, axis in (("SSTX", block.axis_x), ("SSTY", block.axis_y)) if axis]
+        lines += _numbers("ST/X", block.x)
         for place, row in enumerate(block.values):
-            out += _numbers("ST/Y", block.y[place : place + 1])
-            out += _numbers("WERT", row)
-        out += ["END", ""]
-    return "\n".join(out)
+            lines += _numbers("ST/Y", block.y[place : place + 1])
+            lines += _numbers("WERT", row)
+        lines += ["END", ""]
+    return "\n".join(lines)
 
 
 def dcm_blocks(text: str, origin: str) -> tuple[list[DcmBlock], list[str]]:
-    """Read values, curves, maps and breakpoints, and name what is skipped: other blocks, keywords that nobody knows."""
+    """Read values, curves, maps and breakpoints, and name what is skipped: other blocks, unknown keywords."""
     lines = _lines(text)
     first = lines.pop(0) if lines else None
     if first is None or first.word != _HEAD:
-        said = "the file is empty" if first is None else f"line {first.number}: {first.word[:60]!r}"
-        raise DataError(f"{origin}: {said}: a DCM file begins with {_HEAD} {_VERSION}")
+        place = "the file is empty" if first is None else f"line {first.number}: {first.word[:60]!r}"
+        raise DataError(f"{origin}: {place}: a DCM file begins with {_HEAD} {_VERSION}")
     if first.rest.split()[:1] != [_VERSION]:
         raise DataError(f"{origin}, line {first.number}: {_HEAD} {first.rest}: only {_VERSION} is read; export that")
     blocks: dict[str, DcmBlock] = {}
@@ -137,12 +137,12 @@ def _skip(lines: list[_Line]) -> str:
 
 def _lines(text: str) -> list[_Line]:
     """Give word and rest of every line that is not empty; of the comments only those that name an axis."""
-    found = []
+    words = []
     for number, raw in enumerate(text.splitlines(), start=1):
         word, *rest = raw.split(None, 1) or [""]
         if word and (word[0] not in "*!." or word in _COMMENTS):
-            found.append(_Line(number, word, rest[0].strip() if rest else ""))
-    return found
+            words.append(_Line(number, word, rest[0].strip() if rest else ""))
+    return words
 
 
 def _block(head: _Line, lines: list[_Line], origin: str) -> tuple[DcmBlock | None, list[str]]:
@@ -165,9 +165,9 @@ def _block(head: _Line, lines: list[_Line], origin: str) -> tuple[DcmBlock | Non
         elif line.word == "ST/X":
             block.x += _floats(line.rest, at)
         elif line.word == "ST/Y":
-            found = _floats(line.rest, at)
-            block.y += found
-            rows += [[] for _ in found]
+            breakpoints = _floats(line.rest, at)
+            block.y += breakpoints
+            rows += [[] for _ in breakpoints]
         elif line.word == "WERT":
             if not rows:
                 rows.append([])
@@ -210,18 +210,18 @@ def _check_counts(block: DcmBlock, where: str) -> None:
         "ST/Y": (len(block.y), deep if len(block.sizes) > 1 else 0),
         "rows of WERT": (len(block.values), 0 if block.is_axis else deep),
     }
-    for word, (found, needed) in counts.items():
-        if found != needed:
-            raise DataError(f"{where}: {block.name} has {found} {word}: its head says {needed}; add what is missing")
+    for word, (count, needed) in counts.items():
+        if count != needed:
+            raise DataError(f"{where}: {block.name} has {count} {word}: its head states {needed}; add what is missing")
     for row, values in enumerate(block.values):
         if len(values) != wide:
             at = f" at ST/Y {block.y[row]:g}" if block.y else ""
             raise DataError(
-                f"{where}: {block.name} has {len(values)} values{at}: its head says {wide}; add what is missing"
+                f"{where}: {block.name} has {len(values)} values{at}: its head states {wide}; add what is missing"
             )
 
 
-def _said(word: str, text: str) -> str:
+def _line(word: str, text: str) -> str:
     return f'   {word:<13} "{text}"'
 
 

@@ -89,12 +89,12 @@ def _encoded(text: str, path: str | os.PathLike[str], encoding: str) -> str:
         raw = text.encode(encoding)
     except UnicodeEncodeError as error:
         letter, line = text[error.start], text.count("\n", 0, error.start) + 1
-        said = text.splitlines()[line - 1].strip()
+        row = text.splitlines()[line - 1].strip()
         raise DataError(
-            f"{path}, line {line}: {letter!r} in {said!r} is not a letter of {encoding}: change the text, or write it "
+            f"{path}, line {line}: {letter!r} in {row!r} is not a letter of {encoding}: change the text, or write it "
             f"with {argument('encoding', repr('utf-8'))}"
         ) from error
-    if encoding != "utf-8" and Path(path).suffix.lower() == ".dcm":  # XML says its encoding itself
+    if encoding != "utf-8" and Path(path).suffix.lower() == ".dcm":  # XML states its encoding itself
         with contextlib.suppress(DataError):
             if decoded(raw, str(path)) == text:
                 return text
@@ -111,7 +111,7 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     Parameters
     ----------
     path : path-like
-        DCM, format 2.0, UTF-8 or Windows-1252, or CDFX (ASAM CDF 2.0); its content says which. Axes have the names that
+        DCM, format 2.0, UTF-8 or Windows-1252, or CDFX (ASAM CDF 2.0); decided by its content. Axes have the names that
         ``*SSTX`` and ``*SSTY`` give, or the axis that several maps share, where an axis can be called so, else ``x``
         and ``y``.
 
@@ -215,11 +215,11 @@ def _map_of(block: DcmBlock) -> CalibrationMap:
     given = (("x", block.axis_x, block.x, block.unit_x), ("y", block.axis_y, block.y, block.unit_y))
     axes: dict[str, list[float]] = {}
     labels: dict[str, tuple[str, str]] = {}
-    for plain, said, points, unit in given if block.y else given[:1]:
+    for plain, label, points, unit in given if block.y else given[:1]:
         # The names of axes stand in comments, where other tools may write anything.
-        name = said if can_be_name(said) and said not in (block.name, "x", "y", *axes) else plain
+        name = label if can_be_name(label) and label not in (block.name, "x", "y", *axes) else plain
         axes[name] = points
-        labels[name] = (unit_from(unit, name), said if said not in ("", name) else spoken_name(name))
+        labels[name] = (unit_from(unit, name), label if label not in ("", name) else spoken_name(name))
     labels[block.name] = (unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
     rows = np.array(block.values)
     return CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".cdfx", ".nc")
-_HEAD = 1 << 16  # bytes that tell a form
+_HEAD = 1 << 16  # bytes that identify a form
 
 
 def write_map(
@@ -43,7 +43,7 @@ def write_map(
     values: Mapping[str, tuple[float, str]] | None = None,
     encoding: str = "utf-8",
 ) -> None:
-    """Write a map in the form that the ending of the file says; DCM and CDFX hold several, and single values.
+    """Write a map in the form that the ending of the file selects; DCM and CDFX hold several, and single values.
 
     Parameters
     ----------
@@ -102,11 +102,11 @@ def write_map(
         raise ParameterError(f"{path}: holds one map; several, and single values, go into a .dcm file or a .cdfx file")
     if encoding != "utf-8":
         raise ParameterError.of("encoding", encoding, "'utf-8' in this form; a .dcm or .cdfx file may have others")
-    (own,) = maps
+    (single,) = maps
     if ending == ".nc":
-        write_netcdf(own.to_dataset(), path)
+        write_netcdf(single.to_dataset(), path)
     else:
-        write_whole_text(path, csv_of_map(own) if ending == ".csv" else _json_of(own))
+        write_whole_text(path, csv_of_map(single) if ending == ".csv" else _json_of(single))
 
 
 def read_map(
@@ -132,7 +132,7 @@ def read_map(
         Decimal mark of a text file.
     rows : str, optional
         Axis that runs down a grid, by its label in the corner or by the name that it gets; in a table the column of the
-        first axis; as the file says if left out.
+        first axis; as the file states if left out.
     columns : str, optional
         The same of the axis that runs across, the second one.
     sheet : str, optional
@@ -142,7 +142,7 @@ def read_map(
     -------
     CalibrationMap
         Equal to the one that was written; of other files what they hold. Cells that are empty are ``unattainable``;
-        points of a table that are repeated count with their mean, which ``provenance`` says.
+        points of a table that are repeated count with their mean, which ``provenance`` states.
 
     Warns
     -----
@@ -156,7 +156,7 @@ def read_map(
     mgdd.errors.ParameterError
         A name that the file does not have, `rows` or `columns` where a file names its axes.
     mgdd.errors.DataError
-        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than its names say, another number
+        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than by its names, another number
         of values, a corner that leaves open which axis runs down, or points that are no grid; the message names file,
         line or field, and remedy.
     ImportError
@@ -198,17 +198,17 @@ def read_map(
         text = read_plain_text(file, only_utf8=form == "json")
         made = map_of_csv(text, str(file), decimal) if form == "csv" else _map_of_json(text, str(file))
     except (Error, TypeError, ValueError, KeyError) as error:
-        said = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
-        if isinstance(error, DataError | ParameterError) and said.startswith(str(file)):
+        message = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
+        if isinstance(error, DataError | ParameterError) and message.startswith(str(file)):
             raise
-        raise DataError(f"{file}: {said}") from error
+        raise DataError(f"{file}: {message}") from error
     if name is not None and name != made.name:
         raise ParameterError(f"{file}: holds {made.name!r}, not {name!r}")
     return made
 
 
 def _form_of(file: Path) -> str:
-    """Tell a form by its content, by the ending of the file only where that says nothing; "" for grids and points."""
+    """Detect a form by its content, by the ending of the file only where that is open; "" for grids and points."""
     with file.open("rb") as stream:
         head = stream.read(_HEAD)
     ending = file.suffix.lower()
@@ -227,8 +227,8 @@ def _form_of(file: Path) -> str:
         return "labels"
     if text.startswith("{") or ending == ".json":
         return "json"
-    found = cells_as_text(file)
-    return "csv" if found is not None and not found[2] and is_map_csv(found[1]) else ""
+    cells = cells_as_text(file)
+    return "csv" if cells is not None and not cells[2] and is_map_csv(cells[1]) else ""
 
 
 def _of_labels(file: Path, name: str | None) -> CalibrationMap:
@@ -236,22 +236,22 @@ def _of_labels(file: Path, name: str | None) -> CalibrationMap:
     maps = content.maps
     if name is None and len(maps) != 1:
         raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
-    wanted = next(iter(maps)) if name is None else name
-    if wanted not in maps:
-        left_out = next((said for said in content.skipped if said.startswith(f"{wanted}: ")), None)
-        near = left_out or did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
-        raise ParameterError(f"{file}: no map {wanted!r}: {near}")
-    return maps[wanted]
+    label = next(iter(maps)) if name is None else name
+    if label not in maps:
+        left_out = next((text for text in content.skipped if text.startswith(f"{label}: ")), None)
+        near = left_out or did_you_mean(label, maps) or f"it holds {', '.join(maps) or 'none'}"
+        raise ParameterError(f"{file}: no map {label!r}: {near}")
+    return maps[label]
 
 
 def _of_any(
     file: Path, *, name: str | None, decimal: str, rows: str | None, columns: str | None, sheet: str | None
 ) -> CalibrationMap:
     """Read a grid or a table of points."""
-    found = cells_as_text(file, sheet)
-    if found is None:
+    cells = cells_as_text(file, sheet)
+    if cells is None:
         return map_of_points(read_any_table(file), name=name, rows=rows, columns=columns)
-    source, text, is_sheet = found
+    source, text, is_sheet = cells
     mark = "." if is_sheet else decimal  # the numbers of a sheet have no mark of their own
     grid = map_of_grid(text, source, name=name, decimal=mark, rows=rows, columns=columns, whole=is_sheet)
     if grid is not None:

@@ -45,7 +45,7 @@ class MapForms(Result):
         Returns
         -------
         mgdd.guide.TimingMap
-            With the values as best timings, at most as certain as `sd` says: a cell without it has ``prior_sd_cad``. It
+            With the values as best timings, at most as certain as by `sd`: a cell without it has ``prior_sd_cad``. It
             has no support yet: that counts confirmed optima.
 
         Raises
@@ -66,8 +66,8 @@ class MapForms(Result):
             forgetting=SETTINGS["forgetting"] if forgetting is None else forgetting,
         )  # fmt: skip
         data = made.to_dataset()
-        known = np.isfinite(self._cells["sd"]) & (self._cells["sd"] > 0.0)
-        data["sd_cad"].values[:] = np.where(known, np.minimum(self._cells["sd"], prior), prior)
+        finite = np.isfinite(self._cells["sd"]) & (self._cells["sd"] > 0.0)
+        data["sd_cad"].values[:] = np.where(finite, np.minimum(self._cells["sd"], prior), prior)
         return TimingMap.from_dataset(data)
 
     def learned_from(self, timing: TimingMap) -> Self:
@@ -123,7 +123,7 @@ class MapForms(Result):
             name: (name, entries, *self._labels[name]) for name, entries in self._axes.items()
         }
         variables[self._name] = (dims, self._values, *self._labels[self._name])
-        for name, (said, *_) in NUMBERS.items():
+        for name, (long_name, *_) in NUMBERS.items():
             unit = (
                 self._labels[self._name].units
                 if name in of_value
@@ -131,9 +131,9 @@ class MapForms(Result):
                 if name == "objective"
                 else "-"
             )
-            variables[name] = (dims, self._cells[name], unit, said)
-        for name, (said, _) in TEXTS.items():
-            variables[name] = (dims, self._cells[name], "-", said)
+            variables[name] = (dims, self._cells[name], unit, long_name)
+        for name, (long_name, _) in TEXTS.items():
+            variables[name] = (dims, self._cells[name], "-", long_name)
         attrs: dict[str, Any] = {"map": self._name}
         if self._task is not None:
             attrs |= {"task_objective": self._task.objective, "task_maximize": int(self._task.maximize)}
@@ -153,7 +153,7 @@ class MapForms(Result):
             The variable; the map that the Dataset names, if left out.
         source : str, optional
             Source of the cells of any other Dataset than a map. If left out: the attribute ``source`` of the variable,
-            where it is one of those of a map, and ``extrapolated`` where the variable ``NAME_extrapolated`` says so;
+            where it is one of those of a map, and ``extrapolated`` where the variable ``NAME_extrapolated`` is set;
             otherwise ``given``. Cells without a value are ``unattainable``.
 
         Returns
@@ -166,36 +166,36 @@ class MapForms(Result):
         mgdd.errors.DataError
             No such variable, or one without axes or units.
         """
-        own = str(dataset.attrs.get("map", "")) if name is None else name
-        if own not in dataset or not 1 <= dataset[own].ndim <= 2:
+        value = str(dataset.attrs.get("map", "")) if name is None else name
+        if value not in dataset or not 1 <= dataset[value].ndim <= 2:
             have = ", ".join(str(each) for each in dataset.data_vars if 1 <= dataset[each].ndim <= 2) or "none"
-            if not own:
+            if not value:
                 raise DataError(
                     f"the Dataset names no map: give the name of a variable over one or two axes (it has {have}); "
                     "of a sweep make a map first, with optimize_map or mgdd map optimize"
                 )
-            raise DataError(f"no variable {own!r} over one or two axes: the Dataset has {have}; give its name")
-        variable = dataset[own]
+            raise DataError(f"no variable {value!r} over one or two axes: the Dataset has {have}; give its name")
+        variable = dataset[value]
         dims = [str(dim) for dim in variable.dims]
         lacking = [dim for dim in dims if dim not in dataset.coords]
         if lacking:
-            raise DataError(f"{own}: the axis {lacking[0]} has no coordinates: add them")
-        for each in (*dims, own):
+            raise DataError(f"{value}: the axis {lacking[0]} has no coordinates: add them")
+        for each in (*dims, value):
             if not {"units", "long_name"} <= set(dataset[each].attrs):
-                raise DataError(f"{each} has no units or no long_name: say both in its attributes")
+                raise DataError(f"{each} has no units or no long_name: set both in its attributes")
         values = variable.to_numpy()
-        said = np.full(values.shape, source or _source_of(variable), "U64")
-        if source is None and f"{own}_extrapolated" in dataset:
-            said[dataset[f"{own}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
-        cells: dict[str, Any] = {"source": np.where(np.isfinite(values), said, "unattainable")}
+        sources = np.full(values.shape, source or _source_of(variable), "U64")
+        if source is None and f"{value}_extrapolated" in dataset:
+            sources[dataset[f"{value}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
+        cells: dict[str, Any] = {"source": np.where(np.isfinite(values), sources, "unattainable")}
         task, provenance = None, {}
-        if dataset.attrs.get("map") == own:
+        if dataset.attrs.get("map") == value:
             cells = {each: dataset[each].to_numpy() for each in (*NUMBERS, *TEXTS) if each in dataset}
             task, provenance = _task_of(dataset.attrs), _under(dataset.attrs, "provenance_")
-        labels = {each: label_of(dataset[each]) for each in (*dims, own)}
+        labels = {each: label_of(dataset[each]) for each in (*dims, value)}
         axes = {dim: dataset[dim].to_numpy() for dim in dims}
         make: Any = cls
-        made: Self = make(axes, values, name=own, labels=labels, cells=cells, task=task, provenance=provenance)
+        made: Self = make(axes, values, name=value, labels=labels, cells=cells, task=task, provenance=provenance)
         return made
 
     def __eq__(self, other: object) -> bool:
@@ -209,13 +209,13 @@ class MapForms(Result):
         return self._name, self._labels, exact, list(self._axes), self._task, self._provenance
 
     def __reduce__(self) -> tuple[Any, ...]:
-        said = {"labels": self._labels, "cells": self._cells, "task": self._task, "provenance": self._provenance}
-        return _rebuild, (type(self), self._axes, self._values, {"name": self._name, **said})
+        options = {"labels": self._labels, "cells": self._cells, "task": self._task, "provenance": self._provenance}
+        return _rebuild, (type(self), self._axes, self._values, {"name": self._name, **options})
 
 
 def _source_of(variable: xr.DataArray) -> str:
-    said = str(variable.attrs.get("source", ""))  # an attribute that other files use for texts of their own
-    return said if said in SOURCES and said not in WITHOUT_VALUE else "given"
+    source = str(variable.attrs.get("source", ""))  # an attribute that other files use for texts of their own
+    return source if source in SOURCES and source not in WITHOUT_VALUE else "given"
 
 
 def _under(attrs: Mapping[Any, Any], prefix: str) -> dict[str, Any]:
@@ -229,7 +229,7 @@ def _task_of(attrs: Mapping[Any, Any]) -> MapTask | None:
     return MapTask(objective=str(attrs["task_objective"]), limits=limits, maximize=bool(attrs.get("task_maximize", 1)))
 
 
-def _rebuild(cls: type[MapForms], axes: Any, values: Any, said: dict[str, Any]) -> MapForms:
+def _rebuild(cls: type[MapForms], axes: Any, values: Any, options: dict[str, Any]) -> MapForms:
     make: Any = cls
-    made: MapForms = make(axes, values, **said)
+    made: MapForms = make(axes, values, **options)
     return made

@@ -41,9 +41,9 @@ def csv_of_map(table: CalibrationMap) -> str:
             continue
         rows += [[], ["table", name], *_grid(table, column)]
     rows += [[], [_END]]
-    out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerows(rows)
-    return out.getvalue()
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
 
 
 def is_map_csv(text: str) -> bool:
@@ -77,16 +77,16 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
         raise DataError(f"{origin}: no line {lack!r}: a map names its value and its axes, for example {example}")
     if _VALUE not in blocks:
         raise DataError(f"{origin}: no line 'table,value': the file ends before its values, or was cut off")
-    labels = {said[0]: (said[1], said[2]) for said in (heads[_VALUE], *names)}
+    labels = {head[0]: (head[1], head[2]) for head in (heads[_VALUE], *names)}
     grids: dict[str, Any] = {}
     axes: dict[str, NDArray[np.float64]] = {}
     for name, (number, rows) in blocks.items():
         ended = _END in heads or name != next(reversed(blocks))
-        own, grids[name] = _read_grid(
-            origin, number, rows, [said[0] for said in names], decimal, is_text=name in TEXTS, ended=ended
+        table_axes, grids[name] = _read_grid(
+            origin, number, rows, [head[0] for head in names], decimal, is_text=name in TEXTS, ended=ended
         )
-        axes = axes or own
-        for axis, entries in own.items():
+        axes = axes or table_axes
+        for axis, entries in table_axes.items():
             if not np.array_equal(entries, axes[axis]):
                 raise DataError(
                     f"{origin}, line {number}: {axis} of table {name!r} differs from that of the first table"
@@ -122,15 +122,15 @@ def _grid(table: CalibrationMap, column: NDArray[Any]) -> list[list[str]]:
     written = [[str(cell) if column.dtype.kind == "U" else _number(cell) for cell in row] for row in cells]
     axes = [[_number(entry) for entry in entries] for entries in table.axes.values()]
     head = [["", *axes[1]]] if len(axes) == 2 else []
-    return [*head, *([own, *row] for own, row in zip(axes[0], written, strict=True))]
+    return [*head, *([first, *row] for first, row in zip(axes[0], written, strict=True))]
 
 
 def trimmed(cells: list[str]) -> list[str]:
     """Leave out the empty cells that a spreadsheet adds at the end of a row."""
-    kept = len(cells)
-    while kept and not cells[kept - 1]:
-        kept -= 1
-    return cells[:kept]
+    width = len(cells)
+    while width and not cells[width - 1]:
+        width -= 1
+    return cells[:width]
 
 
 def _parts(
@@ -139,7 +139,7 @@ def _parts(
     """Sort the lines into heads and tables."""
     heads: dict[str, Any] = {}
     blocks: dict[str, tuple[int, list[tuple[int, list[str]]]]] = {}
-    known = (_VALUE, *NUMBERS, *TEXTS)
+    tables = (_VALUE, *NUMBERS, *TEXTS)
     for number, row in lines:
         where, cells = f"{origin}, line {number}", trimmed(row)
         if cells[0].startswith("#"):
@@ -151,8 +151,8 @@ def _parts(
             continue
         if cells[0] == "table":
             name = cells[1] if len(cells) > 1 else ""
-            if name not in known or name in blocks:
-                raise DataError(f"{where}: table {name!r}: must be one of {', '.join(known)}, each once")
+            if name not in tables or name in blocks:
+                raise DataError(f"{where}: table {name!r}: must be one of {', '.join(tables)}, each once")
             blocks[name] = (number, [])
         elif blocks:
             next(reversed(blocks.values()))[1].append((number, row))
@@ -191,7 +191,7 @@ def _read_grid(
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[Any]]:
     if len(rows) < len(axes) + 1:
         raise DataError(f"{origin}, line {number}: the table ends after {len(rows)} rows: the file was cut off")
-    own: dict[str, NDArray[np.float64]] = {}
+    table_axes: dict[str, NDArray[np.float64]] = {}
     width = 1
     if len(axes) == 2:
         line, head = rows[0]
@@ -200,30 +200,30 @@ def _read_grid(
                 f"{origin}, line {line}: {head[0]!r}: the first row of a table has an empty cell and the entries of "
                 f"{axes[1]}"
             )
-        own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in trimmed(head)[1:]])
-        for pair in itertools.pairwise(own[axes[1]]):
+        table_axes[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in trimmed(head)[1:]])
+        for pair in itertools.pairwise(table_axes[axes[1]]):
             require_rise(origin, line, axes[1], pair)
-        width, rows = own[axes[1]].size, rows[1:]
+        width, rows = table_axes[axes[1]].size, rows[1:]
     first, cells = [], []
     for line, row in rows:
-        found = trimmed(row)
+        filled = trimmed(row)
         # A row without any value may end where a spreadsheet ends it; in any other a lost cell would shift the rest.
         # The last row of a file without an end mark may be one that was cut off.
         last = not ended and line == rows[-1][0]
-        if len(found) - 1 > width or ((len(found) > 1 or last) and len(row) - 1 < width):
+        if len(filled) - 1 > width or ((len(filled) > 1 or last) and len(row) - 1 < width):
             cut = "; the file may be cut off here" if last else ""
             raise DataError(
                 f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column; an empty cell "
                 f"keeps its separator{cut}"
             )
-        full = [*found, *[""] * (width + 1 - len(found))]
+        full = [*filled, *[""] * (width + 1 - len(filled))]
         first.append(_read(origin, line, full[0], decimal, axes[0]))
         if len(first) > 1:
             require_rise(origin, line, axes[0], first[-2:])
         cells.append(full[1:] if is_text else [_read(origin, line, c, decimal, "a value", gap=True) for c in full[1:]])
-    own = {axes[0]: np.array(first), **own}
-    shape = tuple(entries.size for entries in own.values())
-    return own, np.array(cells, np.str_ if is_text else np.float64).reshape(shape)
+    table_axes = {axes[0]: np.array(first), **table_axes}
+    shape = tuple(entries.size for entries in table_axes.values())
+    return table_axes, np.array(cells, np.str_ if is_text else np.float64).reshape(shape)
 
 
 def require_rise(origin: str, line: int, axis: str, pair: Sequence[float]) -> None:
@@ -245,5 +245,5 @@ def _read(origin: str, line: int, cell: str, decimal: str, what: str, *, gap: bo
 
 
 def _limits(heads: Mapping[str, Any], origin: str, decimal: str) -> dict[str, float]:
-    said = heads.get("limit", {})
-    return {name: _read(origin, 0, text, decimal, f"limit {name}") for name, text in said.items()}
+    limits = heads.get("limit", {})
+    return {name: _read(origin, 0, text, decimal, f"limit {name}") for name, text in limits.items()}

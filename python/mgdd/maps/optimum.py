@@ -84,7 +84,7 @@ def optimize_map(
     mgdd.errors.DataError
         A sweep with other axes, repeated breakpoints or too few points.
     mgdd.errors.ConvergenceError
-        Cells in which nothing keeps the limits; the message says how near the nearest comes.
+        Cells in which nothing keeps the limits; the message states how near the nearest comes.
 
     Notes
     -----
@@ -104,8 +104,8 @@ def optimize_map(
     >>> best.values.round(1).tolist(), best.cells["active_limit"].tolist()
     ([-3.3, -2.9], ['', 'p_max_bar'])
     """
-    kept = limits_of(limits)
-    caps = {limit.name: limit.upper - limit.margin for limit in kept}
+    checked = limits_of(limits)
+    caps = {limit.name: limit.upper - limit.margin for limit in checked}
     if objective in caps:
         raise ParameterError(f"limits: {objective} is the objective: limit other variables")
     if infeasible not in ("raise", "keep"):
@@ -120,32 +120,32 @@ def optimize_map(
     data = sweep_columns(sweep, over, tuple(dict.fromkeys((objective, *caps, *extra))), objective)
     sign = 1.0 if maximize else -1.0
     gain = sign * data.columns[objective]
-    known = np.isfinite(gain)
+    finite = np.isfinite(gain)
     for name in caps:
-        known &= np.isfinite(data.columns[name])
-    if known.any():
+        finite &= np.isfinite(data.columns[name])
+    if finite.any():
         for finding in idle_limits(
-            caps, {name: float(data.columns[name][known].max()) for name in caps}, "in the sweep"
+            caps, {name: float(data.columns[name][finite].max()) for name in caps}, "in the sweep"
         ):
             _LOG.warning("%s", finding)
-    excess = np.stack([np.where(known, -1.0, np.inf), *(data.columns[name] - cap for name, cap in caps.items())])
-    excess = np.where(known, excess, np.inf)
+    excess = np.stack([np.where(finite, -1.0, np.inf), *(data.columns[name] - cap for name, cap in caps.items())])
+    excess = np.where(finite, excess, np.inf)
     parts = feasible_parts(excess)
     empty = np.asarray(~(parts.low <= parts.high).any(axis=1))
     if empty.any() and (infeasible == "raise" or empty.all()):
         raise ConvergenceError(_nothing_feasible(data, excess, empty, caps, over))
-    best = _best(data.over, np.where(known, gain, np.nan), parts, empty)
+    best = _best(data.over, np.where(finite, gain, np.nan), parts, empty)
     noise = {name: _column(data, value) for name, value in scatter.items()}
     names = ("", *caps)
     active, spread = _held(data, best, parts, names, noise, objective)
     around = parts
     if max_loss is not None:
-        loss = np.where(known, (best.gain[:, None] - gain) - max_loss, np.inf)
+        loss = np.where(finite, (best.gain[:, None] - gain) - max_loss, np.inf)
         around = feasible_parts(np.concatenate([excess, loss[None]]))
     low, high, _, _ = range_around(data.over, around, np.where(empty, data.over[0], best.at))
     cells = {
         "source": np.where(empty, "infeasible", "optimised"),
-        "support": known.sum(axis=1),
+        "support": finite.sum(axis=1),
         "sd": np.where(empty, np.nan, spread),
         "low": np.where(empty, np.nan, low),
         "high": np.where(empty, np.nan, high),
@@ -193,7 +193,7 @@ def _best(over: Array, gain: Array, parts: Parts, empty: NDArray[np.bool_]) -> _
     # At a point of the sweep the parts on both sides belong to it, at a crossing the part of its own interval does.
     below, above = np.where(at_point, np.maximum(point - 1, 0), interval), np.where(at_point, point, interval)
     above = np.minimum(above, n - 1)
-    found = over[interval] + share * step[interval]
+    timing = over[interval] + share * step[interval]
     low = np.where(at_point & (point == 0), over[0], over[below] + parts.low[cells, below] * step[below])
     high = np.where(at_point & (point == n), over[-1], over[above] + parts.high[cells, above] * step[above])
     centre = np.clip(point, 1, n - 1)
@@ -205,7 +205,7 @@ def _best(over: Array, gain: Array, parts: Parts, empty: NDArray[np.bool_]) -> _
     concave = bend < 0.0  # not where a neighbour is NaN
     with np.errstate(divide="ignore", invalid="ignore"):
         vertex = over[centre] - slope / bend
-    at = np.where(concave, np.clip(vertex, low, high), found)
+    at = np.where(concave, np.clip(vertex, low, high), timing)
     gone = at - over[centre]
     here = np.where(concave, middle + slope * gone + 0.5 * bend * gone**2, ends[cells, place])
     return _Best(at, here, centre, slope, np.where(concave, bend, np.nan), low, high, below, above)
@@ -271,15 +271,15 @@ def _nothing_feasible(
     """Name the cells, and where the limits come nearest."""
     blind = empty & ~np.isfinite(excess[0]).any(axis=1)
     if blind.all() or (blind.any() and (blind == empty).all()):
-        said = [cell_at(data.axes, int(place)) for place in np.flatnonzero(blind)]
-        raise DataError(f"{_several(said)}: no point of the sweep is known: measure there or drop the rows")
+        names = [cell_at(data.axes, int(place)) for place in np.flatnonzero(blind)]
+        raise DataError(f"{_several(names)}: no point of the sweep is known: measure there or drop the rows")
     size = np.array([max(abs(cap), 1e-300) for cap in caps.values()])
     worst = np.max(excess[1:] / size[:, None, None], axis=0)
     worst = np.where(empty[:, None] & np.isfinite(worst), worst, np.inf)
     cell, point = np.unravel_index(int(np.argmin(worst)), worst.shape)
     near = ", ".join(f"{name} = {data.columns[name][cell, point]:.4g} (limit {cap:g})" for name, cap in caps.items())
-    said = [cell_at(data.axes, int(place)) for place in np.flatnonzero(empty)]
-    which = "any cell" if empty.all() else f"{empty.sum()} of {empty.size} cells: {_several(said)}"
+    names = [cell_at(data.axes, int(place)) for place in np.flatnonzero(empty)]
+    which = "any cell" if empty.all() else f"{empty.sum()} of {empty.size} cells: {_several(names)}"
     remedy = "raise a limit, widen the sweep" + (
         "" if empty.all() else f", or pass {argument('infeasible', repr('keep'))}"
     )

@@ -43,7 +43,7 @@ def map_of_grid(
     text: str, origin: str, *, name: str | None, decimal: str, rows: str | None, columns: str | None, whole: bool
 ) -> CalibrationMap | None:
     """Read the grid in a text, or give None where there is none; only the rows of a sheet are known to be whole."""
-    grids = [found for mark in _MARKS if mark != decimal for found in [_found(text, mark, origin)] if found]
+    grids = [grid for mark in _MARKS if mark != decimal for grid in [_grid_in(text, mark, origin)] if grid]
     if not grids:
         return None
     grid = max(grids, key=lambda each: each.width)  # the first of the widest
@@ -63,21 +63,21 @@ def map_of_grid(
         require_rise(origin, line, across.name, pair)
     y, values = [], []
     for at, row in grid.body:
-        found, where = trimmed(row), f"{origin}, line {at}"
-        if found and not _like_number(found[0]) and found[0].casefold() not in _EMPTY:
+        filled, where = trimmed(row), f"{origin}, line {at}"
+        if filled and not _like_number(filled[0]) and filled[0].casefold() not in _EMPTY:
             raise DataError(
-                f"{where}: {found[0][:60]!r} is not a breakpoint of {down.name}: remove the line, or begin it with #"
+                f"{where}: {filled[0][:60]!r} is not a breakpoint of {down.name}: remove the line, or begin it with #"
             )
         last = at == grid.body[-1][0] and not whole  # it may be cut off
-        if len(found) - 1 > len(x) or ((len(found) > 1 or last) and len(row) - 1 < len(x)):
+        if len(filled) - 1 > len(x) or ((len(filled) > 1 or last) and len(row) - 1 < len(x)):
             raise DataError(
                 f"{where}: {len(row) - 1} values: {len(x)} are needed, one per column; an empty cell keeps its mark"
                 f"{'; the file may be cut off here' if last else ''}"
             )
-        y.append(number_in(found[0], decimal, where, down.name))
+        y.append(number_in(filled[0], decimal, where, down.name))
         if len(y) > 1:
             require_rise(origin, at, down.name, y[-2:])
-        cells = [*found[1:], *[""] * (len(x) + 1 - len(found))]
+        cells = [*filled[1:], *[""] * (len(x) + 1 - len(filled))]
         values.append([number_in(cell, decimal, where, "a value", gap=True) for cell in cells])
     require_two(origin, {down.name: y, across.name: x})
     table = np.array(values)
@@ -102,10 +102,10 @@ def require_two(origin: str, axes: Mapping[str, Sized]) -> None:
 
 def value_heading(name: str | None, label: str, unit: str = "") -> Heading:
     """Give what the values are: called as asked for, else as the file labels them, else ``value``."""
-    words, own = without_brackets(label)
+    words, bracket = without_brackets(label)
     if name is None:
         return heading_of(label, unit=unit, fallback="value")
-    made = heading_of(name, unit=unit or own, fallback=name)
+    made = heading_of(name, unit=unit or bracket, fallback=name)
     return made._replace(long_name=words) if words and words != name else made
 
 
@@ -134,7 +134,7 @@ def _like_number(cell: str) -> bool:
     return _LIKE_NUMBER.match(cell) is not None
 
 
-def _found(text: str, mark: str | None, origin: str) -> _Grid | None:
+def _grid_in(text: str, mark: str | None, origin: str) -> _Grid | None:
     """Find the row of breakpoints: numbers behind a corner that is none, above rows that begin with a number."""
     lines = _cells(text, mark, origin)
     for place, (line, cells) in enumerate(lines):
@@ -162,27 +162,27 @@ def _found(text: str, mark: str | None, origin: str) -> _Grid | None:
 
 def _names_columns(cells: list[str], width: int) -> bool:
     """Whether a line has a name for every column of a table of points."""
-    said = trimmed(cells)
-    return len(said) == width and not any(_like_number(cell) or cell.casefold() in _EMPTY for cell in said)
+    names = trimmed(cells)
+    return len(names) == width and not any(_like_number(cell) or cell.casefold() in _EMPTY for cell in names)
 
 
 def _cells(text: str, mark: str | None, origin: str) -> Rows:
-    """Give the cells of every line that says something; of blanks only those behind a corner separate."""
+    """Give the cells of every line with content; of blanks only those behind a corner separate."""
     if mark is None:
-        found = []
+        rows = []
         for number, line in enumerate(text.splitlines(), start=1):
             words = line.split()
             first = next((k for k, word in enumerate(words) if _like_number(word)), len(words))
-            found.append((number, [" ".join(words[:first]), *words[first:]] if first else words))
+            rows.append((number, [" ".join(words[:first]), *words[first:]] if first else words))
     else:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
         try:
-            found = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+            rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
         except csv.Error as error:
             raise DataError(f"{origin}, line {reader.line_num}: {error}: correct the quotes and cells there") from error
     return [
         (number, cells)
-        for number, cells in found
+        for number, cells in rows
         if any(cells) and not cells[0].startswith("#") and not "".join(cells).startswith("sep=")
     ]
 
@@ -192,18 +192,18 @@ def _preamble(lines: Rows) -> tuple[str, str, str, str]:
     above = title = unit = ""
     remarks: list[str] = []
     for place, (_, cells) in enumerate(lines):
-        said = [cell for cell in cells if cell.casefold() not in _EMPTY]
-        words, own = without_brackets(said[0]) if said else ("", "")
-        if place == len(lines) - 1 and len(said) == 1 and cells[0] != said[0]:
-            above = said[0]
-        elif len(said) == 2 and said[0].casefold().strip(" :") in _UNIT_KEYS:
-            unit = said[1].strip("[]() ")
-        elif len(said) == 1 and not words and own and (place or spelled_unit(own) is not None):
-            unit = own
-        elif len(said) == 1 and not title:
-            title = said[0]
-        elif said:
-            remarks.append(" ".join(said))
+        filled = [cell for cell in cells if cell.casefold() not in _EMPTY]
+        words, bracket = without_brackets(filled[0]) if filled else ("", "")
+        if place == len(lines) - 1 and len(filled) == 1 and cells[0] != filled[0]:
+            above = filled[0]
+        elif len(filled) == 2 and filled[0].casefold().strip(" :") in _UNIT_KEYS:
+            unit = filled[1].strip("[]() ")
+        elif len(filled) == 1 and not words and bracket and (place or spelled_unit(bracket) is not None):
+            unit = bracket
+        elif len(filled) == 1 and not title:
+            title = filled[0]
+        elif filled:
+            remarks.append(" ".join(filled))
     return above, title, unit, " ".join("; ".join(remarks).split())
 
 
@@ -211,17 +211,17 @@ def _with_units(row: tuple[int, list[str]], down: Heading, value: Heading, origi
     """Take the units of a row below the breakpoints: first that of the rows, then that of the values."""
     line, cells = row
     first, *others = ["" if cell.casefold() in _EMPTY else cell.strip("[](){} ") for cell in cells]
-    said = sorted({cell for cell in others if cell})
-    if len(said) > 1:
+    units = sorted({cell for cell in others if cell})
+    if len(units) > 1:
         raise DataError(
-            f"{origin}, line {line}: units {', '.join(map(repr, said[:3]))}: the values have one; correct them"
+            f"{origin}, line {line}: units {', '.join(map(repr, units[:3]))}: the values have one; correct them"
         )
     made = []
-    for heading, text in ((down, first), (value, said[0] if said else "")):
+    for heading, text in ((down, first), (value, units[0] if units else "")):
         unit = unit_from(text, heading.name) if text else heading.unit
         if not heading.unit.startswith(NOT_GIVEN) and unit != heading.unit:
             raise DataError(
-                f"{origin}, line {line}: unit {text!r} of {heading.name}: its name or label says {heading.unit!r}; "
+                f"{origin}, line {line}: unit {text!r} of {heading.name}: its name or label gives {heading.unit!r}; "
                 "correct one of them"
             )
         made.append(heading._replace(unit=unit))

@@ -89,10 +89,10 @@ def _of_columns(
             f"rows with an empty value, which smooth_map with {argument('fill', 'True')} fills, or fit the points and "
             "predict a grid (mgdd map fit, mgdd map predict)"
         )
-    known = np.isfinite(values)
-    order = np.argsort(cell[known], kind="stable")
-    support = np.bincount(cell[known], minlength=there.size)
-    groups = np.split(values[known][order], np.cumsum(support)[:-1])
+    finite = np.isfinite(values)
+    order = np.argsort(cell[finite], kind="stable")
+    support = np.bincount(cell[finite], minlength=there.size)
+    groups = np.split(values[finite][order], np.cumsum(support)[:-1])
     means = np.array([math.fsum(group) / len(group) if len(group) else np.nan for group in groups])
     several = support > 1
     notes = {}
@@ -126,12 +126,12 @@ def _index(table: Table, label: str | None, what: str) -> int | None:
         return None
     labels = table.header or ()
     names = [heading_of(each, unit=table.unit(k) or "", fallback="").name for k, each in enumerate(labels)]
-    found = [k for k, (each, own) in enumerate(zip(labels, names, strict=True)) if label in (each, own)]
-    if len(found) != 1:
+    places = [k for k, (each, name) in enumerate(zip(labels, names, strict=True)) if label in (each, name)]
+    if len(places) != 1:
         near = did_you_mean(label, (*labels, *names)) or f"the file has {', '.join(map(repr, labels))}"
-        said = "no column" if not found else "more than one column"
-        raise DataError(f"{table.source}: {said} {label!r} for {argument(what)}: {near}")
-    return found[0]
+        count = "no column" if not places else "more than one column"
+        raise DataError(f"{table.source}: {count} {label!r} for {argument(what)}: {near}")
+    return places[0]
 
 
 def _chosen(table: Table, numeric: Sequence[int], given: dict[str, int | None]) -> list[int]:
@@ -148,10 +148,10 @@ def _chosen(table: Table, numeric: Sequence[int], given: dict[str, int | None]) 
         choices = ", ".join(argument(what, repr("…")) for what in needed) or "fewer names"
         raise DataError(
             f"{table.source}: {len(free)} columns with numbers ({names}) for {len(needed)} of the axes and value of "
-            f"a map: say which with {choices}, or remove the others"
+            f"a map: choose one with {choices}, or remove the others"
         )
-    found = given | dict(zip(needed, free if needed else (), strict=True))
-    return [k for what in ("rows", "columns", "name") if (k := found[what]) is not None]
+    columns = given | dict(zip(needed, free if needed else (), strict=True))
+    return [k for what in ("rows", "columns", "name") if (k := columns[what]) is not None]
 
 
 def _column(table: Table, index: int, *, gap: bool) -> Array:
@@ -178,42 +178,42 @@ def _of_matrix(table: ArrayTable, name: str | None, rows: str | None, columns: s
     labels = table.header or ()
     groups: dict[str, list[int]] = {}
     for k, label in enumerate(labels):
-        found = _NUMBERED.fullmatch(label)
-        if found and int(found[2]) == len(groups.get(found[1], ())) + 1:
-            groups.setdefault(found[1], []).append(k)
+        numbered = _NUMBERED.fullmatch(label)
+        if numbered and int(numbered[2]) == len(groups.get(numbered[1], ())) + 1:
+            groups.setdefault(numbered[1], []).append(k)
     matrices = {label: of for label, of in groups.items() if len(of) > 1 and len({table.lengths[k] for k in of}) == 1}
     if not matrices:
         return None
     vectors = [k for k in range(table.width) if not any(k in of for of in matrices.values())]
-    wanted = name or (next(iter(matrices)) if len(matrices) == 1 else "")
-    if wanted not in matrices:
+    matrix = name or (next(iter(matrices)) if len(matrices) == 1 else "")
+    if matrix not in matrices:
         raise DataError(
             f"{table.source}: the matrices are {', '.join(matrices)}: name one with {argument('name', repr('…'))}"
         )
-    own = matrices[wanted]
-    shape = (table.lengths[own[0]], len(own))
+    members = matrices[matrix]
+    shape = (table.lengths[members[0]], len(members))
     chosen = []
-    for side, size, asked in (("rows", shape[0], rows), ("columns", shape[1], columns)):
+    for side, size, named in (("rows", shape[0], rows), ("columns", shape[1], columns)):
         fit = [k for k in vectors if table.lengths[k] == size]
-        index = _index(table, asked, side) if asked is not None else fit[0] if len(fit) == 1 else None
+        index = _index(table, named, side) if named is not None else fit[0] if len(fit) == 1 else None
         if index is None or index not in fit:
             names = ", ".join(labels[k] for k in fit) or "none"
             raise DataError(
-                f"{table.source}: {wanted} is {shape[0]} x {shape[1]}, and of length {size} are {names}: name the axis "
+                f"{table.source}: {matrix} is {shape[0]} x {shape[1]}, and of length {size} are {names}: name the axis "
                 f"with {argument(side, repr('…'))}"
             )
         chosen.append(index)
     if chosen[0] == chosen[1]:
         raise DataError(
-            f"{table.source}: {wanted} is {shape[0]} x {shape[1]} and only {labels[chosen[0]]} has that length: add "
+            f"{table.source}: {matrix} is {shape[0]} x {shape[1]} and only {labels[chosen[0]]} has that length: add "
             "the other axis"
         )
-    value = value_heading(None, wanted, table.unit(own[0]) or "")
+    value = value_heading(None, matrix, table.unit(members[0]) or "")
     heads = [
         heading_of(labels[k], unit=table.unit(k) or "", fallback="yx"[k == chosen[1]], taken=(value.name,))
         for k in chosen
     ]
-    grid = table.matrix(own).T
+    grid = table.matrix(members).T
     return CalibrationMap(
         {head.name: _column(table, k, gap=False) for head, k in zip(heads, chosen, strict=True)},
         grid,

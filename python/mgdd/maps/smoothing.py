@@ -64,8 +64,8 @@ def smooth_map(
     Returns
     -------
     CalibrationMap
-        Values with the source ``smoothed``, none outside of its range; ``active_limit`` says what holds a value:
-        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis. ``provenance`` says the
+        Values with the source ``smoothed``, none outside of its range; ``active_limit`` names what holds a value:
+        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis. ``provenance`` gives the
         largest move, and which cells were filled.
 
     Warns
@@ -104,45 +104,45 @@ def smooth_map(
     optimum = map_of(optimum, "optimum")
     slopes = _checked(optimum, weight, slope_limits or {})
     values, low, high = (_flat(optimum, name) for name in ("", "low", "high"))
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     if tolerance is not None:
         if isinstance(tolerance, bool) or not (np.isfinite(tolerance) and tolerance >= 0.0):
             raise ParameterError.of("tolerance", tolerance, f">= 0, {optimum.unit}")
         low, high = np.fmax(low, values - tolerance), np.fmin(high, values + tolerance)  # of no range: the tolerance
     # What fills the gaps need not touch the rest.
-    kept = known & ((np.isnan(low) & np.isnan(high) & fill) | (tolerance == 0.0))
-    _check_ranges(optimum, values, low, high, known, kept)
-    ranged = known & ~kept
-    scale, width = _half_widths(values, low, high, ranged, known)
+    fixed = finite & ((np.isnan(low) & np.isnan(high) & fill) | (tolerance == 0.0))
+    _check_ranges(optimum, values, low, high, finite, fixed)
+    ranged = finite & ~fixed
+    scale, width = _half_widths(values, low, high, ranged, finite)
     free_low, free_high = np.where(ranged, low, -np.inf), np.where(ranged, high, np.inf)
     # Not of no width: a method of interior points needs an interior.
-    free_low[kept], free_high[kept] = values[kept] - _KEPT * scale, values[kept] + _KEPT * scale
+    free_low[fixed], free_high[fixed] = values[fixed] - _KEPT * scale, values[fixed] + _KEPT * scale
     _check_reach(optimum, slopes, free_low, free_high)
     pairs = _neighbours(optimum, slopes)
-    solved = _solve(optimum, values, width, scale, known, free_low, free_high, pairs, weight)
+    solved = _solve(optimum, values, width, scale, finite, free_low, free_high, pairs, weight)
     held = _holds(solved, free_low, free_high, pairs, _AT_END * scale)
-    solved[kept], held[kept] = values[kept], ""
+    solved[fixed], held[fixed] = values[fixed], ""
     if tolerance is not None:
-        solved[known] = _within(solved[known], values[known], tolerance)
-    missing = ~known & (not fill)
-    outside = _outside(optimum, known) if fill else np.zeros(known.size, np.bool_)
+        solved[finite] = _within(solved[finite], values[finite], tolerance)
+    missing = ~finite & (not fill)
+    outside = _outside(optimum, finite) if fill else np.zeros(finite.size, np.bool_)
     gained = np.where(outside, "extrapolated", "interpolated")
     cells = {
-        "source": np.where(missing | kept, optimum.cells["source"].ravel(), np.where(known, "smoothed", gained)),
+        "source": np.where(missing | fixed, optimum.cells["source"].ravel(), np.where(finite, "smoothed", gained)),
         "active_limit": np.where(missing, "", held),
-        "support": np.where(known | missing, optimum.cells["support"].ravel(), 0.0),
-        "objective": np.where(kept, optimum.cells["objective"].ravel(), np.nan),
+        "support": np.where(finite | missing, optimum.cells["support"].ravel(), 0.0),
+        "objective": np.where(fixed, optimum.cells["objective"].ravel(), np.nan),
     }
     how = ", ".join(f"{name} at most {limit:g} per unit" for name, limit in slopes.items() if np.isfinite(limit))
     notes = {"smoothed": f"weight {weight:g}, slope over {how or 'every axis free'}"}
     if tolerance is not None:
-        move = np.where(known, np.abs(solved - values), 0.0)
+        move = np.where(finite, np.abs(solved - values), 0.0)
         notes["smoothed"] += (
             f"; tolerance {tolerance:g} {optimum.unit}, largest move {move.max():.4g} {optimum.unit} at "
             f"{cell_at(optimum.axes, int(np.argmax(move)))}"
         )
-    if fill and not known.all():
-        notes["filled"] = _named(optimum, ~known)
+    if fill and not finite.all():
+        notes["filled"] = _named(optimum, ~finite)
         if outside.any():
             notes["extrapolated"] = f"{_named(optimum, outside)}: outside of the hull of the cells with a value"
             warnings.warn(
@@ -157,26 +157,26 @@ def smooth_map(
     )
 
 
-def _within(found: Array, values: Array, tolerance: float) -> Array:
+def _within(smoothed: Array, values: Array, tolerance: float) -> Array:
     """Keep the tolerance to the last bit: the end of a range is rounded."""
-    while (beyond := np.abs(found - values) > tolerance).any():
-        found = np.where(beyond, np.nextafter(found, values), found)
-    return found
+    while (beyond := np.abs(smoothed - values) > tolerance).any():
+        smoothed = np.where(beyond, np.nextafter(smoothed, values), smoothed)
+    return smoothed
 
 
-def _outside(optimum: CalibrationMap, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Say which cells lie outside of the convex hull of those with a value."""
+def _outside(optimum: CalibrationMap, finite: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which cells lie outside of the convex hull of those with a value."""
     points = np.stack([entries.ravel() for entries in np.meshgrid(*optimum.axes.values(), indexing="ij")], axis=1)
-    own = points[known]
-    varies = np.ptp(own, axis=0) > 0.0
-    inside = (points[:, ~varies] == own[0, ~varies]).all(axis=1)
+    base = points[finite]
+    varies = np.ptp(base, axis=0) > 0.0
+    inside = (points[:, ~varies] == base[0, ~varies]).all(axis=1)
     if varies.any():
         try:
-            hull = hull_of(own[:, varies], [name for name, free in zip(optimum.axes, varies, strict=True) if free])
+            hull = hull_of(base[:, varies], [name for name, free in zip(optimum.axes, varies, strict=True) if free])
         except DataError:  # a few cells on a slanted line: nothing lies between them
-            return ~known
+            return ~finite
         inside &= hull.depth(points[:, varies])[0] >= -EDGE
-    return np.asarray(~inside & ~known)
+    return np.asarray(~inside & ~finite)
 
 
 def _named(optimum: CalibrationMap, where: NDArray[np.bool_]) -> str:
@@ -216,12 +216,12 @@ def _check_ranges(
     values: Array,
     low: Array,
     high: Array,
-    known: NDArray[np.bool_],
-    kept: NDArray[np.bool_],
+    finite: NDArray[np.bool_],
+    fixed: NDArray[np.bool_],
 ) -> None:
-    if not known.any():
+    if not finite.any():
         raise DataError(f"{optimum.name}: no cell has a value: there is nothing to smooth")
-    bad = known & ~kept & ~((low <= values) & (values <= high))  # a range that is NaN too
+    bad = finite & ~fixed & ~((low <= values) & (values <= high))  # a range that is NaN too
     if bad.any():
         at = int(np.argmax(bad))
         raise DataError(
@@ -233,16 +233,16 @@ def _check_ranges(
 
 
 def _half_widths(
-    values: Array, low: Array, high: Array, ranged: NDArray[np.bool_], known: NDArray[np.bool_]
+    values: Array, low: Array, high: Array, ranged: NDArray[np.bool_], finite: NDArray[np.bool_]
 ) -> tuple[float, Array]:
-    """Return the median half width and that of each cell; without ranges the values themselves say what is much."""
+    """Return the median half width and that of each cell; without ranges the values themselves set the scale."""
     if not ranged.any():
-        return (scale := float(np.ptp(values[known])) or 1.0), np.where(known, scale, np.inf)
+        return (scale := float(np.ptp(values[finite])) or 1.0), np.where(finite, scale, np.inf)
     width = np.where(ranged, np.maximum(high - values, values - low), np.nan)
     middle = float(np.median(width[ranged]))
     width = np.where(ranged, np.maximum(width, _NARROWEST * middle if middle > 0.0 else 1.0), np.inf)
     scale = float(np.median(width[ranged]))
-    return scale, np.where(known & ~ranged, scale, width)
+    return scale, np.where(finite & ~ranged, scale, width)
 
 
 def _check_reach(optimum: CalibrationMap, slopes: Mapping[str, float], low: Array, high: Array) -> None:
@@ -291,7 +291,7 @@ def _solve(
     values: Array,
     width: Array,
     scale: float,
-    known: NDArray[np.bool_],
+    finite: NDArray[np.bool_],
     low: Array,
     high: Array,
     pairs: _Pairs,
@@ -301,23 +301,23 @@ def _solve(
     clarabel = import_extra("clarabel", "maps", "smoothing a map")
     from scipy import sparse
 
-    n, middle = values.size, float(np.median(values[known]))
-    pull = np.where(known, (scale / width) ** 2, 1e-10)  # the least, so that a cell without neighbours has one answer
-    target = np.where(known, (values - middle) / scale, 0.0)
+    n, middle = values.size, float(np.median(values[finite]))
+    pull = np.where(finite, (scale / width) ** 2, 1e-10)  # the least, so that a cell without neighbours has one answer
+    target = np.where(finite, (values - middle) / scale, 0.0)
     unit = 2.0 / (1.0 + weight)  # keeps the numbers near one, whatever the weight
-    smoothness = smoothness_of(optimum, weight, has_gaps=not known.all())
+    smoothness = smoothness_of(optimum, weight, has_gaps=not finite.all())
     quadratic = sparse.triu(unit * (sparse.diags(pull) + smoothness), format="csc")
-    own = np.flatnonzero(known)
-    pick = sparse.csc_matrix((np.ones(own.size), (np.arange(own.size), own)), shape=(own.size, n))
+    at = np.flatnonzero(finite)
+    pick = sparse.csc_matrix((np.ones(at.size), (np.arange(at.size), at)), shape=(at.size, n))
     rows = np.arange(pairs.first.size)
     ones = np.ones(rows.size)
     step = sparse.csc_matrix(
         (np.concatenate([ones, -ones]), (np.tile(rows, 2), np.concatenate([pairs.second, pairs.first]))),
         shape=(rows.size, n),
     )
-    spare = _INSIDE * (high[own] - low[own])
+    spare = _INSIDE * (high[at] - low[at])
     most = pairs.most * (1.0 - _INSIDE) / scale
-    bounds = np.concatenate([(high[own] - spare - middle) / scale, (middle - low[own] - spare) / scale, most, most])
+    bounds = np.concatenate([(high[at] - spare - middle) / scale, (middle - low[at] - spare) / scale, most, most])
     rules = sparse.vstack([pick, -pick, step, -step], format="csc")
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -329,18 +329,18 @@ def _solve(
             f"smoothing {optimum.name}: the solver ended with {answer.status} after {answer.iterations} iterations; "
             "check the ranges low and high for cells that lie far from the others"
         )
-    found = np.clip(middle + scale * np.array(answer.x), low, high)
-    excess = np.abs(found[pairs.second] - found[pairs.first]) - pairs.most
+    solution = np.clip(middle + scale * np.array(answer.x), low, high)
+    excess = np.abs(solution[pairs.second] - solution[pairs.first]) - pairs.most
     if excess.size and excess.max() > _TOLERANCE * max(scale, float(pairs.most.max())):
         raise ConvergenceError(
             f"smoothing {optimum.name}: a slope limit is exceeded by {excess.max():.3g} {optimum.unit}; widen the "
             "ranges low and high, or raise the slope limits a little"
         )
-    return np.asarray(found, np.float64)
+    return np.asarray(solution, np.float64)
 
 
 def _holds(values: Array, low: Array, high: Array, pairs: _Pairs, near: float) -> NDArray[np.str_]:
-    """Say what holds each value: an end of its range first, then a slope."""
+    """Return what holds each value: an end of its range first, then a slope."""
     held = np.full(values.size, "", "U64")
     steep = np.abs(values[pairs.second] - values[pairs.first]) >= pairs.most * (1.0 - 1e-4)
     for column in (pairs.first, pairs.second):

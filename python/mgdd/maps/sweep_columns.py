@@ -66,8 +66,8 @@ def sweep_columns(sweep: xr.Dataset, over: str, names: tuple[str, ...], lead: st
         wide = own_variable.set_dims({dim: sweep.sizes[dim] for dim in (*axes, over)})
         columns[name] = np.ascontiguousarray(wide.to_numpy(), np.float64).reshape(-1, sweep.sizes[over])
     labels = {name: label_of(sweep[name]) for name in (*axes, over, *names)}
-    own = {axis: sweep[axis].to_numpy().astype(np.float64) for axis in axes}
-    return SweepColumns(axes=own, over=sweep[over].to_numpy().astype(np.float64), columns=columns, labels=labels)
+    entries = {axis: sweep[axis].to_numpy().astype(np.float64) for axis in axes}
+    return SweepColumns(axes=entries, over=sweep[over].to_numpy().astype(np.float64), columns=columns, labels=labels)
 
 
 def _check_rising(name: str, entries: NDArray[np.float64]) -> None:
@@ -140,8 +140,8 @@ def range_around(timings: Array, parts: Parts, at: Array) -> tuple[Array, Array,
     left = np.maximum.accumulate(stop_left, axis=1)[rows, home]
     low = timings[left] + parts.low[rows, left] * step[left]
     high = timings[right] + parts.high[rows, right] * step[right]
-    known = parts.low[rows, home] <= parts.high[rows, home]
-    low, high = np.where(known, low, at), np.where(known, high, at)
-    first = np.where(known & (low > timings[0]), parts.first[rows, left], -1)
-    last = np.where(known & (high < timings[-1]), parts.last[rows, right], -1)
+    inside = parts.low[rows, home] <= parts.high[rows, home]
+    low, high = np.where(inside, low, at), np.where(inside, high, at)
+    first = np.where(inside & (low > timings[0]), parts.first[rows, left], -1)
+    last = np.where(inside & (high < timings[-1]), parts.last[rows, right], -1)
     return np.minimum(low, at), np.maximum(high, at), first, last

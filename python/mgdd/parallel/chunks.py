@@ -77,7 +77,7 @@ class Plan:
             return 1
         left = self._n - self._next
         by_time = math.floor(_WANTED_S / self._cost_s) if self._cost_s > 0.0 else left
-        fair = math.ceil(left / (2 * self._workers))  # the last chunks get small: nobody waits long for the others
+        fair = math.ceil(left / (2 * self._workers))  # the last chunks get small: the workers end together
         return max(1, min(by_time, fair, self._largest, _GROWTH * self._measured))
 
 
@@ -140,10 +140,10 @@ class _Run:
                     self._progress(self._done, self._n)
         except KeyboardInterrupt:
             self._settle()
-            return Interrupted(f"interrupted: {self._kept()}")
+            return Interrupted(f"interrupted: {self._finished()}")
         except WorkerLostError as lost:
             self._settle()
-            lost.args = (f"{lost}; {self._kept()}",)
+            lost.args = (f"{lost}; {self._finished()}",)
             return lost
         except BaseException:
             self._settle(keep=False)
@@ -194,13 +194,13 @@ class _Run:
         self._plan.measured(chunk, answer.seconds)
 
     def _lost(self, chunk: Chunk, error: BaseException) -> WorkerLostError:
-        said = f"{type(error).__name__}: {error}".removesuffix(": ")
+        cause = f"{type(error).__name__}: {error}".removesuffix(": ")
         return WorkerLostError(
-            f"a worker was lost with {chunk} of {self._n} ({said}): this work may kill its worker, for example by its "
+            f"a worker was lost with {chunk} of {self._n} ({cause}): this work may kill its worker, for example by its "
             "memory: take fewer workers, and run the rest again"
         )
 
-    def _kept(self) -> str:
+    def _finished(self) -> str:
         if not self._done:
             return "nothing was finished"
         return f"{self._done} of {self._n} are finished, they are in .partial"

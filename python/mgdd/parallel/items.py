@@ -24,7 +24,7 @@ def map_items(
     """Call a function with every item, on threads, processes or machines; the results stand in the order of the items.
 
     Items are handed out in chunks: small ones first, then as many as fit in a quarter of a second. What the function
-    calls of mgdd takes one core, unless its own `workers` says otherwise: the other workers have the rest.
+    calls of mgdd takes one core, unless its own `workers` sets otherwise: the other workers have the rest.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def map_items(
         work of a lost worker again, ``mpi4py.futures.MPIPoolExecutor()``. What a function makes, such as
         ``lambda: ProcessPoolExecutor(4)``, is closed at the end, a given executor stays open.
     workers : int, optional
-        Number of threads, or of the workers of an executor that does not say it; one per core if left out.
+        Number of threads, or of the workers of an executor that does not state it; one per core if left out.
     progress : callable, optional
         Called with the number of finished items and that of all.
 

@@ -134,16 +134,16 @@ def family_strip(timing: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes
         raise DataError(f"{timing.attrs.get('file', 'timing')}: no members to draw")
     ax = new_axes(ax, height=0.24 * len(names) + 1.2)
     rows, chosen = np.arange(len(names)), timing.attrs.get("best")
-    best, kept = timing["free_ca50_cad"].to_numpy(), timing["plausible"].to_numpy().astype(bool)
+    best, good = timing["free_ca50_cad"].to_numpy(), timing["plausible"].to_numpy().astype(bool)
     if chosen:
-        ends = ("free_ca50_low_cad", best[kept].min()), ("free_ca50_high_cad", best[kept].max())
+        ends = ("free_ca50_low_cad", best[good].min()), ("free_ca50_high_cad", best[good].max())
         low, high = (float(timing.attrs.get(name, end)) for name, end in ends)
         ax.axvspan(low, high, color=ORANGE, alpha=0.15, linewidth=0, label=minus(f"plausible: {low:.1f} to {high:.1f}"))
         at = names.index(chosen)
         measured = float(timing["fitted_ca50_cad"][at])
         ax.axvline(measured, color=BLUE, linestyle="--", linewidth=1.0, label=minus(f"as measured: {measured:.1f}"))
-    ax.plot(best[~kept], rows[~kept], "o", color=GREY, markerfacecolor="none", markersize=4, label="not plausible")
-    ax.plot(best[kept], rows[kept], "o", color=BLACK, markersize=4.5)
+    ax.plot(best[~good], rows[~good], "o", color=GREY, markerfacecolor="none", markersize=4, label="not plausible")
+    ax.plot(best[good], rows[good], "o", color=BLACK, markersize=4.5)
     if chosen:
         label = minus(f"best member: {best[at]:.1f}")
         ax.plot(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mgdd.results.result import Result
 
 CYCLE = "cycle"
-_LINES = 60  # of a cloud; the band says the rest
+_LINES = 60  # of a cloud; the band shows the rest
 _MARKS = {"misfire": ("x", ORANGE), "partial_burn": ("+", BLUE)}
 _FREQUENCY = "frequency_khz"
 _RINGING, _MODE = "ringing_frequency_khz", "tangential_mode_khz"
@@ -83,22 +83,22 @@ def cycles(dataset: xr.Dataset | Result, figure: str = "imep_gross_bar", *, ax: 
         alone = f"over {CYCLE} alone, or with {ANGLE} or {_FREQUENCY}"
         raise DataError(f"{figure} is over {over}: a figure {alone} is drawn; of several cylinders take one")
     cycle, values = dataset[CYCLE].to_numpy(), dataset[figure].to_numpy()
-    known = values[np.isfinite(values)]
-    if not known.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         raise DataError(f"{figure}: none of the {values.size} cycles has this figure")
     ax, side, after = beside(new_axes(ax), (5.0, 1.0, 3.0))
-    mean = float(known.mean())
+    mean = float(finite.mean())
     lines: list[Line2D] = ax.plot(cycle, values, ".", color=BLACK, markersize=3, label=f"mean {mean:.4g}")
     ax.axhline(mean, color=BLACK, linewidth=0.8)
-    for edge in np.percentile(known, (5.0, 95.0)):
+    for edge in np.percentile(finite, (5.0, 95.0)):
         line = ax.axhline(float(edge), color=BLUE, linewidth=0.9, linestyle="--", label="5th and 95th percentile")
     lines.append(line)
     for name, (marker, color) in _MARKS.items():
         if name in dataset and (at := dataset[name].to_numpy().astype(bool)).any():
             label = f"{label_of(dataset[name]).long_name}: {np.count_nonzero(at)} cycles"
-            there = np.where(np.isfinite(values[at]), values[at], known.min())
+            there = np.where(np.isfinite(values[at]), values[at], finite.min())
             lines += ax.plot(cycle[at], there, marker, color=color, label=label)
-    side.hist(known, bins=min(40, max(5, int(np.sqrt(known.size)))), orientation="horizontal", color=GREY)
+    side.hist(finite, bins=min(40, max(5, int(np.sqrt(finite.size)))), orientation="horizontal", color=GREY)
     side.set(xlabel="cycles")
     side.sharey(ax)
     side.tick_params(labelleft=False)

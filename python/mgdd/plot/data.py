@@ -44,7 +44,7 @@ def data(data: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
             over = data[next(iter(needed))]
             if draw in (pressure, throttle_run) or min(over.shape) >= _LEAST:
                 return draw(data, ax=ax)
-    numbers = [str(name) for name, own in data.data_vars.items() if own.dtype.kind in "fiu"]
+    numbers = [str(name) for name, variable in data.data_vars.items() if variable.dtype.kind in "fiu"]
     lines = [name for name in numbers if data[name].ndim == 1 and data[name].size > 1]
     if lines:
         return _curves(data, lines, ax)
@@ -58,14 +58,14 @@ def data(data: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
 def _curves(data: xr.Dataset, names: list[str], ax: Axes | None) -> Axes:
     """Draw the first variables over their dimension, each in a panel; what changes comes before what does not."""
     over = data[names[0]].dims[0]
-    own = [name for name in names if data[name].dims == (over,)]
-    own.sort(key=lambda name: not np.nanmax(data[name]) > np.nanmin(data[name]))
-    own = own[:_PANELS]
+    shown = [name for name in names if data[name].dims == (over,)]
+    shown.sort(key=lambda name: not np.nanmax(data[name]) > np.nanmin(data[name]))
+    shown = shown[:_PANELS]
     x = data[over].to_numpy()
     labelled = x.dtype.kind in "fiu"
-    ax = new_axes(ax, height=1.2 + 1.3 * len(own))
-    panels = divide(ax, [1.0] * len(own))
-    for panel, name in zip(panels, own, strict=True):
+    ax = new_axes(ax, height=1.2 + 1.3 * len(shown))
+    panels = divide(ax, [1.0] * len(shown))
+    for panel, name in zip(panels, shown, strict=True):
         panel.plot(
             x if labelled else [*map(str, x)], data[name], "-" if x.size > _POINTS else ".-", color=BLACK, linewidth=1.2
         )

@@ -1,4 +1,4 @@
-"""What a validation says: error ahead, what residuals remember, and which parameters are entangled."""
+"""What a validation shows: error ahead, autocorrelation of residuals, and which parameters are entangled."""
 
 from __future__ import annotations
 

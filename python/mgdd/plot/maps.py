@@ -90,9 +90,9 @@ def map_contour(
     bar.set_label(axis_label(data, variable))
     bar.minorticks_off()
     across, along = np.meshgrid(data[x].to_numpy(), data[y].to_numpy())
-    known = np.isfinite(values)
+    finite = np.isfinite(values)
     lines += ax.plot(
-        across[known], along[known], ".", color=BLACK, alpha=0.5, markersize=2, label=f"{known.sum()} points"
+        across[finite], along[finite], ".", color=BLACK, alpha=0.5, markersize=2, label=f"{finite.sum()} points"
     )
     if line is not None:
         lines += ax.plot(data[x], data[line], "-", color=ORANGE, linewidth=2.0, label=label_of(data[line]).long_name)
@@ -117,7 +117,7 @@ def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axe
     Returns
     -------
     matplotlib.axes.Axes
-        The axes. Cells stand at their number, with their breakpoints as ticks. A letter says where a value comes from:
+        The axes. Cells stand at their number, with their breakpoints as ticks. A letter shows where a value comes from:
         p predicted, e extrapolated, i interpolated, h held, l learned; a cross stands where there is none, and a frame
         where a limit holds it.
 
@@ -139,19 +139,19 @@ def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axe
     'fuel [mg]'
     """
     data = require("data", data, (), _MADE_BY)
-    own = str(data.attrs.get("map", "")) if variable is None else variable
-    if own in data and data[own].ndim == 1:
-        return _curve(data, own, new_axes(ax))
-    x, y = _two_axes(data, own)
-    require("data", data, (x, y, own), _MADE_BY)
+    variable_name = str(data.attrs.get("map", "")) if variable is None else variable
+    if variable_name in data and data[variable_name].ndim == 1:
+        return _curve(data, variable_name, new_axes(ax))
+    x, y = _two_axes(data, variable_name)
+    require("data", data, (x, y, variable_name), _MADE_BY)
     ax = new_axes(ax, height=4.6)
-    values = data[own].transpose(x, y).to_numpy()
+    values = data[variable_name].transpose(x, y).to_numpy()
     widest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 1.0
     how: dict[str, Any] = {"cmap": COLOURS}
-    if own == "difference":  # of two maps: zero in the middle
+    if variable_name == "difference":  # of two maps: zero in the middle
         how = {"cmap": "PuOr", "vmin": -widest, "vmax": widest}
     image = ax.imshow(values.T, origin="lower", aspect="auto", **how)
-    ax.figure.colorbar(image, ax=ax).set_label(axis_label(data, own))
+    ax.figure.colorbar(image, ax=ax).set_label(axis_label(data, variable_name))
     for axis, name, set_ticks in ((ax.xaxis, x, ax.set_xticks), (ax.yaxis, y, ax.set_yticks)):
         entries = data[name].to_numpy()
         set_ticks(range(entries.size), [f"{entry:g}" for entry in entries], fontsize="small")
@@ -168,10 +168,10 @@ def map_cells(data: xr.Dataset | Result, variable: str | None = None, *, ax: Axe
 def _levels(values: Any, levels: int | Sequence[float]) -> Any:
     from matplotlib.ticker import MaxNLocator
 
-    known = values[np.isfinite(values)]
-    if not isinstance(levels, int) or not known.size:
+    finite = values[np.isfinite(values)]
+    if not isinstance(levels, int) or not finite.size:
         return levels
-    low, high = np.quantile(known, [0.01, 0.9])
+    low, high = np.quantile(finite, [0.01, 0.9])
     return MaxNLocator(levels).tick_values(float(low), float(high))
 
 
@@ -228,8 +228,8 @@ def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) 
         color = "white" if dark[i, j] else BLACK
         mark = _MARKS.get(str(source[i, j]), "")
         value = 0.0 if np.abs(values[i, j]) < 1e-4 * widest else values[i, j]  # what the solver left of a zero
-        said = f"{value:.3g}" if np.isfinite(value) and size else ""
-        text = minus(said) + (f" {mark}" if mark else "")
+        number = f"{value:.3g}" if np.isfinite(value) and size else ""
+        text = minus(number) + (f" {mark}" if mark else "")
         if text:
             ax.text(i, j, text, ha="center", va="center", fontsize=size or "x-small", color=color)
         if not same and support[i, j] > 0.0:
@@ -238,12 +238,12 @@ def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) 
             width = 1.4 if size else 0.8
             ax.add_patch(Rectangle((i - 0.46, j - 0.46), 0.92, 0.92, fill=False, edgecolor=frame, linewidth=width))
     if most > 0.0:
-        said, dot = (f"support {most:g} everywhere", "") if same else (f"support, at most {most:g}", "o")
-        lines.append(Line2D([], [], marker=dot, color=BLACK, linestyle="none", markersize=4.5, label=said))
-    said = "beyond" if "beyond" in data else "held by"
+        label, dot = (f"support {most:g} everywhere", "") if same else (f"support, at most {most:g}", "o")
+        lines.append(Line2D([], [], marker=dot, color=BLACK, linestyle="none", markersize=4.5, label=label))
+    frame_label = "beyond" if "beyond" in data else "held by"
     limits = sorted({str(text) for text in held.ravel() if str(text)})
     if limits:
-        lines.append(Rectangle((0, 0), 1, 1, fill=False, edgecolor=frame, label=f"{said} {', '.join(limits)}"))
+        lines.append(Rectangle((0, 0), 1, 1, fill=False, edgecolor=frame, label=f"{frame_label} {', '.join(limits)}"))
     used = sorted({str(text) for text in source.ravel() if str(text) in _MARKS})
     lines += [Line2D([], [], marker=f"${_MARKS[name]}$", color=BLACK, linestyle="none", label=name) for name in used]
     return lines

@@ -148,9 +148,9 @@ def _limit_label(run: xr.Dataset, names: list[str]) -> str:
 
 def _running_mean(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     """Mean of the last `window` values, of fewer at the beginning; misfires (NaN) are left out."""
-    known = np.isfinite(values)
-    total = np.concatenate([[0.0], np.cumsum(np.where(known, values, 0.0))])
-    count = np.concatenate([[0], np.cumsum(known)])
+    finite = np.isfinite(values)
+    total = np.concatenate([[0.0], np.cumsum(np.where(finite, values, 0.0))])
+    count = np.concatenate([[0], np.cumsum(finite)])
     last = np.arange(1, values.size + 1)
     first = np.maximum(last - window, 0)
     return np.asarray((total[last] - total[first]) / np.maximum(count[last] - count[first], 1))

@@ -30,7 +30,7 @@ _OVER = ("cycle", "soc_cad", "soi_cad", "t_max_k")
 
 
 def sensors(readings: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
-    """Draw what the NOx sensors say beside the true value.
+    """Draw what the NOx sensors read beside the true value.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def divide(ax: Axes, heights: Sequence[float]) -> list[Axes]:
         left, bottom, width, height = ax.get_position().bounds
         scale, gap = height / sum(heights), 0.02 * height
         feet = [bottom + scale * sum(heights[place + 1 :]) + gap for place in range(count - 1)] + [bottom]
-        boxes = [(left, foot, width, scale * own - gap) for foot, own in zip(feet, heights, strict=True)]
+        boxes = [(left, foot, width, scale * size - gap) for foot, size in zip(feet, heights, strict=True)]
         ax.set_position(boxes[0])
         panels = [ax, *(ax.figure.add_axes(box, sharex=ax) for box in boxes[1:])]
     for panel in panels[:-1]:

@@ -38,7 +38,7 @@ def timing(sweep: xr.Dataset | Result, *, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
         The efficiency axes. The mark is the vertex of the parabola through the highest sample and its
-        neighbours, or that sample itself where it ends the sweep; the legend then says so.
+        neighbours, or that sample itself where it ends the sweep; the legend then states so.
 
     Raises
     ------
@@ -80,14 +80,14 @@ def scanned(
 ) -> Axes:
     """Draw an objective over the only input, with its optimum, and each limited quantity with its limit below."""
     over = str(scan[objective].dims[0])
-    x, kept = scan[over].to_numpy(), np.ones(scan.sizes[over], bool)
+    x, feasible = scan[over].to_numpy(), np.ones(scan.sizes[over], bool)
     for name, cap in caps.items():
-        kept &= scan[name].to_numpy() <= cap
+        feasible &= scan[name].to_numpy() <= cap
     ax = new_axes(ax, height=3.0 + 1.5 * len(caps))
     panels = divide(ax, [1.6] + [1.0] * len(caps))
     handles: list[Line2D] = ax.plot(x, scan[objective], "-", color=GREY, linewidth=1.2, label="all timings")
-    if not kept.all():
-        allowed = np.where(kept, scan[objective], np.nan)
+    if not feasible.all():
+        allowed = np.where(feasible, scan[objective], np.nan)
         handles += ax.plot(x, allowed, "-", color=BLACK, linewidth=2.2, label="within the limits")
     text = minus(f"optimum {value:.4g} at {best:.2f} {label_of(scan[over]).units}")
     handles += ax.plot(best, value, "o", color=BLUE, markersize=7, label=text)

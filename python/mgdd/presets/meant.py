@@ -43,13 +43,13 @@ def point_of(given: Any, nominal: OperatingPoint | None = None) -> OperatingPoin
 
 
 def stated(name: str, keyword: float | None, point: Any) -> float | None:
-    """Return what a caller says of this record, by keyword or by name in its point; None where neither does."""
+    """Return what a caller states of this record, by keyword or by name in its point; None where neither does."""
     named = point.get(name) if isinstance(point, Mapping) else None
     if named is None or keyword is None or float(keyword) == float(named):
         return keyword if named is None else float(named)
     raise ParameterError(
         f"{name} = {keyword:g} and point['{name}'] = {named:g} contradict each other: give one",
-        field=name, value=keyword, bound=f"{named:g}, as the point says",
+        field=name, value=keyword, bound=f"{named:g}, as the point states",
     )  # fmt: skip
 
 
@@ -58,7 +58,7 @@ def engine_of(
 ) -> tuple[Cylinder, OperatingPoint]:
     """Return the cylinder and the operating point that are meant; numbers by name replace those of the nominal one."""
     meant = _loaded(cylinder, "engine")
-    own, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
+    engine, nominal = cylinder_of(meant, argument), meant.point if isinstance(meant, Preset) else OperatingPoint()
     changes = {name: value for name, value in fields.items() if value is not None}
     for name, value in changes.items():
         stated(name, value, point)
@@ -69,7 +69,7 @@ def engine_of(
             "name as {'speed_rpm': 1200.0}, or a preset instead of the Cylinder"
         )
     whole = nominal if point is None else point
-    return own, whole.replace(**changes) if changes else whole
+    return engine, whole.replace(**changes) if changes else whole
 
 
 def throttle_of(given: Any) -> Throttle:
@@ -92,8 +92,8 @@ def _loaded(given: Any, kind: str) -> Any:
     return load(given, kind=kind) if isinstance(given, str | os.PathLike) else given
 
 
-def _refusal(argument: str, given: Any, wanted: str, kind: str) -> ParameterError:
-    bound = f"{wanted}, a preset, or the name of one: {', '.join(available(kind))}"
+def _refusal(argument: str, given: Any, needed: str, kind: str) -> ParameterError:
+    bound = f"{needed}, a preset, or the name of one: {', '.join(available(kind))}"
     part = getattr(given, argument, None)
     remedy = f"; give its .{argument}" if isinstance(part, Cylinder | Throttle) else ""
     return ParameterError(

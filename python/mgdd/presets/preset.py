@@ -19,7 +19,7 @@ from mgdd.results.describe import core_rows, described
 
 _TABLES: Mapping[str, Any] = MappingProxyType({"cylinder": Cylinder, "point": OperatingPoint, "throttle": Throttle})
 _OF_KIND: Mapping[str, tuple[str, ...]] = MappingProxyType({"engine": ("cylinder", "point"), "throttle": ("throttle",)})
-# What a file of one's own must say, by kind, in the first table of the kind: nobody's parts have a default.
+# What a user's file must state, by kind, in the first table of the kind: nobody's parts have a default.
 _REQUIRED: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "engine": ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad"),
@@ -117,8 +117,8 @@ class Preset(Parameters):
 
     def _record(self, table: str) -> Cylinder | OperatingPoint | Throttle:
         if table not in self.records:
-            wanted = "throttle" if table == "throttle" else "engine"
-            raise ParameterError(_wrong_kind(self.name, self.kind, wanted))
+            kind = "throttle" if table == "throttle" else "engine"
+            raise ParameterError(_wrong_kind(self.name, self.kind, kind))
         return self.records[table]
 
     def to_parameters(self) -> ParameterFile:
@@ -265,22 +265,22 @@ def _check_kind(kind: str | None) -> None:
         raise ParameterError.of("kind", kind, f"one of {', '.join(_OF_KIND)}")
 
 
-def _wrong_kind(name: str, kind: str, wanted: str) -> str:
+def _wrong_kind(name: str, kind: str, needed: str) -> str:
     article = {"engine": "an engine", "throttle": "a throttle"}
     return (
-        f"preset {name!r} is {article[kind]}, not {article[wanted]}: shipped {wanted}s are "
-        f"{', '.join(available(wanted))}"
+        f"preset {name!r} is {article[kind]}, not {article[needed]}: shipped {needed}s are "
+        f"{', '.join(available(needed))}"
     )
 
 
 def _record(file: ParameterFile, table: str, sources: dict[str, str]) -> Any:
     kind = _TABLES[table]
     fields = kind.fields()
-    wanted = {
+    keys = {
         key: Wanted(info["unit"], "text" if "choices" in info else "number", required=False)
         for key, info in fields.items()
     }
-    values = file.values(table, wanted)
-    said = file.tables.get(table, {})
-    sources.update({f"{table}.{key}": entry.source for key, entry in said.items() if entry.source is not None})
+    values = file.values(table, keys)
+    entries = file.tables.get(table, {})
+    sources.update({f"{table}.{key}": entry.source for key, entry in entries.items() if entry.source is not None})
     return kind().replace(**values)

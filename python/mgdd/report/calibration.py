@@ -1,4 +1,4 @@
-"""A calibration as a report: measured traces, cycle models, their best timing, and what the traces do not say."""
+"""A calibration as a report: measured traces, cycle models, their best timing, and what the traces do not identify."""
 
 from __future__ import annotations
 
@@ -106,18 +106,18 @@ def calibration_report(
         "inlet_pressure_kpa": inlet_pressure_kpa,
     }
     absolute = [pegged(trace, cylinder, point_of(point), **how) for trace in listed(traces)]
-    known: dict[str, Any] = {"point": point, "fuel_heat_j": fuel_heat_j, "progress": step}
+    inputs: dict[str, Any] = {"point": point, "fuel_heat_j": fuel_heat_j, "progress": step}
     step("analyse the traces")
     analyses = [analyze(trace, cylinder, point=point, quiet=True) for trace in absolute]
-    timing, stop = _timing(absolute, cylinder, **known, **scheme)
+    timing, stop = _timing(absolute, cylinder, **inputs, **scheme)
     main = headline_of(timing)
     fits, scans = [main.fit], dict[str, WallHeatProfile]()
     tdc: TdcEstimate | None = None
     if stop is None:
         try:
-            fits = compare_laws(absolute, cylinder, **known, **scheme)
+            fits = compare_laws(absolute, cylinder, **inputs, **scheme)
             if profiles:
-                tdc = estimate_tdc(absolute, cylinder, span_cad=TDC_SPAN_CAD, **known)
+                tdc = estimate_tdc(absolute, cylinder, span_cad=TDC_SPAN_CAD, **inputs)
                 scans = _profiles(main, step)
         except KeyboardInterrupt:
             stop = Interrupted("interrupted: the models and their best timing are in .partial, not all checks of them")
@@ -167,12 +167,12 @@ def _profiles(main: Member, progress: Callable[[str], None]) -> dict[str, WallHe
     request = replace(main.fit.request, cylinder=main.fit.model, start_values=starts_of(main.fit))
     gamma = GAMMA_PARAMETER[main.gamma_model]
     burn = tuple(name for name in request.free if name not in (gamma, "wall_heat_scale"))
-    out = {}
+    tables = {}
     for text, common in (("held", ()), ("refitted", (gamma,))):
         fit = fit_request(replace(request, free=("wall_heat_scale", *common, *burn)))
         value = f" at {main.gamma:.4g}" if text == "held" else ""
-        out[f"{main.law}, {main.gamma_model} gamma {text}{value}"] = wall_heat_profile(fit, progress=progress)
-    return out
+        tables[f"{main.law}, {main.gamma_model} gamma {text}{value}"] = wall_heat_profile(fit, progress=progress)
+    return tables
 
 
 _PROVENANCE = (
@@ -367,8 +367,8 @@ def _limitations(s: Mapping[str, Any]) -> list[str]:
             out.append(
                 f"The wall-heat scale is not identifiable from these traces ({law}): {'; '.join(profile['reasons'])}."
             )
-    told = "wall_heat_scale is not identifiable from these traces"
-    out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(told))]
+    not_identifiable = "wall_heat_scale is not identifiable from these traces"
+    out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(not_identifiable))]
     for row in s["traces"]:
         out += [f"{row['file']}: {text}." for text in row["warnings"]]
     out.append(
@@ -388,31 +388,31 @@ def _limitations(s: Mapping[str, Any]) -> list[str]:
 def _headline(s: Mapping[str, Any]) -> tuple[str, ...]:
     rows = s["best_timing"]
     n = len(rows[0]["members"])
-    kept = sum(any(row["members"][at]["plausible"] for row in rows) for at in range(n))
-    if not kept:
+    good = sum(any(row["members"][at]["plausible"] for row in rows) for at in range(n))
+    if not good:
         return (
             (
                 f"None of {n} models is plausible for these traces: no best timing is given. The member that comes "
                 f"nearest is {s['law']}; what it fails stands below. Suspect geometry, TDC, pegging, speed or mass."
             ),
         )
-    return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=kept, n=n, misfit=ModelFamily().misfit_cad)
+    return _HEADLINE_TEXT.format(law=s["law"]), _TIMING_TEXT.format(kept=good, n=n, misfit=ModelFamily().misfit_cad)
 
 
 def move_of(row: Mapping[str, Any]) -> str:
-    """Say of a trace how far to move the timing, what that gains, and how sure that is."""
+    """State how far to move the timing of a trace, what that gains, and how sure that is."""
     best = row["best"]
     if best is None:
         return f"{row['file']}: no plausible model, so no best timing."
-    kept, free = (_part(row, prefix) for prefix in ("", "free_"))
+    limited, free = (_part(row, prefix) for prefix in ("", "free_"))
     same = abs(best["shift_cad"] - best["free_shift_cad"]) < 0.05
     if same and undetermined(row["shift_cad"]) == undetermined(row["free_shift_cad"]):
         return f"{row['file']}: {free}; its own p_max kept, range {_ends(row['shift_cad'])} °CA."
-    return f"{row['file']}: {kept}, its own p_max kept; without that limit {free}."
+    return f"{row['file']}: {limited}, its own p_max kept; without that limit {free}."
 
 
 def _part(row: Mapping[str, Any], prefix: str) -> str:
-    """Say the move of one question; a range that spans zero says none."""
+    """Describe the move of one question; a range that spans zero gives none."""
     best, ends = row["best"], row[f"{prefix}shift_cad"]
     if undetermined(ends):
         return f"no direction is determined, range {_ends(ends)} °CA"
@@ -507,7 +507,7 @@ def draw(
     analyses: Sequence[xr.Dataset], main: Member, profiles: Mapping[str, WallHeatProfile], timing: Sequence[BestTiming]
 ) -> dict[str, Figure]:
     """Draw the figures by caption; nothing is registered with pyplot."""
-    out = {
+    figures = {
         "Best timing by every member of the family, without a pressure limit": family_strips(timing),
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
         "log p over log V with the polytropic slopes of compression and expansion": _grid(
@@ -516,12 +516,12 @@ def draw(
         f"Calibration, {main.name}": _grid(main.fit.loads, Load.plot),
     }
     for law, profile in profiles.items():
-        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
+        figures[f"What the traces show of wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
             draw_profile, profile.dataset, size=(13.0, 4.8)
         )
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in main.fit.loads]
-    out[f"Efficiency and NOx proxies over timing, {main.name}"] = _grid(sweeps, plot.timing, label=True)
-    return out
+    figures[f"Efficiency and NOx proxies over timing, {main.name}"] = _grid(sweeps, plot.timing, label=True)
+    return figures
 
 
 def _grid(datasets: Sequence[Any], function: Any, *, label: bool = False) -> Figure:

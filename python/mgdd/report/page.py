@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _DPI = 110
 _VERSIONS = ("numpy", "scipy", "xarray", "matplotlib")
 _INPUTS = {"seeds": "Seeds", "plant": "Plant", "data": "Data", "engine": "Engine", "records": "Records"}  # in a summary
-_NUMBERS = " The numbers stand in summary.json beside this page."
+_NUMBERS = " The numbers are in summary.json beside this page."
 _SHORT = 8  # rows of a table that is not folded
 
 
@@ -116,7 +116,7 @@ def _inputs(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for name, head in _INPUTS.items():
         if value := summary.get(name):
             pairs = value.items() if isinstance(value, Mapping) else ()
-            yield head, ", ".join(f"{key} {as_number(own)}" for key, own in pairs) or str(value)
+            yield head, ", ".join(f"{key} {as_number(entry)}" for key, entry in pairs) or str(value)
 
 
 def _first_and_last_fact(made_by: str) -> tuple[tuple[str, str], tuple[str, str]]:
@@ -140,17 +140,17 @@ def _section(section: Section) -> dict[str, Any]:
 
 
 def _axes(figure: Figure) -> list[dict[str, Any]]:
-    """Say where axes lie, in shares of a drawn figure, and what they show, so that the page can read the pointer."""
-    out = []
+    """Return where axes lie, in shares of a drawn figure, and what they show, so that the page can read the pointer."""
+    places = []
     for ax in figure.axes:
         shown: dict[str, Any] = {}
         for way in "xy":
             beside = getattr(ax, f"get_shared_{way}_axes")().get_siblings(ax)  # one of them may have the label
-            label = next(filter(None, (getattr(own, f"get_{way}label")() for own in (ax, *beside))), way)
+            label = next(filter(None, (getattr(axes, f"get_{way}label")() for axes in (ax, *beside))), way)
             shown[way] = [*getattr(ax, f"get_{way}lim")(), getattr(ax, f"get_{way}scale")(), label]
         if ax.axison and {shown["x"][2], shown["y"][2]} <= {"linear", "log"}:
-            out.append({"place": [*map(float, ax.get_position().extents)], **shown})
-    return out
+            places.append({"place": [*map(float, ax.get_position().extents)], **shown})
+    return places
 
 
 def _png(figure: Figure) -> str:

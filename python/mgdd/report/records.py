@@ -59,25 +59,25 @@ def _urgency(check: object) -> int:
 
 
 def _text(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[str]:
-    """Say how the figures were made, and what is not in the table."""
-    said = figures.attrs
-    cycles = said.get("cycles", 1)
+    """State how the figures were made, and what is not in the table."""
+    attrs = figures.attrs
+    cycles = attrs.get("cycles", 1)
     yield (
-        f"{cycles} cycle{'s' if cycles != 1 else ''}, {said['motored']} motored. Pegging: {said['method']}; gamma of "
-        f"the heat release: {said['gamma']}; smoothing: {said['smoothing']}; heat window: {said['heat_window']}."
+        f"{cycles} cycle{'s' if cycles != 1 else ''}, {attrs['motored']} motored. Pegging: {attrs['method']}; gamma of "
+        f"the heat release: {attrs['gamma']}; smoothing: {attrs['smoothing']}; heat window: {attrs['heat_window']}."
     )
     if "cycle" not in traces.dims:
         return
     if traces.sizes["cycle"] < cycles:
         yield f"Clouds, maps and spectrum show {traces.sizes['cycle']} cycles, evenly over the record."
-    low, high = (1e-3 * edge for edge in said["knock_band_hz"])
+    low, high = (1e-3 * edge for edge in attrs["knock_band_hz"])
     at = float(figures["ringing_frequency_khz"])
-    found = f"The pressure rings at {at:.2f} kHz" if at == at else "No frequency stands out of the pressure"
+    ringing = f"The pressure rings at {at:.2f} kHz" if at == at else "No frequency stands out of the pressure"
     mode = float(figures["tangential_mode_khz"])
     knock = ""
     if "knock_share_percent" in figures:
         knock = f" {as_number(float(figures['knock_share_percent']))} % of the cycles knock."
-    yield f"{found} between {low:g} and {high:g} kHz; the first tangential mode of the bore is {mode:.2f} kHz.{knock}"
+    yield f"{ringing} between {low:g} and {high:g} kHz; the first tangential mode of the bore is {mode:.2f} kHz.{knock}"
 
 
 def _table(figures: xr.Dataset) -> Table:
@@ -89,8 +89,8 @@ def _table(figures: xr.Dataset) -> Table:
     names = [str(name).removeprefix("cycle_mean_") for name in figures if str(name).startswith("cycle_mean_")]
     table = []
     for name in names:
-        found = (figures.get(f"{before}{name}{after}") for before, after in _STATISTICS.values())
-        cells = ["–" if value is None else as_number(float(value)) for value in found]
+        statistics = (figures.get(f"{before}{name}{after}") for before, after in _STATISTICS.values())
+        cells = ["–" if value is None else as_number(float(value)) for value in statistics]
         if any(cell != "–" for cell in cells):
             table.append((label_of(figures[name]).long_name, *cells, label_of(figures[name]).units))
     return Table(columns=("figure", *_STATISTICS, "unit"), rows=tuple(table))
@@ -102,9 +102,9 @@ def _figures(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[tuple[str, Fig
     yield "Heat release with burn angles", drawn(_burn, traces, size=_SIZE)
     if "cycle" not in traces.dims:
         return
-    work = next(name for name in ("imep_net_bar", "imep_gross_bar", "imep_closed_bar") if _known(figures, name))
+    work = next(name for name in ("imep_net_bar", "imep_gross_bar", "imep_closed_bar") if _has_number(figures, name))
     for name in (work, "ca50_cad", "p_max_bar", "mapo_bar"):
-        if _known(figures, name):
+        if _has_number(figures, name):
             caption = f"{label_of(figures[name]).long_name}: from cycle to cycle, histogram, return map"
             yield caption, drawn(plot.cycles, figures, size=_WIDE, figure=name)
     if _SPECTRUM in traces:
@@ -114,7 +114,7 @@ def _figures(figures: xr.Dataset, traces: xr.Dataset) -> Iterator[tuple[str, Fig
     yield "Net heat release of every cycle", drawn(plot.cycles, traces, size=_TALL, figure=heat)
 
 
-def _known(figures: xr.Dataset, name: str) -> bool:
+def _has_number(figures: xr.Dataset, name: str) -> bool:
     return bool(np.isfinite(figures[name]).any())
 
 

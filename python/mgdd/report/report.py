@@ -31,7 +31,7 @@ class Report(Result):
         Plain numbers and text, ready for JSON; ``interrupted`` is true in the part that `mgdd.errors.Interrupted`
         carries. The verdict joins it.
     sections : tuple of Section
-        What the page says, in order; those with figures stand first.
+        What the page states, in order; those with figures stand first.
     title : str
         Heading of the page; the name if left out.
     verdict : tuple of str

@@ -1,6 +1,6 @@
 """Results: labelled Datasets, what every result and every model can do, the one result of a fit, and findings.
 
-Nothing stands here without a unit: a Dataset refuses a variable that does not say its own.
+Nothing stands here without a unit: a Dataset refuses a variable that does not state its own.
 """
 
 from __future__ import annotations

@@ -48,19 +48,19 @@ def as_text(title: str, rows: Iterable[Row]) -> str:
         flow = textwrap.wrap(", ".join(cell.replace(" ", "\0") for cell in cells), _WIDTH - 2, break_long_words=False)
         lines = [f"  {line}".replace("\0", " ") for line in flow]
         if len(lines) > most:
-            kept = sum(line.count(", ") + line.endswith(",") for line in flow[: most - 1])
-            lines = [*lines[: most - 1], f"  … and {len(cells) - kept} more"]
+            shown = sum(line.count(", ") + line.endswith(",") for line in flow[: most - 1])
+            lines = [*lines[: most - 1], f"  … and {len(cells) - shown} more"]
     return printable("\n".join([head, *lines]))
 
 
 def as_html(title: str, rows: Iterable[Row], picture: str = "") -> str:
     """Lay out rows as an HTML table, for notebooks."""
-    known = list(rows)
-    lead = len(known) if len(known) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
-    rest = known[lead:_MANY]
-    fold = f"<details><summary>{len(known) - lead} more</summary>{_table(rest)}</details>" if rest else ""
-    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
-    return f"<div><p><b>{html.escape(title)}</b></p>{picture}{_table(known[:lead])}{fold}{more}</div>"
+    entries = list(rows)
+    lead = len(entries) if len(entries) <= _LEAD + 2 else _LEAD  # a fold of one or two rows saves nothing
+    rest = entries[lead:_MANY]
+    fold = f"<details><summary>{len(entries) - lead} more</summary>{_table(rest)}</details>" if rest else ""
+    more = f"<p>… and {len(entries) - _MANY} more</p>" if len(entries) > _MANY else ""
+    return f"<div><p><b>{html.escape(title)}</b></p>{picture}{_table(entries[:lead])}{fold}{more}</div>"
 
 
 def _table(rows: Sequence[Row]) -> str:
@@ -80,10 +80,10 @@ def picture_of(data: Any) -> str:
     """
     for name, variable in data.data_vars.items():
         values = variable.to_numpy() if variable.dtype.kind == "f" else np.empty(0)
-        known = values[np.isfinite(values)]
-        if known.size < 2 or not np.ptp(known) > 0.0:
+        finite = values[np.isfinite(values)]
+        if finite.size < 2 or not np.ptp(finite) > 0.0:
             continue
-        places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - known.min()) / np.ptp(known)
+        places, shades = [data[dim].to_numpy() for dim in variable.dims], (values - finite.min()) / np.ptp(finite)
         if values.ndim == 1 and values.size >= (2 if places[0].dtype.kind == "f" else 10):
             drawing = _line_of(places[0] if places[0].dtype.kind == "f" else np.arange(values.size), shades)
         elif values.ndim == 2 and max(values.shape) <= _CELLS:
@@ -107,13 +107,13 @@ def _line_of(x: Any, shades: Any) -> str:
 def _cells_of(shades: Any) -> str:
     width, height = 240 // len(shades), 50 // len(shades[0])
     dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
-    out = ""
+    html = ""
     for (i, j), shade in np.ndenumerate(shades):
         if np.isfinite(shade):
-            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), own):.0f}" for own in dark_to_pale)
+            color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), channel):.0f}" for channel in dark_to_pale)
             size = f"width='{width}' height='{height}'"
-            out += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
-    return out
+            html += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
+    return html
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
@@ -132,31 +132,31 @@ def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
 
 
 def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Row]:
-    """Make rows of names and values; units as given, else as the results' labels or the names say."""
-    out = []
+    """Make rows of names and values; units as given, else as the results' labels or the names give."""
+    lines = []
     for name, value in values.items():
         if isinstance(value, Mapping) and value and all(_is_scalar(item) for item in value.values()):
             owner, shared = "" if name in PLAIN else f"{name}.", unit_of(name)
             for key, item in value.items():
                 (row,) = rows_of({str(key): item}, units)
                 unit = row.unit if shared == "-" or row.value == "–" else shared
-                out.append(Row(f"{owner}{row.name}", row.value, unit))
+                lines.append(Row(f"{owner}{row.name}", row.value, unit))
         else:
             unit = (units or {}).get(name) or (VARIABLES[name].units if name in VARIABLES else unit_of(name))
             shown = _shown(value)
-            out.append(Row(name, shown, unit if shown != "–" else "-"))
-    return out
+            lines.append(Row(name, shown, unit if shown != "–" else "-"))
+    return lines
 
 
 def dataset_text(data: Any) -> str:
     """Lay out a Dataset as text: its size, and the value or the range of every variable."""
     over = " × ".join(f"{size} {dim}" for dim, size in data.sizes.items())
     shown: dict[str, Any] = {}
-    for name, own in sorted(data.data_vars.items(), key=lambda item: item[1].ndim):  # numbers before ranges
-        values = own.to_numpy()
+    for name, each in sorted(data.data_vars.items(), key=lambda item: item[1].ndim):  # numbers before ranges
+        values = each.to_numpy()
         few = values.size <= _FEW and values.ndim == 1
-        shown[str(name)] = own.item() if not own.ndim else values if few else _range(values, "")
-    units = {str(name): label_of(own).units for name, own in data.data_vars.items() if "units" in own.attrs}
+        shown[str(name)] = each.item() if not each.ndim else values if few else _range(values, "")
+    units = {str(name): label_of(each).units for name, each in data.data_vars.items() if "units" in each.attrs}
     return as_text(f"Dataset over {over}" if over else "Dataset", rows_of(shown, units))
 
 
@@ -166,15 +166,15 @@ def described(
     """Give a class a short text and an HTML form."""
     head = title_of if title is None else title
 
-    def known(obj: Any) -> list[Row]:
-        found = fields_of(obj) if rows is None else rows(obj)
-        return rows_of(found) if isinstance(found, Mapping) else list(found)
+    def listed(obj: Any) -> list[Row]:
+        fields = fields_of(obj) if rows is None else rows(obj)
+        return rows_of(fields) if isinstance(fields, Mapping) else list(fields)
 
     def text(self: Any) -> str:
-        return as_text(head(self), known(self))
+        return as_text(head(self), listed(self))
 
     def markup(self: Any) -> str:
-        return as_html(head(self), known(self))
+        return as_html(head(self), listed(self))
 
     for name, function in (("__repr__", text), ("_repr_html_", markup)):
         function.__name__, function.__qualname__ = name, f"{cls.__name__}.{name}"
@@ -184,8 +184,8 @@ def described(
 
 def title_of(obj: Any) -> str:
     """Name an object by its class, name and kind."""
-    said = [str(value) for name in ("name", "kind") if isinstance(value := getattr(obj, name, None), str)]
-    return " ".join([type(obj).__name__, *said])
+    labels = [str(value) for name in ("name", "kind") if isinstance(value := getattr(obj, name, None), str)]
+    return " ".join([type(obj).__name__, *labels])
 
 
 def fields_of(obj: Any) -> dict[str, Any]:
@@ -215,8 +215,8 @@ def _shown(value: Any) -> str:
     if hasattr(value, "sizes") and hasattr(value, "dims"):
         return "Dataset (" + ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items()) + ")"
     if isinstance(value, Mapping | Sequence | set | frozenset):
-        named = value.items() if isinstance(value, Mapping) else [("", own) for own in value]
-        entries = [f"{name} {_shown(own)}".lstrip() for name, own in named]
+        named = value.items() if isinstance(value, Mapping) else [("", text) for text in value]
+        entries = [f"{name} {_shown(text)}".lstrip() for name, text in named]
         joined = ", ".join(entries) or "none"
         short = textwrap.shorten(joined, _LONG, placeholder=" …")
         return short if short == joined else f"{len(value)}: {short}"
@@ -224,18 +224,18 @@ def _shown(value: Any) -> str:
         return f"{value.name} <= {value.upper:g}"
     if callable(value):
         return getattr(value, "__qualname__", type(value).__qualname__)
-    own = repr(value)
-    return own if len(own) <= _LONG and "\n" not in own and " object at " not in own else title_of(value)
+    text = repr(value)
+    return text if len(text) <= _LONG and "\n" not in text and " object at " not in text else title_of(value)
 
 
 def _range(values: np.ndarray[Any, Any], shape: str) -> str:
     """Show an array by its least and its largest number."""
     if values.dtype.kind == "b":
         return f"{int(values.sum())} of {values.size} yes"
-    known = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
-    if not known.size:
+    finite = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
+    if not finite.size:
         return f"array{shape or ' without numbers'}"
-    low, high = _shown(known.min()), _shown(known.max())
+    low, high = _shown(finite.min()), _shown(finite.max())
     return f"{low if low == high else f'{low} to {high}'}{shape}"
 
 
@@ -254,9 +254,9 @@ def _markup_of_core(self: Any) -> str:
 
 def _wrapped(plain: Callable[[Any], str]) -> Callable[[Any], str]:
     def text(self: Any) -> str:
-        own = plain(self)
-        lines = textwrap.wrap(own, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-        return own if len(own) <= _WIDTH else "\n".join(lines)
+        text = plain(self)
+        lines = textwrap.wrap(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        return text if len(text) <= _WIDTH else "\n".join(lines)
 
     return text
 

@@ -26,7 +26,7 @@ class Finding:
     text : str
         What was found, as a sentence without a full stop.
     remedy : str
-        What to do about it; empty where the text says all.
+        What to do about it; empty where the text is enough.
     """
 
     code: str
@@ -82,5 +82,5 @@ def _strongest(report: _core.optimize.FitReport, count: int) -> list[tuple[str, 
         for j in range(i + 1, len(report.names))
         if np.isfinite(c[i, j])
     ]
-    kept = sorted((i, j) for *_, i, j in sorted(pairs)[:count])
-    return [(report.names[i], report.names[j]) for i, j in kept]
+    strongest = sorted((i, j) for *_, i, j in sorted(pairs)[:count])
+    return [(report.names[i], report.names[j]) for i, j in strongest]

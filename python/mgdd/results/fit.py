@@ -63,7 +63,7 @@ class FitQuality:
     Parameters
     ----------
     nrmse_fit_percent : float or None
-        ``100 (1 - |y - yh| / |y - mean y|)`` [%]: 100 is perfect, 0 as good as the mean; None where it says nothing.
+        ``100 (1 - |y - yh| / |y - mean y|)`` [%]: 100 is perfect, 0 as good as the mean; None where it is undefined.
     rmse : float
         Root of the mean squared error, in `unit`.
     unit : str
@@ -176,7 +176,7 @@ class Fit(Result):
         """Estimates, correlation and what was simulated; everything of `to_dict` as attributes."""
         import xarray as xr
 
-        parts = [own for name in self.__dataclass_fields__ if isinstance(own := getattr(self, name), xr.Dataset)]
+        parts = [part for name in self.__dataclass_fields__ if isinstance(part := getattr(self, name), xr.Dataset)]
         attrs = {
             name: json.dumps(value) if isinstance(value, dict | list) else str(value)
             for name, value in self.to_dict().items()
@@ -230,10 +230,10 @@ class Fit(Result):
         DataError
             A model that does not predict, as a cylinder: `mgdd.engine.simulate` takes it.
         """
-        own = getattr(self.model, "predict", None)
-        if own is None:
+        predict = getattr(self.model, "predict", None)
+        if predict is None:
             raise DataError(f"{type(self.model).__name__} has no predict: simulate it, with the model of this fit")
-        made: xr.Dataset = own(*given, **options)
+        made: xr.Dataset = predict(*given, **options)
         return made
 
     def to_dict(self) -> dict[str, Any]:
@@ -278,12 +278,12 @@ class Fit(Result):
         give = getattr(self.model, "to_parameters", None)
         if give is None:
             raise DataError(f"{type(self.model).__name__} has no parameter file: keep the parameters of to_dict()")
-        own = give()
-        if "parameters" not in own.tables:  # a response, whose file has its points: they say what the fit would
-            return str(own.to_toml())
+        made = give()
+        if "parameters" not in made.tables:  # a response, whose file has its points: they give what the fit would
+            return str(made.to_toml())
         units = dict.fromkeys(("fit_percent_train", "fit_percent_test"), "%")
         units["rmse_test"] = "-" if self.test is None else self.test.unit
-        file = own.with_fit(
+        file = made.with_fit(
             stderr=self.stderr,
             figures={name: (value, units[name]) for name, value in figures_of(self).items() if value is not None},
             source=f"fitted to {self.source}",

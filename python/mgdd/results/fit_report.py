@@ -220,8 +220,8 @@ class FitReport(Result):
         dict
             Arrays become lists; infinite and NaN numbers become None.
         """
-        own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
-        plain = {field: to_jsonable(getattr(self, field)) for field in own}
+        fields = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
+        plain = {field: to_jsonable(getattr(self, field)) for field in fields}
         return plain | {"findings": [finding.to_dict() for finding in self.findings]}
 
     @property
@@ -245,15 +245,15 @@ class FitReport(Result):
         >>> round(float(report.to_dataset()["correlation"][0, 1]), 3)
         -0.5
         """
-        names, own = list(self.names), "unit of the parameter"
+        names, unit = list(self.names), "unit of the parameter"
         return labelled_dataset(
             {
                 "parameter": ("parameter", names, "-", "parameter"),
                 "other": ("other", names, "-", "parameter"),
-                "value": ("parameter", self.values, own, "estimate"),
-                "stderr": ("parameter", self.stderr, own, "standard error"),
-                "lower": ("parameter", self.lower, own, "lower bound"),
-                "upper": ("parameter", self.upper, own, "upper bound"),
+                "value": ("parameter", self.values, unit, "estimate"),
+                "stderr": ("parameter", self.stderr, unit, "standard error"),
+                "lower": ("parameter", self.lower, unit, "lower bound"),
+                "upper": ("parameter", self.upper, unit, "upper bound"),
                 "bound_active": ("parameter", self.bounds_active, "-", "bound reached: -1 lower, 1 upper"),
                 "correlation": (("parameter", "other"), self.correlation, "-", "correlation"),
             }
@@ -282,8 +282,8 @@ class FitReport(Result):
         return f"{self.status}: {self.message}"
 
     def _rows(self) -> list[Row]:
-        found = zip(self.names, self.values, self.stderr, strict=True)
-        return [Row(name, f"{value:.6g} ± {error:.2g}", unit_of(name)) for name, value, error in found]
+        estimates = zip(self.names, self.values, self.stderr, strict=True)
+        return [Row(name, f"{value:.6g} ± {error:.2g}", unit_of(name)) for name, value, error in estimates]
 
     def _lines(self) -> list[tuple[str, ...]]:
         remarks = {-1: "at lower bound", 1: "at upper bound"}

@@ -1,4 +1,4 @@
-"""Labelled results: xarray Datasets in which every variable says its unit and its long name, ready for netCDF.
+"""Labelled results: xarray Datasets in which every variable has its unit and its long name, ready for netCDF.
 
 The units of the names that several modules share stand once, in `VARIABLES`.
 """
@@ -33,7 +33,7 @@ class Label(NamedTuple):
     Parameters
     ----------
     units : str
-        Unit as figures print it, ``"-"`` if dimensionless; attributes hold it as `labelled_dataset` says.
+        Unit as figures print it, ``"-"`` if dimensionless; attributes hold it as `labelled_dataset` describes.
     long_name : str
         Name for axis labels.
     """
@@ -201,9 +201,9 @@ def labelled_dataset(
         if array.ndim != len(dims):
             raise ShapeError(f"{name} has shape {array.shape}: {len(dims)} dimension(s) {dims} were declared")
         for dim, size in zip(dims, array.shape, strict=True):
-            known, first = sizes.setdefault(dim, (size, name))
-            if known != size:
-                raise ShapeError(f"{name} has {size} samples along {dim}: {first} has {known}")
+            earlier, first = sizes.setdefault(dim, (size, name))
+            if earlier != size:
+                raise ShapeError(f"{name} has {size} samples along {dim}: {first} has {earlier}")
         arrays[name] = (dims, array, unit_attributes(label.units, label.long_name))
     coords = {name: item for name, item in arrays.items() if item[0] == (name,)}
     for dim, (_, name) in sizes.items():
@@ -218,8 +218,8 @@ def label_of(variable: xr.DataArray | xr.Variable) -> Label:
     return Label(*printed_units(str(variable.attrs["units"]), str(variable.attrs["long_name"])))
 
 
-def said_unit(name: str) -> str:
-    """Return the unit that a name says for certain, whoever chose it; ``"-"`` for none.
+def name_unit(name: str) -> str:
+    """Return the unit that a name gives for certain, whoever chose it; ``"-"`` for none.
 
     A letter at the end of a name, but for seconds, is a unit behind a word of its quantity alone.
     """
@@ -281,16 +281,16 @@ def _entry(name: str, entry: Sequence[Any]) -> tuple[tuple[str, ...], ArrayLike,
 
 def _check(name: str, units: object, long_name: object) -> None:
     if not isinstance(units, str) or not units.strip():
-        raise DataError(f"variable {name} has no units: say them ('-' if dimensionless)")
+        raise DataError(f"variable {name} has no units: give them ('-' if dimensionless)")
     if not isinstance(long_name, str) or not long_name.strip():
         raise DataError(f"variable {name} has no long_name: name it for axis labels")
-    known = VARIABLES.get(name)
+    usual = VARIABLES.get(name)
     try:
         written = attribute_units(units)
     except ValueError as error:
         raise DataError(f"variable {name} has units {error}") from None
-    if known is not None and attribute_units(known.units) != written:
-        raise DataError(f"variable {name} has units {units!r}: this name is reserved for {known.units!r}")
+    if usual is not None and attribute_units(usual.units) != written:
+        raise DataError(f"variable {name} has units {units!r}: this name is reserved for {usual.units!r}")
 
 
 def _check_attributes(owner: str, attrs: Mapping[Any, Any]) -> None:

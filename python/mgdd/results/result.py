@@ -50,8 +50,8 @@ class Result:
     else:
 
         def __getattr__(self, name: str) -> Any:
-            kind, known = type(self).__name__, [each for each in dir(self) if not each.startswith("_")]
-            hint = "" if name.startswith("_") else did_you_mean(name, known) or f"it has {', '.join(known)}"
+            kind, names = type(self).__name__, [each for each in dir(self) if not each.startswith("_")]
+            hint = "" if name.startswith("_") else did_you_mean(name, names) or f"it has {', '.join(names)}"
             raise AttributeError(f"{kind!r} object has no attribute {name!r}: {hint}", name=name, obj=self)
 
     def _title(self) -> str:
@@ -177,7 +177,7 @@ def saved(what: Any, path: str | os.PathLike[str]) -> None:
 class NumbersResult(Result):
     """A result that is a record of numbers and texts: its `dataset` has them as variables without a dimension."""
 
-    _units: ClassVar[Mapping[str, str]] = MappingProxyType({})  # of numbers whose names do not say it
+    _units: ClassVar[Mapping[str, str]] = MappingProxyType({})  # of numbers whose names do not give it
 
     def _rows(self) -> list[Row]:
         return rows_of(fields_of(self), self._units)
@@ -203,12 +203,12 @@ def _sorted(name: str, value: Any, numbers: dict[str, Any], texts: dict[str, Any
     elif isinstance(value, Real | np.bool_):
         numbers[name] = value
     elif isinstance(value, Mapping):
-        for key, own in value.items():
-            _sorted(str(key) if name in PLAIN else f"{name}_{key}", own, numbers, texts)
-    elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(own, Real) for own in value):
-        for key, own in zip(("low", "high"), value, strict=True):
-            numbers[f"{name}_{key}"] = own
-    elif isinstance(value, tuple) and value and all(isinstance(own, str) for own in value):
+        for key, entry in value.items():
+            _sorted(str(key) if name in PLAIN else f"{name}_{key}", entry, numbers, texts)
+    elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(entry, Real) for entry in value):
+        for key, entry in zip(("low", "high"), value, strict=True):
+            numbers[f"{name}_{key}"] = entry
+    elif isinstance(value, tuple) and value and all(isinstance(entry, str) for entry in value):
         texts[name] = "\n".join(value)
 
 

@@ -1,4 +1,4 @@
-"""Units: what a name says by its ending, what a figure prints, and what stands in the attributes of a Dataset.
+"""Units: what a name gives by its ending, what a figure prints, and what stands in the attributes of a Dataset.
 
 A physical name ends in its unit, as ``tau_s``, ``bore_mm`` or ``spring_above_nm_per_rad`` do. Figures and tables print
 units as they are typeset; attributes hold them as an expression that a units library such as pint parses.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-# Printed units that only say whose unit it is, and counts: without a dimension in an attribute.
+# Printed units that only name whose unit it is, and counts: without a dimension in an attribute.
 _WHOSE = ("unit of ", "in the unit of ", "not given")
 _COUNTS = frozenset({"-", "cycle", "cycles", "sample", "samples"})
 _REMARK = re.compile(r" per unit of .*$| of .*$| \([^)]*\)$| per duty$")
@@ -35,7 +35,7 @@ _UNITS = {
     "kpa": "kPa", "pa": "Pa", "k": "K", "j": "J", "mj": "MJ", "kw": "kW", "kwh": "kWh", "v": "V", "vs": "V s", "a": "A",
     "ohm": "ohm", "mh": "mH", "ppm": "ppm", "percent": "%", "duty": "duty",
 }  # fmt: skip
-_ALONE = {"cad": "°CA aTDC", "duty": "-", "h": "H", "ns": "ns"}  # what these say without a quotient
+_ALONE = {"cad": "°CA aTDC", "duty": "-", "h": "H", "ns": "ns"}  # what these mean without a quotient
 _WHOLE = {
     "_deg_per_s2_per_duty": "deg/s² per duty", "_bar2_cad": "bar² °CA", "_bar_cad": "bar °CA", "_duration_cad": "°CA",
     "_scatter_cad": "°CA", "_rms_cad": "°CA", "_mean_j": "unit of J", "_samples": "samples", "_cycles": "cycles",
@@ -47,15 +47,15 @@ _ENDING = re.compile(
 
 def unit_of(name: str) -> str:
     """Read the unit off the end of a name, ``"-"`` if it has none; a single letter is a name."""
-    found = _ENDING.search(f"_{name}") if len(name) > 1 else None
-    if found is None:
+    ending = _ENDING.search(f"_{name}") if len(name) > 1 else None
+    if ending is None:
         return "-"
-    over, per, unit = found["over"], found["per"], found["unit"]
+    over, per, unit = ending["over"], ending["per"], ending["unit"]
     if per:
         return f"{_UNITS[over] if over else 1}/{_UNITS[unit]}"
     if unit == "cad" and name.startswith("rms_"):
         return "°CA"  # a distance, not an angle
-    return (_ALONE.get(unit) or _UNITS[unit]) if unit else _WHOLE[found[0]]
+    return (_ALONE.get(unit) or _UNITS[unit]) if unit else _WHOLE[ending[0]]
 
 
 def without_unit(name: str) -> str:

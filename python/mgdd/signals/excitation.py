@@ -1,6 +1,6 @@
 """Duty signals that make a throttle show its parameters: offset and amplitude, sampled, within -1..1.
 
-Each gives ``duty`` over ``time_s``, with attributes that say what it is, and refuses what `chirp` refuses.
+Each gives ``duty`` over ``time_s``, with attributes that describe it, and refuses what `chirp` refuses.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ def chirp(
     Returns
     -------
     xarray.Dataset
-        ``duty`` over ``time_s``; the attributes say what it is.
+        ``duty`` over ``time_s``; the attributes describe it.
 
     Raises
     ------
     ParameterError
         Here and in the other signals: a duty beyond ±1, a frequency at or above half the sampling rate, a length
-        below two samples, a number outside what its parameter says.
+        below two samples, a number outside the range of its parameter.
 
     Examples
     --------

@@ -108,11 +108,11 @@ class SampledModel(ABC):
         return self._labelled(time[horizon:], {self.output_name: measured[:-horizon] + run[horizon:] - run[:-horizon]})
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: dict(own) if isinstance(own, MappingProxyType) else own for name, own in vars(self).items()}
+        return {key: dict(item) if isinstance(item, MappingProxyType) else item for key, item in vars(self).items()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, own in state.items():
-            object.__setattr__(self, name, MappingProxyType(own) if isinstance(own, dict) else own)
+        for name, value in state.items():
+            object.__setattr__(self, name, MappingProxyType(value) if isinstance(value, dict) else value)
 
     def state_of(self, given: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Return the whole state of a free run from what is given of it."""
@@ -171,12 +171,12 @@ def table_of(given: Any, names: Sequence[str], *, what: str) -> Any:
     timed = is_timed(table, time)
     if hasattr(table, "columns"):  # a DataFrame
         return table if time in table.columns or not timed else table.rename_axis(time).reset_index()
-    own = str(getattr(table, "name", None) or "")
-    own = own if own in names or len(names) < 2 else names[1]
+    column = str(getattr(table, "name", None) or "")
+    column = column if column in names or len(names) < 2 else names[1]
     if hasattr(table, "coords"):
-        return {**{str(name): table[name] for name in table.coords}, own: table}
+        return {**{str(name): table[name] for name in table.coords}, column: table}
     if timed:
-        return {time: table.index, own: table}
+        return {time: table.index, column: table}
     if getattr(table, "ndim", 0) == 2 and table.shape[1] == len(names):
         return dict(zip(names, np.asarray(table).T, strict=True))
     if isinstance(table, tuple | list) and len(table) == len(names) and all(np.ndim(each) == 1 for each in table):
@@ -186,7 +186,7 @@ def table_of(given: Any, names: Sequence[str], *, what: str) -> Any:
 
 
 def is_timed(given: Any, time: str = "time_s") -> bool:
-    """Say whether a signal carries its time: as a column, a coordinate or an index."""
+    """Return whether a signal has its time: as a column, a coordinate or an index."""
     index: Any = getattr(given, "index", None)
     if hasattr(index, "dtype") and (index.name == time or (index.name is None and index.dtype.kind == "f")):
         return True
@@ -204,7 +204,7 @@ def as_signal(given: Any, names: Sequence[str], *, what: str, optional: Sequence
     for name in optional:
         if name in table:
             (columns[name],) = columns_of(table, [name], what=what)
-    return labelled_dataset({name: (names[0], own) for name, own in columns.items()})
+    return labelled_dataset({name: (names[0], column) for name, column in columns.items()})
 
 
 def check_horizon(horizon: int, size: int) -> None:

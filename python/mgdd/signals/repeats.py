@@ -1,4 +1,4 @@
-"""What bits alone say of a measured channel: cycles that are copies, stretches that recur, samples that stand still.
+"""What bits alone show of a measured channel: cycles that are copies, stretches that recur, samples that stand still.
 
 Noise makes every sample its own: values that recur over a stretch, where the rounding does not explain it, were
 written twice. No model of what was measured is needed, and a copy with new noise is not seen.
@@ -13,12 +13,12 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Two windows are alike by chance once in a thousand records; a window has this many samples at least, and changes.
-_CHANCE, _WINDOW, _CHANGES = 1e-3, 64, 8
-# Equal values of two cycles at one place, as rounding makes them: less is not believed, more is no noise at all.
+# Two windows are alike at random once in a thousand records; a window has this many samples at least, and changes.
+_FALSE_ALARM, _WINDOW, _CHANGES = 1e-3, 64, 8
+# Equal values of two cycles at one place, as rounding makes them: less is not trusted, more is not noise.
 _EQUAL, _ALL_EQUAL = (0.05, 0.95), 0.98
-# A run of equal samples is looked at from four on, and is stuck where chance gives it once in a million records.
-_RUN, _RUN_CHANCE, _LEAST_SHARE = 3, 1e-6, 1e-3
+# A run of equal samples is looked at from four on, and is stuck where noise gives it once in a million records.
+_RUN, _RUN_PROBABILITY, _LEAST_SHARE = 3, 1e-6, 1e-3
 _MIX = np.uint64(0x9E3779B97F4A7C15)  # odd: a product with it loses no bit
 
 
@@ -61,7 +61,7 @@ def copies(rows: NDArray[np.float64]) -> Copies | None:
     if n < 2:
         return None
     equal = float(np.median((rows[1:] == rows[:-1]).mean(axis=1)))
-    window = int(max(_WINDOW, np.log(stream.size**2 / _CHANCE) / -np.log(np.clip(equal, *_EQUAL))))
+    window = int(max(_WINDOW, np.log(stream.size**2 / _FALSE_ALARM) / -np.log(np.clip(equal, *_EQUAL))))
     if equal > _ALL_EQUAL:
         window = m
     if window > stream.size // 2:
@@ -70,12 +70,12 @@ def copies(rows: NDArray[np.float64]) -> Copies | None:
     changes = np.concatenate([[0], np.cumsum(stream[1:] != stream[:-1])])
     alive = changes[window - 1 :] - changes[: stream.size - window + 1] >= max(16, window // _CHANGES)
     places = np.flatnonzero(alive)
-    own = hashes[places]
-    ordered = np.sort(own)
+    alive_hashes = hashes[places]
+    ordered = np.sort(alive_hashes)
     twice = ordered[1:][ordered[1:] == ordered[:-1]]
     if not twice.size:
         return None
-    hit = places[np.isin(own, twice)]
+    hit = places[np.isin(alive_hashes, twice)]
     order = hit[np.argsort(hashes[hit], kind="stable")]
     same = hashes[order[1:]] == hashes[order[:-1]]
     again, first = order[1:][same], order[:-1][same]
@@ -114,7 +114,7 @@ def _joined(left: NDArray[np.uint64], right: NDArray[np.uint64]) -> NDArray[np.u
 def still(rows: NDArray[np.float64], noise: float, near: int) -> Still | None:
     """Find samples of a record (cycle, sample) that stand still longer than rounding makes them.
 
-    How often two neighbours are equal the other cycles say, within `near` samples of the place; of a single cycle its
+    How often two neighbours are equal the other cycles show, within `near` samples of the place; of a single cycle its
     resolution and its noise do.
     """
     n, m = rows.shape
@@ -125,16 +125,16 @@ def still(rows: NDArray[np.float64], noise: float, near: int) -> Still | None:
     row, at = np.divmod(starts, m)
     length = ends - starts
     if n > 1:
-        chance = _chance(equal, row, at, length, near)
+        log_probability = _log_probability(equal, row, at, length, near)
     else:
         usual = np.array([resolution_of(_alike(rows, rows[0, a])) for a in at]) / (
             2.0 * np.sqrt(np.pi) * max(noise, 1e-12)
         )
-        chance = length * np.log(np.clip(usual, _LEAST_SHARE, 0.9))
-    rare = np.flatnonzero(np.log(rows.size) + chance < np.log(_RUN_CHANCE))
+        log_probability = length * np.log(np.clip(usual, _LEAST_SHARE, 0.9))
+    rare = np.flatnonzero(np.log(rows.size) + log_probability < np.log(_RUN_PROBABILITY))
     odd = []
     usual_cycle = np.median(rows, axis=0) if n > 2 else None
-    for k in rare[np.argsort(chance[rare])][:4096].tolist():
+    for k in rare[np.argsort(log_probability[rare])][:4096].tolist():
         first, last = int(at[k]), int(at[k] + length[k])
         level = float(rows[row[k], first])
         step = resolution_of(_alike(rows[: min(n, 8)], level))
@@ -167,10 +167,10 @@ def _runs(equal: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]
     return starts[long], ends[long]
 
 
-def _chance(
+def _log_probability(
     equal: NDArray[np.bool_], row: NDArray[np.intp], at: NDArray[np.intp], length: NDArray[np.intp], near: int
 ) -> NDArray[np.float64]:
-    """Give the logarithm of the chance of each run, by the equal neighbours of the other cycles around there."""
+    """Give the logarithm of the probability of each run, by the equal neighbours of the other cycles around there."""
     n, m = equal.shape
     index = np.arange(m)
     low, high = np.maximum(index - near, 0), np.minimum(index + near + 1, m)
@@ -178,8 +178,8 @@ def _chance(
     hits = _around(equal.sum(axis=0, dtype=np.int64)[None], low, high)[0]
     out = np.empty(len(row))
     for r in np.unique(row):
-        own = _around(equal[r : r + 1].astype(np.int64), low, high)[0]
-        share = np.maximum((hits - own + 1.0) / ((n - 1) * width + 2.0), _LEAST_SHARE)
+        row_hits = _around(equal[r : r + 1].astype(np.int64), low, high)[0]
+        share = np.maximum((hits - row_hits + 1.0) / ((n - 1) * width + 2.0), _LEAST_SHARE)
         total = np.concatenate([[0.0], np.cumsum(np.log(share))])
         mine = row == r
         out[mine] = total[at[mine] + length[mine]] - total[at[mine]]

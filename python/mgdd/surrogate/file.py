@@ -68,18 +68,18 @@ def surrogate_file(surrogate: Mapping[str, Any]) -> ParameterFile:
         "signals": written(_columns({name: signal.label for name, signal in signals.items()}), _LABELS),
         **{_SIGNAL + name: _signal(signal) for name, signal in signals.items()},
         "records": written(surrogate, _RECORDS),
-        "source": {name: Entry(value=_said(value)) for name, value in surrogate["source"].items()},
+        "source": {name: Entry(value=_plain(value)) for name, value in surrogate["source"].items()},
     }
     return ParameterFile(kind="surrogate", tables=tables)
 
 
 def _signal(signal: SignalModel) -> dict[str, Entry]:
     scores = {"lags": list(signal.lag_scores), "lag_scores": list(signal.lag_scores.values())}
-    own = written(vars(signal) | scores, _signal_keys(signal.label))
+    keys = written(vars(signal) | scores, _signal_keys(signal.label))
     if signal.sensor is None:
-        return own
+        return keys
     share = signal.sensor.delay_share
-    return own | written(vars(signal.sensor) | {"delays": list(share), "delay_share": list(share.values())}, _SENSOR)
+    return keys | written(vars(signal.sensor) | {"delays": list(share), "delay_share": list(share.values())}, _SENSOR)
 
 
 def read_surrogate(file: ParameterFile) -> dict[str, Any]:
@@ -94,13 +94,13 @@ def read_surrogate(file: ParameterFile) -> dict[str, Any]:
     if [_SIGNAL + name for name in labels] != per_signal:
         raise DataError(f"{file.origin}: [signals] names {', '.join(labels)}: each needs its table [signal_...]")
     shapes = {**dict.fromkeys(("lower", "upper", "centre", "scale"), (n,)), "root": (terms, terms)}
-    own = _shaped(file, "support", file.values("support", _SUPPORT), shapes)
-    basis = PolynomialBasis.of("quadratic", centre=own.pop("centre"), scale=own.pop("scale"))
+    fields = _shaped(file, "support", file.values("support", _SUPPORT), shapes)
+    basis = PolynomialBasis.of("quadratic", centre=fields.pop("centre"), scale=fields.pop("scale"))
     records = file.values("records", _RECORDS)
     rows = records["residuals"]
     return {
         "signals": {name: _signal_of(file, name, label, terms) for name, label in labels.items()},
-        "support": Support(inputs=names, basis=basis, **own),
+        "support": Support(inputs=names, basis=basis, **fields),
         "medians": dict(zip(names, median.tolist(), strict=True)),
         "input_labels": inputs,
         "nonnegative": tuple(records["nonnegative"]),
@@ -129,15 +129,15 @@ def response_file(model: Mapping[str, Any]) -> ParameterFile:
     """Give everything that the fields of a response model hold."""
     label, factors, surface = model["label"], model["factors"], model["surface"]
     kind = "polynomial" if isinstance(surface, PolynomialSurface) else "gaussian_process"
-    own = vars(surface)
+    fields = vars(surface)
     if isinstance(surface, PolynomialSurface):
-        own = vars(surface.support.basis) | vars(surface.support) | own
+        fields = vars(surface.support.basis) | vars(surface.support) | fields
     units = {name: Wanted(factor.units, "numbers") for name, factor in factors.items()}
     response = dict(zip(_LABELS, (model["name"], *label), strict=True))
     tables = {
         "factors": written(_columns(factors), _LABELS),
         "response": {part: Entry(value=value) for part, value in response.items()},
-        kind: written(own, _surface_keys(kind, label)),
+        kind: written(fields, _surface_keys(kind, label)),
         "points": written(dict(zip(factors, surface.points.T, strict=True)), units),
         "values": written({model["name"]: surface.values}, {model["name"]: Wanted(label.units, "numbers")}),
     }
@@ -146,28 +146,28 @@ def response_file(model: Mapping[str, Any]) -> ParameterFile:
 
 def read_response(file: ParameterFile) -> dict[str, Any]:
     """Give the fields of the response model of such a file."""
-    known = ("polynomial", "gaussian_process")
-    kinds = [kind for kind in known if kind in file.tables]
+    forms = ("polynomial", "gaussian_process")
+    kinds = [kind for kind in forms if kind in file.tables]
     if file.kind == "response" and len(kinds) != 1:
         raise DataError(
-            f"{file.origin}: holds {' and '.join(kinds) or 'neither'}: must hold one of [{'], ['.join(known)}]"
+            f"{file.origin}: holds {' and '.join(kinds) or 'neither'}: must hold one of [{'], ['.join(forms)}]"
         )
     file.expect(kinds=("response",), tables=("factors", "response", "points", "values", *kinds))
     factors = _labels(file, "factors", file.values("factors", _LABELS))
-    name, *said = file.values("response", wanted(_LABELS, form="text")).values()
-    label = Label(*said)
+    name, *label_texts = file.values("response", wanted(_LABELS, form="text")).values()
+    label = Label(*label_texts)
     columns = file.values("points", {factor: Wanted(each.units, "numbers") for factor, each in factors.items()})
     values = _array(file, "values", file.values("values", {name: Wanted(label.units, "numbers")})[name])
     points = np.column_stack([_array(file, factor, columns[factor], values.shape) for factor in factors])
-    own = {"points": points, "values": values}
+    fields = {"points": points, "values": values}
     (kind,) = kinds
     read = _polynomial if kind == "polynomial" else _process
-    surface = read(file, _surface_keys(kind, label), tuple(factors), own)
+    surface = read(file, _surface_keys(kind, label), tuple(factors), fields)
     return {"name": name, "label": label, "factors": factors, "surface": surface}
 
 
 def _polynomial(
-    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], own: dict[str, Any]
+    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], fields: dict[str, Any]
 ) -> PolynomialSurface:
     given = file.values("polynomial", keys)
     m, p = len(names), len(given["coefficients"])
@@ -179,23 +179,23 @@ def _polynomial(
         )
     support = Support(
         inputs=names,
-        lower=own["points"].min(axis=0),
-        upper=own["points"].max(axis=0),
+        lower=fields["points"].min(axis=0),
+        upper=fields["points"].max(axis=0),
         leverage_limit=given["leverage_limit"],
         basis=PolynomialBasis(centre=given["centre"], scale=given["scale"], monomials=monomials),
         root=given["root"],
     )
-    return PolynomialSurface(support=support, coefficients=given["coefficients"], noise_sd=given["noise_sd"], **own)
+    return PolynomialSurface(support=support, coefficients=given["coefficients"], noise_sd=given["noise_sd"], **fields)
 
 
 def _process(
-    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], own: dict[str, Any]
+    file: ParameterFile, keys: dict[str, Wanted], names: tuple[str, ...], fields: dict[str, Any]
 ) -> ProcessSurface:
     given = file.values("gaussian_process", keys)
     given = _shaped(file, "gaussian_process", given, {"length_scales": (len(names),)})
     if not (given["length_scales"] > 0.0).all() or not given["signal_sd"] > 0.0 or not given["noise_sd"] >= 0.0:
         raise DataError(f"{file.origin}: [gaussian_process]: length scales and signal_sd must be > 0, noise_sd >= 0")
-    return ProcessSurface(**given, **own)
+    return ProcessSurface(**given, **fields)
 
 
 def _columns(labels: Mapping[str, Label]) -> dict[str, list[str]]:
@@ -233,16 +233,16 @@ def _whole(file: ParameterFile, what: str, values: Any) -> NDArray[np.intp]:
     return array.astype(np.intp)
 
 
-def _by_count(file: ParameterFile, table: str, values: dict[str, Any], keys: str, own: str) -> dict[int, float]:
+def _by_count(file: ParameterFile, table: str, values: dict[str, Any], keys: str, entry: str) -> dict[int, float]:
     """Take counts of cycles and what belongs to each."""
     counts = _whole(file, f"[{table}] {keys}", values.pop(keys))
-    numbers = _array(file, f"[{table}] {own}", values.pop(own), counts.shape)
+    numbers = _array(file, f"[{table}] {entry}", values.pop(entry), counts.shape)
     return dict(zip(counts.tolist(), numbers.tolist(), strict=True))
 
 
-def _said(value: object) -> Any:
+def _plain(value: object) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, tuple | list):
-        return [_said(item) for item in value]
+        return [_plain(item) for item in value]
     return value if isinstance(value, str | int | float) else str(value)

@@ -56,7 +56,7 @@ def fit_surrogate(
     Parameters
     ----------
     records : xarray.Dataset
-        Inputs and outputs over ``cycle``, which counts up by one. Rows without ``excited`` (where the records say)
+        Inputs and outputs over ``cycle``, which counts up by one. Rows without ``excited`` (where the records have it)
         and NaN outputs are left out.
     inputs : sequence of str
         Commands, ``soi_cad`` first.

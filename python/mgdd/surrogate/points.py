@@ -43,7 +43,7 @@ def points_of(table: Any, names: Sequence[str], *, what: str = "points") -> NDAr
 
 
 def column_label(table: Any, name: str) -> Label:
-    """Return unit and name of a column: as a Dataset says, otherwise as the name does."""
+    """Return unit and name of a column: as a Dataset states, otherwise as the name does."""
     attributes = getattr(table[name], "attrs", {})
     return label_of(table[name]) if {"units", "long_name"} <= set(attributes) else named_label(name)
 

@@ -1,4 +1,4 @@
-"""Polynomial of a response: its terms, where it was fitted, which terms it needs, and what it says of new points."""
+"""Polynomial of a response: its terms, where it was fitted, which terms it needs, and its prediction at new points."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ class PolynomialBasis:
             terms = terms * z[:, column]
         return np.asarray(terms, dtype=np.float64)
 
-    def only(self, kept: Sequence[int] | NDArray[np.intp]) -> PolynomialBasis:
+    def only(self, columns: Sequence[int] | NDArray[np.intp]) -> PolynomialBasis:
         """Return some of the terms."""
-        return PolynomialBasis(centre=self.centre, scale=self.scale, monomials=self.monomials[kept])
+        return PolynomialBasis(centre=self.centre, scale=self.scale, monomials=self.monomials[columns])
 
     def names(self, inputs: Sequence[str]) -> tuple[str, ...]:
         """Name the terms, for example ``1``, ``soi_cad``, ``soi_cad^2`` and ``soi_cad*fuel_mg``."""
-        out = []
+        terms = []
         for monomial in self.monomials.tolist():
             powers = Counter(inputs[place - 1] for place in monomial if place > 0)
-            out.append("*".join(name if power == 1 else f"{name}^{power}" for name, power in powers.items()) or "1")
-        return tuple(out)
+            terms.append("*".join(name if power == 1 else f"{name}^{power}" for name, power in powers.items()) or "1")
+        return tuple(terms)
 
 
 @described
@@ -86,7 +86,7 @@ class Support:
         object.__setattr__(self, "root", np.ascontiguousarray(self.root))
 
     def leverage(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Say how far points are from the middle of the records, in the metric of the fit."""
+        """Return how far points are from the middle of the records, in the metric of the fit."""
         return self._leverage_of(self.basis(np.asarray(points, dtype=np.float64)))
 
     def contains(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -171,34 +171,34 @@ def choose_terms(
     rows: list[Monomial] = [tuple(row) for row in monomials.tolist()]
     place = {row: index for index, row in enumerate(rows)}
     # The factors of a term: the monomials of one degree less that it contains.
-    above = [[tuple(sorted((*row[:k], 0, *row[k + 1 :]))) for k, own in enumerate(row) if own > 0] for row in rows]
+    above = [[tuple(sorted((*row[:k], 0, *row[k + 1 :]))) for k, power in enumerate(row) if power > 0] for row in rows]
     needs = [frozenset(place[factor] for factor in factors if factor in place) for factors in above]
 
     @cache
     def with_factors(term: int) -> frozenset[int]:
         return frozenset({term}).union(*map(with_factors, needs[term]))
 
-    known: dict[frozenset[int], float] = {}
+    criteria: dict[frozenset[int], float] = {}
 
-    def worth(kept: frozenset[int]) -> float:
-        if kept not in known:
-            known[kept] = _criterion(terms[:, sorted(kept)], values, criterion)
-        return known[kept]
+    def worth(chosen: frozenset[int]) -> float:
+        if chosen not in criteria:
+            criteria[chosen] = _criterion(terms[:, sorted(chosen)], values, criterion)
+        return criteria[chosen]
 
-    def searched(kept: frozenset[int]) -> frozenset[int]:
+    def searched(some: frozenset[int]) -> frozenset[int]:
         while True:
-            needed: frozenset[int] = frozenset().union(*(needs[term] for term in kept))
-            trials: list[frozenset[int]] = [kept | with_factors(term) for term in range(len(rows)) if term not in kept]
-            trials += [kept - {term} for term in kept - needed if term != 0]
-            best = min([kept, *trials], key=worth)
-            if not worth(best) < worth(kept) - _LEAST_GAIN:
-                return kept
-            kept = best
+            needed: frozenset[int] = frozenset().union(*(needs[term] for term in some))
+            trials: list[frozenset[int]] = [some | with_factors(term) for term in range(len(rows)) if term not in some]
+            trials += [some - {term} for term in some - needed if term != 0]
+            best = min([some, *trials], key=worth)
+            if not worth(best) < worth(some) - _LEAST_GAIN:
+                return some
+            some = best
 
-    found = [searched(frozenset({0}))]
+    searches = [searched(frozenset({0}))]
     if np.isfinite(worth(frozenset(range(len(rows))))):
-        found.append(searched(frozenset(range(len(rows)))))
-    least = min(found, key=worth)
+        searches.append(searched(frozenset(range(len(rows)))))
+    least = min(searches, key=worth)
     return np.array(sorted(least), dtype=np.intp)
 
 

@@ -1,4 +1,4 @@
-"""Gaussian process of a response: what it says between its points, and its fit by scikit-learn."""
+"""Gaussian process of a response: its prediction between its points, and its fit by scikit-learn."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def matern(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProcessSurface:
-    """What a Gaussian process says between its points.
+    """Prediction of a Gaussian process between its points.
 
     Length scales in the units of the factors; offset, signal and noise in that of the response. Needs no scikit-learn.
 
@@ -60,12 +60,12 @@ class ProcessSurface:
         from scipy.linalg import solve_triangular
 
         across = self.signal_sd**2 * matern(points, self.points, self.length_scales)
-        known = solve_triangular(self._root, across.T, lower=True)
-        variance = self.signal_sd**2 - np.sum(known**2, axis=0)
+        explained = solve_triangular(self._root, across.T, lower=True)
+        variance = self.signal_sd**2 - np.sum(explained**2, axis=0)
         return self.offset + across @ self._weights, np.sqrt(np.maximum(variance, 0.0))
 
     def supports(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return True: the hull alone says where the points end."""
+        """Return True: the hull alone bounds the points."""
         return np.ones(len(points), dtype=np.bool_)
 
     def fitted(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -84,8 +84,8 @@ class ProcessSurface:
 
     @cached_property
     def _root(self) -> NDArray[np.float64]:
-        own = self.signal_sd**2 * matern(self.points, self.points, self.length_scales)
-        full = own + (self.noise_sd**2 + self._jitter) * np.eye(len(own))
+        covariance = self.signal_sd**2 * matern(self.points, self.points, self.length_scales)
+        full = covariance + (self.noise_sd**2 + self._jitter) * np.eye(len(covariance))
         return np.asarray(np.linalg.cholesky(full), dtype=np.float64)
 
     @cached_property
@@ -120,9 +120,9 @@ class _Search:
     ) -> tuple[NDArray[np.float64], float]:
         from scipy.optimize import minimize
 
-        found = minimize(negative, start, method="L-BFGS-B", jac=True, bounds=bounds)
-        self.results.append(found)
-        return found.x, float(found.fun)
+        result = minimize(negative, start, method="L-BFGS-B", jac=True, bounds=bounds)
+        self.results.append(result)
+        return result.x, float(result.fun)
 
 
 def fit_process(
@@ -149,7 +149,7 @@ def fit_process(
     few = 1 if len(values) <= _ONE_THREAD else None
     threads: Any = import_extra("threadpoolctl", "gp", purpose)
     with threads.threadpool_limits(few), warnings.catch_warnings():
-        # A parameter at its bound is said as a finding.
+        # A parameter at its bound is reported as a finding.
         warnings.simplefilter("ignore", import_extra("sklearn.exceptions", "gp", purpose).ConvergenceWarning)
         regressor.fit((points - points.mean(axis=0)) / half, (values - offset) / spread)
     logs = np.asarray(regressor.kernel_.theta, dtype=np.float64)  # of the variances and lengths: signal, lengths, noise
@@ -177,7 +177,7 @@ def _report(
 ) -> FitReport:
     bounds = np.asarray(regressor.kernel_.bounds, dtype=np.float64)
     at_bound = (logs > bounds[:, 1] - _AT_BOUND).astype(np.int_) - (logs < bounds[:, 0] + _AT_BOUND)
-    own = ("signal_sd", *(f"length_scale_{name}" for name in names), "noise_sd")
+    parameters = ("signal_sd", *(f"length_scale_{name}" for name in names), "noise_sd")
     values = np.r_[surface.signal_sd, surface.length_scales, surface.noise_sd]
     # d value/d log: 1/2 of a variance, 1 of a length.
     slope = values * np.r_[0.5, np.ones(len(names)), 0.5]
@@ -185,7 +185,7 @@ def _report(
     free = np.flatnonzero(at_bound == 0)
     covariance[np.ix_(free, free)] = _covariance(regressor, logs, free) * np.outer(slope[free], slope[free])
     stderr = np.sqrt(np.diag(covariance))
-    best = min(search.results, key=lambda found: float(found.fun))
+    best = min(search.results, key=lambda result: float(result.fun))
     with np.errstate(invalid="ignore"):  # a flat likelihood has infinite errors, and no correlation
         correlation = covariance / np.outer(stderr, stderr)
     edges = np.exp(bounds)
@@ -193,9 +193,9 @@ def _report(
     edges[1:-1] *= half[:, None]
     residual = surface.fitted()[0] - surface.values
     size = float(np.linalg.norm(surface.values - surface.values.mean()))
-    near = sum(float(found.fun) < float(best.fun) + 0.05 for found in search.results)
+    near = sum(float(result.fun) < float(best.fun) + 0.05 for result in search.results)
     return FitReport(
-        names=own,
+        names=parameters,
         values=values,
         stderr=stderr,
         lower=edges[:, 0],
@@ -203,15 +203,15 @@ def _report(
         bounds_active=at_bound,
         covariance=covariance,
         correlation=correlation,
-        unidentifiable=tuple(name for name, side in zip(own, at_bound, strict=True) if side),
-        findings=tuple(_at_bound(name, int(side)) for name, side in zip(own, at_bound, strict=True) if side),
+        unidentifiable=tuple(name for name, side in zip(parameters, at_bound, strict=True) if side),
+        findings=tuple(_at_bound(name, int(side)) for name, side in zip(parameters, at_bound, strict=True) if side),
         null_directions=np.zeros((logs.size, 0)),
         rmse=float(np.sqrt(np.mean(residual**2))),
         cost=0.5 * float(np.sum(residual**2)),
         nrmse_fit_percent=100.0 * (1.0 - float(np.linalg.norm(residual)) / size),
         residual=residual,
-        nfev=sum(int(found.nfev) for found in search.results),
-        njev=sum(int(found.nfev) for found in search.results),
+        nfev=sum(int(result.nfev) for result in search.results),
+        njev=sum(int(result.nfev) for result in search.results),
         nit=int(best.nit),
         history={},
         status="cost_converged" if best.success else "stalled",

@@ -38,8 +38,8 @@ def random_step_records(cycles: int = 4000, *, seed: int = 0, noise: float = 1.0
     holds = generator.integers(1, 31, size=cycles)
     which = np.repeat(np.arange(cycles), holds)[:cycles]
     inputs = {name: generator.uniform(low, high, size=cycles)[which] for name, (low, high) in _BOX.items()}
-    own, shared = generator.standard_normal((cycles, len(_NOISE))), generator.standard_normal((cycles, 1))
-    scatter = noise * (np.sqrt(1.0 - _SHARED) * own + np.sqrt(_SHARED) * shared)
+    independent, shared = generator.standard_normal((cycles, len(_NOISE))), generator.standard_normal((cycles, 1))
+    scatter = noise * (np.sqrt(1.0 - _SHARED) * independent + np.sqrt(_SHARED) * shared)
     signals = _law(inputs, cycles)
     for column, (name, sd) in enumerate(_NOISE.items()):
         signals[name] = signals[name] + sd * scatter[:, column]

@@ -76,7 +76,7 @@ def fit_response(
         noise; needs ``pip install "mgdd[gp]"``).
     factors : sequence of str, optional
         Columns to use. If left out: the inputs of a sweep or of read points, which are the axes of its grid or
-        coordinates over its points; all but the response where `points` says of none that it is an input.
+        coordinates over its points; all but the response where `points` marks none as an input.
     degree : int
         Of the full polynomial, 1 to 4.
     select : {"bic", "press", "all"}
@@ -128,10 +128,10 @@ def fit_response(
     """
     _check(kind, degree, select, n_starts, seed)
     if hasattr(points, "data_vars"):
-        own = response if isinstance(response, str) and response in points else ""
-        factors = factors if factors is not None else input_names(points, own) or None
-        if own and points[own].ndim > 1:
-            points = flat_points(points, None if factors is None else [*factors, own], "points")
+        column = response if isinstance(response, str) and response in points else ""
+        factors = factors if factors is not None else input_names(points, column) or None
+        if column and points[column].ndim > 1:
+            points = flat_points(points, None if factors is None else [*factors, column], "points")
     names = _factor_names(points, response, factors)
     x = points_of(points, names)
     name, label, y = _response(points, response, names, len(x))
@@ -143,10 +143,10 @@ def fit_response(
     if not np.ptp(y) > 0.0:
         raise DataError(f"{name} is {y[0]:g} at every point: nothing to fit; record more digits")
 
-    def fitter(own: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[Surface, FitReport]:
+    def fitter(column: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[Surface, FitReport]:
         if kind == "polynomial":
-            return _polynomial(own, values, names, degree, select)
-        return fit_process(own, values, names, n_starts=n_starts, seed=seed)
+            return _polynomial(column, values, names, degree, select)
+        return fit_process(column, values, names, n_starts=n_starts, seed=seed)
 
     surface, report = fitter(x, y)
     model = ResponseModel(
@@ -154,13 +154,13 @@ def fit_response(
     )
     left_out, studentised = surface.left_out()
     parted = left_out if folds is None else _parted(x, y, fitter, int(folds), seed)
-    known = np.isfinite(parted)
+    finite = np.isfinite(parted)
     return ResponseFit(
         report=report,
         model=model,
         kind=kind,
         train=_quality(y, surface.fitted()[0], label),
-        test=_quality(y[known], parted[known], label) if known.sum() > 1 else None,
+        test=_quality(y[finite], parted[finite], label) if finite.sum() > 1 else None,
         checked_by="leave-one-out" if folds is None else f"{folds}-fold",
         findings=(*report.findings, *response_findings(model, studentised, left_out)),
         unidentifiable=report.unidentifiable,
@@ -183,17 +183,17 @@ def _polynomial(
     basis = PolynomialBasis.of(degree, centre=points.min(axis=0) + half, scale=half)
     if select != "all":
         basis = basis.only(choose_terms(basis(points), values, basis.monomials, select))
-    terms, said = basis(points), basis.names(names)
+    terms, labels = basis(points), basis.names(names)
     n, p = terms.shape
     if n <= p:
         raise DataError(f"{n} points for {p} terms: at least {p + 1} are needed; add points or lower the degree")
     if np.linalg.matrix_rank(terms) < p:
         raise DataError(
-            f"the points do not tell the {p} terms apart ({', '.join(said)}): use {argument('select', repr('bic'))}, "
+            f"the points do not separate the {p} terms ({', '.join(labels)}): use {argument('select', repr('bic'))}, "
             "fewer factors or a lower degree, or add points with d_optimal"
         )
     coefficients = np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)
-    report = least_squares(lambda c: (terms @ c - values, terms), coefficients, names=said, data=values)
+    report = least_squares(lambda c: (terms @ c - values, terms), coefficients, names=labels, data=values)
     surface = PolynomialSurface(
         points=points,
         values=values,
@@ -208,14 +208,14 @@ def _parted(
     points: NDArray[np.float64], values: NDArray[np.float64], fitter: Fitter, folds: int, seed: int
 ) -> NDArray[np.float64]:
     """Predict each random part from a fit to the others."""
-    out = np.empty(values.size)
+    predicted = np.empty(values.size)
     order = np.random.default_rng(seed).permutation(values.size)
     for part in np.array_split(order, folds):
         others = np.setdiff1d(order, part)
         if not (np.ptp(points[others], axis=0) > 0.0).all() or not np.ptp(values[others]) > 0.0:
             raise DataError(f"folds = {folds}: without one part a factor or the response does not vary; use more folds")
-        out[part] = fitter(points[others], values[others])[0].predict(points[part])[0]
-    return out
+        predicted[part] = fitter(points[others], values[others])[0].predict(points[part])[0]
+    return predicted
 
 
 def _quality(measured: NDArray[np.float64], model: NDArray[np.float64], label: Label) -> FitQuality:
@@ -232,11 +232,11 @@ def _factor_names(points: Any, response: Any, factors: Sequence[str] | None) -> 
     have = column_names(points, "points")
     if isinstance(response, str) and response not in have:
         raise DataError(f"points have no response {response!r}: they have {', '.join(have)}")
-    own = response if isinstance(response, str) else None
-    names = tuple(name for name in have if name != own) if factors is None else tuple(factors)
+    column = response if isinstance(response, str) else None
+    names = tuple(name for name in have if name != column) if factors is None else tuple(factors)
     if isinstance(factors, str) or not names or len(set(names)) < len(names):
         raise ParameterError.of("factors", factors, "names of columns, each once, at least one")
-    odd = [name for name in names if name in RESERVED or name == own]
+    odd = [name for name in names if name in RESERVED or name == column]
     if odd:
         raise ParameterError.of("factors", odd[0], f"no response and none of {', '.join(RESERVED)}: rename the column")
     return names
@@ -253,8 +253,8 @@ def _response(
         attributes: Mapping[str, Any] = getattr(response, "attrs", {})
         if name in factors:  # arithmetic on a factor kept its name and unit
             name, attributes = "response", {}
-        said = {"units", "long_name"} <= set(attributes)
-        label = label_of(given) if said else Label("unit of the response", name)
+        labelled = {"units", "long_name"} <= set(attributes)
+        label = label_of(given) if labelled else Label("unit of the response", name)
     values = np.array(given, dtype=np.float64)
     if values.shape != (size,):
         raise ShapeError(f"{name} has shape {values.shape}: must have one value per point, ({size},)")
@@ -264,9 +264,9 @@ def _response(
 
 
 def _check(kind: str, degree: int, select: str, n_starts: int, seed: int) -> None:
-    for what, value, known in (("kind", kind, KINDS), ("select", select, SELECTIONS)):
-        if value not in known:
-            raise ParameterError.of(what, value, f"one of {', '.join(known)}")
+    for what, value, choices in (("kind", kind, KINDS), ("select", select, SELECTIONS)):
+        if value not in choices:
+            raise ParameterError.of(what, value, f"one of {', '.join(choices)}")
     counts = (("degree", degree, 1, _MOST_DEGREE), ("n_starts", n_starts, 1, 1000), ("seed", seed, 0, 2**32 - 1))
     for what, count, least, most in counts:
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or not least <= count <= most:
@@ -327,12 +327,12 @@ def _few(model: ResponseModel, weight: NDArray[np.float64]) -> Iterator[Finding]
 
 def _outliers(model: ResponseModel, studentised: NDArray[np.float64]) -> Iterator[Finding]:
     bound = outlier_bound(model.values.size, model.surface.freedom)
-    found = np.flatnonzero(np.abs(studentised) > bound)
-    if found.size:
-        worst = ", ".join(f"{k} ({studentised[k]:+.1f})" for k in found[:5])
-        text = f"point {worst} beyond ±{bound:.1f} standard deviations of what the other points say"
+    outliers = np.flatnonzero(np.abs(studentised) > bound)
+    if outliers.size:
+        worst = ", ".join(f"{k} ({studentised[k]:+.1f})" for k in outliers[:5])
+        text = f"point {worst} beyond ±{bound:.1f} standard deviations of what the other points predict"
         yield Finding(
-            "outlier", tuple(f"point {k}" for k in found), text, "look at the record; repeat it before it is dropped"
+            "outlier", tuple(f"point {k}" for k in outliers), text, "look at the record; repeat it before it is dropped"
         )
 
 
@@ -340,17 +340,17 @@ def _prediction(
     model: ResponseModel, left_out: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> Iterator[Finding]:
     error = model.values - left_out
-    known = np.isfinite(error)
-    spread = model.values[known] - model.values[known].mean()
-    if known.sum() < 2:
+    finite = np.isfinite(error)
+    spread = model.values[finite] - model.values[finite].mean()
+    if finite.sum() < 2:
         return
-    share = 1.0 - float(np.sum(error[known] ** 2) / np.sum(spread**2))
+    share = 1.0 - float(np.sum(error[finite] ** 2) / np.sum(spread**2))
     if share < 0.5:
         text = f"the others predict {100.0 * max(share, 0.0):.0f} % of the variance of left-out points"
         yield Finding(
             "poor_prediction", (model.name,), text, "add points, factors or terms, or measure with less noise"
         )
-    ratio = float(np.sqrt(np.mean(error[known] ** 2) / max(float(np.mean(residual[known] ** 2)), 1e-300)))
+    ratio = float(np.sqrt(np.mean(error[finite] ** 2) / max(float(np.mean(residual[finite] ** 2)), 1e-300)))
     if ratio > 2.0 and isinstance(model.surface, PolynomialSurface):
         text = f"left-out points are missed by {ratio:.1f} times the residual: there are too many terms for the points"
         yield Finding("overfitted", (model.name,), text, "add points or lower the degree")
@@ -446,7 +446,7 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
     from scipy.stats import norm, rankdata
 
     fitted, weight = model.surface.fitted()
-    n, names, (unit, said) = model.values.size, tuple(model.factors), model.label
+    n, names, (unit, long_name) = model.values.size, tuple(model.factors), model.label
     bound = outlier_bound(n, model.surface.freedom)
     scores = norm.ppf((rankdata(studentised, method="ordinal") - 0.375) / (n + 0.25))
     columns = {
@@ -460,15 +460,15 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
         at[place, :, place] = steps[place]
     cuts = model.predict(dict(zip(names, at.reshape(-1, len(names)).T, strict=True)))
     cut = {name: cuts[name].to_numpy().reshape(len(names), _STEPS) for name in ("mean", "lower", "upper")}
-    along, own = ("factor", "step"), "unit of the factor"
+    along, unit_text = ("factor", "step"), "unit of the factor"
     return labelled_dataset(
         {
             "point": ("point", np.arange(n), "-", "point in run order"),
             **columns,
-            "measured": ("point", model.values, unit, f"{said}, measured"),
-            "fitted": ("point", fitted, unit, f"{said}, fitted"),
-            "left_out": ("point", left_out, unit, f"{said}, predicted from the other points"),
-            "residual": ("point", model.values - fitted, unit, f"{said}, measured minus fitted"),
+            "measured": ("point", model.values, unit, f"{long_name}, measured"),
+            "fitted": ("point", fitted, unit, f"{long_name}, fitted"),
+            "left_out": ("point", left_out, unit, f"{long_name}, predicted from the other points"),
+            "residual": ("point", model.values - fitted, unit, f"{long_name}, measured minus fitted"),
             "studentised": ("point", studentised, "-", "studentised residual"),
             "leverage": ("point", weight, "-", "leverage"),
             "normal_score": ("point", scores, "-", "normal score"),
@@ -476,10 +476,10 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
             "outlier_bound": ((), bound, "-", "bound for outliers"),
             "factor": ("factor", list(names), "-", "factor"),
             "step": ("step", np.arange(_STEPS), "-", "step of a cut"),
-            "cut": (along, steps, own, "factor, the others at their medians"),
-            "cut_mean": (along, cut["mean"], unit, f"{said}, prediction"),
-            "cut_lower": (along, cut["lower"], unit, f"{said}, lower end of the interval"),
-            "cut_upper": (along, cut["upper"], unit, f"{said}, upper end of the interval"),
+            "cut": (along, steps, unit_text, "factor, the others at their medians"),
+            "cut_mean": (along, cut["mean"], unit, f"{long_name}, prediction"),
+            "cut_lower": (along, cut["lower"], unit, f"{long_name}, lower end of the interval"),
+            "cut_upper": (along, cut["upper"], unit, f"{long_name}, upper end of the interval"),
         },
         attrs={"response": model.name, "kind": model.kind, "level": 0.95},
     )

@@ -30,12 +30,12 @@ RESERVED = ("point", "mean", "mean_sd", "sd", "lower", "upper", "extrapolated")
 
 def _rows(model: ResponseModel) -> dict[str, Any]:
     surface = model.surface
-    own: dict[str, Any] = {"factors": tuple(model.factors), "points": model.values.size, "noise_sd": surface.noise_sd}
+    rows: dict[str, Any] = {"factors": tuple(model.factors), "points": model.values.size, "noise_sd": surface.noise_sd}
     if isinstance(surface, PolynomialSurface):
-        own["terms"] = model.terms
+        rows["terms"] = model.terms
     else:
-        own["length_scale"] = dict(zip(model.factors, surface.length_scales.tolist(), strict=True))
-    return own
+        rows["length_scale"] = dict(zip(model.factors, surface.length_scales.tolist(), strict=True))
+    return rows
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -101,7 +101,7 @@ class ResponseModel(Parameters):
         """Convex hull of the points; None where they have none: then their ranges count."""
         try:
             return hull_of(self.points, tuple(self.factors))
-        except DataError:  # said by `fit_response` as a finding
+        except DataError:  # reported by `fit_response` as a finding
             return None
 
     def predict(self, points: Any, *, level: float = 0.95) -> xr.Dataset:
@@ -162,9 +162,9 @@ class ResponseModel(Parameters):
 
     def extrapolated(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which points, shape (n, m), lie outside of those that were fitted."""
-        own = self.points
+        measured = self.points
         if self.hull is None:
-            inside = np.all((points >= own.min(axis=0)) & (points <= own.max(axis=0)), axis=1)
+            inside = np.all((points >= measured.min(axis=0)) & (points <= measured.max(axis=0)), axis=1)
         else:
             inside = self.hull.depth(points)[0] >= -EDGE
         return np.asarray(~(inside & self.surface.supports(points)), dtype=np.bool_)
@@ -204,16 +204,16 @@ def prediction_table(
     variables |= {name: (POINT, columns[name], *labels[name]) for name in beside}
     outside: dict[str, int] = {}
     for model in models:
-        found = model.predict({name: columns[name].ravel() for name in model.factors}, level=level)
-        beyond = found["extrapolated"].to_numpy()
+        prediction = model.predict({name: columns[name].ravel() for name in model.factors}, level=level)
+        beyond = prediction["extrapolated"].to_numpy()
         outside[model.name] = int(beyond.sum())
         keep = np.ones(beyond.shape, dtype=bool) if extrapolate else ~beyond
         for ending, part in _PARTS.items():
-            values = np.where(keep, found[part].to_numpy(), np.nan).reshape(shape)
-            variables[f"{model.name}{ending}"] = (dims, values, *label_of(found[part]))
+            values = np.where(keep, prediction[part].to_numpy(), np.nan).reshape(shape)
+            variables[f"{model.name}{ending}"] = (dims, values, *label_of(prediction[part]))
         if extrapolate:
             where = beyond.reshape(shape).astype(np.int8)
-            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
+            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(prediction["extrapolated"]))
     table = labelled_dataset(variables, attrs={"level": level}).set_coords(beside)
     for model in models:
         table[model.name].attrs["source"] = "predicted"

@@ -102,11 +102,11 @@ def find_sensor_lag(
     flat = np.ascontiguousarray(np.moveaxis(grams[some], 2, 0)).reshape(len(blocks), -1)
     shape = (*cost[some].shape, *grams.shape[-2:])
     counts = np.random.default_rng(seed).multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), _RESAMPLES)
-    found = [
+    minima = [
         _minimum(_costs(summed.reshape(shape)), delays[some[0]], _TAUS[some[1]])[:2]
         for summed in counts.astype(np.float64) @ flat
     ]
-    many, taus = np.array([d for d, _ in found]), np.array([t for _, t in found])
+    many, taus = np.array([d for d, _ in minima]), np.array([t for _, t in minima])
     return SensorLag(
         delay_cycles=delay,
         tau_cycles=tau,

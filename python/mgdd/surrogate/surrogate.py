@@ -33,11 +33,11 @@ def best_along(
     at: NDArray[np.float64],
     *,
     weights: Mapping[str, float],
-    kept: tuple[Limit, ...],
+    upper_limits: tuple[Limit, ...],
     nonnegative: tuple[str, ...],
 ) -> Optimum:
     """Maximise the weighted sum of signals over SOI where supported and within the limits, the rest of a point held."""
-    limits = {limit.name: limit.upper - limit.margin for limit in kept}
+    limits = {limit.name: limit.upper - limit.margin for limit in upper_limits}
     column = support.inputs.index("soi_cad")
     low, high = float(support.lower[column]), float(support.upper[column])
     nodes = np.linspace(low, high, 5)
@@ -59,8 +59,8 @@ def best_along(
     others = np.delete(np.arange(len(support.inputs)), column)
     inside = np.all((points[0, others] >= support.lower[others]) & (points[0, others] <= support.upper[others]))
     candidates = np.unique(np.r_[edges, _inner_roots([*held.values(), goal.deriv()], low, high)])
-    supported = inside & _kept(rules, candidates)
-    feasible = supported & _kept(list(held.values()), candidates)
+    supported = inside & _within(rules, candidates)
+    feasible = supported & _within(list(held.values()), candidates)
     if not feasible.any():
         if not supported.any():
             raise ConvergenceError(f"no soi_cad in [{low:.4g}, {high:.4g}] is supported: change the other inputs")
@@ -72,13 +72,13 @@ def best_along(
             "raise a limit"
         )
     best = float(candidates[int(np.argmax(np.where(feasible, goal(candidates), -np.inf)))])
-    start, end = _range_around(best, edges, inside & _kept(rules, 0.5 * (edges[1:] + edges[:-1])))
+    start, end = _range_around(best, edges, inside & _within(rules, 0.5 * (edges[1:] + edges[:-1])))
     return Optimum(
         inputs={"soi_cad": best},
         objective=" + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items()),
         value=float(goal(best)),
         values={name: float(curve(best)) for name, curve in curves.items()},
-        limits=kept,
+        limits=upper_limits,
         active_limits=tuple(n for n, curve in held.items() if abs(curve(best)) <= _TINY * max(1.0, abs(limits[n]))),
         at_bound=min(best - start, end - best) <= _TINY * (high - low),
         bounds={"soi_cad": (start, end)},
@@ -88,7 +88,7 @@ def best_along(
 
 def _inner_roots(curves: list[Polynomial], low: float, high: float) -> NDArray[np.float64]:
     """Return the ends of the range and the real roots between them, sorted."""
-    found = [low, high]
+    roots = [low, high]
     for curve in curves:
         slope = curve.deriv()
         for root in curve.trim(_TINY**2 * np.abs(curve.coef).max()).roots():
@@ -96,8 +96,8 @@ def _inner_roots(curves: list[Polynomial], low: float, high: float) -> NDArray[n
             for _ in range(3):  # Newton: a nearly straight curve spoils the digits of its companion matrix
                 at = at - float(curve(at) / slope(at)) if slope(at) != 0.0 else at
             if abs(np.imag(root)) < _TINY * (high - low) and low < at < high:
-                found.append(at)
-    return np.unique(found)
+                roots.append(at)
+    return np.unique(roots)
 
 
 def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np.bool_]) -> tuple[float, float]:
@@ -111,11 +111,11 @@ def _range_around(best: float, edges: NDArray[np.float64], supported: NDArray[np
     return float(edges[first]), float(edges[last])
 
 
-def _kept(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
-    out = np.ones(at.size, dtype=np.bool_)
+def _within(curves: list[Polynomial], at: NDArray[np.float64]) -> NDArray[np.bool_]:
+    feasible = np.ones(at.size, dtype=np.bool_)
     for curve in curves:
-        out &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())
-    return out
+        feasible &= curve(at) <= _TINY * (1.0 + np.abs(curve.coef).max())
+    return feasible
 
 
 STEERED = "soi_cad"
@@ -234,7 +234,7 @@ class EngineSurrogate(Parameters):
         -------
         Optimum
             Input ``soi_cad``; ``values`` holds every signal there, ``bounds`` the supported range around it, and
-            ``at_bound`` says that the records, not the engine, hold it.
+            ``at_bound`` marks that the records, not the engine, hold it.
 
         Raises
         ------
@@ -244,10 +244,10 @@ class EngineSurrogate(Parameters):
             No supported SOI meets the limits.
         """
         weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
-        kept = limits_of(limits)
+        upper_limits = limits_of(limits)
         if not weights:
             raise ParameterError("objective = {}: must name at least one signal")
-        for what, numbers in (("objective", weights), ("limits", {limit.name: limit.upper for limit in kept})):
+        for what, numbers in (("objective", weights), ("limits", {limit.name: limit.upper for limit in upper_limits})):
             for name, value in numbers.items():
                 if name not in self.signals:
                     raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {', '.join(self.signals)}")
@@ -258,22 +258,22 @@ class EngineSurrogate(Parameters):
             {name: signal.coefficients for name, signal in self.signals.items()},
             self.points(np.zeros(1), at)[0],
             weights=weights,
-            kept=kept,
+            upper_limits=upper_limits,
             nonnegative=self.nonnegative,
         )
 
     def quality(self) -> xr.Dataset:
         """Tabulate how well each surface does."""
         models = list(self.signals.values())
-        own = "unit of the signal"
+        unit = "unit of the signal"
         return labelled_dataset(
             {
                 "signal": ("signal", list(self.signals), "-", "signal"),
                 "r2": ("signal", [m.r2 for m in models], "-", "R² of all records"),
                 "r2_held_out": ("signal", [m.r2_held_out for m in models], "-", "R² of the held-out records"),
                 "lag_cycles": ("signal", [m.lag_cycles for m in models], "cycles", "lag from command to log"),
-                "residual_sd": ("signal", [m.residual_sd for m in models], own, "residual standard deviation"),
-                "cyclic_sd": ("signal", [m.cyclic_sd for m in models], own, "cyclic standard deviation"),
+                "residual_sd": ("signal", [m.residual_sd for m in models], unit, "residual standard deviation"),
+                "cyclic_sd": ("signal", [m.cyclic_sd for m in models], unit, "cyclic standard deviation"),
             }
         )
 

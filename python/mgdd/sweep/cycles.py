@@ -55,15 +55,15 @@ class Request:
 
 def simulate_cases(request: Request, columns: NDArray[np.float64]) -> dict[str, NDArray[np.generic]]:
     """Simulate cases that differ in the named inputs, on one thread."""
-    wanted = dict.fromkeys(name for name in request.outputs if name not in NOX)
-    wanted |= dict.fromkeys(["t_max_k"] if set(NOX) & set(request.outputs) else [])
-    found = _batch(request, columns, [*wanted, *([] if _ALWAYS in wanted else [_ALWAYS])])
-    out: dict[str, NDArray[np.generic]] = {VOID: np.flatnonzero(np.isnan(found[_ALWAYS]))}
+    needed = dict.fromkeys(name for name in request.outputs if name not in NOX)
+    needed |= dict.fromkeys(["t_max_k"] if set(NOX) & set(request.outputs) else [])
+    outputs = _batch(request, columns, [*needed, *([] if _ALWAYS in needed else [_ALWAYS])])
+    result: dict[str, NDArray[np.generic]] = {VOID: np.flatnonzero(np.isnan(outputs[_ALWAYS]))}
     for name, proxy in zip(NOX, (request.nox.affine_log_ppm, request.nox.arrhenius_ppm), strict=True):
         if name in request.outputs:
-            out[name] = proxy(found["t_max_k"])
-    out |= {name: found[name] for name in request.outputs if name in found}
-    return out | _traces(request, columns)
+            result[name] = proxy(outputs["t_max_k"])
+    result |= {name: outputs[name] for name in request.outputs if name in outputs}
+    return result | _traces(request, columns)
 
 
 def angles_of(request: Request) -> NDArray[np.float64]:
@@ -78,12 +78,12 @@ def _batch(request: Request, columns: NDArray[np.float64], outputs: Sequence[str
     shared = (request.cylinder, request.point, request.soc_cad, request.names)
     scheme = (request.step_cad, request.integrator)
     try:
-        found: Mapping[str, NDArray[np.float64]] = _core.engine.batch(
+        columns_out: Mapping[str, NDArray[np.float64]] = _core.engine.batch(
             *shared, columns, outputs, *scheme, threads=1, form=request.form
         )
     except ParameterError as error:
         raise _located(error, request, columns) from None
-    return found
+    return columns_out
 
 
 def _located(error: ParameterError, request: Request, columns: NDArray[np.float64]) -> ParameterError:
@@ -93,11 +93,11 @@ def _located(error: ParameterError, request: Request, columns: NDArray[np.float6
         return error
     text = str(error)[match.end() :]
     if len(request.names) > 1:
-        text += f" (at {said(request.names, columns[int(match[1])])})"
+        text += f" (at {case_text(request.names, columns[int(match[1])])})"
     return ParameterError(text, field=error.field, value=error.value, bound=error.bound)
 
 
-def said(names: Sequence[str], row: NDArray[np.float64]) -> str:
+def case_text(names: Sequence[str], row: NDArray[np.float64]) -> str:
     """Name a case by its inputs."""
     return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, row, strict=True))
 
@@ -282,16 +282,16 @@ def _finding(cases: Cases, void: _Void) -> Finding:
     text = f"{void.count} of {cases.n} cycles leave the physical range of the pressure and are NaN, the first at "
     (row,) = cases.rows(np.array([void.first]))
     remedy = "take a smaller step_cad, less wall heat or other points"
-    return Finding("unphysical", tuple(cases.names), text + said(cases.names, row), remedy)
+    return Finding("unphysical", tuple(cases.names), text + case_text(cases.names, row), remedy)
 
 
-def _chosen(what: str, given: str | Iterable[str] | None, known: Iterable[str]) -> tuple[str, ...]:
-    known = tuple(known)
-    names = known if given is None else (given,) if isinstance(given, str) else tuple(given)
+def _chosen(what: str, given: str | Iterable[str] | None, choices: Iterable[str]) -> tuple[str, ...]:
+    choices = tuple(choices)
+    names = choices if given is None else (given,) if isinstance(given, str) else tuple(given)
     for name in names:
-        if name not in known:
-            hint = did_you_mean(name, known) or "known are"
-            raise ParameterError.of(argument(what), name, f"a known name: {hint} {', '.join(known)}")
+        if name not in choices:
+            hint = did_you_mean(name, choices) or "known are"
+            raise ParameterError.of(argument(what), name, f"a known name: {hint} {', '.join(choices)}")
     if len(set(names)) < len(names):
         raise ParameterError.of(argument(what), ", ".join(names), "names that differ")
     return names
@@ -335,7 +335,7 @@ def input_labels() -> Mapping[str, Label]:
 
 
 def rank_of(name: str) -> int:
-    """Say where in a grid an input belongs: the higher, the less of a cycle has to be computed anew when it changes."""
+    """Return the rank of an input in a grid: the higher, the less of a cycle has to be computed anew by a change."""
     if name == _TIMING:
         return 3
     if name == "fuel_mg" or name.startswith(_BURN):
@@ -426,12 +426,12 @@ class Cases:
 
     def coordinates(self) -> dict[str, tuple[Any, ...]]:
         """Give the coordinates as `labelled_dataset` takes them."""
-        out: dict[str, tuple[Any, ...]] = {}
+        variables: dict[str, tuple[Any, ...]] = {}
         if self._numbers is not None:
-            out[POINT] = (POINT, self._numbers, "-", "number of the point")
+            variables[POINT] = (POINT, self._numbers, "-", "number of the point")
         for name, values in self.inputs.items():
-            out[name] = (name if self._numbers is None else POINT, values, *input_labels()[name])
-        return out
+            variables[name] = (name if self._numbers is None else POINT, values, *input_labels()[name])
+        return variables
 
 
 def cases_of(over: Any, *, points: bool) -> Cases:
@@ -475,6 +475,6 @@ def _values(name: str, given: Any) -> NDArray[np.float64]:
 
 
 def _require_different(name: str, values: NDArray[np.float64]) -> None:
-    found, counts = np.unique(values, return_counts=True)
+    entries, counts = np.unique(values, return_counts=True)
     if (counts > 1).any():
-        raise ParameterError.of(name, float(found[counts > 1][0]), "on the axis once; it is given several times")
+        raise ParameterError.of(name, float(entries[counts > 1][0]), "on the axis once; it is given several times")

@@ -1,4 +1,4 @@
-"""What the parameters of a throttle say in closed form: groups, holding duty, linear part, air flow."""
+"""What the parameters of a throttle give in closed form: groups, holding duty, linear part, air flow."""
 
 from __future__ import annotations
 

@@ -75,18 +75,18 @@ def to_iosystem(
     ...     assert system.dt == 0.001
     ...     assert rest.round(6).tolist() == [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
     """
-    own: Throttle | PseudoWiener = throttle_model_of(model)
+    plant_model: Throttle | PseudoWiener = throttle_model_of(model)
     try:
         import control
     except ImportError as error:
         raise ImportError("to_iosystem needs python-control: pip install 'mgdd[control]'") from error
-    rest = _at_rest(own, start_deg)
+    rest = _at_rest(plant_model, start_deg)
     stepper: Any
-    if isinstance(own, PseudoWiener):
-        stepper = _stepper(own.at_sample(sample_s))
+    if isinstance(plant_model, PseudoWiener):
+        stepper = _stepper(plant_model.at_sample(sample_s))
         states = [f"state_{i}" for i in range(rest.size)]
     else:
-        stepper = _core.throttle.Stepper(own, sample_s=sample_s, step_s=step_s)
+        stepper = _core.throttle.Stepper(plant_model, sample_s=sample_s, step_s=step_s)
         states = list(_STATES)
 
     def update(_time: float, state: Any, inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
@@ -94,7 +94,7 @@ def to_iosystem(
 
     def output(_time: float, state: Any, _inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
         column = np.asarray(state, dtype=np.float64)
-        return np.asarray([stepper.output(column) if isinstance(own, PseudoWiener) else column[_ANGLE]])
+        return np.asarray([stepper.output(column) if isinstance(plant_model, PseudoWiener) else column[_ANGLE]])
 
     system = control.nlsys(
         update, output, inputs=["duty"], outputs=["angle_deg"], states=states, dt=sample_s, name=name

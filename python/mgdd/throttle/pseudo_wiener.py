@@ -113,8 +113,8 @@ class PseudoWiener(SampledModel, Parameters):
     @property
     def units(self) -> Mapping[str, str]:
         """Unit of every parameter."""
-        known = _core.throttle.pseudo_wiener_units(self.kind)
-        return MappingProxyType({name: str(known[name]) for name in self.parameters})
+        units = _core.throttle.pseudo_wiener_units(self.kind)
+        return MappingProxyType({name: str(units[name]) for name in self.parameters})
 
     def replace(self, **changes: float) -> PseudoWiener:
         """Give a copy with other numbers.
@@ -252,10 +252,10 @@ class PseudoWiener(SampledModel, Parameters):
         """Make the model of a file that `to_toml` or a fit wrote."""
         file.expect(kinds=_KINDS, tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
         units = {name: str(unit) for name, unit in _core.throttle.pseudo_wiener_units(file.kind).items()}
-        said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
+        parameters = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
         options = file.values("settings", wanted(("switching", "friction"), form="text"))
-        model = cls(file.kind, said, **options)
-        file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
+        model = cls(file.kind, parameters, **options)
+        file.values("parameters", wanted(model.parameters, units))  # the numbers determine which of them there are
         return model
 
     def __eq__(self, other: object) -> bool:

@@ -119,7 +119,7 @@ def simulate_throttle(
         if not cases:
             raise ParameterError("throttle, start_deg are empty: give at least one")
         if given is None:
-            starts = np.array([one.limp_home_deg for one in cases])
+            starts = np.array([case.limp_home_deg for case in cases])
         elif starts.size == 1:
             starts = np.repeat(starts, len(cases))
         angle = _core.throttle.simulate_many(cases, column, start_deg=starts, **options)

@@ -289,7 +289,7 @@ def test_unknown_signals_and_priors_are_refused() -> None:
         design_excitation("square", P1)
     with pytest.raises(ParameterError, match=r"side = 'left'"):
         design_excitation("chirp", P1, side="left")
-    with pytest.raises(ParameterError, match="knows no limp-home angle and friction"):
+    with pytest.raises(ParameterError, match="has no limp-home angle and friction"):
         design_excitation("chirp", lambda t, u, s: t + u + s)
     with pytest.raises(ParameterError, match="staircase lasts"):
         design_excitation("staircase", P1, duration_s=5.0)

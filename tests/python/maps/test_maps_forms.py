@@ -83,12 +83,12 @@ def test_the_corner_names_the_axes(
         (
             "n/M",
             {},
-            "line 1: the corner says 'n' and 'M' and not which axis runs down: pass rows='n' if n runs down, or",
+            "line 1: the corner names 'n' and 'M' and not which axis runs down: pass rows='n' if n runs down, or",
         ),
         ("speed [rpm] / fuel [mg]", {}, r"pass rows='speed \[rpm\]' if speed \[rpm\] runs down"),
         ("speed [rpm]", {}, "names one axis, and not whether it runs down or across"),
         ("speed [rpm] / fuel [mg]", {"rows": "load_percent"}, "not which axis runs down"),
-        (r"rpm\mg", {"rows": "fuel_mg"}, "says that rpm runs down and mg across: correct it, or leave rows and"),
+        (r"rpm\mg", {"rows": "fuel_mg"}, "states that rpm runs down and mg across: correct it, or leave rows and"),
         (r"speed_rpm [1/s]\mg", {}, "unit of speed_rpm = '1/s': must be 'rpm'"),
     ],
 )
@@ -145,7 +145,7 @@ def test_title_units_and_remarks_of_a_grid(tmp_path: Path) -> None:
     text = grid(r"n\m").replace("\n", "\n[1/min];mm;mm;mm;mm;mm\n", 1)
     below = read(text, tmp_path, name="lift_mm")
     assert [below.labels[name].units for name in ("lift_mm", "n", "m")] == ["mm", "rpm", "not given"]
-    with pytest.raises(DataError, match="line 2: unit 'mm' of lift_s: its name or label says 's'"):
+    with pytest.raises(DataError, match="line 2: unit 'mm' of lift_s: its name or label gives 's'"):
         read(text, tmp_path, name="lift_s")
     with pytest.raises(DataError, match="line 2: units 'cm', 'mm': the values have one"):
         read(text.replace("mm", "cm", 1), tmp_path)
@@ -210,7 +210,7 @@ BAD = [
     ("<html><body/></html>", "begins with <html>"),
     ("speed_rpm,fuel_mg,x\n900,6,1\n900,10,2\n1400,6,3\n", "no point at speed_rpm = 1400, fuel_mg = 10: 1 of 4 cells"),
     ("speed_rpm,fuel_mg,x\n900,6,1\n,10,2\n1400,6,3\n", "line 3: the breakpoint of 'speed_rpm' is empty"),
-    ("a,b,c,d\n900,6,1,0\n900,10,2,0\n", "4 columns with numbers .* say which with rows='…', columns='…', name='…'"),
+    ("a,b,c,d\n900,6,1,0\n900,10,2,0\n", "4 columns with numbers .* choose one with rows='…', columns='…', name='…'"),
 ]  # fmt: skip
 
 
@@ -420,7 +420,7 @@ def test_a_cdfx_file_of_other_hands() -> None:
     assert found.skipped == (
         "Cube: category CUBOID: only VALUE, CURVE, MAP, COM_AXIS are read",
         "Text: its values are texts, or not there",
-        "KL.Away: the breakpoints of its axis Elsewhere do not stand in the file",
+        "KL.Away: the breakpoints of its axis Elsewhere are not in the file",
     )
     with pytest.raises(ParameterError, match="no map 'Cube': Cube: category CUBOID: only VALUE, CURVE, MAP"):
         read_map(DATA / "tool.cdfx", "Cube")

@@ -473,7 +473,7 @@ def test_bad_records_are_named():
         fit_response(PLAN, y[:-1])
     with pytest.raises(DataError, match="10 points for 10 terms: at least 11 are needed"):
         fit_response(PLAN.isel(point=slice(10)), y[:10], select="all")
-    with pytest.raises(DataError, match="do not tell the 3 terms apart"):
+    with pytest.raises(DataError, match="do not separate the 3 terms"):
         fit_response({"x": np.tile([0.0, 1.0], 4)}, np.arange(8.0), select="all")
     with pytest.raises(ParameterError, match="none of point, mean"):
         fit_response({"mean": [1.0, 2.0, 3.0]}, [1.0, 2.0, 4.0])

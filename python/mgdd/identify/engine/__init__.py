@@ -1,1 +1,1 @@
-"""Calibration of the cylinder model to measured pressure; public names stand in `mgdd.identify`."""
+"""Calibration of the cylinder model to measured pressure; public names are in `mgdd.identify`."""

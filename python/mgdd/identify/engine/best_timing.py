@@ -46,7 +46,7 @@ def best_timing(
     """Give each load's best timing by every model of a family, and the range of the plausible ones.
 
     Traces alone do not determine wall heat and gamma, so one model's best timing would be false precision: the range
-    says what the plausible models leave open, the best member what to try first.
+    states what the plausible models leave open, the best member what to try first.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def best_timing(
     >>> rows[0].free_direction
     'not determined'
     """
-    kept = {limit.name: limit.upper - limit.margin for limit in limits_of(limits)}
-    check_request(objective, kept)
+    caps = {limit.name: limit.upper - limit.margin for limit in limits_of(limits)}
+    check_request(objective, caps)
     request = Request.of(
         traces, cylinder, free=None, fuel_heat_j=fuel_heat_j, bounds=bounds, point=point, start_values=None,
         step_cad=step_cad, integrator=integrator, options=None,
@@ -109,11 +109,11 @@ def best_timing(
         raise ConvergenceError("no model of the family could be fitted to these traces: check geometry, TDC, pegging")
     scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
     answers = [
-        tuple(_answer(member, at, objective, kept, bounds_cad, scheme) for member in members)
+        tuple(_answer(member, at, objective, caps, bounds_cad, scheme) for member in members)
         for at in range(len(request.traces))
     ]
     misfit = family.misfit_cad
-    rows = [_over_family(label, own, misfit) for label, own in zip(request.labels, answers, strict=True)]
+    rows = [_over_family(label, timings, misfit) for label, timings in zip(request.labels, answers, strict=True)]
     return hand_over(rows, stop)
 
 
@@ -127,19 +127,19 @@ def _answer(
 ) -> MemberTiming:
     load: Load = member.fit.loads[at]
     free: Optimum | None
-    kept: Optimum | None
+    limited: Optimum | None
     now = simulate(load.cylinder, load.point, soc_cad=load.soc_cad, **scheme)
     # The model's own error in p_max at the measured timing is not a violation of the limit.
     ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
-    own = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
+    own_limits = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
     search: dict[str, Any] = {"bounds_cad": bounds_cad or _search(load), **scheme}
     try:
         free = find_optimum(load.cylinder, load.point, objective, limits=limits, **search)
-        kept = find_optimum(load.cylinder, load.point, objective, limits=own, **search)
+        limited = find_optimum(load.cylinder, load.point, objective, limits=own_limits, **search)
     except ConvergenceError:
         if not member.why_not[at]:
             raise
-        free = kept = None  # an implausible member has no say, so it must not stop the others
+        free = limited = None  # an implausible member does not count, so it must not stop the others
     base = float(now[objective])
     return MemberTiming(
         member=member,
@@ -152,12 +152,12 @@ def _answer(
         fitted_ca50_cad=load.ca50_cad,
         soc_minus_soi_cad=load.onset_against_soi_cad,
         efficiency_gross=float(now["efficiency_gross"]),
-        **_best_of(kept, base, load.soc_cad, ""),
+        **_best_of(limited, base, load.soc_cad, ""),
         **_best_of(free, base, load.soc_cad, "free_"),
         free_p_max_bar=math.nan if free is None else float(free["p_max_bar"]),
         p_max_model_error_bar=float(now["p_max_bar"]) - load.p_max_bar,
         p_max_limit_bar=ceiling,
-        at_bound=any(found is not None and found.at_bound for found in (free, kept)),
+        at_bound=any(optimum is not None and optimum.at_bound for optimum in (free, limited)),
     )
 
 
@@ -170,21 +170,21 @@ def _search(load: Load) -> tuple[float, float]:
     return max(first, low, cylinder.ivc_cad), min(last, high, cylinder.evo_cad - 1.0)
 
 
-def _best_of(found: Optimum | None, base: float, fitted: float, prefix: str) -> dict[str, float]:
+def _best_of(best: Optimum | None, base: float, fitted: float, prefix: str) -> dict[str, float]:
     # Over a cycle without work no gain is a share of it.
     per_base = 100.0 / base if base > 0.0 else math.nan
     soc, half, gain = (
-        (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], per_base * (found.value - base))
+        (math.nan,) * 3 if best is None else (best["soc_cad"], best["ca50_cad"], per_base * (best.value - base))
     )
     values = {"soc_cad": soc, "ca50_cad": half, "shift_cad": soc - fitted, "gain_percent": gain}
     return {prefix + name: value for name, value in values.items()}
 
 
 def _over_family(file: str, answers: tuple[MemberTiming, ...], misfit_cad: float) -> BestTiming:
-    kept = [answer for answer in answers if answer.plausible]
+    plausible = [answer for answer in answers if answer.plausible]
 
     def span(name: str) -> tuple[float, float]:
-        values = [float(getattr(answer, name)) for answer in kept] or [math.nan]
+        values = [float(getattr(answer, name)) for answer in plausible] or [math.nan]
         wider = misfit_cad if name.endswith("_cad") else 0.0
         return min(values) - wider, max(values) + wider
 
@@ -204,22 +204,22 @@ def headline_of(rows: Sequence[BestTiming]) -> Member:
     """Give the member that stands for all loads: plausible for the most of them, then with the least score."""
 
     def rank(at: int) -> tuple[int, float]:
-        own = [row.members[at] for row in rows]
-        return -sum(answer.plausible for answer in own), own[0].member.score
+        members = [row.members[at] for row in rows]
+        return -sum(answer.plausible for answer in members), members[0].member.score
 
     return rows[0].members[min(range(len(rows[0].members)), key=rank)].member
 
 
 def doubts_of(rows: Sequence[BestTiming], tdc: TdcEstimate | None = None) -> list[str]:
-    """Say what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
-    out = [str(finding) for finding in headline_of(rows).fit.findings]
+    """Report what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
+    reasons = [str(finding) for finding in headline_of(rows).fit.findings]
     for row in rows:
         ends = sum(answer.at_bound for answer in row.plausible)
         if ends:
-            out.append(
+            reasons.append(
                 f"{row.file}: the best timing of {ends} plausible model(s) lies at the end of the searched range: "
                 "widen bounds_cad, or suspect TDC"
             )
         if not row.plausible:
-            out.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
-    return out + (tdc.doubts() if tdc is not None else [])
+            reasons.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
+    return reasons + (tdc.doubts() if tdc is not None else [])

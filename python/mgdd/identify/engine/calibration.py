@@ -73,8 +73,8 @@ def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
     best = min(laws, key=lambda law: law.report.rmse if law.report.rmse == law.report.rmse else float("inf"))
     if not best.report.rmse < _MUCH_BETTER * fit.report.rmse:
         return []
-    rmse, own = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
-    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}"
+    rmse, fit_rmse = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
+    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {fit_rmse:.2f} % of {fit.kind}"
     remedy = (
         f"{argument('burn_shape')} and {argument('gamma_model')} choose the law, mgdd engine optimum compares a family"
     )
@@ -83,8 +83,8 @@ def better_laws(fit: CylinderFit, laws: Sequence[CylinderFit]) -> list[str]:
 
 def law_row(fit: CylinderFit) -> dict[str, Any]:
     """Give one row of the comparison of burn laws: lists over the traces."""
-    known = any(math.isfinite(load.soi_cad) for load in fit.loads)
-    onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if known else {}
+    has_soi = any(math.isfinite(load.soi_cad) for load in fit.loads)
+    onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if has_soi else {}
     return {
         "law": fit.kind,
         **onset,
@@ -104,7 +104,7 @@ _PER_TRACE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """A fit, and what says how far it may be believed; the profile is None where the wall heat was not fitted."""
+    """A fit with its reliability; the profile is None where the wall heat was not fitted."""
 
     fit: CylinderFit
     profile: WallHeatProfile | None
@@ -159,32 +159,32 @@ class Calibration:
         return common
 
     def summary(self) -> str:
-        """Say all of it in words."""
+        """Return a short summary."""
         fit, profile, tdc = self.fit, self.profile, self.tdc
-        out = [f"Calibration with {fit.kind}: {fit.report.message}", "", *_loads(fit)]
+        lines = [f"Calibration with {fit.kind}: {fit.report.message}", "", *_loads(fit)]
         for name, value, error in zip(fit.report.names, fit.report.values, fit.report.stderr, strict=True):
             if "[" not in name and name != "wall_heat_scale":
-                out.append(f"  {name} = {value:.6g} +- {error:.2g} (all traces)")
+                lines.append(f"  {name} = {value:.6g} +- {error:.2g} (all traces)")
         if profile is not None:
             error = f" +- {profile.stderr:.3f}" if profile.stderr == profile.stderr else ", at a bound"
             verdict = "identifiable" if profile.identifiable else "not identifiable from these traces"
-            out += [
+            lines += [
                 "",
                 f"wall-heat scale {profile.value:.3f}{error}: {verdict}",
                 f"  strongest correlation {profile.correlation:+.2f}, with {profile.correlated_with}",
                 *(f"  {reason}" for reason in profile.reasons),
             ]
         if self.unidentifiable():
-            out += ["", f"not identifiable: {', '.join(self.unidentifiable())}"]
+            lines += ["", f"not identifiable: {', '.join(self.unidentifiable())}"]
         place = f"{tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"
-        out += ["", f"TDC offset {place}; {tdc.cost}"]
+        lines += ["", f"TDC offset {place}; {tdc.cost}"]
         if self.doubts():
-            out += ["", "limitations found:", *(f"  - {text}" for text in self.doubts())]
-        out += ["", "every burn law on the same traces:"]
+            lines += ["", "limitations found:", *(f"  - {text}" for text in self.doubts())]
+        lines += ["", "every burn law on the same traces:"]
         for law in self.laws:
-            out += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
-            out += [f"  - {text}" for text in law.findings]
-        return "\n".join(out)
+            lines += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
+            lines += [f"  - {text}" for text in law.findings]
+        return "\n".join(lines)
 
 
 def _loads(fit: CylinderFit) -> list[str]:
@@ -192,15 +192,15 @@ def _loads(fit: CylinderFit) -> list[str]:
     last = f" {'SOC - SOI':>10}" if onset else ""
     form = "  {:24} {:>9} {:>15} {:>7} {:>9} {:>9} {:>7} {:>20}"
     head = ("trace", "RMSE [%]", "closed IMEP [%]", "SOC", "duration", "heat [J]", "CA50", "largest error")
-    out = [form.format(*head) + last]
+    lines = [form.format(*head) + last]
     for load in fit.loads:
         error = f"{load.largest_error_bar:+.1f} bar at {load.largest_error_cad:.0f}"
         late = f" {load.onset_against_soi_cad:+10.1f}" if onset else ""
-        out.append(
+        lines.append(
             f"  {load.file:24} {load.rmse_percent:9.2f} {load.imep_closed_error_percent:+15.1f} {load.soc_cad:7.2f} "
             f"{load.burn_duration_cad:9.1f} {load.fuel_heat_j:9.0f} {load.ca50_cad:7.1f} {error:>20}{late}"
         )
-    return out
+    return lines
 
 
 def judge_fit(fit: CylinderFit, *, fuel_heat_j: float | None, progress: Callable[[str], None]) -> Calibration:

@@ -200,7 +200,7 @@ def _load(
         },
         attrs={"file": label, "burn": cylinder.burn_shape},
     )
-    own = conditions(trace, point).replace(
+    state = conditions(trace, point).replace(
         intake_pressure_kpa=burn.start_pressure_bar * 100.0,
         fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
         burn_duration_cad=burn.burn_duration_cad,
@@ -208,7 +208,7 @@ def _load(
     )
     return Load(
         file=label,
-        point=own,
+        point=state,
         cylinder=with_burn(cylinder, burn),
         soc_cad=burn.soc_cad,
         burn_duration_cad=burn.burn_duration_cad,

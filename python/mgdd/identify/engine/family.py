@@ -183,8 +183,8 @@ def fit_family(
     members: list[Member] = []
     stop: Interrupted | None = None
     try:
-        for own in family.requests(request):
-            members.append(_member(own, fit_request(own)))
+        for law_request in family.requests(request):
+            members.append(_member(law_request, fit_request(law_request)))
             if progress is not None:
                 progress(f"calibrated {members[-1].name}")
     except KeyboardInterrupt:
@@ -194,16 +194,16 @@ def fit_family(
     least = family.least_rmse(members)
     members = [replace(m, why_not=tuple(_judged(m, family, least, request.known_heat_j))) for m in members]
     # The choice is among the plausible ones, so an implausible member does not set the measure.
-    kept = [m for m in members if "" in m.why_not]
-    least = family.least_rmse(kept or members)
+    plausible = [m for m in members if "" in m.why_not]
+    least = family.least_rmse(plausible or members)
     return hand_over(tuple(replace(m, score=_score(m, family, least)) for m in members), stop)
 
 
 def of_law(request: Request, cylinder: Cylinder, common: tuple[str, ...]) -> Request:
     """Give the request for another burn law: its own burn parameters free, and what is common to all traces."""
     shape = SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ()
-    known = request.known_heat_j[0] is not None
-    burn = tuple(name for name in BURN_FIELDS if not (known and name == "fuel_heat_j"))
+    heat_is_known = request.known_heat_j[0] is not None
+    burn = tuple(name for name in BURN_FIELDS if not (heat_is_known and name == "fuel_heat_j"))
     start = tuple(name for name in request.free if name == "start_pressure_bar")
     return replace(request, cylinder=cylinder, free=(*common, *burn, *shape, *start), start_values=None)
 
@@ -235,12 +235,12 @@ def _left_out(request: Request, fit: CylinderFit) -> tuple[float, ...]:
     common, n = common_of(request), len(request.traces)
     if n < 2 or not common:
         return tuple(load.rmse_percent for load in fit.loads)
-    out = []
+    reasons = []
     for i in range(n):
         others = fit_request(request.subset([k for k in range(n) if k != i]))
         held = request.cylinder.replace(**{name: float(getattr(others.model, name)) for name in common})
-        out.append(fit_request(of_law(request.subset([i]), held, ())).loads[0].rmse_percent)
-    return tuple(out)
+        reasons.append(fit_request(of_law(request.subset([i]), held, ())).loads[0].rmse_percent)
+    return tuple(reasons)
 
 
 def _score(member: Member, family: ModelFamily, least: float) -> float:
@@ -250,7 +250,7 @@ def _score(member: Member, family: ModelFamily, least: float) -> float:
 
 
 def _judged(member: Member, family: ModelFamily, least: float, known_heat_j: Sequence[float | None]) -> Iterator[str]:
-    of_all = [found.text for found in family.of_model(member.fit.model)]
+    of_all = [finding.text for finding in family.of_model(member.fit.model)]
     if not member.fit.report.success:
         of_all.append("the fit did not converge")
     rmse, factor = member.fit.report.rmse, family.rmse_factor
@@ -258,14 +258,14 @@ def _judged(member: Member, family: ModelFamily, least: float, known_heat_j: Seq
         of_all.append(
             f"RMSE {100.0 * rmse:.2f} % of all traces, over {factor:g} times the least, {100.0 * least:.2f} %"
         )
-    for load, left_out, known in zip(member.fit.loads, member.left_out_percent, known_heat_j, strict=True):
-        own = [found.text for found in family.of_load(load, known)]
-        yield "; ".join([*of_all, *own, *_reasons(load, family, left_out)])
+    for load, left_out, heat_j in zip(member.fit.loads, member.left_out_percent, known_heat_j, strict=True):
+        of_trace = [finding.text for finding in family.of_load(load, heat_j)]
+        yield "; ".join([*of_all, *of_trace, *_reasons(load, family, left_out)])
 
 
 def _reasons(load: Load, family: ModelFamily, left_out: float) -> Iterator[str]:
     if load.onset_against_soi_cad < -1e-9:
         yield f"burn {-load.onset_against_soi_cad:.1f} °CA before the injection"
-    own = max(load.rmse_percent, family.rmse_floor_percent)
-    if not left_out <= family.rmse_factor * own:
-        yield f"RMSE {left_out:.2f} % with wall heat and gamma of the other traces, {own:.2f} % with its own"
+    own_rmse = max(load.rmse_percent, family.rmse_floor_percent)
+    if not left_out <= family.rmse_factor * own_rmse:
+        yield f"RMSE {left_out:.2f} % with wall heat and gamma of the other traces, {own_rmse:.2f} % with its own"

@@ -123,14 +123,14 @@ def _of_traces(request: Request) -> Iterator[Finding]:
             "heat per degree depends on it",
             "give point=, or the attribute speed_rpm",
         )
-    for trace, label, known in zip(request.traces, request.labels, request.known_heat_j, strict=True):
+    for trace, label, heat_j in zip(request.traces, request.labels, request.known_heat_j, strict=True):
         analysis = analyze(trace, request.cylinder, point=request.point, quiet=True)
         net = float(analysis["heat_net_j"])
-        if known is not None and net > known:
+        if heat_j is not None and net > heat_j:
             yield Finding(
                 "fuel_too_small",
                 (label,),
-                f"{label}: the gas shows {net:.0f} J of net heat, more than the {known:.0f} J of the stated fuel",
+                f"{label}: the gas shows {net:.0f} J of net heat, more than the {heat_j:.0f} J of the stated fuel",
                 "suspect fuel_mg, TDC, the pressure unit or the displacement",
             )
         for text in analysis.attrs["warnings"].splitlines():
@@ -180,20 +180,20 @@ def _early(fit: CylinderFit, request: Request) -> Iterator[Finding]:
 
 def _implausible(fit: CylinderFit, request: Request) -> Iterator[Finding]:
     """Give what the model cannot be; the error of the work has a finding of its own, over all traces."""
-    for found in _PLAUSIBLE.of_model(fit.model):
+    for finding in _PLAUSIBLE.of_model(fit.model):
         yield replace(
-            found,
-            text=f"{found.text}: it makes up for another error of the model, and fuel heat and burn do so with it",
+            finding,
+            text=f"{finding.text}: it makes up for another error of the model, and fuel heat and burn do so with it",
             remedy="state the fuel, hold wall_heat_scale and free gamma, or ask best_timing",
         )
     of_loads: dict[str, list[Finding]] = {}
-    for load, known in zip(fit.loads, request.known_heat_j, strict=True):
-        for found in _PLAUSIBLE.of_load(load, known):
-            of_loads.setdefault(found.code, []).append(replace(found, text=f"{load.file} {found.text}"))
+    for load, heat_j in zip(fit.loads, request.known_heat_j, strict=True):
+        for finding in _PLAUSIBLE.of_load(load, heat_j):
+            of_loads.setdefault(finding.code, []).append(replace(finding, text=f"{load.file} {finding.text}"))
     for code, together in of_loads.items():
         if code != "imep_error":
-            files = tuple(name for found in together for name in found.names)
-            text = "; ".join(found.text for found in together[:3]) + (" and others" if len(together) > 3 else "")
+            files = tuple(name for finding in together for name in finding.names)
+            text = "; ".join(finding.text for finding in together[:3]) + (" and others" if len(together) > 3 else "")
             yield Finding(code, files, text, "suspect gamma, TDC, pegging or the fuel")
 
 
@@ -216,7 +216,7 @@ def _work(fit: CylinderFit) -> Iterator[Finding]:
     )
 
 
-# How far gamma, pressure and angle of a usual bench may be off, where nobody has said better.
+# How far gamma, pressure and angle of a usual bench may be off, without better knowledge.
 WIDTHS: Mapping[str, float] = MappingProxyType({"gamma": 0.03, "pegging_bar": 0.1, "tdc_cad": 0.3})
 _FUEL = 0.05  # of the stated fuel that may not burn, or not be there
 _STEPS = 30  # of a search that starts near its end
@@ -228,14 +228,14 @@ def with_model_error(report: FitReport, request: Request, fit: _core.identify.Cy
     Considered, not estimated (Schmidt 1966): each held quantity is spread evenly over its width, and everything is
     fitted again with it at one end. A parameter at a bound or in a null direction stays as it is.
     """
-    known = np.flatnonzero(np.isfinite(report.stderr))
-    if known.size == 0:
+    finite = np.flatnonzero(np.isfinite(report.stderr))
+    if finite.size == 0:
         return report
     covariance, stderr = report.covariance.copy(), report.stderr.copy()
     for change in _changes(request, fit.cylinder):
         moved = _estimates(request, fit, **change) - report.values
-        covariance[np.ix_(known, known)] += np.outer(moved, moved)[np.ix_(known, known)] / 3.0  # of an even spread
-    stderr[known] = np.sqrt(np.diag(covariance)[known])
+        covariance[np.ix_(finite, finite)] += np.outer(moved, moved)[np.ix_(finite, finite)] / 3.0  # of an even spread
+    stderr[finite] = np.sqrt(np.diag(covariance)[finite])
     for array in (covariance, stderr):
         array.flags.writeable = False
     return replace(report, covariance=covariance, stderr=stderr)

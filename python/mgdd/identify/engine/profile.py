@@ -32,7 +32,7 @@ _CORRELATION = float(_core.identify.correlation_limit)
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class WallHeatProfile(Result):
-    """What the traces say about the wall-heat scale.
+    """What the traces show of the wall-heat scale.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def wall_heat_profile(
     ('wall_heat_scale',)
     """
     if NAME not in fit.report.names:
-        raise ParameterError(f"{NAME} was not free in this fit: free it, then ask for its profile")
+        raise ParameterError(f"{NAME} was not free in this fit: free it, then take its profile")
     bad = [scale for scale in scales if not 0.0 <= scale <= UPPER]
     if bad:
         raise ParameterError(f"scales: {bad[0]:g} must be in [0, {UPPER:g}]")
@@ -139,7 +139,7 @@ def wall_heat_profile(
         if scale not in fits:
             if progress is not None:
                 progress(f"{fit.kind}: refit at wall-heat scale {scale:.3g}")
-            near = fits[min(fits, key=lambda known: abs(known - scale))]
+            near = fits[min(fits, key=lambda other: abs(other - scale))]
             held = near.model.replace(wall_heat_scale=scale)
             fits[scale] = fit_request(replace(fit.request, cylinder=held, free=free, start_values=starts_of(near)))
         return fits[scale]
@@ -194,7 +194,7 @@ def _moved(
     """Estimate the scale again with one assumption lower and higher by its width."""
     start = replace(fit.request, cylinder=fit.model, start_values=starts_of(fit))
     gamma = GAMMA_PARAMETER[fit.model.gamma_model]
-    out = {}
+    errors = {}
     for name, width in widths.items():
         if name == "gamma" and gamma in fit.request.free:
             continue
@@ -203,8 +203,8 @@ def _moved(
             if progress is not None:
                 progress(f"{fit.kind}: refit with {_NAMES[name]} {side:+g}{_UNITS[name]}")
             pair.append(float(fit_request(_with_offset(start, name, side, gamma)).model.wall_heat_scale))
-        out[name] = (pair[0], pair[1])
-    return out
+        errors[name] = (pair[0], pair[1])
+    return errors
 
 
 def _with_offset(request: Request, name: str, offset: float, gamma: str) -> Request:
@@ -284,14 +284,14 @@ def _dataset(fits: dict[float, CylinderFit]) -> xr.Dataset:
     scales = np.array(sorted(fits))
     ordered = [fits[scale] for scale in scales]
     files = [load.file for load in ordered[0].loads]
-    own = np.array([[load.rmse_percent for load in f.loads] for f in ordered])
+    trace_rmse = np.array([[load.rmse_percent for load in f.loads] for f in ordered])
     error = np.array([[load.imep_closed_error_percent for load in f.loads] for f in ordered])
     return labelled_dataset(
         {
             NAME: (NAME, scales),
             "file": ("file", files, "-", "trace"),
             "rmse_percent": (NAME, [100.0 * f.report.rmse for f in ordered]),
-            "rmse_percent_per_trace": ((NAME, "file"), own, "% of p_max", "pressure RMSE of each trace"),
+            "rmse_percent_per_trace": ((NAME, "file"), trace_rmse, "% of p_max", "pressure RMSE of each trace"),
             "imep_closed_error_percent": ((NAME, "file"), error),
         }
     )

@@ -89,7 +89,7 @@ class CylinderFit(Fit):
 
     The residual of the report is (model - measured)/p_max, so its ``rmse`` is a fraction of p_max. Standard errors of
     `fit_cylinder` count, beside the scatter of the residual, gamma 0.03, pegging 0.1 bar and TDC 0.3 °CA off where they
-    are held, and 5 % of a stated fuel; ``findings`` say where the laws of the model are too far off for that.
+    are held, and 5 % of a stated fuel; ``findings`` report where the laws of the model are too far off for that.
 
     Parameters
     ----------

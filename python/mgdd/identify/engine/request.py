@@ -1,4 +1,4 @@
-"""What a calibration is asked for: traces pegged and cut to the closed part, what is free, known and bounded."""
+"""Settings of a calibration: traces pegged and cut to the closed part, what is free, known and bounded."""
 
 from __future__ import annotations
 
@@ -79,8 +79,8 @@ class Request:
         heats = _known_heats(given, cylinder, fuel_heat_j, fuel_mg, chosen)
         noisy = any(_scatter_of_start(trace, cylinder) > _NOISY_START for trace in given)
         default = (*default_free(cylinder), *(("start_pressure_bar",) if noisy else ()))
-        known = _all_known(heats)
-        names = chosen if chosen is not None else tuple(n for n in default if n != "fuel_heat_j" or not known)
+        heat_known = _all_known(heats)
+        names = chosen if chosen is not None else tuple(n for n in default if n != "fuel_heat_j" or not heat_known)
         names = tuple(GAMMA_PARAMETER[cylinder.gamma_model] if name == "gamma" else name for name in names)
         if start_values is not None and len(start_values) != len(given):
             raise ParameterError(f"start_values has {len(start_values)} entries for {len(given)} traces")
@@ -105,26 +105,26 @@ class Request:
             angle, pressure = closed(trace, self.cylinder)
             if late_cad or more_bar:
                 pressure = np.interp(angle - late_cad, angle, pressure) + more_bar
-            own = conditions(trace, self.point)
+            point = conditions(trace, self.point)
             out.append(
-                _core.identify.MeasuredCycle(label=label, crank_angle_cad=angle, pressure_bar=pressure, point=own)
+                _core.identify.MeasuredCycle(label=label, crank_angle_cad=angle, pressure_bar=pressure, point=point)
             )
         return out
 
     def starts(self, measured: Sequence[_core.identify.MeasuredCycle]) -> list[LoadBurn]:
         """Give the start of each burn: from the trace's heat release, then what is given, then what is known."""
-        known = _core.identify.load_parameters()
+        names = _core.identify.load_parameters()
         burns = []
         for index, trace in enumerate(measured):
-            said = {} if self.start_values is None else self.start_values[index]
-            for name in said:
-                if name not in known:
+            start_values = {} if self.start_values is None else self.start_values[index]
+            for name in start_values:
+                if name not in names:
                     raise ParameterError(
-                        f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
+                        f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(names)}"
                     )
-            full = set(known) - {"start_pressure_bar"} <= set(said)  # then nothing is left to estimate
+            full = set(names) - {"start_pressure_bar"} <= set(start_values)  # then nothing is left to estimate
             burn = LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
-            for name, value in said.items():
+            for name, value in start_values.items():
                 setattr(burn, name, float(value))
             heat = self.known_heat_j[index]
             if heat is not None:
@@ -151,14 +151,14 @@ class Request:
                 out[name] = (earliest, math.inf)
         return out
 
-    def subset(self, kept: Sequence[int]) -> Self:
+    def subset(self, places: Sequence[int]) -> Self:
         """Give the same request for some of the traces."""
         return replace(
             self,
-            traces=tuple(self.traces[i] for i in kept),
-            labels=tuple(self.labels[i] for i in kept),
-            known_heat_j=tuple(self.known_heat_j[i] for i in kept),
-            start_values=None if self.start_values is None else tuple(self.start_values[i] for i in kept),
+            traces=tuple(self.traces[i] for i in places),
+            labels=tuple(self.labels[i] for i in places),
+            known_heat_j=tuple(self.known_heat_j[i] for i in places),
+            start_values=None if self.start_values is None else tuple(self.start_values[i] for i in places),
         )
 
     def shifted(self, *, angle_cad: float = 0.0, pressure_bar: float = 0.0) -> Self:
@@ -221,8 +221,8 @@ def default_free(cylinder: Cylinder) -> tuple[str, ...]:
 
 def earliest_burn_cad(trace: xr.Dataset) -> float:
     """Give the earliest start of a burn: the injection or spark that the trace states, else NaN."""
-    said = [float(trace.attrs[name]) for name in _EARLIEST if _has(trace, name)]
-    return min(said) if said else math.nan
+    angles = [float(trace.attrs[name]) for name in _EARLIEST if _has(trace, name)]
+    return min(angles) if angles else math.nan
 
 
 def _has(trace: xr.Dataset, name: str) -> bool:
@@ -274,7 +274,7 @@ def _known_heats(
 ) -> tuple[float | None, ...]:
     """Give the known fuel heat of each trace: as given, by its attribute or the stated ``fuel_mg``; all or none."""
     if fuel_heat_j is not None and fuel_mg is not None:
-        raise ParameterError("fuel_heat_j and point['fuel_mg'] both say the fuel: give one")
+        raise ParameterError("fuel_heat_j and point['fuel_mg'] both state the fuel: give one")
     heats: tuple[float | None, ...]
     if fuel_heat_j is None:
         per_mg = cylinder.lower_heating_value_mj_per_kg
@@ -283,8 +283,8 @@ def _known_heats(
         if free is not None and "fuel_heat_j" in free:
             return (None,) * len(traces)
     else:
-        one = isinstance(fuel_heat_j, int | float | np.number)
-        heats = (fuel_heat_j,) * len(traces) if one else tuple(fuel_heat_j)  # type: ignore[arg-type, assignment]
+        is_number = isinstance(fuel_heat_j, int | float | np.number)
+        heats = (fuel_heat_j,) * len(traces) if is_number else tuple(fuel_heat_j)  # type: ignore[arg-type, assignment]
         if free is not None and "fuel_heat_j" in free:
             raise ParameterError("fuel_heat_j is free and given: leave it out of free to hold it, or do not give it")
     if len(heats) != len(traces):

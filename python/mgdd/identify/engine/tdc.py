@@ -38,7 +38,7 @@ _STEP_CAD = 0.25
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class TdcEstimate(Result):
-    """Where top dead centre stands in the angles of a trace.
+    """Where top dead centre lies in the angles of a trace.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class TdcEstimate(Result):
 
     def __post_init__(self) -> None:
         labels = {name: unit_attributes("°CA", f"{end} possible offset") for name, end in _ENDS}
-        ends = {name: ((), getattr(self, name), own) for name, own in labels.items()}
+        ends = {name: ((), getattr(self, name), label) for name, label in labels.items()}
         object.__setattr__(self, "dataset", self.dataset.assign(ends))
 
     @property
@@ -88,7 +88,7 @@ class TdcEstimate(Result):
         motored = {name: getattr(self, name) for name in ("loss_angle_cad", "wall_heat_scale")}
         return {
             **{name: getattr(self, name) for name in names},
-            **{name: None if math.isnan(own) else own for name, own in motored.items()},
+            **{name: None if math.isnan(value) else value for name, value in motored.items()},
             "findings": list(self.findings),
             "others_cad": list(self.others_cad),
         }
@@ -104,7 +104,7 @@ class TdcEstimate(Result):
         return not self.low_cad <= 0.0 <= self.high_cad
 
     def doubts(self) -> list[str]:
-        """Say in words that the angles are outside the range, and what no sound engine has."""
+        """Report that the angles are outside the range, and what no sound engine has."""
         if not self.suspect:
             return list(self.findings)
         edge = "tdc_offset_cad" in self.dataset and abs(self.tdc_offset_cad) >= abs(
@@ -116,14 +116,14 @@ class TdcEstimate(Result):
             else f"{self.low_cad:+.2f} to {self.high_cad:+.2f} possible"
         )
         shown = f"{self.tdc_offset_cad:+.2f} °CA too large ({how}; {self.cost})"
-        said = f"the {self.method} has the angles {shown}: suspect TDC"
-        return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off", *self.findings]
+        text = f"the {self.method} has the angles {shown}: suspect TDC"
+        return [f"{text}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off", *self.findings]
 
     def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.calibration import tdc_scan
 
         if "rmse_percent" not in self.dataset:
-            raise DataError("a motored estimate has no scan to draw: its offset and loss angle say all")
+            raise DataError("a motored estimate has no scan to draw: use its offset and loss angle")
         return tdc_scan(self, ax=ax)
 
 
@@ -137,7 +137,7 @@ def estimate_tdc(
     span_cad: float = 3.0,
     progress: Callable[[str], None] | None = None,
 ) -> TdcEstimate:
-    """Estimate where firing TDC stands in the angles of traces from one encoder.
+    """Estimate where firing TDC lies in the angles of traces from one encoder.
 
     Parameters
     ----------
@@ -210,17 +210,17 @@ def _of_motored(request: Request, cost: DegreeCost) -> TdcEstimate:
             )
         except DataError as error:
             raise error.reworded(f"{label}: {error}") from None
-    found = MotoredTdc.of_many(strokes)
+    motored = MotoredTdc.of_many(strokes)
     return TdcEstimate(
-        tdc_offset_cad=found.offset_cad,
-        low_cad=found.offset_cad - found.offset_half_cad,
-        high_cad=found.offset_cad + found.offset_half_cad,
+        tdc_offset_cad=motored.offset_cad,
+        low_cad=motored.offset_cad - motored.offset_half_cad,
+        high_cad=motored.offset_cad + motored.offset_half_cad,
         method="motored strokes",
         imep_closed_bar=cost.imep_bar,
         imep_error_bar=cost.error_bar,
-        loss_angle_cad=found.loss_angle_cad,
-        wall_heat_scale=found.wall_heat_scale,
-        findings=found.findings,
+        loss_angle_cad=motored.loss_angle_cad,
+        wall_heat_scale=motored.wall_heat_scale,
+        findings=motored.findings,
         dataset=labelled_dataset({}),
     )
 
@@ -278,18 +278,18 @@ def _with_gas(request: Request) -> Request:
     return replace(made, bounds={**_GAS, **made.bounds})
 
 
-def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
+def _best_at(request: Request, offset: float, neighbours: dict[float, CylinderFit]) -> CylinderFit:
     """Fit at one offset, from the heat release and from the neighbour that is fitted: the better of both."""
     moved = request.shifted(angle_cad=-offset)
-    found = []
+    fits = []
     try:
-        found.append(fit_request(moved))
+        fits.append(fit_request(moved))
     except DataError:  # a wrong angle may leave no heat release to start from; the neighbour has a burn
-        if not known:
+        if not neighbours:
             raise
-    if known:
-        found.append(_from(known[min(known, key=lambda other: abs(other - offset))], moved))
-    return min(found, key=_rmse)
+    if neighbours:
+        fits.append(_from(neighbours[min(neighbours, key=lambda other: abs(other - offset))], moved))
+    return min(fits, key=_rmse)
 
 
 def _from(near: CylinderFit, moved: Request) -> CylinderFit:

@@ -24,7 +24,7 @@ RANGED = (
 
 
 def undetermined(shift_cad: Sequence[float]) -> bool:
-    """Say whether a range of moves leaves open if earlier or later is better."""
+    """Return whether a range of moves leaves open if earlier or later is better."""
     return shift_cad[0] <= 0.0 <= shift_cad[1]
 
 
@@ -101,8 +101,8 @@ class MemberTiming:
         """Give law, gamma and wall heat of the member and its answer as plain values."""
         names = ("law", "gamma_model", "gamma", "wall_heat_model", "wall_heat_scale")
         model = {name: getattr(self.member, name) for name in names}
-        own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
-        return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
+        return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **fields}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

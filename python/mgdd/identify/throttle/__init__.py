@@ -1,1 +1,1 @@
-"""Identification of a throttle from its log; public names stand in `mgdd.identify`."""
+"""Identification of a throttle from its log; public names are in `mgdd.identify`."""

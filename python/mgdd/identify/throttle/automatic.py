@@ -47,7 +47,7 @@ STOPS = ("stop_duty_per_deg", "stop_damping")
 _ABSENT = {name: REFINEMENTS[name] for term in (DROP, PRESLIDING, GAP) for name in term}
 _SHOWN = {LAG: "lag", DROP: "Stribeck drop", PRESLIDING: "presliding", GAP: "gap"}
 _STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
-_AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
+_AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log shows that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
 _FIRST_LOOK = 6  # delays; the next are tried while one of the last two is the best
@@ -76,32 +76,32 @@ def fit_groups(
     findings: list[Finding] = []
     by_delay: Delays | None = None
     report: FitReport | None = None
-    known = fixed or {}
+    fixed_values = fixed or {}
     try:
-        rough, terms = _structure(hunt, known, sorted(delays), chosen.n_starts, chosen.seed)
+        rough, terms = _structure(hunt, fixed_values, sorted(delays), chosen.n_starts, chosen.seed)
         by_delay = whole_delay(hunt, rough, sorted(delays))
-        found, terms = _without(hunt, by_delay.found, terms)
+        search, terms = _without(hunt, by_delay.best, terms)
         if STOPS in terms:
-            found = hunt.fine(found.values, list(dict.fromkeys([*names_of(found), *STOPS])))
-        findings = _told(found, terms, by_delay, delays)
-        report = FitReport.from_core(found.report, problem.angle)
+            search = hunt.fine(search.values, list(dict.fromkeys([*names_of(search), *STOPS])))
+        findings = _findings(search, terms, by_delay, delays)
+        report = FitReport.from_core(search.report, problem.angle)
         n = independent_values(problem, report)
-        weights = delay_weights(by_delay.rivals, found.values["delay_samples"], n)
+        weights = delay_weights(by_delay.rivals, search.values["delay_samples"], n)
         report = with_nuisances(
-            problem, found.values, report, substeps=FINE, share_known=SHARE in known, delays=weights
+            problem, search.values, report, substeps=FINE, share_known=SHARE in fixed_values, delays=weights
         )
     except Interrupted as stop:
         if hunt.best is None:
             raise
         interrupted = stop
         if report is None:
-            found = hunt.best if by_delay is None else by_delay.found
-            report = FitReport.from_core(found.report, problem.angle)
+            search = hunt.best if by_delay is None else by_delay.best
+            report = FitReport.from_core(search.report, problem.angle)
     if by_delay is not None and len(by_delay.rmse) > 1:
-        kept = found.values["delay_samples"]
-        report = with_delay(report, kept, by_delay.rivals, independent_values(problem, report), delays)
+        delay = search.values["delay_samples"]
+        report = with_delay(report, delay, by_delay.rivals, independent_values(problem, report), delays)
     model = FirstPrincipleModel(
-        parameters=found.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=FINE, sample_s=problem.step_s
+        parameters=search.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=FINE, sample_s=problem.step_s
     )
     run = free_run(model, log)
     train = quality_of([run])
@@ -113,8 +113,8 @@ def fit_groups(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*problem.findings, *report.findings, *findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(one.rmse for one in hunt.done)),
-        n_best=sum(one.rmse <= 1.005 * found.rmse for one in hunt.done),
+        start_rmse=tuple(sorted(entry.rmse for entry in hunt.done)),
+        n_best=sum(entry.rmse <= 1.005 * search.rmse for entry in hunt.done),
         run=run,
         draw=draw_free_run,
     )
@@ -152,7 +152,7 @@ def _structure(
     plain = hunt.search(best_of(tries).values, base, BRISTLES, 20)
     terms: list[tuple[str, ...]] = [LAG] if "electrical_s" in base else []
     plain, terms = _stopped(hunt, fixed, plain, terms)
-    found: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
+    fits: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
     enough = max(AT_NOISE * noise_of(problem.angle), FLOOR_DEG)
     if plain.rmse < enough:
         return [plain], terms
@@ -163,7 +163,7 @@ def _structure(
     start = {**plain.values, "stribeck_drop": 0.15, "stribeck_deg_per_s": 25.0}
     tries = [hunt.search(one, of([DROP]), _COARSE, 20) for one in spread_starts(start, box, n_starts, seed)]
     dropping = hunt.search(best_of(tries).values, of([DROP]), _COARSE, 40)
-    found[(DROP,)] = dropping
+    fits[(DROP,)] = dropping
     if dropping.rmse < enough:
         return [dropping], [*terms, DROP]
     least = min([plain, dropping], key=lambda one: one.rmse).values
@@ -174,31 +174,31 @@ def _structure(
         )
         for width in _PRESLIDINGS
     ]  # fmt: skip
-    found[(DROP, PRESLIDING)] = hunt.search(best_of(tries).values, of([DROP, PRESLIDING]), BRISTLES, 30)
+    fits[(DROP, PRESLIDING)] = hunt.search(best_of(tries).values, of([DROP, PRESLIDING]), BRISTLES, 30)
     # Both ways: friction without bristles also from where that with them has ended.
-    rigid = {**found[(DROP, PRESLIDING)].values, **{name: _ABSENT[name] for name in PRESLIDING}}
-    found[(DROP,)] = best_of([dropping, hunt.search(rigid, of([DROP]), BRISTLES, 25)])
+    rigid = {**fits[(DROP, PRESLIDING)].values, **{name: _ABSENT[name] for name in PRESLIDING}}
+    fits[(DROP,)] = best_of([dropping, hunt.search(rigid, of([DROP]), BRISTLES, 25)])
     if problem.both_sides:
         tries = [
             hunt.search({**plain.values, "half_gap_deg": half, "ramp_deg": 0.25}, of([GAP]), _COARSE, 30)
             for half in _HALF_GAPS
         ]
-        found[(GAP,)] = best_of(tries)
-        found[(DROP, GAP)] = hunt.search({**found[(GAP,)].values, "stribeck_drop": 0.1}, of([DROP, GAP]), _COARSE, 30)
-    n = independent_samples(best_of(found.values()))
-    best = min(found, key=lambda one: _criterion(found[one], len(of(one)), n))
+        fits[(GAP,)] = best_of(tries)
+        fits[(DROP, GAP)] = hunt.search({**fits[(GAP,)].values, "stribeck_drop": 0.1}, of([DROP, GAP]), _COARSE, 30)
+    n = independent_samples(best_of(fits.values()))
+    best = min(fits, key=lambda one: _criterion(fits[one], len(of(one)), n))
     # Sticking makes the cost rough: what the other structures have found are further starts of the chosen one.
-    own = {name: found[best].values[name] for term in best for name in term}
-    others = [one.values for one in sorted(found.values(), key=lambda one: one.rmse)[1:3]]
-    others += [{**found[best].values, **ramp} for ramp in ramps[1:]]
-    again = [hunt.search({**one, **_ABSENT, **own}, of(best), BRISTLES, 20) for one in others]
-    return sorted([found[best], *again], key=lambda one: one.rmse)[:_SEEDS], [*terms, *best]
+    parameters = {name: fits[best].values[name] for term in best for name in term}
+    others = [one.values for one in sorted(fits.values(), key=lambda one: one.rmse)[1:3]]
+    others += [{**fits[best].values, **ramp} for ramp in ramps[1:]]
+    again = [hunt.search({**one, **_ABSENT, **parameters}, of(best), BRISTLES, 20) for one in others]
+    return sorted([fits[best], *again], key=lambda one: one.rmse)[:_SEEDS], [*terms, *best]
 
 
 def _stopped(
     hunt: Hunt, fixed: Mapping[str, float], plain: Search, terms: list[tuple[str, ...]]
 ) -> tuple[Search, list[tuple[str, ...]]]:
-    """Let the stops yield where the plate has touched one and the log does not say that they are rigid."""
+    """Let the stops yield where the plate has touched one and the log does not show that they are rigid."""
     problem = hunt.problem
     low, high = problem.stops_deg
     touched = problem.angle.min() < low + _TOUCHED_DEG or problem.angle.max() > high - _TOUCHED_DEG
@@ -210,27 +210,27 @@ def _stopped(
     return soft, [*terms, STOPS]
 
 
-def _without(hunt: Hunt, found: Search, terms: list[tuple[str, ...]]) -> tuple[Search, list[tuple[str, ...]]]:
+def _without(hunt: Hunt, search: Search, terms: list[tuple[str, ...]]) -> tuple[Search, list[tuple[str, ...]]]:
     """Try every term without, the last first; what the log does not miss is left out."""
     for term in [PRESLIDING, GAP, DROP, LAG]:
         if term not in terms or (term == DROP and PRESLIDING in terms):
             continue
-        free = [name for name in names_of(found) if name not in term]
+        free = [name for name in names_of(search) if name not in term]
         absent = {**_ABSENT, "electrical_s": 0.0}
-        smaller = hunt.search({**found.values, **{name: absent[name] for name in term}}, free, FINE, 25, 1e-6)
-        n = independent_samples(found)
-        if not missed(smaller, found, len(term), n):
-            found, terms = smaller, [one for one in terms if one != term]
-    return found, terms
+        smaller = hunt.search({**search.values, **{name: absent[name] for name in term}}, free, FINE, 25, 1e-6)
+        n = independent_samples(search)
+        if not missed(smaller, search, len(term), n):
+            search, terms = smaller, [one for one in terms if one != term]
+    return search, terms
 
 
-def _criterion(found: Search, size: int, n: float) -> float:
-    return 2.0 * n * math.log(max(found.rmse, FLOOR_DEG)) + size * math.log(n)
+def _criterion(search: Search, size: int, n: float) -> float:
+    return 2.0 * n * math.log(max(search.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
-def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
-    """Say what the model has and what it is worth, and how other delays fare."""
-    by_delay, rms = delays.rmse, found.rmse
+def _findings(fit: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
+    """Report what the model has and what it is worth, and how other delays fare."""
+    by_delay, rms = delays.rmse, fit.rmse
     has = ", ".join(_SHOWN[term] for term in terms if term in _SHOWN) or "none"
     stops = ", stops that yield" if STOPS in terms else ""
     left = ", ".join(_SHOWN[term] for term in _SHOWN if term not in terms) or "nothing"
@@ -238,14 +238,14 @@ def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried
     if len(by_delay) < 2:
         return [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
     each = ", ".join(f"{delay:g}: {error:.3g}" for delay, error in sorted(by_delay.items()))
-    text += f"; delay {found.values['delay_samples']:g} samples (deg RMS by delay: {each})"
-    told = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
-    kept = found.values["delay_samples"]
-    told += delay_at_end(kept, tried, LONGEST_DELAY)
+    text += f"; delay {fit.values['delay_samples']:g} samples (deg RMS by delay: {each})"
+    findings = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
+    chosen_delay = fit.values["delay_samples"]
+    findings += delay_at_end(chosen_delay, tried, LONGEST_DELAY)
     if len(delays.ties) > 1:
         ties = " and ".join(f"{delay:g}" for delay in delays.ties)
         text = f"delays of {ties} samples fit alike; taken is the shortest with the lag of a motor"
-        told.append(
+        findings.append(
             Finding("delay_open", ("delay_samples", *LAG), text, "add steps of the duty, or give delay_samples")
         )
-    return told
+    return findings

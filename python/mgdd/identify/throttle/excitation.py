@@ -78,9 +78,9 @@ class ExcitationCheck(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Give the figures and sentences as a dict, without the prediction."""
-        own = {name: getattr(self, name) for name in ("passed", "peak_current_a", "rms_current_a")}
+        figures = {name: getattr(self, name) for name in ("passed", "peak_current_a", "rms_current_a")}
         words = {name: [str(finding) for finding in getattr(self, name)] for name in ("findings", "unanswered")}
-        return own | {name: getattr(self.content, name) for name in RecordContent.__dataclass_fields__} | words
+        return figures | {name: getattr(self.content, name) for name in RecordContent.__dataclass_fields__} | words
 
 
 def check_excitation(
@@ -135,17 +135,17 @@ def check_excitation(
     """
     excitation = as_signal(excitation, ("time_s", "duty"), what="excitation")
     time, duty = _signal_of(excitation)
-    known = prior_of(prior)
-    window = known.window_deg if angle_window_deg is None else angle_window_deg
+    throttle = prior_of(prior)
+    window = throttle.window_deg if angle_window_deg is None else angle_window_deg
     _check_limits(window, max_rate_deg_per_s, max_current_a)
     start = start_deg
     if start is None:
-        start = 0.5 * (window[0] + window[1]) if known.limp_home_deg is None else known.limp_home_deg
-    answer = known.simulate(time, duty, start)
+        start = 0.5 * (window[0] + window[1]) if throttle.limp_home_deg is None else throttle.limp_home_deg
+    answer = throttle.simulate(time, duty, start)
     angle, current = answer["angle_deg"], answer.get("current_a")
     if max_current_a is not None and current is None:
         raise ParameterError(f"max_current_a = {max_current_a:g}: the prior model has no current; leave the limit out")
-    content = record_content(time, angle, limp_home_deg=known.limp_home_deg, stops_deg=known.stops_deg)
+    content = record_content(time, angle, limp_home_deg=throttle.limp_home_deg, stops_deg=throttle.stops_deg)
     peak = math.nan if current is None else float(np.abs(current).max())
     findings = _violations(content, peak, window, max_rate_deg_per_s, max_current_a)
     variables: dict[str, Any] = {"time_s": ("time_s", time), "duty": ("time_s", duty), "angle_deg": ("time_s", angle)}
@@ -154,7 +154,7 @@ def check_excitation(
     return ExcitationCheck(
         passed=not findings,
         findings=findings,
-        unanswered=open_questions(content, swing=known.swing),
+        unanswered=open_questions(content, swing=throttle.swing),
         content=content,
         peak_current_a=peak,
         rms_current_a=math.nan if current is None else float(np.sqrt(np.mean(current**2))),
@@ -190,10 +190,10 @@ def _violations(
     max_rate_deg_per_s: float | None,
     max_current_a: float | None,
 ) -> tuple[Finding, ...]:
-    out: list[Finding] = []
+    findings: list[Finding] = []
 
     def add(name: str, text: str, remedy: str) -> None:
-        out.append(Finding("limit_exceeded", (name,), text, remedy))
+        findings.append(Finding("limit_exceeded", (name,), text, remedy))
 
     if content.angle_high_deg > window[1]:
         add(
@@ -216,7 +216,7 @@ def _violations(
     if max_current_a is not None and peak_current_a > max_current_a:
         text = f"the motor takes {peak_current_a:.2f} A, above {max_current_a:g}"
         add("max_current_a", text, "lower the amplitude")
-    return tuple(out)
+    return tuple(findings)
 
 
 EXCITATIONS = ("chirp", "multisine", "prbs", "amplitude_random_steps", "staircase", "triangle")
@@ -253,7 +253,7 @@ def design_excitation(
     kind : {"chirp", "multisine", "prbs", "amplitude_random_steps", "staircase", "triangle"}
         The signal; its other parameters keep their defaults, except a chirp below limp-home: 0.5 to 8 Hz.
     prior : Throttle or Model
-        What is known of the throttle; it must know limp-home and friction.
+        What is known of the throttle; it must have limp-home and friction.
     side : {"above", "below", "both"}
         Side of limp-home to be identified.
     duration_s : float, optional
@@ -278,9 +278,9 @@ def design_excitation(
     Raises
     ------
     ParameterError
-        An unknown kind or side, a prior that knows no limp-home or friction, and all of `check_excitation`.
+        An unknown kind or side, a prior without limp-home or friction, and all of `check_excitation`.
     ConvergenceError
-        Nothing useful stays inside the limits; the message says what the smallest one still violates.
+        Nothing useful stays inside the limits; the message states what the smallest one still violates.
 
     Examples
     --------
@@ -294,13 +294,13 @@ def design_excitation(
         raise ParameterError.of("kind", kind, f"one of {', '.join(map(repr, EXCITATIONS))}")
     if side not in ("above", "below", "both"):
         raise ParameterError.of("side", side, "one of 'above', 'below', 'both'")
-    known = prior_of(prior)
-    if known.groups is None or known.limp_home_deg is None:
-        raise ParameterError("prior: knows no limp-home angle and friction; pass a Throttle, for example a preset")
+    model = prior_of(prior)
+    if model.groups is None or model.limp_home_deg is None:
+        raise ParameterError("prior: has no limp-home angle and friction; pass a Throttle, for example a preset")
     window = angle_window_deg
     if window is None:
-        low, high = known.stops_deg
-        window = known.window_deg
+        low, high = model.stops_deg
+        window = model.window_deg
         if side != "above" or kind in _QUASI_STATIC:
             window = (low - _STOP_DEG, window[1])
         if kind in _QUASI_STATIC:
@@ -308,7 +308,7 @@ def design_excitation(
     make = _maker(kind, side, duration_s, sample_s)
     check: ExcitationCheck | None = None
     for factor in _OVER_FRICTION:
-        offset, amplitude = _rule(known.groups, known.limp_home_deg, window, side, factor, slow=kind in _QUASI_STATIC)
+        offset, amplitude = _rule(model.groups, model.limp_home_deg, window, side, factor, slow=kind in _QUASI_STATIC)
         for _ in range(_CORRECTIONS):
             amplitude = min(amplitude, 1.0 - abs(offset))
             signal = make(offset, amplitude)

@@ -35,7 +35,7 @@ def fit_first_principle(
 
     A regression on the torque balance of the moving samples gives the start; the free run is then fitted in stages
     (dynamics, static groups, all), from several starts. A side of limp-home the log does not visit keeps its start
-    values and is named. `mgdd.identify.identify_throttle` chooses the structure, and knows delays.
+    values and is named. `mgdd.identify.identify_throttle` chooses the structure, and covers delays.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def fit_first_principle(
     if not share_known and ("electrical_s" in problem.free or problem.values["electrical_s"] > 0.0):
         problem = dataclasses.replace(problem, values={**problem.values, SHARE: TYPICAL_SHARE})
     if whole_shift(problem.values["delay_samples"]):
-        text = "within [0, 5] here; identify_throttle(log, 'first_principle') knows delays of up to 20 samples"
+        text = "within [0, 5] here; identify_throttle(log, 'first_principle') covers delays of up to 20 samples"
         raise ParameterError.of("delay_samples", problem.values["delay_samples"], text)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in problem.free if name in STATIC]
@@ -86,9 +86,9 @@ def fit_first_principle(
     starts = group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed)
     how: dict[str, Any] = {"records": [problem.record()], "stages": stages, "closed_deg": 0.0, "open_deg": 90.0}
     search = partial(_core.identify.fit_throttle_groups, starts=starts, substeps=SUBSTEPS, n_threads=threads_of(None))
-    found, stop = or_partial(lambda: search(**how))
-    report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
-    groups = dict(zip(GROUP_NAMES, found["values"], strict=True))
+    result, stop = or_partial(lambda: search(**how))
+    report = FitReport.from_core(result["reports"][result["best"]], problem.angle)
+    groups = dict(zip(GROUP_NAMES, result["values"], strict=True))
     model = FirstPrincipleModel(parameters=groups, substeps=SUBSTEPS, sample_s=problem.step_s)
     findings = (*problem.findings, *report.findings)
     report = with_nuisances(problem, model.parameters, report, substeps=SUBSTEPS, share_known=share_known)
@@ -102,8 +102,8 @@ def fit_first_principle(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=(*findings, *below_ceiling([log], train)),
         source=source_of(log),
-        start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
-        n_best=int(found["n_reached"]),
+        start_rmse=tuple(sorted(float(start_report.rmse) for start_report in result["reports"])),
+        n_best=int(result["n_reached"]),
         run=run,
         draw=draw_free_run,
     )

@@ -166,13 +166,13 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         ParameterError
             A number that is not positive, or none or both of the two.
         """
-        known = {
+        numbers = {
             "resistance_ohm": resistance_ohm,
             "supply_v": supply_v,
             "inertia_kgm2": inertia_kgm2,
             "torque_constant_nm_per_a": torque_constant_nm_per_a,
         }
-        for name, value in known.items():
+        for name, value in numbers.items():
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ParameterError.of(name, value, "> 0")
         if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):

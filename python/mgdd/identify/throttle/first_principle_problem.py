@@ -98,7 +98,7 @@ class GroupsProblem:
         stage: tuple[list[int], list[int], float, float, int] = (
             [GROUP_NAMES.index(name) for name in free], [], 1.0, tolerance, max_iterations,
         )  # fmt: skip
-        found, stop = or_partial(
+        result, stop = or_partial(
             lambda: _core.identify.fit_throttle_groups(
                 [self.record(shift)],
                 stages=[stage],
@@ -109,8 +109,8 @@ class GroupsProblem:
                 n_threads=1,
             )
         )
-        report = found["reports"][0]
-        ended = dict(zip(GROUP_NAMES, found["values"], strict=True))
+        report = result["reports"][0]
+        ended = dict(zip(GROUP_NAMES, result["values"], strict=True))
         return hand_over(
             Search(report.rmse, {**ended, _DELAY: min(ended[_DELAY] + shift, LONGEST_DELAY)}, report), stop
         )
@@ -273,12 +273,12 @@ def regression_start(
     )
     solution = dict(zip(names, np.linalg.lstsq(matrix, target, rcond=None)[0].tolist(), strict=True))
     inertia, damping = solution.pop("inertia"), solution.pop("damping")
-    found = {name: value for name, value in solution.items() if value > 0.0}
+    positive = {name: value for name, value in solution.items() if value > 0.0}
     if inertia > 0.0 and "gain_deg_per_s2_per_duty" in free:
-        found["gain_deg_per_s2_per_duty"] = 1.0 / inertia
+        positive["gain_deg_per_s2_per_duty"] = 1.0 / inertia
         if damping > 0.0 and "tau_s" in free:
-            found["tau_s"] = inertia / damping
-    return found
+            positive["tau_s"] = inertia / damping
+    return positive
 
 
 def group_starts(values: Mapping[str, float], free: list[str], n_starts: int, seed: int) -> list[list[float]]:

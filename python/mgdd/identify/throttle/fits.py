@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _EARLY = 0.75  # of the log, for both models; they are compared on the rest
 _BETTER_PERCENT = 0.3  # PW-R must gain that much to replace the groups, which have physical meaning
-_STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups know stiffer ones below limp-home
+_STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups have stiffer ones below limp-home
 _LONGEST_DELAY = 5.0  # that PW-R has [samples]
 _LEAST_SAMPLES, _LEAST_DEG = 100, 1.0
 
@@ -67,16 +67,16 @@ def fit_auto(
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
         # The groups may start PW-R in a valley of their own: it is also searched from no delay.
-        kept = min((_pw_r(one, log, iterations) for one in _starts(other.model)), key=_rmse) if better else groups
-        if better and _rmse(kept) > _rmse(groups):  # one event of the last quarter, not the model
-            better, kept = False, groups
+        best = min((_pw_r(each, log, iterations) for each in _starts(other.model)), key=_rmse) if better else groups
+        if better and _rmse(best) > _rmse(groups):  # one event of the last quarter, not the model
+            better, best = False, groups
     except Interrupted as stop:
         raise Interrupted(str(stop), groups) from stop
     text = (
         f"{'PW-R was' if better else 'the groups were'} taken: fitted to three quarters of the log, the groups meet "
         f"the last one at {percent[0]:.2f} % and PW-R, from their result, at {percent[1]:.2f} %"
     )
-    return _with(kept, Finding("model_chosen", (), text))
+    return _with(best, Finding("model_chosen", (), text))
 
 
 def _groups_again(
@@ -87,14 +87,14 @@ def _groups_again(
     names = [name for name in groups.report.names if name in model.parameters]
     problem = groups_problem(early, start_values=model.parameters, stops_deg=stops_deg)
     gone = {*problem.unvisited, *(fixed or {})}
-    found = problem.search(
+    search = problem.search(
         model.parameters,
         [name for name in names if name not in gone],
         substeps=model.substeps,
         tolerance=1e-6,
         max_iterations=30,
     )
-    again: FirstPrincipleModel = dataclasses.replace(model, parameters=found.values)
+    again: FirstPrincipleModel = dataclasses.replace(model, parameters=search.values)
     return again
 
 
@@ -166,7 +166,7 @@ def fit_kind(
     stops_deg: tuple[float, float],
     options: FitOptions | None,
 ) -> Fit:
-    """Fit a kind with what the front knows; what is None keeps the fit's own default."""
+    """Fit a kind with what the caller gives; what is None keeps the fit's own default."""
     if kind not in PSEUDO_WIENER:
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
         fit = fit_auto if kind == "auto" else fit_groups
@@ -239,5 +239,5 @@ def load_throttle_model(path: str | os.PathLike[str]) -> Model:
 
 def _seeded(options: FitOptions | None) -> FitOptions:
     """Return the options with the seed of every identification, 0."""
-    known = options or FitOptions()
-    return known if known.seed is not None else replace(known, seed=0)
+    chosen = options or FitOptions()
+    return chosen if chosen.seed is not None else replace(chosen, seed=0)

@@ -93,16 +93,16 @@ def noise_of(angle: NDArray[np.float64]) -> float:
 
 def below_ceiling(logs: Sequence[xr.Dataset], train: FitQuality | None) -> tuple[Finding, ...]:
     """Report a fit that misses far more of its own logs than the noise of the angle."""
-    own = None if train is None else train.nrmse_fit_percent
-    if own is None:
+    fit = None if train is None else train.nrmse_fit_percent
+    if fit is None:
         return ()
     angles = [log["angle_deg"].to_numpy() for log in logs]
     noise = float(np.sqrt(np.average([noise_of(angle) ** 2 for angle in angles], weights=[a.size for a in angles])))
     ceiling = 100.0 * (1.0 - noise / float(np.std(np.concatenate(angles))))
-    if ceiling - own <= _MISSED_PERCENT:
+    if ceiling - fit <= _MISSED_PERCENT:
         return ()
     text = (
-        f"the fit meets its own log at {own:.1f} %, and the noise of the angle alone would leave {ceiling:.1f} %: the "
+        f"the fit meets its own log at {fit:.1f} %, and the noise of the angle alone would leave {ceiling:.1f} %: the "
         "plate does what the model does not have, and the intervals hold for the model only"
     )
     remedy = "compare with the other kinds of model, look at the residuals, and check the stops and the log"

@@ -1,4 +1,4 @@
-"""One call for every throttle model: check the log, fit, test on another log, and say what stays open."""
+"""One call for every throttle model: check the log, fit, test on another log, and report what stays open."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def read_off(log: xr.Dataset) -> float:
 
 
 def doubts(log: xr.Dataset, model: Model, home: float) -> tuple[Finding, ...]:
-    """Say where limp-home was read off, and doubt it after the fit.
+    """Report where limp-home was read off, and doubt it after the fit.
 
     At rest without duty, friction holds the plate within ramp friction/preload of limp-home, and anywhere if it
     exceeds the preload; under a duty it may rest anywhere.
@@ -129,12 +129,12 @@ def identify_throttle(
         Kind of the model. ``first_principle``: the groups of the plant, with as much of electrical lag, delay, Stribeck
         drop, presliding and gap as the log supports. ``pw_r``, ``pw_w``, ``pw_p``: pseudo-Wiener with friction inside,
         strict Wiener, Wiener with play. ``auto`` (the default): the groups, or PW-R fitted from them where that runs
-        better on a quarter of the log that neither has seen; the findings say why.
+        better on a quarter of the log that neither has seen; the findings give the reason.
     test : Dataset, DataFrame or mapping of columns, optional
         Another log, for the quality ``test``.
     limp_home_deg : float, optional
         Limp-home angle [deg], if it is known. None: the groups estimate it from a log that has been on both sides;
-        otherwise the record starts at rest there, and the findings say which angle was read off it.
+        otherwise the record starts at rest there, and the findings state which angle was read off it.
     two_sided : bool
         Fit a set of parameters above and one below limp-home (the groups have both always); the log must have been on
         both sides.
@@ -196,29 +196,29 @@ def identify_throttle(
         stops_deg=(closed_deg, open_deg), options=options,
     )  # fmt: skip
     tested = None if test is None else quality_of([free_run(fit.model, test)])
-    known = prior_of(fit.model)
-    home = known.limp_home_deg if estimated or limp_home is None else limp_home
+    prior = prior_of(fit.model)
+    home = prior.limp_home_deg if estimated or limp_home is None else limp_home
     content = record_content(
-        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=known.stops_deg
+        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=prior.stops_deg
     )
-    asked = open_questions(content, swing=known.swing, pairs=entangled(fit.report))
+    questions = open_questions(content, swing=prior.swing, pairs=entangled(fit.report))
     # The report names correlated pairs, too; here each comes with its remedy.
-    own = (found for found in fit.findings if found.code != "correlated")
+    of_fit = (finding for finding in fit.findings if finding.code != "correlated")
     read: tuple[Finding, ...] = ()
     if limp_home_deg is None:
         read = stuck_elsewhere(log, fit.model) if limp_home is None or estimated else doubts(log, fit.model, limp_home)
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    findings = unique((*own, *_carried_over(fit.train, tested), *read, *stops, *asked))
+    findings = unique((*of_fit, *_carried_over(fit.train, tested), *read, *stops, *questions))
     return dataclasses.replace(fit, test=tested, findings=findings)
 
 
 def _carried_over(train: FitQuality | None, test: FitQuality | None) -> tuple[Finding, ...]:
     """Report a fit that holds for its own log only."""
-    own, other = (None if quality is None else quality.nrmse_fit_percent for quality in (train, test))
-    if own is None or other is None or own - other < _LOST_PERCENT:
+    trained, tested = (None if quality is None else quality.nrmse_fit_percent for quality in (train, test))
+    if trained is None or tested is None or trained - tested < _LOST_PERCENT:
         return ()
     text = (
-        f"the fit meets its own log at {own:.1f} % and the test log at {other:.1f} %: what it has learned does "
+        f"the fit meets its own log at {trained:.1f} % and the test log at {tested:.1f} %: what it has learned does "
         "not carry over"
     )
     remedy = "fit fewer parameters, from more starts, or to a log that excites them all"
@@ -229,7 +229,7 @@ def _plateaus(log: xr.Dataset, home: float | None, stops_deg: tuple[float, float
     """Name an extreme angle that the plate meets again and again inside the travel: a stop that was not given."""
     angle = log["angle_deg"].to_numpy()
     low, high = float(angle.min()), float(angle.max())
-    found = []
+    findings = []
     for name, extreme, stop, share in (
         ("closed_deg", low, stops_deg[0], angle - low),
         ("open_deg", high, stops_deg[1], high - angle),
@@ -237,8 +237,8 @@ def _plateaus(log: xr.Dataset, home: float | None, stops_deg: tuple[float, float
         inside = abs(extreme - stop) > _SIDE_DEG and (home is None or abs(extreme - home) > _SIDE_DEG)
         if inside and _visits(share < _PLATEAU_DEG) >= _PLATEAU_VISITS:
             text = f"the plate stops at {extreme:.3g} deg again and again, {name} is {stop:g} deg"
-            found.append(Finding("unknown_stop", (name,), text, "if there is a stop, give it"))
-    return tuple(found)
+            findings.append(Finding("unknown_stop", (name,), text, "if there is a stop, give it"))
+    return tuple(findings)
 
 
 def _visits(there: NDArray[np.bool_]) -> int:

@@ -53,30 +53,30 @@ def with_nuisances(
     longer than the residual is correlated: errors are then also those of a jackknife over blocks of a second
     (Kuensch 1989), where that is larger.
     """
-    known = np.flatnonzero(np.isfinite(report.stderr))
-    if known.size == 0:
+    finite = np.flatnonzero(np.isfinite(report.stderr))
+    if finite.size == 0:
         return report
-    about = _Slopes.of(problem, values, report, known, substeps)
+    about = _Slopes.of(problem, values, report, finite, substeps)
     changes = [2.0 * about.answer(substeps=2 * substeps)]  # half a step takes away half of the error
     if values["electrical_s"] > 0.0 and not share_known:
         low, high = (about.answer({SHARE: share}) for share in _SHARES)
         changes += [0.5 * (high - low) / math.sqrt(3.0), 0.5 * (high + low) / math.sqrt(5.0)]
     if delays is not None:
-        kept = values[_DELAY]
-        spread = sum(weight * (delay - kept) ** 2 for delay, weight in delays.items()) / sum(delays.values())
-        side = 1.0 if kept + 1.0 <= LONGEST_DELAY else -1.0
-        changes.append(math.sqrt(spread) * about.answer({_DELAY: kept + side}))
-    at = np.ix_(known, known)
+        best_delay = values[_DELAY]
+        spread = sum(weight * (delay - best_delay) ** 2 for delay, weight in delays.items()) / sum(delays.values())
+        side = 1.0 if best_delay + 1.0 <= LONGEST_DELAY else -1.0
+        changes.append(math.sqrt(spread) * about.answer({_DELAY: best_delay + side}))
+    at = np.ix_(finite, finite)
     covariance = report.covariance.copy()
     blocks = report.residual_blocks
     if _misses(problem, report.rmse):
         blocks = independent_values(problem, report)
         longer = about.jackknife(report.residual, math.ceil(report.residual.size / blocks))
-        wider = np.sqrt(np.maximum(longer / np.diag(covariance)[known], 1.0))
+        wider = np.sqrt(np.maximum(longer / np.diag(covariance)[finite], 1.0))
         covariance[at] *= np.outer(wider, wider)
     covariance[at] += sum(np.outer(change, change) for change in changes)
     stderr = report.stderr.copy()
-    stderr[known] = np.sqrt(np.diag(covariance)[known])
+    stderr[finite] = np.sqrt(np.diag(covariance)[finite])
     for array in (covariance, stderr):
         array.flags.writeable = False
     return dataclasses.replace(report, covariance=covariance, stderr=stderr, residual_blocks=blocks)
@@ -92,9 +92,9 @@ def independent_values(problem: GroupsProblem, report: FitReport) -> float:
     return max(residual.size / rows, _LEAST_BLOCKS)
 
 
-def delay_weights(rmse: Mapping[float, float], kept: float, n: float) -> dict[float, float]:
+def delay_weights(rmse: Mapping[float, float], best_delay: float, n: float) -> dict[float, float]:
     """Return the likelihood of each delay over that of the one kept, at most 1, from `n` independent values."""
-    return {delay: min(1.0, math.exp(-n * math.log(error / rmse[kept]))) for delay, error in rmse.items()}
+    return {delay: min(1.0, math.exp(-n * math.log(error / rmse[best_delay]))) for delay, error in rmse.items()}
 
 
 def _misses(problem: GroupsProblem, rmse: float) -> bool:
@@ -118,13 +118,13 @@ class _Slopes:
         problem: GroupsProblem,
         values: Mapping[str, float],
         report: FitReport,
-        known: NDArray[np.int_],
+        finite: NDArray[np.int_],
         substeps: int,
     ) -> _Slopes:
         """Take central differences: wide enough that a plate which sticks a sample sooner is not a slope."""
         begin = {**values, **dict(zip(report.names, report.values, strict=True))}
         columns = []
-        for name in (report.names[index] for index in known):
+        for name in (report.names[index] for index in finite):
             ends = [begin[name] + way * _STEP * max(abs(begin[name]), _USUAL.get(name, 0.0)) for way in (1.0, -1.0)]
             if name not in ("limp_home_deg", *_START):
                 ends[1] = max(ends[1], 0.0)
@@ -147,14 +147,14 @@ class _Slopes:
         As `block_sandwich` of the core does it for blocks that the correlation of the residual asks for.
         """
         whole = self.slopes.T @ self.slopes
-        own = np.zeros(self.norms.size)
+        variances = np.zeros(self.norms.size)
         for shift in (0, rows // 2):
             for first in range(-shift, residual.size, rows):
                 block = slice(max(first, 0), first + rows)
                 slopes = self.slopes[block]
                 left = (1.0 + _RIDGE) * whole - slopes.T @ slopes
-                own += 0.5 * np.linalg.lstsq(left, slopes.T @ residual[block], rcond=1e-12)[0] ** 2
-        return np.asarray((1.0 - rows / residual.size) * own / self.norms**2)
+                variances += 0.5 * np.linalg.lstsq(left, slopes.T @ residual[block], rcond=1e-12)[0] ** 2
+        return np.asarray((1.0 - rows / residual.size) * variances / self.norms**2)
 
 
 def _angle(problem: GroupsProblem, values: Mapping[str, float], substeps: int) -> NDArray[np.float64]:

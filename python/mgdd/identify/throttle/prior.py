@@ -75,7 +75,7 @@ class Prior:
 
 
 def prior_of(model: Any) -> Prior:
-    """Return what a throttle, a fitted model or a callable says of itself."""
+    """Return what a throttle, a fitted model or a callable gives as prior."""
     model = throttle_model_of(model)
     if isinstance(model, Throttle):
         return _of_throttle(model)

@@ -77,11 +77,11 @@ def fit_pseudo_wiener(
     identified from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
     """
     chosen = fit_options(options, n_starts=_STARTS.get(kind, 1), seed=1, max_iterations=150)
-    logs = [as_log(one) for one in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]
+    logs = [as_log(record) for record in ([log] if isinstance(log, Mapping) or hasattr(log, "columns") else list(log))]
     if not logs:
         raise DataError("no logs: a fit needs at least one")
     sample_s = _sample(logs)
-    columns = [(one["duty"].to_numpy(), one["angle_deg"].to_numpy()) for one in logs]
+    columns = [(record["duty"].to_numpy(), record["angle_deg"].to_numpy()) for record in logs]
     limp_home = float(columns[0][1][0]) if limp_home_deg is None else float(limp_home_deg)
     base = PseudoWiener(kind) if start_values is None else start_values
     if base.kind != kind:
@@ -112,15 +112,15 @@ def fit_pseudo_wiener(
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
-    runs = [free_run(model, one) for one in logs]
-    found = [*wrapped.findings]
-    found += delay_at_end(parameters["delay_samples"], delays, 5.0)
+    runs = [free_run(model, record) for record in logs]
+    findings = [*wrapped.findings]
+    findings += delay_at_end(parameters["delay_samples"], delays, 5.0)
     if errors.size > 1 and n_best < 2:
         text = "the best fit was found once only: a better one may exist"
-        found.append(Finding("found_once", (), text, "raise n_starts"))
+        findings.append(Finding("found_once", (), text, "raise n_starts"))
     if kind == "pw_r" and sides == "shared":
         text = "one set of values serves both sides of limp-home"
-        found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
+        findings.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
     train = quality_of(runs)
     fit = Fit(
         report=wrapped,
@@ -128,7 +128,7 @@ def fit_pseudo_wiener(
         kind=kind,
         train=train,
         unidentifiable=wrapped.unidentifiable,
-        findings=(*found, *below_ceiling(logs, train)),
+        findings=(*findings, *below_ceiling(logs, train)),
         source=source_of(logs[0]),
         start_rmse=tuple(errors.tolist()),
         n_best=int(n_best),
@@ -140,4 +140,4 @@ def fit_pseudo_wiener(
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:
     names = [f"log {k}" for k in range(1, len(logs) + 1)]
-    return common_step([one["time_s"].to_numpy() for one in logs], names)
+    return common_step([record["time_s"].to_numpy() for record in logs], names)

@@ -25,7 +25,7 @@ _CROSSING_DEG = 0.5
 _STOP_DEG = 0.5
 _LEAST_SHARE = 0.05
 _LEAST_SIDE_S = 0.1
-# Below this the inertia adds less than a tenth of the friction of the throttles we know.
+# Below this the inertia adds less than a tenth of the friction of known throttles.
 _FAST_DEG_PER_S = 60.0
 _TRIANGLE_HZ = 0.05
 
@@ -126,10 +126,10 @@ def open_questions(
     lh = content.limp_home_deg
     where = "" if math.isnan(lh) else f" ({lh:.3g} deg)"
     ramp = f"a triangle of ±{swing:.2g} duty at {_TRIANGLE_HZ:g} Hz across limp-home{where}"
-    out: list[Finding] = []
+    findings: list[Finding] = []
 
     def add(code: str, text: str, remedy: str, *names: str) -> None:
-        out.append(Finding(code, names, text, remedy))
+        findings.append(Finding(code, names, text, remedy))
 
     if content.travel_open_deg + content.travel_closed_deg < _LEAST_TRAVEL_DEG:
         text = "the plate hardly moves: nothing but a lower bound of the breakaway duty can be learned"
@@ -176,7 +176,7 @@ def open_questions(
             f"the plate rests on an end stop {share:.0f} % of the time, which identifies nothing",
             "lower offset or amplitude",
         )
-    return tuple(out)
+    return tuple(findings)
 
 
 def _kind(name: str) -> str:

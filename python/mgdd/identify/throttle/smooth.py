@@ -155,8 +155,8 @@ class SmoothThrottle(SampledModel, ModelParameters):
             "cost_tolerance": chosen.tolerance,
             "lanes": True,
         }
-        found, stop = or_partial(lambda: _core.identify.fit_smooth_throttle(starts=table.tolist(), **how))
-        reports = tuple(map(FitReport.from_core, found["reports"]))
+        result, stop = or_partial(lambda: _core.identify.fit_smooth_throttle(starts=table.tolist(), **how))
+        reports = tuple(map(FitReport.from_core, result["reports"]))
         number, reached = rank(reports)
         best = reports[number]
         fitted = replace(self, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))

@@ -198,7 +198,7 @@ def validate_throttle(
     Parameters
     ----------
     model : Model or Fit
-        The model; a fit also says which of its parameters are entangled.
+        The model; a fit also reports which of its parameters are entangled.
     log : Dataset, DataFrame or mapping of columns
         The log.
     horizons_s : sequence of float
@@ -231,31 +231,31 @@ def validate_throttle(
     log = as_log(log)
     check_throttle_log(log)
     fit = model if isinstance(model, Fit) else None
-    own = model.model if isinstance(model, Fit) else model
+    plain_model = model.model if isinstance(model, Fit) else model
     time, duty, angle = columns_of(log, LOG_COLUMNS)
     step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     for horizon in horizons_s:
         samples_of(horizon, step, time.size)
-    run = free_run(own, log)
+    run = free_run(plain_model, log)
     skip = discarded(step, time.size)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
-    one = angle[1:] - own.predict(log, 1)["angle_deg"].to_numpy()
-    tests = residual_tests(one[skip:], duty[:-1][skip:])
-    known = prior_of(own)
-    limp_home = known.limp_home_deg if limp_home_deg is None else limp_home_deg
-    content = record_content(time, angle, limp_home_deg=limp_home, stops_deg=known.stops_deg)
+    one_step = angle[1:] - plain_model.predict(log, 1)["angle_deg"].to_numpy()
+    tests = residual_tests(one_step[skip:], duty[:-1][skip:])
+    throttle = prior_of(plain_model)
+    limp_home = throttle.limp_home_deg if limp_home_deg is None else limp_home_deg
+    content = record_content(time, angle, limp_home_deg=limp_home, stops_deg=throttle.stops_deg)
     quality = quality_of([run])
     notes = _notes(quality, tests)
     pairs = entangled(fit.report) if fit is not None else ()
     return ThrottleValidation(
-        kind=own.kind,
+        kind=plain_model.kind,
         quality=quality,
         vaf_percent=vaf_percent(measured, modelled),
-        n_step=n_step_rms(own, log, horizons_s=horizons_s),
+        n_step=n_step_rms(plain_model, log, horizons_s=horizons_s),
         tests=tests,
         free_run=run,
-        findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)),
+        findings=(*notes, *open_questions(content, swing=throttle.swing, pairs=pairs)),
         source=source_of(log),
     )
 

@@ -48,7 +48,7 @@ class Hunt:
         """Search once; an interrupt hands over what it has."""
         start = {name: value or (_ABSENT.get(name, 0.0) if name in free else 0.0) for name, value in values.items()}
         try:
-            found = self.problem.search(
+            search = self.problem.search(
                 start, free, substeps=substeps, tolerance=tolerance,
                 max_iterations=min(iterations, self.max_iterations),
             )  # fmt: skip
@@ -56,23 +56,23 @@ class Hunt:
             if isinstance(stop.partial, Search):
                 self.keep(stop.partial)
             raise
-        return self.keep(found)
+        return self.keep(search)
 
-    def keep(self, found: Search) -> Search:
+    def keep(self, search: Search) -> Search:
         """Count a search in."""
-        self.done.append(found)
-        if self.best is None or found.rmse < self.best.rmse:
-            self.best = found
-        return found
+        self.done.append(search)
+        if self.best is None or search.rmse < self.best.rmse:
+            self.best = search
+        return search
 
     def fine(self, values: Mapping[str, float], free: Sequence[str]) -> Search:
         """Search with the steps and the tolerance of what is handed over."""
         return self.search(values, free, FINE, self.max_iterations, self.tolerance)
 
 
-def independent_samples(found: Search) -> float:
+def independent_samples(search: Search) -> float:
     """Return how many independent samples the residual is worth: samples over its integrated correlation time."""
-    residual = np.asarray(found.report.residual)
+    residual = np.asarray(search.report.residual)
     return residual.size / _core.optimize.autocorrelation_time(residual)
 
 
@@ -82,9 +82,9 @@ def missed(smaller: Search, larger: Search, size: int, n: float) -> bool:
     return low < WORTH * high and 2.0 * n * math.log(high / low) > size * math.log(n)
 
 
-def names_of(found: Search) -> list[str]:
+def names_of(search: Search) -> list[str]:
     """Return the groups that a search estimated."""
-    return [name for name in found.report.names if name in found.values]
+    return [name for name in search.report.names if name in search.values]
 
 
 def best_of(searches: Iterable[Search]) -> Search:
@@ -111,9 +111,9 @@ def block_losses(
     samples = np.bincount(of_sample)
     moving = np.array([np.ptp(angle[of_sample == k]) > _MOVED_DEG for k in range(samples.size)])
     moving = moving if moving.any() else np.ones(samples.size, dtype=bool)
-    square = {key: (np.bincount(of_sample, weights=one**2) / samples)[moving] for key, one in residual.items()}
-    usual = max(min(float(np.median(one)) for one in square.values()), floor_deg**2)
-    return {key: np.minimum(one, _SPREAD**2 * usual) for key, one in square.items()}
+    square = {key: (np.bincount(of_sample, weights=error**2) / samples)[moving] for key, error in residual.items()}
+    usual = max(min(float(np.median(error)) for error in square.values()), floor_deg**2)
+    return {key: np.minimum(error, _SPREAD**2 * usual) for key, error in square.items()}
 
 
 def certainly_less(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> bool:
@@ -129,7 +129,7 @@ def certainly_less(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> bo
 RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
 _MOVED = 0.25  # samples by which a delay may differ before the time constant is searched anew
 _RIVAL = 1.5  # a delay whose coarse search ends that far above the best is not fitted finely
-_ALIKE = 1.25  # delays whose errors differ by more are not treated as equal, whatever their blocks say
+_ALIKE = 1.25  # delays whose errors differ by more are not treated as equal, whatever their blocks show
 _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
 
 
@@ -137,14 +137,14 @@ _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between de
 class Delays:
     """The delay that was taken, what its rivals reach, and which of them the log does not separate from the best."""
 
-    found: Search
+    best: Search
     rmse: Mapping[float, float]
     ties: tuple[float, ...]
 
     @property
     def rivals(self) -> dict[float, float]:
         """Errors by delay [deg], equals with that of the delay taken."""
-        return {**self.rmse, **dict.fromkeys(self.ties, self.rmse[self.found.values["delay_samples"]])}
+        return {**self.rmse, **dict.fromkeys(self.ties, self.rmse[self.best.values["delay_samples"]])}
 
 
 def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
@@ -164,7 +164,7 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     ramps = [{"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in free]
     begin = [*rough, *(rough[0]._replace(values={**rough[0].values, **ramp}) for ramp in ramps)]
     looks: dict[float, Search] = {}
-    found: dict[float, Search] = {}
+    fits: dict[float, Search] = {}
 
     def look(start: Search, delay: float) -> Search:
         values = _at_delay(start, delay, hunt.problem.step_s, free)
@@ -179,24 +179,24 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
                 looks[delay] = best_of([looks[delay], look(looks[other], delay)])
         enough = _RIVAL * max(best_of(looks.values()).rmse, FLOOR_DEG)
         for delay in near:
-            if looks[delay].rmse <= enough and delay not in found:
-                found[delay] = hunt.search(looks[delay].values, free, FINE, 25, 1e-6)
-        best = min(found, key=lambda delay: found[delay].rmse)
+            if looks[delay].rmse <= enough and delay not in fits:
+                fits[delay] = hunt.search(looks[delay].values, free, FINE, 25, 1e-6)
+        best = min(fits, key=lambda delay: fits[delay].rmse)
         at = list(delays).index(best)  # never the last of those looked at, while there are others
         near = [d for d in delays if d in looks or d in delays[max(at - 1, 0) : at + 2]]
     problem = hunt.problem
-    residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
+    residual = {delay: np.asarray(fit.report.residual) for delay, fit in fits.items()}
     floor = max(noise_of(problem.angle), FLOOR_DEG)
-    alike = _ALIKE * max(best_of(found.values()).rmse, FLOOR_DEG)
+    alike = _ALIKE * max(best_of(fits.values()).rmse, FLOOR_DEG)
     equals = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
-    ties = [delay for delay in equals if found[delay].rmse <= alike] or equals
-    complete = best_of(found.values()).rmse < AT_NOISE * floor  # nothing is missed that could make the plate come later
-    kept = min(
+    ties = [delay for delay in equals if fits[delay].rmse <= alike] or equals
+    complete = best_of(fits.values()).rmse < AT_NOISE * floor  # nothing is missed that could make the plate come later
+    best_delay = min(
         ties,
-        key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), complete and found[delay].rmse, delay),
+        key=lambda delay: (_unlike_a_motor(fits[delay].values["electrical_s"]), complete and fits[delay].rmse, delay),
     )
-    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **found}.items()}
-    return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
+    rmse = {delay: max(fit.rmse, FLOOR_DEG) for delay, fit in {**looks, **fits}.items()}
+    return Delays(best=fits[best_delay], rmse=rmse, ties=tuple(ties))
 
 
 def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
@@ -205,8 +205,8 @@ def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
     least = max(float(loss[best].mean()), FLOOR_DEG**2)
     return [
         delay
-        for delay, own in sorted(loss.items())
-        if max(float(own.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], own)
+        for delay, losses in sorted(loss.items())
+        if max(float(losses.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], losses)
     ]
 
 
@@ -217,11 +217,11 @@ def _unlike_a_motor(lag_s: float) -> float:
     return math.log(max(low / lag, lag / high, 1.0))
 
 
-def _at_delay(found: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
+def _at_delay(search: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
     """Move a part of the latency between delay and lag."""
-    values = {**found.values, "delay_samples": float(delay)}
+    values = {**search.values, "delay_samples": float(delay)}
     if "electrical_s" in free:
-        lag = found.values["electrical_s"] + step_s * (found.values["delay_samples"] - delay)
+        lag = search.values["electrical_s"] + step_s * (search.values["delay_samples"] - delay)
         values["electrical_s"] = min(max(lag, 1e-4), 0.015)
     return values
 
@@ -265,16 +265,16 @@ def with_delay(
     )
 
 
-def delay_at_end(kept: float, tried: Sequence[float], longest_known: float) -> list[Finding]:
-    """Say that the delay which was taken is an end of what was tried."""
-    longest = kept == max(tried)
-    if len(tried) < 2 or not (longest or kept == min(tried) > 0.0):
+def delay_at_end(delay: float, tried: Sequence[float], longest_known: float) -> list[Finding]:
+    """Report that the chosen delay is an end of those tried."""
+    longest = delay == max(tried)
+    if len(tried) < 2 or not (longest or delay == min(tried) > 0.0):
         return []
     most, more = ("longest", "longer") if longest else ("shortest", "shorter")
-    text = f"a delay of {kept:g} samples is the {most} that was tried: the true one may be {more}, and then"
+    text = f"a delay of {delay:g} samples is the {most} that was tried: the true one may be {more}, and then"
     text += " lag and time constant stand for the rest"
     remedy = "log at a longer sample time, of which a delay is fewer"
-    if kept < longest_known:
+    if delay < longest_known:
         remedy = f"give {more} delay_samples" + (f", or {remedy}" if longest else "")
     return [Finding("delay_at_end", (_NAME, *_STAND_IN), text, remedy)]
 
