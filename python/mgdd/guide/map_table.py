@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-SETTINGS = {"prior_sd_cad": 3.0, "forgetting": 0.95}  # of a map where nothing is said
+SETTINGS = {"prior_sd_cad": 3.0, "forgetting": 0.95}  # of a map that gives none
 _CELLS = {"timing_cad": (-180.0, 180.0), "sd_cad": (0.0, math.inf), "support": (0.0, math.inf)}
 _KNOWN = (*_CELLS, *SETTINGS, "source")
 
@@ -49,8 +49,8 @@ def read_map_table(path: str | os.PathLike[str], decimal: str) -> tuple[xr.Datas
     names = _names(table)
     axes = [name for name in names if name not in _KNOWN]
     if not 1 <= len(axes) <= 2:
-        said = f"{len(axes)} axes, {', '.join(map(repr, axes))}" if axes else "no axis"
-        raise DataError(f"{table.source}: {said}: a map has one or two, for example speed_rpm and fuel_mg")
+        axes_text = f"{len(axes)} axes, {', '.join(map(repr, axes))}" if axes else "no axis"
+        raise DataError(f"{table.source}: {axes_text}: a map has one or two, for example speed_rpm and fuel_mg")
     found = {name: _numbers(table, name) for name in names if name != "source"}
     settings = SETTINGS | {name: _one(table, name, found[name]) for name in SETTINGS if name in found}
     entries = {name: _entries(table, name, found[name]) for name in axes}

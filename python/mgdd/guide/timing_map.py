@@ -152,10 +152,10 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         values = []
         for cell in cells.tolist():
             numbers = dict(zip(own, cell, strict=True))
-            said = guide(make(**numbers))
-            if said is None:
+            reply = guide(make(**numbers))
+            if reply is None:
                 raise DataError(f"guide: no answer at {numbers}: narrow the axes")
-            values.append(next(iter(said.inputs.values())) if isinstance(said, Optimum) else float(said))
+            values.append(next(iter(reply.inputs.values())) if isinstance(reply, Optimum) else float(reply))
         return cls(own, np.reshape(values, [entries.size for entries in own.values()]), **settings)
 
     def __call__(self, point: Any) -> float | None:

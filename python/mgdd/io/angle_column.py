@@ -123,14 +123,14 @@ def at_the_speed_of_the_record(
         return degrees, speed_rpm, []
     share = CYCLE_DEG / found.degrees
     stated = argument("speed_rpm", format(speed_rpm, "g"))
-    said = (
+    remark = (
         f"the pressure repeats every {found.degrees:.6g} degrees of {stated}, not 720: over {found.cycles} cycles the "
         f"engine ran at {speed_rpm * share:.6g} rpm"
     )
     if abs(share - 1.0) > _CORRECTED:
-        raise DataError(f"{source}: {said}: correct it")
+        raise DataError(f"{source}: {remark}: correct it")
     scaled = degrees[0] + (degrees - degrees[0]) * share
-    return scaled, speed_rpm * share, [f"{said}, and its angles were made with that"]
+    return scaled, speed_rpm * share, [f"{remark}, and its angles were made with that"]
 
 
 def _check_start(where: str, what: str, how: Reading) -> None:

@@ -172,9 +172,9 @@ class ArrayTable(Table):
 
 
 def _complete(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """Refuse fewer numbers than the head of a file told, which NumPy would repeat or leave out."""
+    """Refuse fewer numbers than the head of a file states, which NumPy would repeat or leave out."""
     if values.shape != shape:
-        raise ValueError(f"{values.shape} numbers where {shape} are said to be")
+        raise ValueError(f"{values.shape} numbers where the head states {shape}")
     return values
 
 

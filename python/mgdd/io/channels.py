@@ -146,14 +146,14 @@ def _pressures(
     table: Table, heads: Sequence[Heading], how: Reading, angle: Angle, fast: Sequence[int]
 ) -> list[tuple[int, ...]]:
     """Return the columns of each cylinder's pressure."""
-    said = [i for i in fast if heads[i].quantity == "pressure"]
-    exact = [i for i in said if heads[i].name == "pressure_bar"]
-    if how.pressure_column is not None or not said:
+    pressures = [i for i in fast if heads[i].quantity == "pressure"]
+    exact = [i for i in pressures if heads[i].name == "pressure_bar"]
+    if how.pressure_column is not None or not pressures:
         columns = choose_pressure(table, heads, how.pressure_column, angle)
         if how.pressure_column is None:
             return [tuple(columns)]
     else:
-        columns = exact if len(exact) == 1 else said
+        columns = exact if len(exact) == 1 else pressures
     if foreign := [i for i in columns if i not in fast]:
         raise DataError(
             f"{table.source}: {table.called(foreign[0])} has another raster than the crank angle, "
@@ -231,8 +231,8 @@ def _channel(
     """Name a channel as none in `used` is, and add its name there."""
     index = columns[0]
     header = heads[index].name
-    said = stated_unit(header, table.unit(index))
-    units = None if said is None else _printed(said)
+    unit = stated_unit(header, table.unit(index))
+    units = None if unit is None else _printed(unit)
     words = stem(header) if len(columns) > 1 else without_brackets(header)
     name = re.sub(r"\W+", "_", words).strip("_") or f"column_{index}"
     name = f"c_{name}" if name[0].isdigit() else name

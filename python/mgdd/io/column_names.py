@@ -99,7 +99,7 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
 
 @lru_cache(maxsize=1024)  # the files of a folder have the same names
 def _heading(name: str, units_row: str | None) -> Heading:
-    said, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
+    written, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
     name, name_gauge = _without_reference(name)
     units_row, row_gauge = _without_reference(units_row or "")
     in_name, in_row = _known(_unit_word(name, lone=not units_row) or ""), _known(units_row)
@@ -115,7 +115,7 @@ def _heading(name: str, units_row: str | None) -> Heading:
     units = [units_row, *_SQUARE.findall(name)]
     letter = in_name == "other" and not in_row and len(_unit_word(name) or "") == 1 and not _BRACKETS.search(name)
     return Heading(
-        name=said,
+        name=written,
         unit=None if unit == "other" else unit,
         quantity=quantity,
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
@@ -144,9 +144,9 @@ def _without_reference(text: str) -> tuple[str, bool]:
 def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool]:
     """Return what stands where a unit stands, None for nothing, and whether it can be nothing else."""
     for texts, sure in (([units_row or "", *_SQUARE.findall(name)], True), (_maybe_units(name), False)):
-        said = next((text.strip() for text in texts if text.strip()), None)
-        if said is not None:
-            return said, sure
+        unit = next((text.strip() for text in texts if text.strip()), None)
+        if unit is not None:
+            return unit, sure
     return None, False
 
 
@@ -189,8 +189,8 @@ def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
 
 def stated_unit(name: str, units_row: str | None = None) -> str | None:
     """Return the unit of a column as the file writes it, known or not; None where it gives none."""
-    said = next((text.strip() for text in (units_row or "", *_SQUARE.findall(name)) if text.strip()), None)
-    return said or _unit_word(name)
+    unit = next((text.strip() for text in (units_row or "", *_SQUARE.findall(name)) if text.strip()), None)
+    return unit or _unit_word(name)
 
 
 def _unit_word(name: str, *, lone: bool = True) -> str | None:

@@ -20,7 +20,7 @@ _LATER_CAD, _AS_QUIET = (-50.0, -40.0, -30.0, -20.0, -10.0), 1.05
 # The median cycle is known so far beyond: within it a cycle may be shifted without leaving it.
 _MARGIN_CAD = 4.0
 COMPRESSION_CAD = _FROM_CAD - _MARGIN_CAD, _LATER_CAD[-1] + _MARGIN_CAD  # all that `phases` looks at
-# 0.2 °CA from first to last is 0.1 °CA in the mean and 1 % of the work; less is not told from the exponent.
+# 0.2 °CA from first to last is 0.1 °CA in the mean and 1 % of the work; less is not separable from the exponent.
 DRIFT_CAD = 0.2
 _JUMP_CAD, _REFUSED_CAD = 0.75, 2.0
 SIGNIFICANT = 4.0  # standard errors

@@ -90,7 +90,7 @@ class Encoder:
         -------
         xarray.Dataset
             ``crank_angle_deg(time_s)``, running on, 0 at a mark: the first edge behind the gap, the edge of the index,
-            or the first edge; NaN before the first and behind the last turn that can be told. ``speed_rpm(turn)`` from
+            or the first edge; NaN before the first and behind the last countable turn. ``speed_rpm(turn)`` from
             mark to mark, ``mark_s(turn)``; ``lost``, ``extra`` (edges) and ``lost_marks`` are counts, ``slipped_deg``
             (stretch, end) are turns whose count is wrong, and the neighbourhoods of edges that come early or late: the
             angle is right at their ends only.
@@ -135,8 +135,8 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
 
     What a place of the wheel has in every turn, as a bent tooth, is left to it.
     """
-    told, pitch = np.isfinite(degrees), 360.0 / teeth
-    angle, time = degrees[told], time_s[told]
+    valid, pitch = np.isfinite(degrees), 360.0 / teeth
+    angle, time = degrees[valid], time_s[valid]
     at = np.arange(angle[0] + pitch, angle[-1] - pitch, pitch / _PER_PITCH)
     if not at.size:
         return []
@@ -153,7 +153,7 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
 
 
 class Turning(NamedTuple):
-    """The angle of every sample of a table by its encoder, its columns, and what is to be said of it."""
+    """The angle of every sample of a table by its encoder, its columns, and the remarks on it."""
 
     degrees: NDArray[np.float64]
     columns: tuple[int, ...]
@@ -212,8 +212,8 @@ def on_even_angles(
     The first channel is a cylinder pressure; `tdc_deg` is the angle of TDC behind a mark of the turn. Firing TDC is the
     one of the two turns with the higher pressure.
     """
-    told = np.flatnonzero(np.isfinite(turning.degrees))
-    part = slice(int(told[0]), int(told[-1]) + 1)
+    valid = np.flatnonzero(np.isfinite(turning.degrees))
+    part = slice(int(valid[0]), int(valid[-1]) + 1)
     degrees = turning.degrees[part]
     usual = float(np.median(np.diff(degrees)))
     step: float = step_deg or max((each for each in _STEPS_DEG if each <= usual * 1.001), default=_STEPS_DEG[0])

@@ -172,8 +172,8 @@ class ParameterFile:
         for table, values in self.tables.items():
             out += ["", f"[{_quoted(table)}]"]
             for key, entry in values.items():
-                said = {part: getattr(entry, part) for part in _PARTS}
-                parts = ", ".join(_key_line(part, value) for part, value in said.items() if value is not None)
+                fields = {part: getattr(entry, part) for part in _PARTS}
+                parts = ", ".join(_key_line(part, value) for part, value in fields.items() if value is not None)
                 out.append(f"{_quoted(key)} = {{ {parts} }}")
         return "\n".join(out) + "\n"
 

@@ -129,12 +129,12 @@ def _place(name: str, own: Sequence[str], origin: str) -> int:
     raise DataError(f"{origin}: no column {name!r}: {near}")
 
 
-def _label(name: str, said: str | None, where: str) -> Label:
+def _label(name: str, text: str | None, where: str) -> Label:
     """Return the given unit, which must be that of the name where the name has one."""
     known = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
-    if said in (None, "", "-", "1"):
+    if text in (None, "", "-", "1"):
         return known
-    unit = _AS_WRITTEN.get(str(said).lower(), str(said))
+    unit = _AS_WRITTEN.get(str(text).lower(), str(text))
     try:
         written = attribute_units(unit)
     except ValueError as error:
@@ -143,7 +143,7 @@ def _label(name: str, said: str | None, where: str) -> Label:
         return Label(unit, known.long_name)
     if attribute_units(known.units) != written:
         raise DataError(
-            f"{where}: unit {said!r}: must be {known.units!r}, as the name says; convert the numbers or change the name"
+            f"{where}: unit {text!r}: must be {known.units!r}, as the name says; convert the numbers or change the name"
         )
     return known
 

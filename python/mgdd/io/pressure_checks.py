@@ -28,7 +28,7 @@ _BAR_PER = {
     "kgf/cm2": 0.980665, "atm": 1.01325, "torr": 1.01325 / 760.0,
 }  # fmt: skip
 PRESSURE_UNITS = (*_PER_BAR, *_BAR_PER)
-# That a remedy names: the others are too near to one of these to be told by a number.
+# That a remedy names: the others are too near to one of these to be told apart by a number.
 _USUAL = PRESSURE_UNITS[:6]
 # Peak pressure from a throttled motored engine to twice today's diesels; traces without TDC get a floor.
 PEAK_BAR = (4.0, 500.0)

@@ -305,7 +305,7 @@ def _unit_of_pressure(
     table: Table, heads: Sequence[Heading], columns: Sequence[int], unit: str | None, *, gain: bool
 ) -> tuple[str, bool]:
     """Return the unit of the pressure columns, and whether the file says it; volts need a gain."""
-    said = {heads[i].unit for i in columns}
+    units = {heads[i].unit for i in columns}
     strange = next((heads[i].strange for i in columns if heads[i].strange), None)
     if strange is not None:
         raise DataError(
@@ -318,11 +318,11 @@ def _unit_of_pressure(
             f"{table.source}: {unclear!r} in the header may be a unit, and none that is known: convert it to one of "
             f"{', '.join(PRESSURE_UNITS)}, or pass {argument('pressure_unit', '')} if the pressure is in one of them"
         )
-    if len(said) > 1:
+    if len(units) > 1:
         raise DataError(
-            f"{table.source}: pressures in {', '.join(map(str, sorted(said, key=str)))}: name columns of one unit"
+            f"{table.source}: pressures in {', '.join(map(str, sorted(units, key=str)))}: name columns of one unit"
         )
-    (known,) = said
+    (known,) = units
     volts = known in ("V", "mV")
     foreign = [i for i in columns if heads[i].other]
     if foreign or (known is not None and known not in PRESSURE_UNITS and not volts):
@@ -336,7 +336,7 @@ def _unit_of_pressure(
         )
     if gain and (unit is not None or (known is not None and not volts)):
         raise DataError(
-            f"{table.source}: {argument('gain_bar_per_v')} is for volts, and the pressure is said to be in "
+            f"{table.source}: {argument('gain_bar_per_v')} is for volts, and the pressure is given in "
             f"{unit or known}: give one of them"
         )
     if unit is not None and known is not None and unit != known:

@@ -136,11 +136,11 @@ class Table(ABC):
     def require_units_of_names(self, *texts: str) -> None:
         """Refuse a units row that contradicts the names, which say the units; columns of `texts` have none."""
         for name in self.header or ():
-            said, unit = self.unit(self.index(name)), unit_of(name)
-            if said in (None, "", "-", unit) or name in texts or (unit in _ANGLES and said in _ANGLES):
+            given, unit = self.unit(self.index(name)), unit_of(name)
+            if given in (None, "", "-", unit) or name in texts or (unit in _ANGLES and given in _ANGLES):
                 continue
             raise DataError(
-                f"{self.source}, column {name!r}: unit {said!r}: must be {unit!r}; convert the values, units stand in "
+                f"{self.source}, column {name!r}: unit {given!r}: must be {unit!r}; convert the values, units stand in "
                 "the names"
             )
 

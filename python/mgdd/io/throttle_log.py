@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-# The first unit of each column is taken where nothing is said.
+# The first unit of each column is taken where none is given.
 _UNITS = {
     "time_s": ("s", "ms"), "duty": ("-", "%"), "angle_deg": ("deg", "rad", "%"), "current_a": ("A",), "supply_v": ("V",)
 }  # fmt: skip
@@ -224,11 +224,11 @@ def _read(
 
 def _unit_of_column(key: str, asked: str | None, table: Table, index: int) -> str:
     """Return what the file says, else what is asked for, else the usual unit; the first two must agree."""
-    said, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
+    text, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
     units = _UNITS[key]
-    if said is None or (said == "-" and "-" not in units):
+    if text is None or (text == "-" and "-" not in units):
         return asked or units[0]
-    unit, where = spelled_unit(said), f"{table.source}: {table.called(index)} is in {said!r} as the file says"
+    unit, where = spelled_unit(text), f"{table.source}: {table.called(index)} is in {text!r} as the file says"
     if unit not in units:
         if not sure and asked is not None:
             return asked  # a remark, as who reads the file knows

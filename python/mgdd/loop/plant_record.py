@@ -143,7 +143,7 @@ class Cycles:
         )
 
 
-def cycles_told(seeker: Seeker, count: int) -> Cycles:
+def cycles_given(seeker: Seeker, count: int) -> Cycles:
     """Take the last cycles from the history of a seeker, of a plant that applies what it is asked for."""
     history = {name: column[len(column) - count :] for name, column in seeker._history_columns().items()}
     missed = history["misfire"] != 0.0
@@ -186,8 +186,8 @@ def dataset_of(cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapp
             variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
         elif name not in _OWN:
             labels: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in columns else {}  # of a bench
-            said: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
-            variables[name] = ("cycle", values, *said)
+            label: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
+            variables[name] = ("cycle", values, *label)
     width = cycles.components.shape[1]
     variables["component"] = ("component", np.arange(width), "-", "term of the performance")
     variables["components"] = (("cycle", "component"), cycles.components, "unit of J", "component of the performance")

@@ -46,7 +46,7 @@ def seek(
     settings: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> SeekResult:
-    """Seek the best inputs of a plant or a function, with a seeker that is chosen and said in the result.
+    """Seek the best inputs of a plant or a function, with a seeker that is chosen and named in the result.
 
     `mgdd engine seek` and ``task = "seek"`` of an experiment are this call. By itself one input is sought by
     `CurveSeeking`, with the curve of the guide or with a parabola. Several inputs are sought by
@@ -88,7 +88,7 @@ def seek(
         start of combustion.
     known : DataFrame, Dataset or mapping of columns, optional
         Readings of before, in their order: a column per input and limit, and ``j``, as the Dataset of a result is. A
-        row whose J is not finite failed. They are told first, to ``curve_seeking`` or ``gaussian_process_seeking``.
+        row whose J is not finite failed. They are given first, to ``curve_seeking`` or ``gaussian_process_seeking``.
     maximize : bool
         False to minimise J.
     settings : mapping of str to any, optional
@@ -216,8 +216,8 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
         if there and {one.name: (one.lower, one.upper) for one in given} != {
             one.name: (one.lower, one.upper) for one in there
         }:
-            said = ", ".join(f"{one.name} in [{one.lower:g}, {one.upper:g}]" for one in there)
-            raise ParameterError(f"inputs: the seeker given has {said}: leave them out")
+            bounds_text = ", ".join(f"{one.name} in [{one.lower:g}, {one.upper:g}]" for one in there)
+            raise ParameterError(f"inputs: the seeker given has {bounds_text}: leave them out")
         there = there or given
     if not there:
         if not isinstance(plant, Plant):
@@ -228,8 +228,8 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
         there = inputs_of({name: (a, b) for name, a, b in bounds})
     held = tuple(own["limits"])
     if limits and {one.name: one.upper for one in limits} != {one.name: one.upper for one in held}:
-        said = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
-        raise ParameterError(f"limits: the seeker given has {said}: leave them out")
+        limits_text = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
+        raise ParameterError(f"limits: the seeker given has {limits_text}: leave them out")
     begun = dict(zip([one.name for one in there], seeker.estimate.tolist(), strict=True))
     return Question(
         inputs=there, start=begun, limits=held, components=own.get("components"), maximize=own["maximize"],

@@ -90,8 +90,8 @@ class Question:
     @property
     def started_blindly(self) -> bool:
         """Whether nobody says that the limits hold where it begins."""
-        told = self.start is not None or isinstance(self.guide, EngineGuide)
-        return bool(self.limits) and not told and not safe_side(self.inputs, self.limits)
+        has_start = self.start is not None or isinstance(self.guide, EngineGuide)
+        return bool(self.limits) and not has_start and not safe_side(self.inputs, self.limits)
 
     def first(self, scales: float = 0.0) -> dict[str, float]:
         """Give where to begin: the start, else the safe side less so many scales of the input, else the middle."""
@@ -184,8 +184,8 @@ def _class_of(seeker: Any) -> type[Seeker]:
         named = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", seeker).lower()
         if named in SEEKERS:
             return SEEKERS[named]
-        said = f"{argument('seeker', seeker)}: must be auto or one of {', '.join(SEEKERS)}"
-        raise ParameterError(hinted(said, seeker, list(SEEKERS)), field="seeker", value=seeker)
+        message = f"{argument('seeker', seeker)}: must be auto or one of {', '.join(SEEKERS)}"
+        raise ParameterError(hinted(message, seeker, list(SEEKERS)), field="seeker", value=seeker)
     raise ParameterError.of("seeker", seeker, f"auto, a name ({', '.join(SEEKERS)}) or a seeker")
 
 
@@ -229,8 +229,8 @@ def _automatic(asked: Question) -> tuple[Seeker, str]:
     """Take a curve for one input, a Gaussian process for several and for components of their own delays."""
     guide, inputs = asked.guide, asked.inputs
     if asked.components is None and (isinstance(guide, Curve) or (guide is None and len(inputs) == 1)):
-        told = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
-        return _by_curve(asked), f"{told}, placed by the readings"
+        basis = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
+        return _by_curve(asked), f"{basis}, placed by the readings"
     start = asked.start
     if start is None and guide is not None and not asked.limits and asked.components is None:
         start = _best_of(guide, inputs, asked.maximize)
@@ -254,12 +254,12 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         raise ParameterError(f"{argument('guide')}: the plant has no operating point: give EngineGuide its point")
     plain = replace(asked, guide=None)
     if isinstance(guide, TimingMap):
-        said = guide(point)
-        if said is None:
+        timing_cad = guide(point)
+        if timing_cad is None:
             raise ParameterError(
                 f"{argument('guide_table')}: has nothing to say at {point}; its axes end before: widen them"
             )
-        inner = _inner(plain, seeker, float(said))
+        inner = _inner(plain, seeker, float(timing_cad))
         return FeedForward(inner, guide, keep_start=True), f"{inner.kind} after the timing of a table"
     model = guide.model((one.lower, one.upper))
     if guide.kind == "feed_forward":

@@ -47,7 +47,7 @@ def seek_front(
 ) -> FrontResult:
     """Seek the front of two objectives, as efficiency and NOx over timing and EGR.
 
-    Several `GaussianProcessSeeking` take turns, each on a weighted sum of both objectives, and every one hears every
+    Several `GaussianProcessSeeking` take turns, each on a weighted sum of both objectives, and every one receives every
     reading. The first three tenths of the cycles look for the best of each objective alone; the ranges between these
     two make the scales of the sums. At last each objective is fitted once to all readings, by a polynomial, and the
     front is what no other input beats in both fits, within what was tried.

@@ -200,10 +200,10 @@ def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> I
     elif guided and getattr(seeker, "trust", 1.0) < _TRUSTED:
         text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"
         yield Finding("untrusted_guide", (), text, "look at its shape and its height")
-    told, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
-    if seen and isinstance(taken, int | float) and asked.components is None and taken != told:
-        text = f"the readings fit a delay of {taken:g} cycles, not {told:g} as stated"
-        yield Finding("delay", (), text, "mend delay_cycles")
+    stated, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
+    if seen and isinstance(taken, int | float) and asked.components is None and taken != stated:
+        text = f"the readings fit a delay of {taken:g} cycles, not {stated:g} as configured"
+        yield Finding("delay", (), text, "correct delay_cycles")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -235,7 +235,7 @@ class SeekResult(Result):
     run : LoopRun
         Every cycle.
     asked : Question
-        Inputs, limits and what was said of J.
+        Inputs, limits and what was given of J.
     """
 
     inputs: dict[str, float]
@@ -267,8 +267,8 @@ class SeekResult(Result):
         rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", "unit of J"))
         for limit in self.asked.limits:
             name, side = plain_name(limit.name)
-            said = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
-            rows.append(Row(name, said, unit_of(name)))
+            reading = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
+            rows.append(Row(name, reading, unit_of(name)))
         rows.append(Row("cycles", str(self.run.dataset.sizes["cycle"])))
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 

@@ -140,7 +140,7 @@ def _best(
     best = _climbed(j, room, starts)
     if room(best).min() < -_EDGE:
         asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
-        raise ConvergenceError(f"no {asked} keeps {_said(caps)}: move a limit")
+        raise ConvergenceError(f"no {asked} keeps {_listed(caps)}: move a limit")
     return low + best * span, low + free * span
 
 
@@ -180,7 +180,7 @@ def _settled(quiet: VirtualEngine, inputs: Point) -> dict[str, Any]:
     return quiet.step(first, further)
 
 
-def _said(caps: Mapping[str, float]) -> str:
+def _listed(caps: Mapping[str, float]) -> str:
     """Write limits as they were given."""
     sides = [(*plain_name(name), cap) for name, cap in caps.items()]
     return ", ".join(f"{name} {'<=' if side > 0.0 else '>='} {side * cap:g}" for name, side, cap in sides)

@@ -124,19 +124,19 @@ def _dead_s(sample_s: float, delay_samples: int) -> float:
 def _doubts(kind: str, family: Family, sample_s: float, delay_samples: int) -> tuple[str, ...]:
     """Say where shipped numbers are used beyond what they have been seen to bear."""
     remedy = "look at a run of mgdd.loop.track with both, take a shorter sample time, or give own numbers"
-    told = []
+    doubts = []
     if sample_s > family.longest_sample_s * _SAME:
-        told.append(
+        doubts.append(
             f"sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at 0.001 s and have been seen to serve up to "
             f"{family.longest_sample_s:g} s; {remedy}"
         )
     elif _dead_s(sample_s, delay_samples) > family.longest_dead_s:
         most = family.longest_dead_s / sample_s - 0.5
-        told.append(
+        doubts.append(
             f"delay_samples = {delay_samples} at sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at "
             f"0.001 s and have been seen to serve up to {most:.3g} samples here; {remedy}"
         )
-    return tuple(told)
+    return tuple(doubts)
 
 
 def family_of(kind: str) -> Family:

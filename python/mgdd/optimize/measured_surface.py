@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _SIGNIFICANCE = 0.01  # of the test of lack of fit
-_FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test believes
+_FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test trusts
 _ILL = 1e8  # condition of a design that shows nothing
 
 

@@ -255,8 +255,8 @@ def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, 
         found = content["format"]
         kind, settings, state = content["kind"], content["settings"], content["state"]
     except (ValueError, KeyError, TypeError) as error:
-        said = str(error) if isinstance(error, DataError) else repr(error)
-        raise DataError(f"{file}: is not a seeker written by save(): {said}") from error
+        reason = str(error) if isinstance(error, DataError) else repr(error)
+        raise DataError(f"{file}: is not a seeker written by save(): {reason}") from error
     if found != _FORMAT:
         raise DataError(f"{file}: has format {found!r}: this version of mgdd reads format {_FORMAT}")
     if not (isinstance(kind, str) and isinstance(settings, dict) and isinstance(state, dict)):

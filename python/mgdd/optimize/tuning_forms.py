@@ -163,8 +163,8 @@ def _dither(
     decades = float(np.log(ratio).max())
     # The fastest direction keeps to the bound of averaging, the slowest one has to arrive.
     tau_least = bends[-1] * max((4.0 if lagged and compensated else 2.0) * period, _DELAYS_PER_TAU * (whole + doubt))
-    wished = cycles if cycles is not None else max(_CYCLES, (period + tau_least / bends[0] * decades) / _RESERVE)
-    tau = max(tau_least, bends[0] * (_RESERVE * wished - period) / decades)
+    cycles_wanted = cycles if cycles is not None else max(_CYCLES, (period + tau_least / bends[0] * decades) / _RESERVE)
+    tau = max(tau_least, bends[0] * (_RESERVE * cycles_wanted - period) / decades)
 
     def scatter(amplitude: Array) -> Array:
         """Solve the stationary covariance of z with the noise of the slopes that its steps take in."""
@@ -218,7 +218,7 @@ def _spsa(
     noise_sd: float, coupling: tuple[Array, Array], spec: Mapping[str, Array], cycles: float | None
 ) -> tuple[dict[str, Any], Array]:
     count = coupling[0].size
-    wished = _CYCLES if cycles is None else cycles
+    cycles_wanted = _CYCLES if cycles is None else cycles
     decades = float(np.log(spec["distance"] / spec["arrival"]).max())
     bend = _matrix(coupling)
 
@@ -229,7 +229,7 @@ def _spsa(
     steps = np.linspace(0.0, 1.0 / (count + 1), 201)[1:]
     factors = np.array([shrinks(q) for q in steps])
     q = float(steps[factors.argmin()])
-    wanted = math.exp(-4.0 * decades / (_RESERVE * wished))
+    wanted = math.exp(-4.0 * decades / (_RESERVE * cycles_wanted))
     if factors.min() < wanted:
         low, high = 0.0, q
         for _ in range(60):

@@ -184,9 +184,9 @@ def readable_record(path: str | os.PathLike[str]) -> RecordedRun:
 
 def _warn_of_rest(path: str | os.PathLike[str], ignored_bytes: int) -> None:
     if ignored_bytes:
-        said = "are not readable and left out: mgdd.rig.repair_record looks behind them"
+        state = "are not readable and left out: mgdd.rig.repair_record looks behind them"
         warnings.warn(
-            f"{printable(os.fspath(path))}: {ignored_bytes} bytes at its end {said}", UserWarning, stacklevel=3
+            f"{printable(os.fspath(path))}: {ignored_bytes} bytes at its end {state}", UserWarning, stacklevel=3
         )
 
 

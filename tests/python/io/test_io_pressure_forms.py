@@ -288,9 +288,9 @@ def test_volts(write: Write) -> None:
     np.testing.assert_allclose(
         read_pressure(milli, gain_bar_per_v=25.0, offset_bar=-7.5)["pressure_bar"], BAR, atol=1e-12
     )
-    with pytest.raises(DataError, match="is for volts, and the pressure is said to be in bar: give one"):
+    with pytest.raises(DataError, match="is for volts, and the pressure is given in bar: give one"):
         read_pressure(path, gain_bar_per_v=25.0, pressure_unit="bar")
-    with pytest.raises(DataError, match="said to be in kPa"):
+    with pytest.raises(DataError, match="is given in kPa"):
         read_pressure(write([CLOSED, BAR], "angle,p_kPa"), gain_bar_per_v=25.0)
     with pytest.raises(DataError, match="offset_bar acts on volts only"):
         read_pressure(path, offset_bar=1.0)

@@ -94,7 +94,7 @@ def test_something_else_at_the_port_of_a_hub() -> None:
 
         answer = threading.Thread(target=greet)
         answer.start()
-        with pytest.raises(RigError, match=r"not socketcand: it said b'SSH-2.0'"):
+        with pytest.raises(RigError, match=r"not socketcand: it sent b'SSH-2.0'"):
             CanTransport.parse(f"socketcand:can0?host=127.0.0.1&port={port}").open()
         answer.join()
 

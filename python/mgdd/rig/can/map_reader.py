@@ -60,8 +60,8 @@ class MapReader:
                     sorted(driven),
                     f"given a value of {signal.name} too: it is neither an input nor protected",
                 )
-        said = table.table("safe")
-        safe = self._raws(message, said)
+        safe_table = table.table("safe")
+        safe = self._raws(message, safe_table)
         if safe or message.cycle_s is not None:
             for entry in inputs.values():
                 if entry.signal.name not in safe:

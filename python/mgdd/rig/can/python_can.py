@@ -135,7 +135,7 @@ def _require_hub(name: str, options: Mapping[str, Any]) -> None:
     except OSError as error:
         raise RigError(f"{name}: nobody answers there: {error}; start the hub first: mgdd rig hub") from error
     if not greeting.startswith(b"< hi"):
-        raise RigError(f"{name}: what answers there is not socketcand: it said {greeting!r}")
+        raise RigError(f"{name}: what answers there is not socketcand: it sent {greeting!r}")
 
 
 class Reception:

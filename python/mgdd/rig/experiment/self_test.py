@@ -156,7 +156,7 @@ def _rows(truth: Path) -> list[tuple[int, float]]:
 
 
 class _Host:
-    """The process that dies; it is started early, and drives when it is told to die."""
+    """The process that dies; it is started early, and drives when the command to die comes."""
 
     def __init__(self, way: str, connection: str, loop: str) -> None:
         self.way = way
@@ -194,7 +194,7 @@ class _Host:
         if not line.startswith(word):
             self._process.kill()
             _, complaint = self._process.communicate()
-            raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'it said nothing'}")
+            raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'no error output'}")
         return line
 
 

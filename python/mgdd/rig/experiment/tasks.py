@@ -161,22 +161,22 @@ class IdentifyPlan:
         samples = _fewer(self.samples, most)
         columns, interrupted = _drive(plant, samples, lambda sample, _: float(self.duty[sample]), first_angle_deg)
         dataset = _dataset(columns, self.sample_s, {}, {})
-        said: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
+        figures: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
         if interrupted or samples < self.samples:
-            return Outcome(figures=said, dataset=dataset, interrupted=interrupted)
+            return Outcome(figures=figures, dataset=dataset, interrupted=interrupted)
         time_s = np.arange(len(columns["duty"])) * self.sample_s
         angle_deg = np.r_[first_angle_deg, columns["sensed_angle_deg"][:-1]]  # a log holds the angle before its duty
         log = throttle_log(time_s, columns["duty"], angle_deg, name="recorded")
         fit = identify.identify_throttle(
             log, self.task.model, two_sided=self.task.side == "both", options=FitOptions(seed=self.seed)
         )
-        said |= {
+        figures |= {
             "model": fit.kind, **figures_of(fit), "parameters": dict(fit.to_dict()["parameters"]),
             "findings": [str(finding) for finding in fit.findings], "success": bool(fit.report.success),
         }  # fmt: skip
         validation = identify.validate_throttle(fit, log)
         return Outcome(
-            figures=said,
+            figures=figures,
             dataset=dataset,
             files={"fit.toml": fit.to_toml()},
             drawings={"identify": partial(_draw_fit, validation)},

@@ -117,10 +117,10 @@ class LiveData:
                 self.gate, self.reason = category, text
         self.frames += len(news.frames)
         if self._inbox is not None and not {"loop", "rig"} & self.tables.keys():
-            self._hear(self._inbox, news.frames, start_ns)
+            self._receive(self._inbox, news.frames, start_ns)
         self.version += bool(news.rows or news.events or news.frames or news.restarted)
 
-    def _hear(self, inbox: Inbox, frames: list[Frame], start_ns: int) -> None:
+    def _receive(self, inbox: Inbox, frames: list[Frame], start_ns: int) -> None:
         """Read frames by the map: a row per cycle."""
         known = inbox.map
         commands = {m.key: m for m in known.commands.values()}

@@ -57,7 +57,7 @@ def _writes(process: str, wanted: os.stat_result) -> bool:
 class RecordSource:
     """A record, of a run that goes on or is over. Stop is Ctrl-C to the process that writes it, as from its terminal.
 
-    A second click is SIGTERM, for one that a shell told to ignore the first.
+    A second click is SIGTERM, for one that a shell made ignore the first.
     """
 
     def __init__(self, path: Path, signal_map: SignalMap | None = None, *, name: str = "") -> None:
@@ -177,13 +177,13 @@ class BusSource:
             self.trouble, self.state = str(error), "the bus is gone"
 
     def _send_safe(self) -> None:
-        """Go on from the counter that was heard last: the node takes the frames, and refuses those of its host."""
+        """Go on from the counter that was received last: the node takes the frames, and refuses those of its host."""
         commands = [message for message in self._map.commands.values() if message.safe]
         sender, sent = Sender(), 0
         for message in commands:
-            heard = self.data.last_commands.get(message.name)
-            if heard is not None:
-                sender.go_on(message, heard)
+            last = self.data.last_commands.get(message.name)
+            if last is not None:
+                sender.go_on(message, last)
         try:
             for _ in range(_SAFE_FRAMES):
                 for message in commands:
