@@ -114,17 +114,17 @@ class ModelOptimum(_core.guide.ModelOptimum):
         _require_point(point)
         if point in self._known:
             return self._known[point]
-        found = self._find(point)
-        if not found["found"]:
+        optimum = self._find(point)
+        if not optimum["found"]:
             return None
         best = Optimum(
-            inputs={"soc_cad": found["soc_cad"]},
+            inputs={"soc_cad": optimum["soc_cad"]},
             objective="performance",
-            value=found["j"],
-            values={"iterations": float(found["iterations"])},
-            at_bound=found["at_bound"],
+            value=optimum["j"],
+            values={"iterations": float(optimum["iterations"])},
+            at_bound=optimum["at_bound"],
             bounds={"soc_cad": tuple(self.settings["bounds_cad"])},
-            curvature=found["curvature"] or math.nan,
+            curvature=optimum["curvature"] or math.nan,
         )
         if len(self._known) >= _MOST_POINTS:
             self._known.pop(next(iter(self._known)))

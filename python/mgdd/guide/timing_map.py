@@ -176,8 +176,8 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         mgdd.errors.ParameterError
             The point lacks an axis.
         """
-        found = self.lookup(point)
-        return None if found.held_outside else found.timing_cad
+        cell = self.lookup(point)
+        return None if cell.held_outside else cell.timing_cad
 
     def lookup(self, point: Any) -> MapValue:
         """Read the map, outside of its axes too.

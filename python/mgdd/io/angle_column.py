@@ -68,8 +68,8 @@ class Angle(NamedTuple):
 def angle_of(table: Table, heads: Sequence[Heading], how: Reading, *, samples: int | None = None) -> Angle:
     """Read the angle, or make it; `samples` is the length of the raster of a file without one."""
     if how.encoder is not None:
-        found = turning_of(table, heads, how.encoder, how.angle_column)
-        return Angle(found.columns[0], found.degrees, "deg", False, found)
+        turning = turning_of(table, heads, how.encoder, how.angle_column)
+        return Angle(turning.columns[0], turning.degrees, "deg", False, turning)
     if how.angle_step_deg is not None:
         _check_start(table.source, "a count of samples", how)
         count = np.arange(table.height if samples is None else samples, dtype=np.float64)
@@ -118,14 +118,14 @@ def at_the_speed_of_the_record(
     """Compare the stated speed with the period of the record: correct angles and speed, or refuse."""
     if not (np.isfinite(degrees).all() and np.all(np.diff(degrees) > 0.0)):
         return degrees, speed_rpm, []  # check_trace names the sample
-    found = repetition(degrees, pressure, firing_tdc_deg)
-    if found is None or not found.differs:
+    period = repetition(degrees, pressure, firing_tdc_deg)
+    if period is None or not period.differs:
         return degrees, speed_rpm, []
-    share = CYCLE_DEG / found.degrees
+    share = CYCLE_DEG / period.degrees
     stated = argument("speed_rpm", format(speed_rpm, "g"))
     remark = (
-        f"the pressure repeats every {found.degrees:.6g} degrees of {stated}, not 720: over {found.cycles} cycles the "
-        f"engine ran at {speed_rpm * share:.6g} rpm"
+        f"the pressure repeats every {period.degrees:.6g} degrees of {stated}, not 720: over {period.cycles} cycles "
+        f"the engine ran at {speed_rpm * share:.6g} rpm"
     )
     if abs(share - 1.0) > _CORRECTED:
         raise DataError(f"{source}: {remark}: correct it")

@@ -74,8 +74,8 @@ def open_table(
             table: Table = read_table(path, delimiter=delimiter, decimal=decimal)
         else:
             with naming_damage(file):
-                found = _opened(form, file, stack, sheet=sheet, without_side_blocks=True)
-                table = _table_of(file, found) if isinstance(found, list) else text_table(*found, delimiter="\t")
+                content = _opened(form, file, stack, sheet=sheet, without_side_blocks=True)
+                table = _table_of(file, content) if isinstance(content, list) else text_table(*content, delimiter="\t")
         if sheet is not None and (form is None or not isinstance(table, TextTable)):
             raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
         yield _of_rows(table) if cycle_per_row else table
@@ -123,9 +123,9 @@ def cells_as_text(path: str | os.PathLike[str], sheet: str | None = None) -> tup
     form = _form_of(file)
     if form == "XLSX or NPZ":
         with naming_damage(file), contextlib.ExitStack() as stack:
-            found = _opened(form, file, stack, sheet=sheet) if _is_xlsx(file) else None
-            if isinstance(found, tuple):
-                return *found, True
+            content = _opened(form, file, stack, sheet=sheet) if _is_xlsx(file) else None
+            if isinstance(content, tuple):
+                return *content, True
     if sheet is not None:
         raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
     return None if form is not None else (str(file), read_plain_text(file), False)

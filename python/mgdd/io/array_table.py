@@ -82,8 +82,8 @@ class Column(NamedTuple):
         if self.across is None:
             return np.asarray(self.values[tuple(index)])[None]
         index[self.across] = slice(self.number, self.number + count)
-        found = np.asarray(self.values[tuple(index)])
-        return found.T if self.along < self.across else found
+        table = np.asarray(self.values[tuple(index)])
+        return table.T if self.along < self.across else table
 
 
 Columns = list[tuple[str, str, Column]]  # name, unit, column

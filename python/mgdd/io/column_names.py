@@ -221,17 +221,17 @@ def stem(name: str) -> str:
 
 def last_number(name: str) -> str | None:
     """Return the last number in a name, its unit in brackets left out."""
-    found = re.findall(r"\d+", without_brackets(name))
-    return found[-1] if found else None
+    numbers = re.findall(r"\d+", without_brackets(name))
+    return numbers[-1] if numbers else None
 
 
 def without_brackets(name: str) -> str:
     """Return a name without the brackets that hold a unit; remarks stay."""
 
-    def kept(found: re.Match[str]) -> str:
-        return " " if found[0].startswith("[") or _known(found[1]) is not None else f" {found[1]} "
+    def cleaned(bracket: re.Match[str]) -> str:
+        return " " if bracket[0].startswith("[") or _known(bracket[1]) is not None else f" {bracket[1]} "
 
-    return _BRACKETS.sub(kept, name).strip()
+    return _BRACKETS.sub(cleaned, name).strip()
 
 
 def _words(name: str) -> set[str]:

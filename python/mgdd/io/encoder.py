@@ -102,32 +102,32 @@ class Encoder:
         DataError, ShapeError
             Unlike lengths, a sample that is not finite, a signal that stands, or one of another wheel, which is named.
         """
-        found = _found(self, time_s, signal, index)
-        marks = found["mark_s"]
+        result = _found(self, time_s, signal, index)
+        marks = result["mark_s"]
         speed = 60.0 / np.diff(marks)
-        slipped = np.array(found["slipped_deg"], dtype=np.float64).reshape(-1, 2)
+        slipped = np.array(result["slipped_deg"], dtype=np.float64).reshape(-1, 2)
         return labelled_dataset(
             {
                 "time_s": ("time_s", np.asarray(time_s, dtype=np.float64)),
                 "turn": ("turn", np.arange(1, speed.size + 1), "-", "turn"),
                 "slip": ("slip", np.arange(1, len(slipped) + 1), "-", "stretch of miscounted or displaced edges"),
                 "end": ("end", np.array(["from", "to"]), "-", "end of a stretch"),
-                "crank_angle_deg": ("time_s", found["angle_deg"], "deg", "crank angle from a mark on"),
+                "crank_angle_deg": ("time_s", result["angle_deg"], "deg", "crank angle from a mark on"),
                 "mark_s": ("turn", marks[:-1], "s", "time of the mark that begins a turn"),
                 "speed_rpm": ("turn", speed, "rpm", "engine speed"),
                 "slipped_deg": (("slip", "end"), slipped, "deg", "miscounted or displaced edges"),
-                **{name: ((), found[name], "-", name.replace("_", " ")) for name in ("lost", "extra", "lost_marks")},
+                **{name: ((), result[name], "-", name.replace("_", " ")) for name in ("lost", "extra", "lost_marks")},
             }
         )
 
 
 def _found(encoder: Encoder, time_s: ArrayLike, signal: ArrayLike, index: ArrayLike | None) -> dict[str, Any]:
     e = encoder
-    found: dict[str, Any] = _core.encoder_angle(
+    result: dict[str, Any] = _core.encoder_angle(
         time_s, signal, index, teeth=e.teeth, missing_teeth=e.missing_teeth, falling=e.falling, level=e.level
     )
-    displaced = _displaced(np.asarray(found["angle_deg"]), np.asarray(time_s, np.float64), e.teeth)
-    return {**found, "slipped_deg": sorted([*found["slipped_deg"], *displaced])}
+    displaced = _displaced(np.asarray(result["angle_deg"]), np.asarray(time_s, np.float64), e.teeth)
+    return {**result, "slipped_deg": sorted([*result["slipped_deg"], *displaced])}
 
 
 def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth: int) -> list[tuple[float, float]]:
@@ -178,14 +178,14 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
         even_step(seconds, where=f"{table.source}, {table.called(clock)}, row {{}}".format)
     pulse = None if index is None else table.numbers(index)
     try:
-        found = _found(encoder, seconds, table.numbers(column), pulse)
+        result = _found(encoder, seconds, table.numbers(column), pulse)
     except DataError as error:
         raise error.reworded(f"{table.source}, {table.called(column)}: {error}") from error
-    marks, notes = found["mark_s"], []
+    marks, notes = result["mark_s"], []
     for count, what in (
-        (found["lost"], "edge{} missing, the angle runs through"),
-        (found["extra"], "edge{} too many, left out"),
-        (found["lost_marks"], "mark{} of the turn missing or false"),
+        (result["lost"], "edge{} missing, the angle runs through"),
+        (result["extra"], "edge{} too many, left out"),
+        (result["lost_marks"], "mark{} of the turn missing or false"),
     ):
         if count:
             notes.append(f"{table.called(column)}: {count} {what.format('s' if count > 1 else '')}")
@@ -194,7 +194,7 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
         notes.append(f"{table.called(column)} has no mark of the turn: that no edge is missing is taken for granted")
     speed = 60.0 * (len(marks) - 1) / float(marks[-1] - marks[0]) if clock is not None and len(marks) > 1 else None
     used = tuple(i for i in (column, index, clock) if i is not None)
-    return Turning(found["angle_deg"], used, speed, found["slipped_deg"], notes, has_mark)
+    return Turning(result["angle_deg"], used, speed, result["slipped_deg"], notes, has_mark)
 
 
 def _time(table: Table, heads: Sequence[Heading], size: int, column: int) -> int | None:

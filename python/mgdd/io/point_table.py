@@ -103,23 +103,23 @@ def flat_points(data: xr.Dataset, names: Sequence[str] | None, origin: str) -> x
     if POINT in data.dims and inputs:
         raise DataError(f"{origin}: stands over {POINT} and {', '.join(inputs)}: select one entry of each")
     have = [*inputs, *(str(name) for name in data.data_vars)]
-    wanted = have if names is None else [have[_place(name, have, origin)] for name in names]
-    for name in wanted:
+    chosen = have if names is None else [have[_place(name, have, origin)] for name in names]
+    for name in chosen:
         if not {"units", "long_name"} <= set(data[name].attrs):
             raise DataError(f"{origin}: {name} has no units or no long_name: say both in its attributes")
     if not inputs:
-        return data[wanted]
-    flat = data.drop_vars([name for name in data.data_vars if name not in wanted])
+        return data[chosen]
+    flat = data.drop_vars([name for name in data.data_vars if name not in chosen])
     flat = flat.stack({POINT: inputs}).reset_index(POINT).reset_coords(inputs)
     numbers = (POINT, np.arange(flat.sizes[POINT]), {"units": "1", "long_name": "number of the point"})
     for name in inputs:
         flat[name].attrs = dict(data[name].attrs)
-    return flat.assign_coords({POINT: numbers})[wanted]
+    return flat.assign_coords({POINT: numbers})[chosen]
 
 
 def _named(head: str) -> tuple[str, str | None]:
-    found = _BRACKETS.fullmatch(head)
-    return (found[1], found[2].strip()) if found else (head, None)
+    match = _BRACKETS.fullmatch(head)
+    return (match[1], match[2].strip()) if match else (head, None)
 
 
 def _place(name: str, own: Sequence[str], origin: str) -> int:
@@ -177,8 +177,8 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
         raise DataError(f"{table.source}: the header needs a column 'file' that names each trace")
     unknown = [name for name in header if name != "file" and name not in _BOUNDS]
     if unknown or len(set(header)) != len(header):
-        known = ", ".join(map(repr, ("file", *_BOUNDS)))
-        raise DataError(f"{table.source}: unknown or repeated column in {header}: known are {known}, once each")
+        columns = ", ".join(map(repr, ("file", *_BOUNDS)))
+        raise DataError(f"{table.source}: unknown or repeated column in {header}: known are {columns}, once each")
     conditions: dict[str, dict[str, float]] = {}
     for line, row in zip(table.lines.tolist(), table.cells, strict=True):
         cells = dict(zip(header, row, strict=True))

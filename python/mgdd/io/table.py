@@ -202,8 +202,8 @@ class TextTable(Table):
 
     def _read(self, indices: Sequence[int]) -> None:
         # To find a row's cells costs as much as a few numbers: of a narrow table all columns are read in one go.
-        wanted = range(self.width) if self.width <= _NARROW and not self._known else indices
-        lacking = sorted(set(wanted) - self._known.keys())
+        needed = range(self.width) if self.width <= _NARROW and not self._known else indices
+        lacking = sorted(set(needed) - self._known.keys())
         if lacking:
             values, plain = self.rows.numbers(lacking, self.mark, self.decimal)
             self._known.update((index, values[k]) for k, index in enumerate(lacking) if plain[k])

@@ -88,9 +88,9 @@ def units_filled(
 def spells_units(cells: Sequence[str]) -> bool:
     """Return whether a row holds units, and nothing else that is not empty."""
     texts = [bare_unit(cell) for cell in cells]
-    known = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
+    are_units = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
     bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
-    return (bool(known) and all(known)) or (bool(bracketed) and all(bracketed))
+    return (bool(are_units) and all(are_units)) or (bool(bracketed) and all(bracketed))
 
 
 def _is_head(cells: tuple[str, ...]) -> bool:

@@ -173,8 +173,8 @@ def read_throttle_log(
             check_choice(_ASKED[key], unit, _UNITS[key])
     if not 0.0 < travel_deg <= 95.0:
         raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
-    wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
-    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
+    columns_asked = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
+    columns, place, units = _read(path, columns_asked, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
     scales = {"time_s": 0.001 if units["time_s"] == "ms" else 1.0, "duty": 0.01 if units["duty"] == "%" else 1.0}
     scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(units["angle_deg"], 1.0)
     columns = {key: values * scales.get(key, 1.0) for key, values in columns.items()}

@@ -111,11 +111,11 @@ def front_of(
 ) -> FrontResult:
     """Fit every quantity to all readings, `late` cycles after their inputs, and find the front of the fits."""
     names, wanted = [one.name for one in inputs], list(signs)
-    known = ~void[late:]
-    caused = applied[: len(applied) - late][known]
+    valid = ~void[late:]
+    caused = applied[: len(applied) - late][valid]
     columns = dict(zip(names, caused.T, strict=True))
-    fits = {name: fit_of(columns, measured[late:][known][:, k]) for k, name in enumerate(wanted)}
-    fits |= {limit.name: fit_of(columns, measured_limits[late:][known][:, k]) for k, limit in enumerate(limits)}
+    fits = {name: fit_of(columns, measured[late:][valid][:, k]) for k, name in enumerate(wanted)}
+    fits |= {limit.name: fit_of(columns, measured_limits[late:][valid][:, k]) for k, limit in enumerate(limits)}
     models = {name: fit.model for name, fit in fits.items()}
     at, kept = _front_inputs(models, signs, limits, caused, seed)
     at = at[_spaced(_signed(models, signs, at), points)]
@@ -160,15 +160,15 @@ def front_of(
 def fit_of(columns: Mapping[str, Numbers], values: Numbers) -> ResponseFit:
     """Fit the polynomial of the lowest degree that predicts left-out readings about as well as any."""
     inputs = len(columns)
-    found: list[tuple[float, ResponseFit]] = []
+    fits: list[tuple[float, ResponseFit]] = []
     for degree in _DEGREES:
         terms = math.comb(inputs + degree, degree)
-        if found and (terms > _MOST_TERMS or 2 * terms > values.size):
+        if fits and (terms > _MOST_TERMS or 2 * terms > values.size):
             break
         fit = fit_response(columns, values, degree=degree)
-        found.append((math.inf if fit.test is None else fit.test.rmse, fit))
-    least = min(error for error, _ in found)
-    return next(fit for error, fit in found if error <= _SLACK * least)
+        fits.append((math.inf if fit.test is None else fit.test.rmse, fit))
+    least = min(error for error, _ in fits)
+    return next(fit for error, fit in fits if error <= _SLACK * least)
 
 
 def _signed(models: Mapping[str, ResponseModel], signs: Mapping[str, float], at: Numbers) -> Numbers:

@@ -126,9 +126,9 @@ class Cycles:
             return {name: np.array([table.get(name, math.nan) for table in tables]) for name in names}
 
         limits = columns([row.limits for row in rows])
-        known = None
+        noise_free = None
         if any(row.noise_free_limits for row in rows):
-            known = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
+            noise_free = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
         return cls(
             estimate=np.array([row.estimate for row in log], np.float64).reshape(-1, inputs),
             asked=np.array([row.asked for row in log], np.float64).reshape(-1, inputs),
@@ -139,7 +139,7 @@ class Cycles:
             void=np.array([row.void for row in log], np.bool_),
             limits=limits,
             values=columns([row.values for row in rows]),
-            noise_free=known,
+            noise_free=noise_free,
         )
 
 

@@ -133,10 +133,10 @@ def seek(
     """
     if cycles is not None and (isinstance(cycles, bool) or not isinstance(cycles, int | np.integer)):
         raise ParameterError.of("cycles", cycles, "a whole number")
-    wanted = both_sides(limits)
+    sides = both_sides(limits)
     own = Seeker | FeedForward | GuidedEngine | OwnSeeker
     if not isinstance(seeker, own) and OwnSeeker.is_one(seeker):
-        seeker = OwnSeeker(seeker, seek_inputs(inputs), wanted, maximize=maximize)
+        seeker = OwnSeeker(seeker, seek_inputs(inputs), sides, maximize=maximize)
     if isinstance(seeker, own):
         left_out = {
             "start": start is None, "noise_sd": noise_sd is None, "delay_cycles": not delay_cycles,
@@ -146,12 +146,12 @@ def seek(
         }  # fmt: skip
         if named := [name for name, out in left_out.items() if not out]:
             raise ParameterError(f"{', '.join(named)}: the seeker given has its own: leave it out, or name the seeker")
-        asked = _question_of(seeker, inputs, wanted, plant)
+        asked = _question_of(seeker, inputs, sides, plant)
         choice = Choice(seeker, "as given", 1, asked.budget(seeker))
     else:
         given = seek_inputs(inputs)
         asked = Question(
-            inputs=given, start=started(start, given), limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
+            inputs=given, start=started(start, given), limits=sides, noise_sd=noise_sd, delay_cycles=delay_cycles,
             lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
             settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
         )  # fmt: skip
@@ -303,8 +303,8 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tupl
     read = np.isfinite(j) & np.isfinite(limits).all(axis=1)
     if asked.start is None and asked.late_cycles == 0.0 and read.any():
         uppers = np.array([limit.upper for limit in asked.limits])
-        kept = read & (limits <= uppers).all(axis=1)
-        worth = np.where(kept if kept.any() else read, j if asked.maximize else -j, -math.inf)
+        feasible = read & (limits <= uppers).all(axis=1)
+        worth = np.where(feasible if feasible.any() else read, j if asked.maximize else -j, -math.inf)
         best = dict(zip(names, x[int(np.argmax(worth))].tolist(), strict=True))
         asked = replace(asked, start=best)
         choice = chosen(asked, seeker)

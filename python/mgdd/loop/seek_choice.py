@@ -103,7 +103,7 @@ class Question:
     def made(self, cls: type[Seeker], start: Mapping[str, float] | None, **own: Any) -> Seeker:
         """Make a seeker of that class; ParameterError for what is known that it cannot know."""
         takes = inspect.signature(cls).parameters
-        known: dict[str, Any] = {
+        arguments: dict[str, Any] = {
             "inputs": list(self.inputs), "maximize": self.maximize, "limits": list(self.limits),
             "start": start or self.first(0.0 if cls in _FIRST else _DITHER),
         }  # fmt: skip
@@ -112,7 +112,7 @@ class Question:
         if any(late.values()) and lags is not None:
             raise ParameterError("components: hold the delays: leave delay_cycles and lag_cycles out")
         if "delay_cycles" in takes and lags is None:
-            known |= late
+            arguments |= late
         elif self.late_cycles > 0.0:
             if "components" not in takes:
                 late_ones = ", ".join(name for name, one in SEEKERS.items() if _bears_delay(one))
@@ -120,24 +120,24 @@ class Question:
                     f"{argument('seeker', _name_of(cls))}: takes J of the same cycle, and J is late here: take one of "
                     f"{late_ones}"
                 )
-            known["components"] = lags or [ComponentLag(**late)]
+            arguments["components"] = lags or [ComponentLag(**late)]
             if "period" in takes:
-                slowest = max(known["components"], key=lambda lag: lag.delay_cycles + lag.lag_cycles)
+                slowest = max(arguments["components"], key=lambda lag: lag.delay_cycles + lag.lag_cycles)
                 slow = tune(
                     1.0, -1.0, delay_cycles=slowest.delay_cycles, lag_cycles=slowest.lag_cycles
                 )  # whose period does not depend on noise and curvature
-                known["period"] = max(takes["period"].default, slow.period)
+                arguments["period"] = max(takes["period"].default, slow.period)
         elif lags is not None:
-            known["components"] = lags
+            arguments["components"] = lags
         if self.noise_sd is not None and "noise_sd" in takes:
-            known["noise_sd"] = self.noise_sd
+            arguments["noise_sd"] = self.noise_sd
         elif cls is GoldenSection and "noise_sd" not in self.settings:
             raise ParameterError(
                 f"{argument('seeker', _name_of(cls))}: needs {argument('noise_sd')}, the standard deviation of one "
                 "reading"
             )
         if "seed" in takes:
-            known["seed"] = self.seed
+            arguments["seed"] = self.seed
         for name in self.settings:
             if name in _OWN_WORDS:
                 raise ParameterError(
@@ -149,7 +149,7 @@ class Question:
                     hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {', '.join(have)}", name, have)
                 )
         try:
-            return cls(**known | own | dict(self.settings))
+            return cls(**arguments | own | dict(self.settings))
         except ParameterError as error:
             if error.field not in self.settings:
                 raise

@@ -72,9 +72,9 @@ class Readings:
         """Average the readings whose inputs were nearest to the last estimate."""
         late = round(late_cycles)
         read, caused = values[late:], self.applied[: max(values.size - late, 0)]
-        known = np.isfinite(read)
-        away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[known]
-        return _mean(read[known][np.argsort(away, kind="stable")[:_NEAREST]])
+        finite = np.isfinite(read)
+        away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[finite]
+        return _mean(read[finite][np.argsort(away, kind="stable")[:_NEAREST]])
 
     def velocities(self, late_cycles: float, *, maximize: bool) -> list[Mean]:
         """Give the steady velocity of the best of every input per cycle in the last half, NaN where there is none.
@@ -88,19 +88,19 @@ class Readings:
             return out
         half = np.array_split(np.arange(cycles // 2, cycles), _BLOCKS)
         steps = np.diff([self.estimates[block].mean(axis=0) for block in half], axis=0) / (len(half[0]))
-        known = np.flatnonzero(np.isfinite(self.j[max(cycles // 2, late) :])) + max(cycles // 2, late)
-        u = (self.applied[known - late] - self.applied[known - late].mean(axis=0)) / self.width
-        k = (known - known.mean()) / cycles
+        cycles_read = np.flatnonzero(np.isfinite(self.j[max(cycles // 2, late) :])) + max(cycles // 2, late)
+        u = (self.applied[cycles_read - late] - self.applied[cycles_read - late].mean(axis=0)) / self.width
+        k = (cycles_read - cycles_read.mean()) / cycles
         for i in range(names):
             mean, sd = float(steps[:, i].mean()), float(np.std(steps[:, i], ddof=1)) / math.sqrt(len(steps))
             slower = 2.0 * abs(steps[-2:, i].mean()) < abs(steps[:2, i].mean())  # as towards a best that stands still
             if slower or abs(mean) <= _GOES_ON * sd or abs(mean) * cycles / 2 <= _FAR * self.width[i]:
                 continue
             terms = np.column_stack([np.ones_like(k), k, k**2, u, u**2, k * u[:, i]])
-            fit, left, rank, _ = np.linalg.lstsq(terms, self.j[known], rcond=None)
-            if rank < terms.shape[1] or len(known) <= rank:
+            fit, left, rank, _ = np.linalg.lstsq(terms, self.j[cycles_read], rcond=None)
+            if rank < terms.shape[1] or len(cycles_read) <= rank:
                 continue
-            turn = math.sqrt(float(left[0]) / (len(known) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
+            turn = math.sqrt(float(left[0]) / (len(cycles_read) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
             if math.copysign(1.0 if maximize else -1.0, mean) * float(fit[-1]) > _SURE * turn:
                 out[i] = Mean(mean, sd)
         return out
@@ -337,12 +337,12 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     if getattr(seeker, "expected_sd", 0.0) > 0.0:  # 0 before the process is fitted
         at_best = Mean(float(seeker.expected), float(seeker.expected_sd))
     gained = readings.gain(asked.late_cycles)
-    kept = {
+    estimates = {
         limit.name: readings.near_estimate(readings.limit(limit.name), limit.delay_cycles + limit.lag_cycles)
         for limit in asked.limits
     }
     gain = Mean(sign * gained.value, gained.sd)
-    doubts = doubts_about(seeker, run, readings, gain, kept, asked)
+    doubts = doubts_about(seeker, run, readings, gain, estimates, asked)
     return SeekResult(
         inputs=dict(zip([one.name for one in asked.inputs], seeker.settable.tolist(), strict=True)),
         value=at_best.value,
@@ -350,7 +350,7 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
         gain=gain.value,
         gain_sd=gain.sd,
         start=dict(start),
-        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]},
+        limits={name: sign * estimates[given].value for given in estimates for name, sign in [plain_name(given)]},
         seeker=seeker,
         reason=reason,
         findings=unique([*seeker.findings, *doubts]),

@@ -75,9 +75,9 @@ def steady_map(quiet: VirtualEngine, inputs: ArrayLike | Mapping[str, ArrayLike]
 
 def limits_to_keep(limits: Any) -> tuple[Limit, ...]:
     """Read limits that have a steady value, lower ones as upper ones of the negated quantity."""
-    kept = both_sides(limits)
-    check_request(OBJECTIVES[0], measured_names(kept), bench_limits)
-    return kept
+    upper_limits = both_sides(limits)
+    check_request(OBJECTIVES[0], measured_names(upper_limits), bench_limits)
+    return upper_limits
 
 
 def find_optimum(
@@ -135,8 +135,8 @@ def _best(
     free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]]) if low.size > 1 else _peak(j, grid, values)
     if room(free).min(initial=1.0) >= 0.0:
         return low + free * span, low + free * span
-    kept = np.flatnonzero(least >= 0.0)
-    starts = grid[kept[np.argsort(-values[kept])[:_STARTS]]] if kept.size else grid[np.argsort(-least)[:_STARTS]]
+    valid = np.flatnonzero(least >= 0.0)
+    starts = grid[valid[np.argsort(-values[valid])[:_STARTS]]] if valid.size else grid[np.argsort(-least)[:_STARTS]]
     best = _climbed(j, room, starts)
     if room(best).min() < -_EDGE:
         asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
@@ -150,8 +150,8 @@ def _peak(j: Any, grid: NDArray[np.float64], values: NDArray[np.float64]) -> NDA
 
     top = int(values.argmax())
     ends = grid[max(top - 1, 0), 0], grid[min(top + 1, len(grid) - 1), 0]
-    found = minimize_scalar(lambda z: -j(np.array([z])), bounds=ends, method="bounded", options={"xatol": 2.5e-6})
-    return np.array([found.x])
+    solution = minimize_scalar(lambda z: -j(np.array([z])), bounds=ends, method="bounded", options={"xatol": 2.5e-6})
+    return np.array([solution.x])
 
 
 def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -165,11 +165,11 @@ def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float
 
     ends = list(starts)
     for start in starts:
-        found = minimize(
+        solution = minimize(
             lambda z: -j(z), start, method="SLSQP", bounds=[(0.0, 1.0)] * start.size, constraints=rules,
             options={"eps": 1e-5, "ftol": 1e-10, "maxiter": 200},
         )  # fmt: skip
-        ends.append(np.clip(found.x, 0.0, 1.0))
+        ends.append(np.clip(solution.x, 0.0, 1.0))
     return np.asarray(max(ends, key=worth))
 
 

@@ -191,16 +191,16 @@ def measure_map(
     moved = narrow.optimum - wider.optimum
     covariance = noise[0] * narrow.optimum_variance + np.outer(moved, moved)
     bend_sd = np.sqrt(noise[0] * narrow.curvature_variance)
-    found: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "curvature": narrow.curvature,
         "curvature_stderr": np.hypot(bend_sd, narrow.curvature - wider.curvature),
         "optimum": narrow.optimum,
         "optimum_stderr": np.sqrt(np.diag(covariance)),
     }
     if inputs == 1:
-        found = {name: value.item() for name, value in found.items()}
+        figures = {name: value.item() for name, value in figures.items()}
     else:
-        found |= {"optimum_covariance": covariance, "bends": narrow.bends, "directions": narrow.directions}
+        figures |= {"optimum_covariance": covariance, "bends": narrow.bends, "directions": narrow.directions}
     findings += _unknown(x, narrow.curvature, bend_sd, narrow.optimum, names)
     return MeasuredMap(
         noise_sd=math.sqrt(noise[0]),
@@ -208,5 +208,5 @@ def measure_map(
         points=int(np.count_nonzero(kept)),
         findings=findings,
         inputs=names,
-        **found,
+        **figures,
     )

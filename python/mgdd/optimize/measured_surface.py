@@ -67,9 +67,9 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
     for place, (i, j) in enumerate(pairs, start=count + 1):
         bend[i, j] = bend[j, i] = c[place] * (2.0 if i == j else 1.0)
         bend_variance[i, j] = bend_variance[j, i] = spread[place, place] * (4.0 if i == j else 1.0)
-    found = np.linalg.eigh(bend)
-    order = np.argsort(-np.abs(found.eigenvalues))
-    bends, directions = found.eigenvalues[order], found.eigenvectors[:, order].T
+    eigen = np.linalg.eigh(bend)
+    order = np.argsort(-np.abs(eigen.eigenvalues))
+    bends, directions = eigen.eigenvalues[order], eigen.eigenvectors[:, order].T
     directions *= np.sign(directions[np.arange(count), np.abs(directions).argmax(axis=1)])[:, None]
     terms = np.array([[2.0 * d[i] * d[j] for i, j in pairs] for d in directions])
     own = spread[count + 1 :, count + 1 :]
@@ -197,28 +197,28 @@ def narrowed(
 
     x has the shape (n, inputs); the farthest distinct point, in scaled columns, is left out first.
     """
-    kept = np.ones(y.size, dtype=np.bool_)
+    used = np.ones(y.size, dtype=np.bool_)
     narrow, noise = wide, (wide.variance, wide.freedom)
     richer = _richer(x, y)
     if richer is None:
-        return narrow, kept, noise
+        return narrow, used, noise
     free = (float((y - richer[0]) @ (y - richer[0])) / richer[1], richer[1])
     scale = _scaled(x)[2]
     best = x[np.argmax(richer[0] if maximize else -richer[0])]
-    while not _fits(x[kept], y[kept], narrow, free):
+    while not _fits(x[used], y[used], narrow, free):
         noise = free
-        at = np.unique(x[kept], axis=0)
+        at = np.unique(x[used], axis=0)
         away = np.linalg.norm((at - best) / scale, axis=1)
         farthest = at[away.size - 1 - away[::-1].argmax()]
-        fewer = kept & (x != farthest).any(axis=1)
+        fewer = used & (x != farthest).any(axis=1)
         points = fewest(x.shape[1])
         if len(at) <= points or np.count_nonzero(fewer) < points + 2:
             break
         if _unseen(x[fewer], _numbered(x)) is not None:
             break
-        kept = fewer
-        narrow = fit(x[kept], y[kept], f" in {span_of(x[kept])}, over the whole of it J is not a parabola")
-    return narrow, kept, noise
+        used = fewer
+        narrow = fit(x[used], y[used], f" in {span_of(x[used])}, over the whole of it J is not a parabola")
+    return narrow, used, noise
 
 
 def span_of(x: Array) -> str:

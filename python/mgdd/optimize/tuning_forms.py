@@ -36,8 +36,8 @@ def coupling_of(hessian: Array) -> tuple[Array, Array]:
     """Return eigenvalues and eigenvectors of a matrix of curvatures whose diagonal is scaled to ones."""
     size = np.sqrt(np.abs(np.diag(hessian)))
     scaled = np.abs(hessian[0, 0]) / hessian[0, 0] * hessian / np.outer(size, size)
-    found = np.linalg.eigh(scaled)
-    return found.eigenvalues, found.eigenvectors
+    eigen = np.linalg.eigh(scaled)
+    return eigen.eigenvalues, eigen.eigenvectors
 
 
 def harmonics_of(inputs: int, *, least: int, per_harmonic: float = 0.0) -> tuple[int, tuple[int, ...]]:
@@ -51,8 +51,8 @@ def harmonics_of(inputs: int, *, least: int, per_harmonic: float = 0.0) -> tuple
         fastest = min((period - 1) // 2, int(period / per_harmonic) if per_harmonic > 0.0 else period)
         for top in range(inputs, fastest + 1):
             for below in combinations(range(top - 1, 0, -1), inputs - 1):  # close to each other: less ripple
-                if _apart(found := (*below[::-1], top), period):
-                    return period, found
+                if _apart(harmonics := (*below[::-1], top), period):
+                    return period, harmonics
         period += 1
 
 
@@ -171,8 +171,8 @@ def _dither(
         noise = (along.T * (2.0 * (noise_sd / (echo * amplitude * tau)) ** 2)) @ along
         share = bends / tau
         if batch:
-            kept = 1.0 - period * share
-            own = period * noise / (1.0 - np.outer(kept, kept))
+            decay = 1.0 - period * share
+            own = period * noise / (1.0 - np.outer(decay, decay))
         else:
             own = noise / np.add.outer(share, share)
         return np.asarray(along @ own @ along.T)
@@ -210,8 +210,8 @@ def spsa_moments(bend: Array, q: float, c: Array) -> Array:
     squares = np.kron(slopes, slopes).reshape(count, count, count * count)
     spread = 2.0 * squares
     spread[np.arange(count), np.arange(count)] = np.trace(squares)
-    kept = np.eye(count * count) - q * (np.kron(slopes, eye) + np.kron(eye, slopes))
-    return np.asarray(kept + q * q * spread.reshape(count * count, -1))
+    linear = np.eye(count * count) - q * (np.kron(slopes, eye) + np.kron(eye, slopes))
+    return np.asarray(linear + q * q * spread.reshape(count * count, -1))
 
 
 def _spsa(
@@ -229,12 +229,12 @@ def _spsa(
     steps = np.linspace(0.0, 1.0 / (count + 1), 201)[1:]
     factors = np.array([shrinks(q) for q in steps])
     q = float(steps[factors.argmin()])
-    wanted = math.exp(-4.0 * decades / (_RESERVE * cycles_wanted))
-    if factors.min() < wanted:
+    target = math.exp(-4.0 * decades / (_RESERVE * cycles_wanted))
+    if factors.min() < target:
         low, high = 0.0, q
         for _ in range(60):
             q = 0.5 * (low + high)
-            low, high = (low, q) if shrinks(q) < wanted else (q, high)
+            low, high = (low, q) if shrinks(q) < target else (q, high)
 
     def scatter(c: Array) -> Array:
         noise = (0.5 * (q * noise_sd) ** 2 * np.eye(count)).ravel()
@@ -275,33 +275,33 @@ def hessian_of(curvature: Any, inputs: Sequence[str]) -> tuple[Any, tuple[str, .
     if isinstance(curvature, Mapping):
         names = names or tuple(map(str, curvature))
         curvature = named_values("curvature", curvature, names)
-    found = np.asarray(curvature, dtype=np.float64)
-    if found.size == 1:
-        found = found.reshape(())
-    count = len(found) if found.ndim else 1
-    if found.ndim > 2 or found.shape not in ((), (count,), (count, count)) or count > _MOST_INPUTS:
+    values = np.asarray(curvature, dtype=np.float64)
+    if values.size == 1:
+        values = values.reshape(())
+    count = len(values) if values.ndim else 1
+    if values.ndim > 2 or values.shape not in ((), (count,), (count, count)) or count > _MOST_INPUTS:
         raise ShapeError(
-            f"curvature has shape {found.shape}: must be a number, one per input, or the matrix of at most "
+            f"curvature has shape {values.shape}: must be a number, one per input, or the matrix of at most "
             f"{_MOST_INPUTS} inputs"
         )
     if names and len(names) != count:
         raise ShapeError(f"inputs has {len(names)} entries: must have {count}, one per input of curvature")
-    for value in np.ravel(found if found.ndim < 2 else np.diag(found)):
+    for value in np.ravel(values if values.ndim < 2 else np.diag(values)):
         if not (math.isfinite(value) and value != 0.0):
             raise ParameterError.of("|curvature|", abs(value), "> 0; measure J at three points per input or more")
-    if not found.ndim:
-        return float(found), names
-    if found.ndim == 1:
-        return np.diag(-np.abs(found)), names
-    if not np.isfinite(found).all() or not np.allclose(found, found.T, rtol=1e-6, atol=0.0):
+    if not values.ndim:
+        return float(values), names
+    if values.ndim == 1:
+        return np.diag(-np.abs(values)), names
+    if not np.isfinite(values).all() or not np.allclose(values, values.T, rtol=1e-6, atol=0.0):
         raise ParameterError("curvature: must be a symmetric matrix of finite numbers")
-    sizes = coupling_of(found)[0]
-    if (np.diag(found) > 0.0).any() != (np.diag(found) > 0.0).all() or not sizes[0] > _FLAT:
+    sizes = coupling_of(values)[0]
+    if (np.diag(values) > 0.0).any() != (np.diag(values) > 0.0).all() or not sizes[0] > _FLAT:
         raise ParameterError(
             "curvature: J must bend one way in every direction; its scaled matrix has the eigenvalues "
             f"{', '.join(f'{size:.3g}' for size in sizes)}: measure again, or give one number per input"
         )
-    return found, names
+    return values, names
 
 
 def of_each(hessian: NDArray[np.float64], names: Sequence[str]) -> tuple[str, ...]:

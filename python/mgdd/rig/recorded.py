@@ -230,8 +230,8 @@ def _table_dataset(table: Mapping[str, Any], start: int) -> xr.Dataset:
     for place, given in enumerate(table["columns"]):
         name = _free(given, variables)
         values = table["values"][:, place]
-        known = VARIABLES.get(name)
-        label = known or (unit_of(name), name.replace("_", " ").strip() or repr(name))
+        standard = VARIABLES.get(name)
+        label = standard or (unit_of(name), name.replace("_", " ").strip() or repr(name))
         variables[name] = ("time_s", values, *label)
     return labelled_dataset(variables)
 

@@ -115,12 +115,12 @@ class MapReader:
         for mode, state in names.items():
             if state != mode and state not in signal.choices:
                 raise named.error(mode, state, f"a name of the value table: {', '.join(signal.choices) or 'none'}")
-        known = {mode: state for mode, state in names.items() if state in signal.choices}
-        failed = tuple(table.take("failed", "texts", [known[mode] for mode in ("limp", "fault") if mode in known]))
+        states = {mode: state for mode, state in names.items() if state in signal.choices}
+        failed = tuple(table.take("failed", "texts", [states[mode] for mode in ("limp", "fault") if mode in states]))
         for state in failed:
             if state not in signal.choices:
                 raise table.error("failed", state, f"a name of the value table: {', '.join(signal.choices) or 'none'}")
-        return StateSignal(message=name, signal=signal, failed=failed, names=known)
+        return StateSignal(message=name, signal=signal, failed=failed, names=states)
 
     def _message(self, name: str, table: TomlTable) -> DbcMessage:
         try:
@@ -130,8 +130,8 @@ class MapReader:
 
     def _signal(self, message: DbcMessage, name: str, table: TomlTable, key: str) -> DbcSignal:
         if name not in message.signals:
-            known = near(name, message.signals)
-            raise table.error(key, name, f"a signal of {message.name} in {self.dbc.file.name}: {known}")
+            hint = near(name, message.signals)
+            raise table.error(key, name, f"a signal of {message.name} in {self.dbc.file.name}: {hint}")
         return message.signals[name]
 
     def _timeout(self, message: DbcMessage, table: TomlTable) -> float | None:

@@ -313,15 +313,15 @@ class NodeCore:
         """Refuse a map with a value that the plant does not measure and its signal cannot say to be missing."""
         if self._known_values is None:
             return
-        known = dict.fromkeys((*self._known_values, *_OWN), 0.0)
+        zeros = dict.fromkeys((*self._known_values, *_OWN), 0.0)
         for message in self.map.measurements.values():
-            if lacking := _without_code(message.signals, known):
+            if lacking := _without_code(message.signals, zeros):
                 raise ParameterError.of(
                     f"values of {message.name}", ", ".join(lacking),
                     f"measured by the plant ({', '.join(self._known_values)}), or give the signal a raw value "
                     '"not available" in its value table (VAL_), or take it out of the map',
                 )  # fmt: skip
-            if lacking := [name for name in message.signals if name not in known]:
+            if lacking := [name for name in message.signals if name not in zeros]:
                 _LOG.warning("%s: the plant does not measure %s: sent as missing", message.name, ", ".join(lacking))
 
     def _report(self, sampled: Sampled) -> list[Frame]:
@@ -339,9 +339,9 @@ class NodeCore:
             state = self.map.state
             if state is not None and state.message == message.name:
                 raws[state.signal.name] = self._codes[self.gate.mode]
-            known = _carried(message.signals, values)
+            carried = _carried(message.signals, values)
             applied = _carried(message.applied, sampled.applied)
-            frames += self._sender.frames(message, message.payloads(known, raws, applied))
+            frames += self._sender.frames(message, message.payloads(carried, raws, applied))
         self.samples += 1
         return frames
 

@@ -43,8 +43,8 @@ class WatchedBus:
 
     def __init__(self, bus: Bus, signal_map: SignalMap) -> None:
         self.bus, self._map, self.name = bus, signal_map, bus.name
-        known = signal_map.state
-        self._key = None if known is None else signal_map.measurements[known.message].key
+        state = signal_map.state
+        self._key = None if state is None else signal_map.measurements[state.message].key
         self._in_a_row = 0
         self.state = ""
 

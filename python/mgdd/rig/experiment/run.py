@@ -113,17 +113,17 @@ class RunFolder:
 
 def versions() -> dict[str, Any]:
     """Give time, versions and machine of a run."""
-    found: dict[str, str | None] = {}
+    packages: dict[str, str | None] = {}
     for name in _PACKAGES:
         try:
-            found[name] = metadata.version(name)
+            packages[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = None
+            packages[name] = None
     return {
         "begun": datetime.now(UTC).isoformat(timespec="seconds"),
         "mgdd": _core.__version__,
         "python": platform.python_version(),
-        "packages": found,
+        "packages": packages,
         "system": platform.platform(),
         "arguments": sys.argv[1:],
     }

@@ -212,18 +212,18 @@ def _axis(part: str, base: str) -> tuple[str, str]:
     """Give the label of the axis that a column belongs to, and its own."""
     if part == "component":
         return "objective J [unit of J]", f"component {base}"
-    known = named_label(base)
-    long = known.long_name.strip() or base
+    label = named_label(base)
+    long = label.long_name.strip() or base
     if base in _DUTIES:
         return "duty [-]", _DUTIES[base]
-    if known.units in ("-", ""):
+    if label.units in ("-", ""):
         return f"{base} [-]", long
-    if known.units == "°CA aTDC" and part in _OF_PARTS:
+    if label.units == "°CA aTDC" and part in _OF_PARTS:
         return "timing [°CA aTDC]", long
     if base.startswith("imep_"):
         return "IMEP [bar]", long
-    what = _QUANTITIES.get(known.units) or long.partition(",")[0]
-    return f"{what} [{known.units}]", long
+    what = _QUANTITIES.get(label.units) or long.partition(",")[0]
+    return f"{what} [{label.units}]", long
 
 
 def _named(names: tuple[str, ...], codes: NDArray[np.float64] | None, before: str) -> str:

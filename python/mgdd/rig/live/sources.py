@@ -29,23 +29,23 @@ _SAFE_FRAMES, _SAFE_PAUSE_S = 5, 0.002
 def writer_of(path: Path) -> int | None:
     """Give the process that has a file open for writing: what a record belongs to while it runs."""
     try:
-        wanted = path.stat()
+        record_stat = path.stat()
     except OSError:
         return None
     for process in os.listdir("/proc") if os.path.isdir("/proc") else []:  # noqa: PTH112, PTH208 - ten thousand paths
-        if process.isdigit() and _writes(process, wanted):
+        if process.isdigit() and _writes(process, record_stat):
             return int(process)
     return None
 
 
-def _writes(process: str, wanted: os.stat_result) -> bool:
+def _writes(process: str, record_stat: os.stat_result) -> bool:
     try:
         for number in os.listdir(f"/proc/{process}/fd"):  # noqa: PTH208
             try:
-                found = os.stat(f"/proc/{process}/fd/{number}")  # noqa: PTH116
+                open_stat = os.stat(f"/proc/{process}/fd/{number}")  # noqa: PTH116
             except OSError:
                 continue
-            if (found.st_dev, found.st_ino) == (wanted.st_dev, wanted.st_ino):
+            if (open_stat.st_dev, open_stat.st_ino) == (record_stat.st_dev, record_stat.st_ino):
                 text = Path(f"/proc/{process}/fdinfo/{number}").read_text(encoding="ascii")
                 if int(text.partition("flags:")[2].split()[0], 8) & _WRITES:
                     return True
