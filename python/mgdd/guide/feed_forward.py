@@ -188,7 +188,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
         """
         now = numbers_of(point)
         if not all(map(math.isfinite, now.values())):
-            _LOG.warning("operating point %s is not finite: the last one stands", now)
+            _LOG.warning("operating point %s is not finite: the last one stays", now)
             return "held"
         change = change_between(now, self._point)
         cause = max(self._owed, "" if change == "same" else change, key=_CAUSES.index)
@@ -221,7 +221,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
             return "followed"
         _LOG.log(
             logging.DEBUG if retry else logging.WARNING,
-            "guide refused at %s: %s; the last valid feed-forward stands, trust is now %.2f",
+            "guide refused at %s: %s; the last valid feed-forward stays, trust is now %.2f",
             point, why, self.trust,
         )  # fmt: skip
         return "refused"

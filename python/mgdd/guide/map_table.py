@@ -84,7 +84,7 @@ def _names(table: TextTable) -> tuple[str, ...]:
         raise DataError(f"{table.source}: no header: name the columns, for example speed_rpm,fuel_mg,timing_cad")
     for name in table.header:
         if table.header.count(name) > 1:
-            raise DataError(f"{table.source}: column {name!r} stands twice: keep one")
+            raise DataError(f"{table.source}: column {name!r} occurs twice: keep one")
     if "timing_cad" not in table.header:
         near = did_you_mean("timing_cad", table.header)
         had = ", ".join(map(repr, table.header))

@@ -138,7 +138,7 @@ def _check_start(where: str, what: str, how: Reading) -> None:
         raise DataError(f"{where}: {argument('before_tdc')} is for an angle column: leave it out")
     if how.angle_start_deg is None and how.firing_tdc_deg is None:
         raise DataError(
-            f"{where}: {what} says nothing of firing TDC: pass {argument('angle_start_deg', '')} with the angle of the "
+            f"{where}: {what} gives no firing TDC: pass {argument('angle_start_deg', '')} with the angle of the "
             f"first sample, or {argument('firing_tdc_deg', '')} with the angle of firing TDC counted from it"
         )
 

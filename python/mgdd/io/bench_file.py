@@ -144,7 +144,7 @@ def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *
     notes += _add_slow(table, layout, chosen, variables, sources)
     notes += _add_per_cycle(table, chosen, record, variables, asked=channels is not None)
     if bare := [channel.name for channel in chosen if channel.units is None and channel.name in variables]:
-        notes.append(f"the file gives no unit of {columns_shown(bare)}: their numbers stand as they are")
+        notes.append(f"the file gives no unit of {columns_shown(bare)}: their numbers are unchanged")
     made = labelled_dataset(variables, attrs=record_attrs(record._replace(notes=record.notes + notes), name))
     sources |= {channel.name: channel.source for channel in chosen}
     for name_of, variable in made.variables.items():  # made[name] would look at every other variable each time

@@ -265,7 +265,7 @@ def phase_warnings(
     """
     turned = lost_turn(cad, pressure)
     if turned is not None:
-        what = f"from cycle {turned + 1} on firing TDC stands at gas exchange: a turn of the shaft is missing before it"
+        what = f"from cycle {turned + 1} on firing TDC is at gas exchange: a turn of the shaft is missing before it"
         return [f"{what}; cut the record there, each part with its own firing_tdc_deg"]
     fit = phases(cad, pressure)
     if fit is None:

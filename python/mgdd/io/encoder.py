@@ -220,7 +220,7 @@ def on_even_angles(
     first = int(np.ceil(degrees[0] / step))
     count = int(np.floor(degrees[-1] / step)) - first + 1
     if count * step < CYCLE_DEG:
-        raise DataError(f"{source}: the encoder tells {max(count * step, 0.0):.4g} degrees: a cycle of 720 is needed")
+        raise DataError(f"{source}: the encoder covers {max(count * step, 0.0):.4g} degrees: a cycle of 720 is needed")
     bad = np.flatnonzero(~np.isfinite(channels[0]))
     if bad.size:
         raise DataError(

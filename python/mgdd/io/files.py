@@ -152,7 +152,7 @@ def _object(pairs: list[tuple[str, Any]], decode: Callable[[dict[str, Any]], Any
     made = dict(pairs)
     if len(made) < len(pairs):
         names = [name for name, _ in pairs]
-        raise DataError(f"the key {next(name for name in made if names.count(name) > 1)!r} stands twice")
+        raise DataError(f"the key {next(name for name in made if names.count(name) > 1)!r} occurs twice")
     return made if decode is None else decode(made)
 
 

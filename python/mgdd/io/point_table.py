@@ -70,7 +70,7 @@ def _of_csv(table: TextTable, names: Sequence[str] | None, always: Collection[st
     own = [name for name, _ in split]
     twice = next((name for name in own if name and own.count(name) > 1), None)
     if twice is not None:
-        raise DataError(f"{table.source}: column {twice!r} stands twice: rename or remove one")
+        raise DataError(f"{table.source}: column {twice!r} occurs twice: rename or remove one")
     if names is None:
         numeric = table.numeric([*range(table.width)])
         places = [k for k, name in enumerate(own) if name not in ("", POINT) and (k in numeric or name in always)]

@@ -67,7 +67,7 @@ class FrontResult(Result):
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + findings_html("What speaks against it", self.findings)
+        return super()._repr_html_() + findings_html("Reasons to doubt it", self.findings)
 
     def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.style import BLUE, GREY, legend, new_axes

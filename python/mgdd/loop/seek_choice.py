@@ -240,7 +240,7 @@ def _automatic(asked: Question) -> tuple[Seeker, str]:
     by = " and a guide" if guided else ""
     return (
         asked.made(GaussianProcessSeeking, start, **guided),
-        f"{count}{by}{kept}: it loses least on the way, whatever their units",
+        f"{count}{by}{kept}: smallest cumulative loss, whatever their units",
     )
 
 
@@ -257,7 +257,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         timing_cad = guide(point)
         if timing_cad is None:
             raise ParameterError(
-                f"{argument('guide_table')}: has nothing to say at {point}; its axes end before: widen them"
+                f"{argument('guide_table')}: gives no timing at {point}: its axes end before: widen them"
             )
         inner = _inner(plain, seeker, float(timing_cad))
         return FeedForward(inner, guide, keep_start=True), f"{inner.kind} after the timing of a table"

@@ -1,4 +1,4 @@
-"""Two objectives at once: seekers of weighted sums of them, all of which hear every reading."""
+"""Two objectives at once: seekers of weighted sums of them, all of which receive every reading."""
 
 from __future__ import annotations
 

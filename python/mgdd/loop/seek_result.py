@@ -1,4 +1,4 @@
-"""What one call of `seek` found: the best inputs, what they give, which seeker sought, and what speaks against it."""
+"""Result of one call of `seek`: the best inputs, what they give, the seeker, and reasons to doubt the result."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) ->
 def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean]) -> Iterator[Finding]:
     if asked.started_blindly:
         names = tuple(measured_names(asked.limits))
-        text = f"no start was given, and nobody knows where {', '.join(names)} would hold: it began where that was open"
+        text = f"no start given, and it is unknown where {', '.join(names)} would hold: it began where that was open"
         yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
     for limit in asked.limits:
         values = readings.limit(limit.name)
@@ -273,7 +273,7 @@ class SeekResult(Result):
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + findings_html("What speaks against it", self.findings)
+        return super()._repr_html_() + findings_html("Reasons to doubt it", self.findings)
 
     @property
     def interrupted(self) -> bool:

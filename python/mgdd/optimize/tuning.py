@@ -120,7 +120,7 @@ class Tuning(InputNumbers):
             lines.append(f"the sensor leaves {shares} of the echo and turns it by {turns} ({state})")
         if np.ndim(self.curvature) and (flattest := coupling_of(self.curvature)[0][0]) < _COUPLED:
             lines.append(
-                f"the inputs are coupled: in the flattest direction J bends {flattest:.2g} of what it does along the "
+                f"the inputs are coupled: in the flattest direction J has {flattest:.2g} of its curvature along the "
                 f"inputs, and the approach takes {1.0 / flattest:.2g} times as long"
             )
         if self.delay_uncertainty > 0.0:

@@ -73,7 +73,7 @@ def test_frames_cross_a_hub_in_order() -> None:
             "channel 'mgdd_none' of interface socketcan cannot be opened: .*(no CAN|No such device)",
         ),
         ("socketcand:can0", "socketcand needs host and port"),
-        ("socketcand:can0?host=127.0.0.1&port=1", "nobody answers there: .*start the hub first: mgdd rig hub"),
+        ("socketcand:can0?host=127.0.0.1&port=1", "no answer there: .*start the hub first: mgdd rig hub"),
         ("pcan:PCAN_USBBUS1", "channel 'PCAN_USBBUS1' of interface pcan cannot be opened"),
     ],
 )

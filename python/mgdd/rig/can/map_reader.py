@@ -88,7 +88,7 @@ class MapReader:
         if not inputs:
             raise DataError(f"{table.origin}: [commands] has no input: give at least one")
         if not any(message.safe for message in commands.values()):
-            raise DataError(f"{table.origin}: no command has safe values: say what is sent when the rig is left")
+            raise DataError(f"{table.origin}: no command has safe values: give what is sent when the rig is left")
         if not any(message.signals for message in measurements.values()):
             raise DataError(f"{table.origin}: [measurements] has no value: give at least one")
         for name in commands:

@@ -134,7 +134,7 @@ def _time_home(host: _Host, truth: Path, home_deg: float) -> float:
     rows = _rows(truth)
     while not rows or rows[-1][0] < until_ns:  # a busy machine: the log comes, but later
         if time.monotonic() > waited:
-            raise RigError("the node says nothing of that time")
+            raise RigError("the node reported nothing of that time")
         time.sleep(0.05)
         rows = _rows(truth)
     before = [angle for at_ns, angle in rows if at_ns <= died_ns]

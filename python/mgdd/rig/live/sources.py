@@ -197,7 +197,7 @@ class BusSource:
         if not sent:
             self.said = "STOP FAILED: the map has no safe frame: use the emergency stop"
             return
-        self.said = f"{sent} safe frames sent at {time.strftime('%H:%M:%S')}: look whether the node lets go"
+        self.said = f"{sent} safe frames sent at {time.strftime('%H:%M:%S')}: check that the node opens its bridge"
 
 
 class SimulatedSource(RecordSource):
