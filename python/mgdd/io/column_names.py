@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mgdd.errors import DataError
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
-# Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
+# Spellings of a unit, in small letters, comma between them; "other" are those of quantities that are not used.
 _SPELLINGS = {
     "bar": "bar, dan/cm2",
     "kPa": "kpa, kn/m2, kn/m²",

@@ -49,7 +49,7 @@ class FrontResult(Result):
     models : dict of str to ResponseModel
         Of every objective and limit, over the inputs.
     findings : tuple of Finding
-        What speaks against it: codes ``few_cycles``, ``one_best``, ``above_limit``, ``uncertain``, ``interrupted``, and
+        Reasons to doubt it: codes ``few_cycles``, ``one_best``, ``above_limit``, ``uncertain``, ``interrupted``, and
         those of the fits, with the name of the objective or limit in front.
     """
 
@@ -232,7 +232,7 @@ def _doubts(mean: Numbers, sd: Numbers, names: Sequence[str], cycles: int, input
 
 
 def _of_fits(fits: Mapping[str, ResponseFit]) -> list[Finding]:
-    """Repeat what speaks against the fits; readings that follow a seeker are neither even nor in random order."""
+    """Repeat the reasons to doubt the fits; readings that follow a seeker are neither even nor in random order."""
     own = {"poor_prediction", "few_points", "lack_of_fit"}
     return [
         Finding(one.code, (name, *one.names), f"{name}: {one.text}", one.remedy)

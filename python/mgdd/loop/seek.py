@@ -67,7 +67,7 @@ def seek(
         `ask`, `tell` and `estimate`, which goes on where it stands and changes.
     start : mapping of str to float, or float for one input, optional
         First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle; with
-        limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where nobody knows one
+        limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where none is known
         it is the middle, with a finding.
     cycles : int, optional
         How many; the first readings to every side at least. Left out: 200, and 25 more per cycle that J is late; of a
@@ -99,7 +99,7 @@ def seek(
     Returns
     -------
     SeekResult
-        Best inputs, J and limits there, the gain over the start, which seeker and why, what speaks against the result,
+        Best inputs, J and limits there, the gain over the start, which seeker and why, reasons to doubt the result,
         and every cycle.
 
     Raises

@@ -89,7 +89,7 @@ class Question:
 
     @property
     def started_blindly(self) -> bool:
-        """Whether nobody says that the limits hold where it begins."""
+        """Whether it is unknown if the limits hold where it begins."""
         has_start = self.start is not None or isinstance(self.guide, EngineGuide)
         return bool(self.limits) and not has_start and not safe_side(self.inputs, self.limits)
 
@@ -156,7 +156,7 @@ class Question:
             raise error.reworded(f"{argument('settings')}: {error}") from error
 
     def budget(self, seeker: Any) -> int:
-        """How many cycles a search takes where nobody says."""
+        """How many cycles a search takes by default."""
         kind = getattr(seeker, "_seeker_kind", None) or seeker.kind
         if kind in {cls.kind for cls in _FIRST}:
             return _CYCLES + math.ceil(_PER_LATE * self.late_cycles)

@@ -79,7 +79,7 @@ def seek_front(
     Returns
     -------
     FrontResult
-        Points of the front with inputs, predictions and their uncertainty; models; every cycle; what speaks against it.
+        Points of the front with inputs, predictions and their uncertainty; models; every cycle; reasons to doubt it.
 
     Raises
     ------

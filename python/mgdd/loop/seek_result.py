@@ -128,7 +128,7 @@ def _mean(values: NDArray[np.float64]) -> Mean:
 def doubts_about(
     seeker: Any, run: LoopRun, readings: Readings, gain: Mean, kept: Mapping[str, Mean], asked: Question
 ) -> list[Finding]:
-    """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
+    """Give reasons to doubt a result: its gain over the start, positive is better, and its limits as they are."""
     return [
         *_about_run(run, readings, asked, gain),
         *_about_limits(readings, asked, kept),
@@ -229,7 +229,7 @@ class SeekResult(Result):
     reason : str
         Why that one.
     findings : tuple of Finding
-        What speaks against the result: codes ``few_cycles``, ``moving``, ``not_settled``, ``at_bound``, ``no_gain``,
+        Reasons to doubt the result: codes ``few_cycles``, ``moving``, ``not_settled``, ``at_bound``, ``no_gain``,
         ``start_unknown``, ``start_above_limit``, ``limit_broken``, ``no_reading``, ``unexplained``, ``handed_over``,
         ``untrusted_guide``, ``delay``, ``interrupted``, and those of the seeker.
     run : LoopRun

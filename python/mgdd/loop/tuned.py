@@ -55,7 +55,7 @@ def tuned_controller(
     ------
     mgdd.errors.ParameterError
         An unknown kind, a model without groups, unknown numbers; a delay for a kind that cannot know one and whose
-        shipped numbers do not bear it.
+        shipped numbers work with shorter ones only.
 
     Examples
     --------

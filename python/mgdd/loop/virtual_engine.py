@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from mgdd.results.dataset import Dataset
 
-_SEARCHED_CAD = (-30.0, 10.0)  # where nobody says, as `mgdd engine seek` does
+_SEARCHED_CAD = (-30.0, 10.0)  # by default, as `mgdd engine seek` does
 _RANDOM = (
     "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
     "wall_heat_drift_per_kcycle",

@@ -65,7 +65,7 @@ class SeekerFindings(_CoreSeeker):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What speaks against the run so far.
+        """Reasons to doubt the run so far.
 
         Codes: ``failing_inputs``, ``failing_everywhere``, ``failing_cycles`` (a tenth of all, and no input is known
         to fail), ``limit_delay``, ``frozen`` (a channel read the same to the last bit, twelve cycles in a row, at

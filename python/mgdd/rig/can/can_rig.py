@@ -322,7 +322,7 @@ class CanRig:
         until = time.monotonic() + max(_LISTEN_S, _LISTEN_CYCLES * max([*cycles, self.map.cycle_s]))
         while (left := until - time.monotonic()) > 0.0:
             self._receive(left)
-        self._punctual.is_timed = self._inbox.answers > 0  # nobody has asked it anything yet
+        self._punctual.is_timed = self._inbox.answers > 0  # it has received no request yet
         if jumping := self._inbox.jumping():
             raise RigError(f"{self.bus.name}: {jumping}: two nodes send it, or most frames are lost")
 

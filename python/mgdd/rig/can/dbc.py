@@ -153,7 +153,7 @@ class DbcFile:
 
 
 def _taken_twice(messages: Sequence[Any]) -> dict[str, str]:
-    """Find messages of one name or identifier: which of them is meant, nobody knows."""
+    """Find messages of one name or identifier: which of them is meant is unknown."""
     taken: dict[Any, str] = {}
     odd: dict[str, str] = {}
     for message in messages:

@@ -110,7 +110,7 @@ class Inbox:
 
     def __init__(self, signal_map: SignalMap) -> None:
         self.map = signal_map
-        self.skipped = 0  # whole cycles that nobody read before the next command
+        self.skipped = 0  # whole cycles that were not read before the next command
         self.state = ""  # that the node reported last
         self._receiver = Receiver(signal_map.measurements)
         self._cycles = 0
@@ -156,15 +156,15 @@ class Inbox:
 
     @property
     def ready(self) -> bool:
-        """Whether there is a whole cycle that nobody has read."""
+        """Whether there is an unread whole cycle."""
         return bool(self._whole)
 
     def read(self) -> tuple[int, Measurement]:
-        """Give the oldest whole cycle that nobody has read, and when it arrived [ns]."""
+        """Give the oldest unread whole cycle, and when it arrived [ns]."""
         return self._whole.popleft()
 
     def skip(self) -> None:
-        """Note that nobody will read what came until now."""
+        """Skip what came until now without reading it."""
         self.skipped += len(self._whole)
         self._whole.clear()
 

@@ -31,7 +31,7 @@ class LocalBus:
     """
 
     name = "the node in this process"
-    shared = False  # nobody else is here, and time is virtual
+    shared = False  # no other node, and time is virtual
 
     def __init__(self, plant: Plant, signal_map: SignalMap) -> None:
         self.core = NodeCore(node_plant(plant), signal_map)

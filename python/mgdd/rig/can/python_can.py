@@ -95,8 +95,8 @@ def connected(interface: str, channel: str | int, options: Mapping[str, Any], na
         _require_hub(name, options)
     if interface not in can.VALID_INTERFACES:
         guess = did_you_mean(interface, can.VALID_INTERFACES)
-        hint = f"must be one of {', '.join(sorted(can.VALID_INTERFACES))}"
-        raise RigError(f"interface {interface!r}: python-can has no such interface: {guess or hint}")
+        names = f"must be one of {', '.join(sorted(can.VALID_INTERFACES))}"
+        raise RigError(f"interface {interface!r}: python-can has no such interface: {guess or names}")
     try:
         for _ in range(_GREETINGS):
             try:

@@ -22,7 +22,7 @@ PACES = ("step", "real_time")
 LOOPS = ("auto", "core", "python")
 TASKS = ("identify", "track", "seek")
 SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
-_BOUNDS_CAD = {"soc_cad": (-30.0, 10.0)}  # of a search, where nobody says; as of `mgdd engine seek`
+_BOUNDS_CAD = {"soc_cad": (-30.0, 10.0)}  # of a search, by default; as of `mgdd engine seek`
 _T = TypeVar("_T")
 
 

@@ -139,7 +139,7 @@ class BusSource:
         self._map, self._bus = signal_map, CanTransport.parse(bus)
         self.name, self.said = self._bus.name, ""
         self.data = LiveData(signal_map)
-        self._frames: deque[Frame] = deque(maxlen=100_000)  # of a page that nobody looks at
+        self._frames: deque[Frame] = deque(maxlen=100_000)  # of a page that is not open
         self._over, self._stop = threading.Event(), threading.Event()
         self._begun_ns = time.monotonic_ns()
         self._bus.open()
