@@ -102,7 +102,7 @@ def _heading(name: str, units_row: str | None) -> Heading:
     written, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
     name, name_gauge = _without_reference(name)
     units_row, row_gauge = _without_reference(units_row or "")
-    in_name, in_row = _known(_unit_word(name, lone=not units_row) or ""), _known(units_row)
+    in_name, in_row = _unit_of(_unit_word(name, lone=not units_row) or ""), _unit_of(units_row)
     if in_name and in_row and in_name != in_row:
         raise DataError(f"the header says {in_name} and the units row {units_row!r}: correct the one that is wrong")
     unit = in_row or in_name
@@ -121,7 +121,7 @@ def _heading(name: str, units_row: str | None) -> Heading:
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
         gauge=gauge or name_gauge or row_gauge,
-        other=next((text.strip() for text in units if _known(text) == "other"), None),
+        other=next((text.strip() for text in units if _unit_of(text) == "other"), None),
         strange=_first_strange(units),
         unclear=_first_strange(_maybe_units(name)) or (_unit_word(name) if letter else None),
     )
@@ -151,12 +151,12 @@ def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool
 
 
 def _first_strange(texts: list[str]) -> str | None:
-    return next((text for text in texts if text.strip(" -") and _known(text) is None), None)
+    return next((text for text in texts if text.strip(" -") and _unit_of(text) is None), None)
 
 
 def _maybe_units(name: str) -> list[str]:
     """Return what round brackets hold, remarks left out, and a last word with a slash in it."""
-    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _known(text) or _words(text) - _REMARKS]
+    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _unit_of(text) or _words(text) - _REMARKS]
     ratio = _ratio(name)
     return [*texts, ratio] if ratio else texts
 
@@ -167,7 +167,7 @@ def _ratio(name: str) -> str | None:
     if "/" not in last.strip("/") or _BRACKETS.search(last):
         return None
     below = last.partition("/")[2]
-    return below if _known(last) is None and _known(below) is not None else last
+    return below if _unit_of(last) is None and _unit_of(below) is not None else last
 
 
 @lru_cache(maxsize=256)
@@ -176,7 +176,7 @@ def spelled_unit(text: str) -> str | None:
     return _UNITS.get(_without_reference(text)[0].strip().lower())
 
 
-def _known(text: str) -> str | None:
+def _unit_of(text: str) -> str | None:
     unit = spelled_unit(text)
     return _AMONG_PRESSURES.get(unit or "", unit)
 
@@ -199,9 +199,9 @@ def _unit_word(name: str, *, lone: bool = True) -> str | None:
     A lone letter is one where `lone`: with a row of units below, Channel A is a name.
     """
     for text in reversed(_BRACKETS.findall(name)):
-        if _known(text) is not None:
+        if _unit_of(text) is not None:
             return str(text)
-    if (ratio := _ratio(name)) and _known(ratio):
+    if (ratio := _ratio(name)) and _unit_of(ratio):
         return ratio
     own = [part for part in name.split(".") if not part.strip().isdecimal()]  # behind those of its structs and groups
     words = [word for word in re.split(r"[\s_/,;\-]+", own[-1].strip() if own else "") if word and not word.isdecimal()]
@@ -209,7 +209,7 @@ def _unit_word(name: str, *, lone: bool = True) -> str | None:
         return None
     if len(words[-1]) == 1 and (not lone or len(words) == 1 or (words[-1] != "V" and words[0].lower() in _PLACES)):
         return None  # a lone letter is a name, and p_a is a cylinder rather than an ampere
-    return words[-1] if _known(words[-1]) is not None else None
+    return words[-1] if _unit_of(words[-1]) is not None else None
 
 
 def stem(name: str) -> str:
@@ -229,7 +229,7 @@ def without_brackets(name: str) -> str:
     """Return a name without the brackets that hold a unit; remarks stay."""
 
     def cleaned(bracket: re.Match[str]) -> str:
-        return " " if bracket[0].startswith("[") or _known(bracket[1]) is not None else f" {bracket[1]} "
+        return " " if bracket[0].startswith("[") or _unit_of(bracket[1]) is not None else f" {bracket[1]} "
 
     return _BRACKETS.sub(cleaned, name).strip()
 

@@ -102,7 +102,7 @@ class Encoder:
         DataError, ShapeError
             Unlike lengths, a sample that is not finite, a signal that stands, or one of another wheel, which is named.
         """
-        result = _found(self, time_s, signal, index)
+        result = _encoder_angle(self, time_s, signal, index)
         marks = result["mark_s"]
         speed = 60.0 / np.diff(marks)
         slipped = np.array(result["slipped_deg"], dtype=np.float64).reshape(-1, 2)
@@ -121,7 +121,7 @@ class Encoder:
         )
 
 
-def _found(encoder: Encoder, time_s: ArrayLike, signal: ArrayLike, index: ArrayLike | None) -> dict[str, Any]:
+def _encoder_angle(encoder: Encoder, time_s: ArrayLike, signal: ArrayLike, index: ArrayLike | None) -> dict[str, Any]:
     e = encoder
     result: dict[str, Any] = _core.encoder_angle(
         time_s, signal, index, teeth=e.teeth, missing_teeth=e.missing_teeth, falling=e.falling, level=e.level
@@ -178,7 +178,7 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
         even_step(seconds, where=f"{table.source}, {table.called(clock)}, row {{}}".format)
     pulse = None if index is None else table.numbers(index)
     try:
-        result = _found(encoder, seconds, table.numbers(column), pulse)
+        result = _encoder_angle(encoder, seconds, table.numbers(column), pulse)
     except DataError as error:
         raise error.reworded(f"{table.source}, {table.called(column)}: {error}") from error
     marks, notes = result["mark_s"], []

@@ -85,9 +85,9 @@ def _virtual(content: Any, channel: Any) -> bool:
     return bool(channel.channel_type in (3, 6) if content.version >= "4" else not channel.bit_count)
 
 
-def _has_time(found: list[Named], count: int, master: Callable[[], NDArray[Any]]) -> bool:
+def _has_time(named: list[Named], count: int, master: Callable[[], NDArray[Any]]) -> bool:
     """Whether a column of seconds holds these times already."""
-    times = [each.values for each in found if each.unit == "s" and each.values.shape == (count,)]
+    times = [each.values for each in named if each.unit == "s" and each.values.shape == (count,)]
     return bool(times) and any(np.array_equal(each[...], master()) for each in times)
 
 

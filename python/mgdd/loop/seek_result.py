@@ -169,7 +169,7 @@ def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) ->
         yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
 
 
-def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean]) -> Iterator[Finding]:
+def _about_limits(readings: Readings, asked: Question, estimates: Mapping[str, Mean]) -> Iterator[Finding]:
     if asked.started_blindly:
         names = tuple(measured_names(asked.limits))
         text = f"no start given, and it is unknown where {', '.join(names)} would hold: it began where that was open"
@@ -177,7 +177,7 @@ def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean])
     for limit in asked.limits:
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
-        mean = kept[limit.name]
+        mean = estimates[limit.name]
         name, side = plain_name(limit.name)
         bound = f"{'above its' if side > 0.0 else 'below its lower'} limit, {side * limit.upper:.6g}"
         if values.size and values[0] > limit.upper:
@@ -320,7 +320,7 @@ class SeekResult(Result):
         names = ("inputs", "value", "value_sd", "gain", "gain_sd", "start", "limits", "reason", "interrupted")
         out = {name: getattr(self, name) for name in names}
         out |= {"seeker": self._kind, "findings": [finding.to_dict() for finding in self.findings]}
-        out |= {name: _known(getattr(self.seeker, name, None)) for name in ("estimate_sd", "trust")}
+        out |= {name: _finite(getattr(self.seeker, name, None)) for name in ("estimate_sd", "trust")}
         figures = {name: value for name, value in self.run.summary.items() if math.isfinite(value)}
         plain: dict[str, Any] = to_jsonable(out | {"cycles": self.run.dataset.sizes["cycle"], "figures": figures})
         return plain
@@ -359,5 +359,5 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     )
 
 
-def _known(value: Any) -> float | None:
+def _finite(value: Any) -> float | None:
     return float(value) if isinstance(value, float) and math.isfinite(value) else None

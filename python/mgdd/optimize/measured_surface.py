@@ -228,8 +228,8 @@ def span_of(x: Array) -> str:
     return f"the {len(np.unique(x, axis=0))} points nearest to the best one"
 
 
-def twice_as_wide(x: Array, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def twice_as_wide(x: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which points lie in a range twice as wide as that of the kept ones."""
-    low, high = x[kept].min(axis=0), x[kept].max(axis=0)
+    low, high = x[used].min(axis=0), x[used].max(axis=0)
     around: NDArray[np.bool_] = (np.abs(x - 0.5 * (low + high)) <= high - low).all(axis=1)
     return around

@@ -267,9 +267,9 @@ class RealtimeLoop:
             time.sleep(_PAUSE_S)
             self._require_running()
 
-    def _ask(self, request: str, wanted: str, timeout_s: float) -> None:
+    def _ask(self, request: str, target_mode: str, timeout_s: float) -> None:
         until = time.monotonic() + timeout_s
-        while self.mode != wanted:
+        while self.mode != target_mode:
             self._require_running()
             if time.monotonic() > until:
                 why = self.cause if self.cause != "none" else f"too few good frames, or the wrong mode, {self.mode}"

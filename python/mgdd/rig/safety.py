@@ -43,21 +43,21 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
 
     def to_parameters(self) -> ParameterFile:
         """Give all fields, as `to_toml` writes them."""
-        units = {name: wanted.unit for name, wanted in _wanted().items()}
+        units = {name: wanted.unit for name, wanted in _entries().items()}
         return ParameterFile(kind=_KIND, tables={"parameters": entries(self.to_dict(), units)})
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> SafetyEnvelope:
         """Make the envelope of a file that `to_toml` wrote."""
         file.expect(kinds=(_KIND,), tables=("parameters",), notes=("name", "title", "source"))
-        return cls(**file.values("parameters", _wanted()))
+        return cls(**file.values("parameters", _entries()))
 
     def replace(self, **changes: Any) -> SafetyEnvelope:
         """Give a validated copy with some fields changed; an unknown name is a ParameterError."""
         return type(self)(**super().replace(**changes).to_dict())
 
 
-def _wanted() -> dict[str, Wanted]:
+def _entries() -> dict[str, Wanted]:
     fields = _core.rig.SafetyEnvelope.fields()
     return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
 

@@ -165,9 +165,9 @@ def _taken_twice(messages: Sequence[Any]) -> dict[str, str]:
     return odd
 
 
-def near(name: str, known: Mapping[str, Any]) -> str:
+def near(name: str, names: Mapping[str, Any]) -> str:
     """Ask for the nearest name, or list them."""
-    return did_you_mean(name, known) or f"it has {', '.join(known) or 'none'}"
+    return did_you_mean(name, names) or f"it has {', '.join(names) or 'none'}"
 
 
 def _message(message: Any) -> DbcMessage:

@@ -68,12 +68,12 @@ class _Throttle:
         self.sample_s: float | None = plant.sample_s
 
     def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...]:  # noqa: ARG002 - a throttle always measures
-        return tuple(self._known())
+        return tuple(self._latest_values())
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
-        return facts_of(self._known(), envelope.cycle_s)
+        return facts_of(self._latest_values(), envelope.cycle_s)
 
-    def _known(self) -> Mapping[str, float]:
+    def _latest_values(self) -> Mapping[str, float]:
         if self._values is None:  # nothing was sampled yet: a look ahead, taken back
             before = self._plant.state
             self.sample(None)

@@ -51,7 +51,7 @@ class LoopSamples:
         self._missing = dict.fromkeys(value_names, math.nan)
         self._before: dict[str, float] | None = None
         self._reported, self._unreported = 0, deque[Cycle]()
-        self._kept = _columns()
+        self._recorded = _columns()
         self._first: int | None = None
         self._running = False
 
@@ -84,7 +84,7 @@ class LoopSamples:
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Give what the task came to, a row per grid point; see `task_columns`."""
-        return task_columns(self._kept, self._samples)
+        return task_columns(self._recorded, self._samples)
 
     def _take(self, deadline_ns: int, now: dict[str, float]) -> None:
         if self._recorder is not None:
@@ -96,7 +96,7 @@ class LoopSamples:
         if self._running and not began:
             self._first = int(now["cycle"])
         if self._first is not None and not over:
-            _keep(self._kept, now)
+            _keep(self._recorded, now)
         if before is None:
             return
         exchange = Exchange({"duty": before["duty"]}, self._measurement(before, now))

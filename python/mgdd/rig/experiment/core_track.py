@@ -230,7 +230,7 @@ class _CoreRun:
             )
         )
         self._record, self._lead = record, max(4, math.ceil(LEAD_S / sample_s))
-        self._wanted, self._handed_over = wanted, 1
+        self._references_deg, self._handed_over = wanted, 1
         self._patience_s = max(_PATIENCE_S, 20.0 * (checked.envelope.good_frames if checked.envelope else 0) * sample_s)
         self.changes: Counter[str] = Counter()
         self.samples = LoopSamples(
@@ -292,7 +292,7 @@ class _CoreRun:
             raise self.bus.error or error from None
 
     def _follow(self) -> None:
-        while self.samples.done < len(self._wanted):
+        while self.samples.done < len(self._references_deg):
             time.sleep(_LOOK_S)
             self._feed()
             self._take()
@@ -320,8 +320,8 @@ class _CoreRun:
         room = self._lead - self.loop.queued_references
         if room > 0 and self.loop.mode in ("armed", "run"):
             begin = self._handed_over
-            places = np.minimum(np.arange(begin, begin + room), len(self._wanted) - 1)
-            self.loop.queue_references(self._wanted[places])
+            places = np.minimum(np.arange(begin, begin + room), len(self._references_deg) - 1)
+            self.loop.queue_references(self._references_deg[places])
             self._handed_over += room
 
     def _take(self) -> None:

@@ -279,7 +279,7 @@ class SeekPlan:
             noise_sd=task.noise_sd, delay_cycles=task.delay_cycles or 0.0, lag_cycles=task.lag_cycles or 0.0,
             guide=guide, seed=seed, point=engine.point, settings=dict(task.settings),
         )  # fmt: skip
-        self._known = None if task.known is None else read_points(beside(folder, task.known))
+        self._earlier_points = None if task.known is None else read_points(beside(folder, task.known))
         self._still = stillness(self._asked, task.tolerance or None)
         choice = self._chosen()
         self.samples = choice.cycles if task.cycles is None else task.cycles
@@ -288,9 +288,9 @@ class SeekPlan:
 
     def _chosen(self) -> Choice:
         choice = chosen(self._asked, self.task.seeker)
-        if self._known is None:
+        if self._earlier_points is None:
             return choice
-        return tell_known(self._asked, self.task.seeker, choice, self._known)[1]
+        return tell_known(self._asked, self.task.seeker, choice, self._earlier_points)[1]
 
     def estimate(self) -> dict[str, float]:
         """Give what the running seeker takes for the best inputs, and standard deviations: NaN where it has none."""
