@@ -269,7 +269,7 @@ class FunctionPlant:
 
     def __getstate__(self) -> dict[str, Any]:
         if self._core is not None:
-            raise TypeError("a FunctionPlant of a compiled function cannot be pickled: take threads")
+            raise TypeError("a FunctionPlant of a compiled function works in this process only: take threads")
         return vars(self)
 
     def __repr__(self) -> str:
