@@ -135,10 +135,10 @@ def _form_of(file: Path) -> str | None:
     """Name the format of a binary file by how it begins; None for a text."""
     with file.open("rb") as stream:
         head = stream.read(_HEAD)
-    found = next((form for start, form in _STARTS.items() if head.startswith(start)), None)
-    if found is None and file.suffix.lower() == ".mat":
+    detected = next((form for start, form in _STARTS.items() if head.startswith(start)), None)
+    if detected is None and file.suffix.lower() == ".mat":
         return "MATLAB"  # of version 4, which has no mark
-    return found
+    return detected
 
 
 def _opened(

@@ -91,14 +91,14 @@ Columns = list[tuple[str, str, Column]]  # name, unit, column
 
 def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
     """Give name, unit and column: a matrix column by column, along the samples of a vector, else its longer side."""
-    found = []
+    named = []
     for name, values, unit in arrays:
         axes = [k for k, size in enumerate(values.shape) if size != 1]
         if values.dtype.kind in "fiub" and len(axes) in (1, 2) and 0 not in values.shape:
-            found.append((name, unit, values, axes))
-    lengths = {values.shape[axes[0]] for _, _, values, axes in found if len(axes) == 1} if along is None else {along}
+            named.append((name, unit, values, axes))
+    lengths = {values.shape[axes[0]] for _, _, values, axes in named if len(axes) == 1} if along is None else {along}
     columns: Columns = []
-    for name, unit, values, axes in found:
+    for name, unit, values, axes in named:
         if len(axes) == 1:
             columns.append((name, unit, Column(values, axes[0])))
             continue

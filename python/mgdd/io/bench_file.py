@@ -213,12 +213,12 @@ def _labelled(channel: Channel, entry: tuple[Any, Any]) -> tuple[Any, ...]:
 
 
 def _add_slow(
-    table: Table, layout: Layout, kept: Sequence[Channel], variables: dict[str, Any], sources: dict[str, str]
+    table: Table, layout: Layout, chosen: Sequence[Channel], variables: dict[str, Any], sources: dict[str, str]
 ) -> list[str]:
     """Add the channels of other rasters over their own times."""
     names: dict[int, str] = {}
     notes = []
-    for channel in kept:
+    for channel in chosen:
         if channel.kind != "slow" or channel.time is None:
             continue
         if channel.time not in names:
@@ -234,11 +234,11 @@ def _add_slow(
 
 
 def _add_per_cycle(
-    table: Table, kept: Sequence[Channel], record: Record, variables: dict[str, Any], *, asked: bool
+    table: Table, chosen: Sequence[Channel], record: Record, variables: dict[str, Any], *, asked: bool
 ) -> list[str]:
     """Add what has one value per cycle; what has neither a time nor that is left out, by name."""
     count, left = len(record.bar), []
-    for channel in kept:
+    for channel in chosen:
         if channel.kind != "other":
             continue
         values = _values(table, channel)[0]

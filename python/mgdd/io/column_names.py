@@ -108,9 +108,9 @@ def _heading(name: str, units_row: str | None) -> Heading:
     unit = in_row or in_name
     words = _words(_BRACKETS.sub(" ", name))
     quantity = _QUANTITIES.get(unit or "")
-    found = next((kind for kind, known in _KINDS.items() if words & known), None)
-    if quantity is None or (quantity == "pressure" and found == "other"):
-        quantity = found or quantity
+    quantity_found = next((kind for kind, known in _KINDS.items() if words & known), None)
+    if quantity is None or (quantity == "pressure" and quantity_found == "other"):
+        quantity = quantity_found or quantity
     cylinder = _CYLINDER.search(name.lower())
     units = [units_row, *_SQUARE.findall(name)]
     letter = in_name == "other" and not in_row and len(_unit_word(name) or "") == 1 and not _BRACKETS.search(name)

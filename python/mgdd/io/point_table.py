@@ -131,21 +131,21 @@ def _place(name: str, own: Sequence[str], origin: str) -> int:
 
 def _label(name: str, text: str | None, where: str) -> Label:
     """Return the given unit, which must be that of the name where the name has one."""
-    known = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
+    standard = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
     if text in (None, "", "-", "1"):
-        return known
+        return standard
     unit = _AS_WRITTEN.get(str(text).lower(), str(text))
     try:
         written = attribute_units(unit)
     except ValueError as error:
         raise DataError(f"{where}: unit {error}") from None
-    if known.units == "-" and name not in VARIABLES:
-        return Label(unit, known.long_name)
-    if attribute_units(known.units) != written:
+    if standard.units == "-" and name not in VARIABLES:
+        return Label(unit, standard.long_name)
+    if attribute_units(standard.units) != written:
         raise DataError(
-            f"{where}: unit {text!r}: must be {known.units!r}, as the name says; convert the numbers or change the name"
+            f"{where}: unit {text!r}: must be {standard.units!r}, as the name says; convert the numbers or change the name"
         )
-    return known
+    return standard
 
 
 # Open bounds of what a bench can mean, closed where zero means something; an injection or spark far outside is another

@@ -202,7 +202,7 @@ def _column(key: str, values: ArrayLike, name: str) -> NDArray[np.float64]:
 
 def _read(
     path: str | os.PathLike[str],
-    wanted: dict[str, int | str | None],
+    columns_asked: dict[str, int | str | None],
     given: Mapping[str, str | None],
     *,
     delimiter: str | None,
@@ -213,7 +213,7 @@ def _read(
     units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
     with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet) as table:
-        for key, column in wanted.items():
+        for key, column in columns_asked.items():
             chosen = key if column is None and key in (table.header or ()) else column
             if chosen is not None:
                 index = table.index(chosen)

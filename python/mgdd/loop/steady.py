@@ -81,7 +81,7 @@ def limits_to_keep(limits: Any) -> tuple[Limit, ...]:
 
 
 def find_optimum(
-    quiet: VirtualEngine, kept: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
+    quiet: VirtualEngine, upper_limits: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
 ) -> Optimum:
     """Find the best inputs of such a bench, whose limits are those to keep, and what this scatter of SOC would do."""
     windows = quiet.input_bounds
@@ -91,7 +91,7 @@ def find_optimum(
             raise ParameterError(
                 f"bounds: {name} = ({low:g}, {high:g}): must increase and lie in [{least:g}, {greatest:g}]"
             )
-    caps = {limit.name: limit.upper - limit.margin for limit in kept}
+    caps = {limit.name: limit.upper - limit.margin for limit in upper_limits}
     best, free = _best(quiet, caps, bounds)
     around = [_settled(quiet, (free[0] + away,))["j"] for away in (-_SECANT_CAD, 0.0, _SECANT_CAD) if len(bounds) == 1]
     at, limited = _settled(quiet, best), _limited(quiet, best)
@@ -106,7 +106,7 @@ def find_optimum(
         objective="j",
         value=float(at["j"]),
         values={**numbers, **limited, **spread},
-        limits=kept,
+        limits=upper_limits,
         active_limits=tuple(name for name, cap in caps.items() if sides[name] > cap - 1e-3 * max(1.0, abs(cap))),
         at_bound=min(edges) < 1e-3,
         bounds=dict(bounds),

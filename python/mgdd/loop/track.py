@@ -222,8 +222,8 @@ def _run_in_python(
     out = {name: np.empty(len(reference_deg)) for name in names}
     still = plant._still
     measured = plant.start_deg
-    for k, wanted in enumerate(reference_deg):
-        out["duty"][k] = controller.step(float(wanted), measured)
+    for k, target_deg in enumerate(reference_deg):
+        out["duty"][k] = controller.step(float(target_deg), measured)
         values = plant.step(
             duty=out["duty"][k - delay_samples] if k >= delay_samples else 0.0,
             supply_v=supply[k] if len(supply) else still["supply_v"],

@@ -190,9 +190,9 @@ class CanRig:
         """
         self._require_open()
         values = checked_inputs(inputs, self.input_names)
-        known = self.map.inputs
+        mapped = self.map.inputs
         clamped = {
-            name: min(max(value, known[name].lower), known[name].upper)
+            name: min(max(value, mapped[name].lower), mapped[name].upper)
             for name, value in zip(self.input_names, values, strict=True)
         }
         self._take_all()

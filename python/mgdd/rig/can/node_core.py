@@ -218,8 +218,8 @@ class NodeCore:
         self._deaf_until_ns = now_ns
         self._missed = max(self._missed, int((now_ns - since_ns) * 1e-9 / self.gate.envelope.cycle_s))
         self._receiver.reset()
-        for known in (self._command_kinds, self._fresh, self._good):
-            known.clear()
+        for memory in (self._command_kinds, self._fresh, self._good):
+            memory.clear()
         self._bad = self._safe_frames = 0
         self._is_asked_to_arm = False
 

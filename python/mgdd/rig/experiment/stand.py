@@ -175,7 +175,7 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
     def counters() -> dict[str, Any]:
         counts: dict[str, Any] = dict(getattr(rig, "counters", {}))
         if isinstance(rig, ReplayRig):
-            sizes = [(found.sample, abs(found.asked - found.recorded)) for found in rig.differences]
+            sizes = [(difference.sample, abs(difference.asked - difference.recorded)) for difference in rig.differences]
             counts["replay"] = compared(rig.sample, len(rig.record), sizes)
         return counts
 

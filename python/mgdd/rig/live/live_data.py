@@ -122,8 +122,8 @@ class LiveData:
 
     def _receive(self, inbox: Inbox, frames: list[Frame], start_ns: int) -> None:
         """Read frames by the map: a row per cycle."""
-        known = inbox.map
-        commands = {m.key: m for m in known.commands.values()}
+        signal_map = inbox.map
+        commands = {m.key: m for m in signal_map.commands.values()}
         rows: list[tuple[int, dict[str, float]]] = []
         for frame in frames:
             inbox.take(frame)
@@ -139,11 +139,11 @@ class LiveData:
                 rows.append((stamp, row | {f"applied.{name}": value for name, value in measured.applied.items()}))
         self.gate = inbox.state or self.gate
         if rows:
-            names = [f"{part}.{name}" for name in known.input_names for part in ("input", "applied")]
-            names += [f"value.{name}" for name in known.value_names]
+            names = [f"{part}.{name}" for name in signal_map.input_names for part in ("input", "applied")]
+            names += [f"value.{name}" for name in signal_map.value_names]
             values = np.array([[row.get(name, math.nan) for name in names] for _, row in rows])
             self._add("bus", names, np.array([stamp for stamp, _ in rows]), values, start_ns)
-            troubles = [name for name in known.value_names if name.startswith(("wrong_", "command_"))]
+            troubles = [name for name in signal_map.value_names if name.startswith(("wrong_", "command_"))]
             last = rows[-1][1]
             self.cause = ", ".join(name for name in troubles if last.get(f"value.{name}") == 1.0) or "none"
 
