@@ -131,21 +131,21 @@ def _place(name: str, own: Sequence[str], origin: str) -> int:
 
 def _label(name: str, text: str | None, where: str) -> Label:
     """Return the given unit, which must be that of the name where the name has one."""
-    standard = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
+    label = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
     if text in (None, "", "-", "1"):
-        return standard
+        return label
     unit = _AS_WRITTEN.get(str(text).lower(), str(text))
     try:
         written = attribute_units(unit)
     except ValueError as error:
         raise DataError(f"{where}: unit {error}") from None
-    if standard.units == "-" and name not in VARIABLES:
-        return Label(unit, standard.long_name)
-    if attribute_units(standard.units) != written:
+    if label.units == "-" and name not in VARIABLES:
+        return Label(unit, label.long_name)
+    if attribute_units(label.units) != written:
         raise DataError(
-            f"{where}: unit {text!r}: must be {standard.units!r}, as the name says; convert the numbers or change the name"
+            f"{where}: unit {text!r}: must be {label.units!r}, as the name says; convert the numbers or change the name"
         )
-    return standard
+    return label
 
 
 # Open bounds of what a bench can mean, closed where zero means something; an injection or spark far outside is another
