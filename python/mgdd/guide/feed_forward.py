@@ -288,8 +288,8 @@ def _settling_of(seeker: Any) -> int:
 def _numbers_of(reply: Any) -> tuple[list[float], list[float]]:
     """Give the optimum and, where it is known, the curvature of a guide's answer."""
     if isinstance(reply, Optimum):
-        bend = [reply.curvature] if len(reply.inputs) == 1 and reply.curvature < 0.0 else []
-        return [float(value) for value in reply.inputs.values()], bend
+        curvature = [reply.curvature] if len(reply.inputs) == 1 and reply.curvature < 0.0 else []
+        return [float(value) for value in reply.inputs.values()], curvature
     return np.atleast_1d(np.asarray(math.nan if reply is None else reply, np.float64)).ravel().tolist(), []
 
 

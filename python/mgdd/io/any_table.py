@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # Arguments that say how the cells of a text or a sheet become columns.
 TEXT = ("delimiter", "decimal", "sheet", "cycle_per_row")
-_HEAD = 128  # bytes that tell a format
+_HEAD = 128  # bytes that identify a format
 _STARTS = {
     b"MATLAB 7.3": "HDF5", b"MATLAB": "MATLAB", b"\x89HDF": "HDF5", b"CDF": "netCDF 3", b"\x93NUMPY": "NumPy",
     b"TDSm": "TDMS", b"MDF ": "MDF", b"UnFinMF": "MDF", b"PAR1": "Parquet", b"PK\x03\x04": "XLSX or NPZ",

@@ -144,7 +144,7 @@ class _Plan(NamedTuple):
         """Give the cycles, so many at a time."""
         at, done, mean = self.first, 0, None
         notes = [f"{at} samples before the first cycle left out: incomplete"] if at else []
-        asked = cycles * self.every + self.reach  # tells whether another cycle follows
+        asked = cycles * self.every + self.reach  # shows whether another cycle follows
         last = False
         while not last:
             source = f"{self.source} from cycle {done + 1} on" if done else self.source

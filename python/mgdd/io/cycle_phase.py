@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Compression before any burn, a spark-ignited one too [°CA aTDC]: cycles differ there by level and factor alone. It is
-# drawn out towards TDC, where the shift tells itself from the factor, while what is left stays noise.
+# drawn out towards TDC, where the shift is separable from the factor, while what is left stays noise.
 _FROM_CAD, _TO_CAD, _LEAST_CAD = -110.0, -60.0, 40.0
 _LATER_CAD, _AS_QUIET = (-50.0, -40.0, -30.0, -20.0, -10.0), 1.05
 # The median cycle is known so far beyond: within it a cycle may be shifted without leaving it.
@@ -46,12 +46,12 @@ class Jump(NamedTuple):
     cad: float
 
 
-def odd_bound(looks: int, chance: float = 1e-3) -> float:
-    """Give the deviations from the median that one of so many cycles passes by `chance`: 4.9 of 10, 5.8 of 300.
+def odd_bound(looks: int, probability: float = 1e-3) -> float:
+    """Give the deviations from the median that one of so many cycles passes by `probability`: 4.9 of 10, 5.8 of 300.
 
     A quarter more than of a normal law, for the heavy tails of a burn.
     """
-    return 1.25 * NormalDist().inv_cdf(1.0 - 0.5 * chance / max(looks, 1))
+    return 1.25 * NormalDist().inv_cdf(1.0 - 0.5 * probability / max(looks, 1))
 
 
 class Phases(NamedTuple):

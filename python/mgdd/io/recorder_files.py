@@ -43,7 +43,7 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
 
 
 def _clock(properties: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Give start and step of a channel's time [s]; None where its properties tell no time, as a step of 0 does."""
+    """Give start and step of a channel's time [s]; None where its properties give no time, as a step of 0 does."""
     given = (properties.get("wf_start_offset", 0.0), properties.get("wf_increment"))
     start, step = (float(each) if isinstance(each, int | float | np.number) else np.nan for each in given)
     return (start, step) if np.isfinite(start) and np.isfinite(step) and step > 0.0 else None

@@ -294,7 +294,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
 
 
 def _inner(asked: Question, seeker: Any, best: float) -> Seeker:
-    """Make the seeker of what is left; a dither that knows nothing of J is the default behind a feed-forward."""
+    """Make the seeker of what is left; a dither without a model of J is the default behind a feed-forward."""
     cls = ExtremumSeeking if seeker == "auto" else _class_of(seeker)
     if cls in (GoldenSection, CurveSeeking):
         raise ParameterError(

@@ -175,7 +175,7 @@ class _Search:
         return weight, self._asked[weight]
 
     def tell(self, row: _Row, names: Sequence[str]) -> None:
-        """Let all hear what was measured at the input that was applied."""
+        """Give all of them what was measured at the input that was applied."""
         for weight, seeker in self._seekers.items():
             self._tell(seeker, weight, row, names)
 

@@ -62,12 +62,12 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
     variance = float(residual @ residual) / max(freedom, 1)
     spread = np.linalg.inv(design.T @ design)
 
-    slope, bend = c[1 : count + 1], np.zeros((count, count))
+    slope, hessian = c[1 : count + 1], np.zeros((count, count))
     bend_variance = np.zeros((count, count))
     for place, (i, j) in enumerate(pairs, start=count + 1):
-        bend[i, j] = bend[j, i] = c[place] * (2.0 if i == j else 1.0)
+        hessian[i, j] = hessian[j, i] = c[place] * (2.0 if i == j else 1.0)
         bend_variance[i, j] = bend_variance[j, i] = spread[place, place] * (4.0 if i == j else 1.0)
-    eigen = np.linalg.eigh(bend)
+    eigen = np.linalg.eigh(hessian)
     order = np.argsort(-np.abs(eigen.eigenvalues))
     bends, directions = eigen.eigenvalues[order], eigen.eigenvectors[:, order].T
     directions *= np.sign(directions[np.arange(count), np.abs(directions).argmax(axis=1)])[:, None]
@@ -76,18 +76,18 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
     doubt = np.sqrt(np.maximum(variance * np.einsum("ij,jk,ik->i", terms, own, terms), 0.0))
     _check_bends(bends, doubt, directions, half, maximize=maximize, names=named, where=where)
 
-    best = -np.linalg.solve(bend, slope)
+    best = -np.linalg.solve(hessian, slope)
     lever = np.zeros((count, design.shape[1]))
     lever[:, 1 : count + 1] = np.eye(count)
     for place, (i, j) in enumerate(pairs, start=count + 1):
         lever[i, place] += best[j]
         lever[j, place] += best[i]
-    lever = np.asarray(-np.linalg.solve(bend, lever))
+    lever = np.asarray(-np.linalg.solve(hessian, lever))
     area = np.outer(half, half)
     return Surface(
         variance=variance,
         freedom=freedom,
-        curvature=bend / area,
+        curvature=hessian / area,
         curvature_variance=bend_variance / area**2,
         optimum=middle + half * best,
         optimum_variance=(lever @ spread @ lever.T) * area,

@@ -186,7 +186,7 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     -----
     Readings that the process does not explain age what was known by ten times `memory_cycles`; `doubts` counts that.
     Where forty inputs in a row have stayed at the estimate, the search is over until the next of these, and a small
-    dither around it goes on: with `memory_cycles` at 143, some 0.02 bounds where noise is a hundredth of the bend.
+    dither around it goes on: with `memory_cycles` at 143, some 0.02 bounds where noise is a hundredth of the curvature.
     Cycles reported as misfires have a process of their own, which keeps the search out of what is likely to fail.
     `trust` says how much of J a guide explains.
     Of a limit whose readings stand well above 0 the logarithm is learnt: quantities as NOx spread over powers of ten.

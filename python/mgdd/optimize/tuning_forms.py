@@ -203,10 +203,10 @@ def _dither(
     return out, final
 
 
-def spsa_moments(bend: Array, q: float, c: Array) -> Array:
+def spsa_moments(hessian: Array, q: float, c: Array) -> Array:
     """Return what an iteration makes of the second moments of c z, row by row: each slope bears those of all inputs."""
     count = c.size
-    slopes, eye = bend * np.outer(c, 1.0 / c), np.eye(count)
+    slopes, eye = hessian * np.outer(c, 1.0 / c), np.eye(count)
     squares = np.kron(slopes, slopes).reshape(count, count, count * count)
     spread = 2.0 * squares
     spread[np.arange(count), np.arange(count)] = np.trace(squares)
@@ -220,10 +220,10 @@ def _spsa(
     count = coupling[0].size
     cycles_wanted = _CYCLES if cycles is None else cycles
     decades = float(np.log(spec["distance"] / spec["arrival"]).max())
-    bend = _matrix(coupling)
+    hessian = _matrix(coupling)
 
     def shrinks(q: float) -> float:
-        return float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, spec["amplitude_max"]))).max())
+        return float(np.abs(np.linalg.eigvals(spsa_moments(hessian, q, spec["amplitude_max"]))).max())
 
     # Steps above 1/(inputs + 1) gain little: the slopes of the other inputs scatter them.
     steps = np.linspace(0.0, 1.0 / (count + 1), 201)[1:]
@@ -238,11 +238,11 @@ def _spsa(
 
     def scatter(c: Array) -> Array:
         noise = (0.5 * (q * noise_sd) ** 2 * np.eye(count)).ravel()
-        own = np.linalg.solve(np.eye(count * count) - spsa_moments(bend, q, c), noise).reshape(count, count)
+        own = np.linalg.solve(np.eye(count * count) - spsa_moments(hessian, q, c), noise).reshape(count, count)
         return np.asarray(own / np.outer(c, c))
 
     c = _amplitudes(spec["amplitude_max"], spec, scatter)
-    time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, c))).max()))
+    time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(hessian, q, c))).max()))
     out = {
         "amplitude": c,
         "period": 2,

@@ -295,7 +295,7 @@ class GatedThrottle:
 
 
 def facts_of(values: Mapping[str, float] | None, cycle_s: float) -> dict[str, Any]:
-    """Give what measured values of a throttle tell a gate; a measurement is new while its age is below a cycle."""
+    """Give a gate's inputs from measured values of a throttle; a measurement is new while its age is below a cycle."""
     if values is None:
         return {}
     age_s = values.get("age_s", 0.0)

@@ -224,7 +224,7 @@ class CanRig:
         return measured
 
     def arm(self) -> None:
-        """Send safe frames until the node is ready to be driven; RigError where it is silent or stays failed."""
+        """Send safe frames until the node is ready to be driven; RigError where it does not answer or stays failed."""
         self._require_open()
         self._take_all()
         self._inbox.skip()  # what waited says nothing of now
@@ -279,7 +279,7 @@ class CanRig:
             raise
 
     def close(self) -> None:
-        """Send five safe frames, then fall silent and disconnect; closing twice does nothing."""
+        """Send five safe frames, then stop sending and disconnect; closing twice does nothing."""
         if not self._is_open:
             return
         self._is_open = False

@@ -49,7 +49,7 @@ class NodePlant(Protocol):
         """Time in the plant per sample [s]; None: that of the map."""
 
     def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...] | None:
-        """Give the names of what it measures at some inputs, and take no time; None where only a sample tells."""
+        """Give the names of what it measures at some inputs, and take no time; None where only a sample shows them."""
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
         """Tell a gate what the sensors say, as `mgdd.rig.SafetyGate.observe` takes it; no time passes."""

@@ -135,7 +135,7 @@ class SocketBus:
         if self._ours is None:
             return
         counts = report()
-        # Counted in this order, an error frame is never taken for a stranger.
+        # Counted in this order, an error frame is never taken for a frame of another sender.
         foreign = counts["frames"]["foreign"] - counts["bus"]["error_frames"]
         if self._foreign is None:  # before, the last safe frames of the rig itself may have been among them
             self._foreign = foreign

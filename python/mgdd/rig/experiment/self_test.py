@@ -1,4 +1,4 @@
-"""The ways to die, tried out on this machine: a process drives a throttle over a bus and ends badly, six times."""
+"""Failure cases, tried out on this machine: a process drives a throttle over a bus and ends badly, six times."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ _SIGNALS = {"sigint": signal.SIGINT, "sigterm": signal.SIGTERM, "sigkill": signa
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SelfTest(NumbersResult):
-    """How long the plate took to limp-home after each way to die."""
+    """How long the plate took to limp-home after each failure."""
 
     ways_to_die: Mapping[str, float | None]  # seconds from the end of the process to limp-home; None: see notes
     limit_s: float

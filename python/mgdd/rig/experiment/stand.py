@@ -102,7 +102,7 @@ class Watched(AroundPlant):
         self.plant.apply(inputs)
 
     def measure(self) -> Measurement:
-        """Pass the measurement back, and tell the listener."""
+        """Pass the measurement back, and report it to the listener."""
         measured = self.plant.measure()
         now = time.perf_counter()
         cycle = Cycle(self.cycles, self._asked, measured, self._applied_s - self._measured_s, now - self._applied_s)

@@ -115,7 +115,7 @@ class TrackPlan:
         if n == 0:
             return Outcome(figures={}, dataset=_dataset(columns, self.sample_s, {}, {}), interrupted=True)
         more = {"reference_deg": reference_deg[:n]}
-        # `settling_ms` and so on are those of `mgdd.loop.track`, of the true angle: most plants do not tell it.
+        # `settling_ms` and so on are those of `mgdd.loop.track`, of the true angle: most plants do not give it.
         sensed = self._figures(columns, "sensed_angle_deg")
         numbers = {name if name == _OF_THE_DUTY else f"sensed_{name}": value for name, value in sensed.items()}
         if "angle_deg" in columns:

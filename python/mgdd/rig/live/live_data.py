@@ -113,7 +113,7 @@ class LiveData:
             self.events.append(((stamp - start_ns) * 1e-9, f"{category}: {text}"))
             if category == "safety gate":
                 self.gate, _, self.reason = text.rpartition(" -> ")[2].partition(": ")
-            elif category == "guard":  # of an engine: it tells of what it held back
+            elif category == "guard":  # of an engine: it reports what it held back
                 self.gate, self.reason = category, text
         self.frames += len(news.frames)
         if self._inbox is not None and not {"loop", "rig"} & self.tables.keys():
@@ -182,7 +182,7 @@ class LiveData:
         return float(min(EDGES_US[1 + int(np.searchsorted(total, share * total[-1]))], self.largest_us[name]))
 
     def panels(self) -> dict[str, list[Line]]:
-        """Give the lines by the label of their axis; a rig whose loop tells of itself is not shown twice."""
+        """Give the lines by the label of their axis; a rig whose loop reports itself is not shown twice."""
         names: list[str] = [n for n in ("seeker", "loop", "rig", "bus") if n in self.tables]
         names += [n for n in self.tables if n not in names]
         if "loop" in names and "rig" in names:

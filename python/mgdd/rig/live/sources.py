@@ -159,7 +159,7 @@ class BusSource:
             self.said = "STOP FAILED: the bus is gone: use the emergency stop"
 
     def close(self) -> None:
-        """Fall silent."""
+        """Close the bus."""
         self._over.set()
         self._thread.join()
         self._bus.close()
