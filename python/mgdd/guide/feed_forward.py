@@ -188,7 +188,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
         """
         now = numbers_of(point)
         if not all(map(math.isfinite, now.values())):
-            _LOG.warning("operating point %s is not finite: the last one stands", now)
+            _LOG.warning("operating point %s is not finite: the last one stays", now)
             return "held"
         change = change_between(now, self._point)
         cause = max(self._owed, "" if change == "same" else change, key=_CAUSES.index)
@@ -204,12 +204,12 @@ class FeedForward(Guided, _core.guide.FeedForward):
         retry = self._owed == cause and not opens
         optimum, curvature, why = [math.nan], list[float](), ""
         try:
-            said = None if self._guide is None else self._guide(point)
-            if said is None:
+            reply = None if self._guide is None else self._guide(point)
+            if reply is None:
                 if opens and self._point is not None:
                     self._hold()
                 return "held"
-            optimum, curvature = _numbers_said(said)
+            optimum, curvature = _numbers_of(reply)
             why = f"it gave {optimum}"
         except Exception as error:  # noqa: BLE001 - a guide must not stop the engine: logged, and trust falls
             why = f"it raised {type(error).__name__}: {error}"
@@ -221,7 +221,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
             return "followed"
         _LOG.log(
             logging.DEBUG if retry else logging.WARNING,
-            "guide refused at %s: %s; the last valid feed-forward stands, trust is now %.2f",
+            "guide refused at %s: %s; the last valid feed-forward stays, trust is now %.2f",
             point, why, self.trust,
         )  # fmt: skip
         return "refused"
@@ -248,7 +248,7 @@ class FeedForward(Guided, _core.guide.FeedForward):
         place, 2: the new one), ``point`` (operating points so far), ``objective`` (NaN where the cycle misfired) and
         ``misfire``. What is not known yet is NaN. Built anew on every access.
         """
-        return self._told()
+        return self._rows_dataset()
 
     @property
     def seeker(self) -> Seeker:
@@ -285,47 +285,47 @@ def _settling_of(seeker: Any) -> int:
     return max((math.ceil(lag.delay_cycles + _LAGS * lag.lag_cycles) for lag in components), default=0)
 
 
-def _numbers_said(said: Any) -> tuple[list[float], list[float]]:
+def _numbers_of(reply: Any) -> tuple[list[float], list[float]]:
     """Give the optimum and, where it is known, the curvature of a guide's answer."""
-    if isinstance(said, Optimum):
-        bend = [said.curvature] if len(said.inputs) == 1 and said.curvature < 0.0 else []
-        return [float(value) for value in said.inputs.values()], bend
-    return np.atleast_1d(np.asarray(math.nan if said is None else said, np.float64)).ravel().tolist(), []
+    if isinstance(reply, Optimum):
+        curvature = [reply.curvature] if len(reply.inputs) == 1 and reply.curvature < 0.0 else []
+        return [float(value) for value in reply.inputs.values()], curvature
+    return np.atleast_1d(np.asarray(math.nan if reply is None else reply, np.float64)).ravel().tolist(), []
 
 
-# First cycle and end of an answer, its optimum (None: nothing was said), curvature and cause.
-Said = tuple[int, int, "list[float] | None", list[float], str]
+# First cycle and end of an answer, its optimum (None: no answer), curvature and cause.
+AnswerSpan = tuple[int, int, "list[float] | None", list[float], str]
 
 
 class _Recording(FeedForward):
     """A feed-forward that keeps what goes to its core."""
 
-    heard: list[tuple[list[float] | None, list[float], str]]
+    offers: list[tuple[list[float] | None, list[float], str]]
 
     def _offer(self, optimum: Any, curvature: Any, cause: str) -> bool:
-        self.heard.append((optimum, curvature, cause))
+        self.offers.append((optimum, curvature, cause))
         return super()._offer(optimum, curvature, cause)
 
     def _hold(self) -> None:
-        self.heard.append((None, [], "new_point"))
+        self.offers.append((None, [], "new_point"))
         super()._hold()
 
 
-def answers_along(seeker: FeedForward, schedule: Sequence[tuple[int, Any]], cycles: int) -> list[Said]:
+def answers_along(seeker: FeedForward, schedule: Sequence[tuple[int, Any]], cycles: int) -> list[AnswerSpan]:
     """Ask the guide at every operating point of a schedule, for a loop that cannot ask it; the seeker stays as it is.
 
     A guide that held or refused is asked once more, and counts as saying the same until the next operating point.
     """
     asked: _Recording = seeker._as(_Recording, seeker.seeker, seeker.guide)
-    out = list[Said]()
+    out = list[AnswerSpan]()
     ends = [first for first, _ in schedule[1:]] + [cycles]
     for (first, point), end in zip(schedule, ends, strict=True):
         for begin, stop in ((first, first + 1), (first + 1, end)):
             if begin >= min(stop, cycles):
                 break
-            asked.heard = []
+            asked.offers = []
             answer = asked.at(point)
-            out += [(begin, begin + 1 if answer == "followed" else stop, *said) for said in asked.heard]
+            out += [(begin, begin + 1 if answer == "followed" else stop, *offer) for offer in asked.offers]
             if answer in ("same", "followed"):
                 break
     return out

@@ -86,12 +86,12 @@ class Guided(SeekerFindings, _CoreGuided):
         """Keep the cycle whose result is given inside, unless it is refused."""
         before = (self.cycle, *self._standing().values())
         yield
-        told = [applied[name] for name in self.input_names] if isinstance(applied, Mapping) else applied
-        done = self.applied if told is None else np.array(told, np.float64)
+        values = [applied[name] for name in self.input_names] if isinstance(applied, Mapping) else applied
+        done = self.applied if values is None else np.array(values, np.float64)
         total = math.nan if misfire else float(np.sum(np.asarray(objective, np.float64)))
         self._rows.append((*before, done, total, misfire))
 
-    def _told(self) -> xr.Dataset:
+    def _rows_dataset(self) -> xr.Dataset:
         """Give the rows as data."""
         named = zip(("cycle", *self._columns), zip(*self._rows, strict=True), strict=True)
         values: dict[str, Any] = dict(named) if self._rows else dict.fromkeys(("cycle", *self._columns), ())

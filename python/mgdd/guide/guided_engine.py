@@ -184,4 +184,4 @@ class GuidedEngine(Guided, _core.guide.GuidedEngine):
         ``trust`` and ``wall_heat_scale`` of the guide; in the cycle ``applied``, ``objective`` (NaN where it misfired)
         and ``misfire`` (0 or 1). Built anew on every access.
         """
-        return self._told()
+        return self._rows_dataset()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-SETTINGS = {"prior_sd_cad": 3.0, "forgetting": 0.95}  # of a map where nothing is said
+SETTINGS = {"prior_sd_cad": 3.0, "forgetting": 0.95}  # of a map that gives none
 _CELLS = {"timing_cad": (-180.0, 180.0), "sd_cad": (0.0, math.inf), "support": (0.0, math.inf)}
 _KNOWN = (*_CELLS, *SETTINGS, "source")
 
@@ -49,20 +49,20 @@ def read_map_table(path: str | os.PathLike[str], decimal: str) -> tuple[xr.Datas
     names = _names(table)
     axes = [name for name in names if name not in _KNOWN]
     if not 1 <= len(axes) <= 2:
-        said = f"{len(axes)} axes, {', '.join(map(repr, axes))}" if axes else "no axis"
-        raise DataError(f"{table.source}: {said}: a map has one or two, for example speed_rpm and fuel_mg")
-    found = {name: _numbers(table, name) for name in names if name != "source"}
-    settings = SETTINGS | {name: _one(table, name, found[name]) for name in SETTINGS if name in found}
-    entries = {name: _entries(table, name, found[name]) for name in axes}
-    places = _places(table, {name: found[name] for name in axes}, entries)
+        axes_text = f"{len(axes)} axes, {', '.join(map(repr, axes))}" if axes else "no axis"
+        raise DataError(f"{table.source}: {axes_text}: a map has one or two, for example speed_rpm and fuel_mg")
+    columns = {name: _numbers(table, name) for name in names if name != "source"}
+    settings = SETTINGS | {name: _one(table, name, columns[name]) for name in SETTINGS if name in columns}
+    entries = {name: _entries(table, name, columns[name]) for name in axes}
+    places = _places(table, {name: columns[name] for name in axes}, entries)
     shape = tuple(own.size for own in entries.values())
     if not settings["prior_sd_cad"] > 0.0 or not 0.0 < settings["forgetting"] <= 1.0:
         bad, bound = ("prior_sd_cad", "> 0") if not settings["prior_sd_cad"] > 0.0 else ("forgetting", "in (0, 1]")
         raise DataError(f"{table.source}: {bad} = {settings[bad]:g}: must be {bound}")
     cells = {"sd_cad": np.full(shape, settings["prior_sd_cad"]), "support": np.zeros(shape)}
-    for name in set(_CELLS) & set(found):
+    for name in set(_CELLS) & set(columns):
         cells[name] = np.empty(shape)
-        cells[name].ravel()[places] = found[name]
+        cells[name].ravel()[places] = columns[name]
     sources = np.full(math.prod(shape), "", dtype=object)
     if "source" in names:
         sources[places] = [row[table.index("source")] for row in table.cells]
@@ -84,7 +84,7 @@ def _names(table: TextTable) -> tuple[str, ...]:
         raise DataError(f"{table.source}: no header: name the columns, for example speed_rpm,fuel_mg,timing_cad")
     for name in table.header:
         if table.header.count(name) > 1:
-            raise DataError(f"{table.source}: column {name!r} stands twice: keep one")
+            raise DataError(f"{table.source}: column {name!r} occurs twice: keep one")
     if "timing_cad" not in table.header:
         near = did_you_mean("timing_cad", table.header)
         had = ", ".join(map(repr, table.header))

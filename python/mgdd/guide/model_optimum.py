@@ -95,7 +95,7 @@ class ModelOptimum(_core.guide.ModelOptimum):
             step_cad=step_cad,
             integrator=integrator,
         )
-        self._known: dict[OperatingPoint, Optimum] = {}
+        self._optima: dict[OperatingPoint, Optimum] = {}
 
     def __call__(self, point: OperatingPoint) -> Optimum | None:
         """Find the best start of combustion.
@@ -112,23 +112,23 @@ class ModelOptimum(_core.guide.ModelOptimum):
             the ascent; None where the model has no optimum, as of a motored point.
         """
         _require_point(point)
-        if point in self._known:
-            return self._known[point]
-        found = self._find(point)
-        if not found["found"]:
+        if point in self._optima:
+            return self._optima[point]
+        optimum = self._find(point)
+        if not optimum["found"]:
             return None
         best = Optimum(
-            inputs={"soc_cad": found["soc_cad"]},
+            inputs={"soc_cad": optimum["soc_cad"]},
             objective="performance",
-            value=found["j"],
-            values={"iterations": float(found["iterations"])},
-            at_bound=found["at_bound"],
+            value=optimum["j"],
+            values={"iterations": float(optimum["iterations"])},
+            at_bound=optimum["at_bound"],
             bounds={"soc_cad": tuple(self.settings["bounds_cad"])},
-            curvature=found["curvature"] or math.nan,
+            curvature=optimum["curvature"] or math.nan,
         )
-        if len(self._known) >= _MOST_POINTS:
-            self._known.pop(next(iter(self._known)))
-        self._known[point] = best
+        if len(self._optima) >= _MOST_POINTS:
+            self._optima.pop(next(iter(self._optima)))
+        self._optima[point] = best
         return best
 
     def curve(self, point: OperatingPoint) -> Curve | None:
@@ -196,13 +196,13 @@ class ModelOptimum(_core.guide.ModelOptimum):
             Another geometry; nothing has changed then.
         """
         self._set_cylinder(cylinder)
-        self._known.clear()
+        self._optima.clear()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, (type(self), self.cylinder, self.settings)
 
     def __repr__(self) -> str:
-        return f"<ModelOptimum by {self.settings['method']}, {len(self._known)} points searched>"
+        return f"<ModelOptimum by {self.settings['method']}, {len(self._optima)} points searched>"
 
     def _repr_html_(self) -> str:
         return as_html("ModelOptimum", core_rows(self.cylinder))

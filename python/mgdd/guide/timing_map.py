@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
@@ -13,15 +14,17 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.guide.conditions import numbers_of
 from mgdd.guide.map_forms import MapForms
 from mgdd.guide.map_table import SETTINGS
-from mgdd.guide.settled import settled_estimate
 from mgdd.optimize.optimum import Optimum
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.result import Result
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import ArrayLike
 
 __all__ = ["MapValue", "TimingMap"]
+
+_LEAST_SHARE = 1e-3  # of the spread: standard deviation of an estimate that does not move at all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,10 +155,10 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         values = []
         for cell in cells.tolist():
             numbers = dict(zip(own, cell, strict=True))
-            said = guide(make(**numbers))
-            if said is None:
+            reply = guide(make(**numbers))
+            if reply is None:
                 raise DataError(f"guide: no answer at {numbers}: narrow the axes")
-            values.append(next(iter(said.inputs.values())) if isinstance(said, Optimum) else float(said))
+            values.append(next(iter(reply.inputs.values())) if isinstance(reply, Optimum) else float(reply))
         return cls(own, np.reshape(values, [entries.size for entries in own.values()]), **settings)
 
     def __call__(self, point: Any) -> float | None:
@@ -176,8 +179,8 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         mgdd.errors.ParameterError
             The point lacks an axis.
         """
-        found = self.lookup(point)
-        return None if found.held_outside else found.timing_cad
+        cell = self.lookup(point)
+        return None if cell.held_outside else cell.timing_cad
 
     def lookup(self, point: Any) -> MapValue:
         """Read the map, outside of its axes too.
@@ -249,7 +252,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         mgdd.errors.ParameterError
             As by `learn`, or fewer than two cycles.
         """
-        settled = settled_estimate(seeker.history, cycles, spread_cad)
+        settled = _settled_estimate(seeker.history, cycles, spread_cad)
         if settled is None:
             return False
         self.learn(point, settled[0], sd_cad=settled[1])
@@ -272,3 +275,21 @@ class TimingMap(_core.guide.TimingMap, MapForms):
 
     def _rows(self) -> list[Row]:
         return rows_of({**self._axes, "timing_cad": self.timing_cad, **self._settings})
+
+
+def _settled_estimate(history: xr.Dataset, cycles: int, spread: float) -> tuple[float, float] | None:
+    """Give mean and standard deviation of the last cycles of a seeker with one input; None where they do not agree."""
+    if cycles < 2:
+        raise ParameterError.of("cycles", cycles, ">= 2")
+    last = history.isel(cycle=slice(-cycles, None))
+    if last.sizes["cycle"] < cycles:
+        return None
+    if "point" in last and (np.ptp(last["point"].to_numpy()) > 0 or bool(last["testing"].to_numpy().any())):
+        return None
+    estimate = last["estimate"].to_numpy()[:, 0]
+    early, late = estimate[: cycles // 2], estimate[cycles // 2 :]
+    drift = abs(float(np.mean(late) - np.mean(early)))
+    scatter = float(np.mean(np.abs(estimate - np.mean(estimate))))
+    if not (scatter < spread and drift < spread):
+        return None
+    return float(np.mean(estimate)), max(math.hypot(scatter, drift), _LEAST_SHARE * spread)

@@ -68,8 +68,8 @@ class Angle(NamedTuple):
 def angle_of(table: Table, heads: Sequence[Heading], how: Reading, *, samples: int | None = None) -> Angle:
     """Read the angle, or make it; `samples` is the length of the raster of a file without one."""
     if how.encoder is not None:
-        found = turning_of(table, heads, how.encoder, how.angle_column)
-        return Angle(found.columns[0], found.degrees, "deg", False, found)
+        turning = turning_of(table, heads, how.encoder, how.angle_column)
+        return Angle(turning.columns[0], turning.degrees, "deg", False, turning)
     if how.angle_step_deg is not None:
         _check_start(table.source, "a count of samples", how)
         count = np.arange(table.height if samples is None else samples, dtype=np.float64)
@@ -118,19 +118,19 @@ def at_the_speed_of_the_record(
     """Compare the stated speed with the period of the record: correct angles and speed, or refuse."""
     if not (np.isfinite(degrees).all() and np.all(np.diff(degrees) > 0.0)):
         return degrees, speed_rpm, []  # check_trace names the sample
-    found = repetition(degrees, pressure, firing_tdc_deg)
-    if found is None or not found.differs:
+    period = repetition(degrees, pressure, firing_tdc_deg)
+    if period is None or not period.differs:
         return degrees, speed_rpm, []
-    share = CYCLE_DEG / found.degrees
+    share = CYCLE_DEG / period.degrees
     stated = argument("speed_rpm", format(speed_rpm, "g"))
-    said = (
-        f"the pressure repeats every {found.degrees:.6g} degrees of {stated}, not 720: over {found.cycles} cycles the "
-        f"engine ran at {speed_rpm * share:.6g} rpm"
+    remark = (
+        f"the pressure repeats every {period.degrees:.6g} degrees of {stated}, not 720: over {period.cycles} cycles "
+        f"the engine ran at {speed_rpm * share:.6g} rpm"
     )
     if abs(share - 1.0) > _CORRECTED:
-        raise DataError(f"{source}: {said}: correct it")
+        raise DataError(f"{source}: {remark}: correct it")
     scaled = degrees[0] + (degrees - degrees[0]) * share
-    return scaled, speed_rpm * share, [f"{said}, and its angles were made with that"]
+    return scaled, speed_rpm * share, [f"{remark}, and its angles were made with that"]
 
 
 def _check_start(where: str, what: str, how: Reading) -> None:
@@ -138,7 +138,7 @@ def _check_start(where: str, what: str, how: Reading) -> None:
         raise DataError(f"{where}: {argument('before_tdc')} is for an angle column: leave it out")
     if how.angle_start_deg is None and how.firing_tdc_deg is None:
         raise DataError(
-            f"{where}: {what} says nothing of firing TDC: pass {argument('angle_start_deg', '')} with the angle of the "
+            f"{where}: {what} gives no firing TDC: pass {argument('angle_start_deg', '')} with the angle of the "
             f"first sample, or {argument('firing_tdc_deg', '')} with the angle of firing TDC counted from it"
         )
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # Arguments that say how the cells of a text or a sheet become columns.
 TEXT = ("delimiter", "decimal", "sheet", "cycle_per_row")
-_HEAD = 128  # bytes that tell a format
+_HEAD = 128  # bytes that identify a format
 _STARTS = {
     b"MATLAB 7.3": "HDF5", b"MATLAB": "MATLAB", b"\x89HDF": "HDF5", b"CDF": "netCDF 3", b"\x93NUMPY": "NumPy",
     b"TDSm": "TDMS", b"MDF ": "MDF", b"UnFinMF": "MDF", b"PAR1": "Parquet", b"PK\x03\x04": "XLSX or NPZ",
@@ -74,8 +74,8 @@ def open_table(
             table: Table = read_table(path, delimiter=delimiter, decimal=decimal)
         else:
             with naming_damage(file):
-                found = _opened(form, file, stack, sheet=sheet, without_side_blocks=True)
-                table = _table_of(file, found) if isinstance(found, list) else text_table(*found, delimiter="\t")
+                content = _opened(form, file, stack, sheet=sheet, without_side_blocks=True)
+                table = _table_of(file, content) if isinstance(content, list) else text_table(*content, delimiter="\t")
         if sheet is not None and (form is None or not isinstance(table, TextTable)):
             raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
         yield _of_rows(table) if cycle_per_row else table
@@ -123,9 +123,9 @@ def cells_as_text(path: str | os.PathLike[str], sheet: str | None = None) -> tup
     form = _form_of(file)
     if form == "XLSX or NPZ":
         with naming_damage(file), contextlib.ExitStack() as stack:
-            found = _opened(form, file, stack, sheet=sheet) if _is_xlsx(file) else None
-            if isinstance(found, tuple):
-                return *found, True
+            content = _opened(form, file, stack, sheet=sheet) if _is_xlsx(file) else None
+            if isinstance(content, tuple):
+                return *content, True
     if sheet is not None:
         raise DataError(f"{file}: no workbook: leave {argument('sheet')} out")
     return None if form is not None else (str(file), read_plain_text(file), False)
@@ -135,10 +135,10 @@ def _form_of(file: Path) -> str | None:
     """Name the format of a binary file by how it begins; None for a text."""
     with file.open("rb") as stream:
         head = stream.read(_HEAD)
-    found = next((form for start, form in _STARTS.items() if head.startswith(start)), None)
-    if found is None and file.suffix.lower() == ".mat":
+    detected = next((form for start, form in _STARTS.items() if head.startswith(start)), None)
+    if detected is None and file.suffix.lower() == ".mat":
         return "MATLAB"  # of version 4, which has no mark
-    return found
+    return detected
 
 
 def _opened(

@@ -54,16 +54,16 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
     h5py = import_extra("h5py", "formats", "a file of MATLAB 7.3, HDF5 or netCDF 4")
     content = stack.enter_context(h5py.File(file, "r"))
     matlab = any("MATLAB_class" in item.attrs for item in content.values())
-    found: list[tuple[str, Any]] = []
+    items: list[tuple[str, Any]] = []
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.shape is not None and item.dtype.kind in "fiub" and name[0] != "#":
-            found.append((name.replace("/", "."), item))
+            items.append((name.replace("/", "."), item))
 
     content.visititems(visit)
     netcdf = "_NCProperties" in content.attrs
     columns = []
-    for name, item in found:
+    for name, item in items:
         values = _Decoded(item, item.attrs, unwritten=netcdf)
         unit = next(filter(None, (_text(item.attrs.get(key)) for key in ("units", "unit"))), "")
         columns.append(Named(name, Reversed(values) if matlab else values, unit))
@@ -82,13 +82,13 @@ def of_netcdf(file: Path, stack: contextlib.ExitStack) -> Columns:
 
     raw: dict[str, Any] = {"mask_and_scale": False, "decode_times": False}
     dataset = stack.enter_context(xr.open_dataset(file, engine="scipy", **raw))
-    found = []
+    named = []
     for name in sorted(dataset.variables, key=lambda each: each != ANGLE):  # the angle first, as in a text
         variable = dataset[name].variable
         values = _Decoded(variable, variable.attrs, unwritten=True)
         turned = variable.dims[-1:] == (ANGLE,)
-        found.append(Named(str(name), Reversed(values) if turned else values, str(variable.attrs.get("units", ""))))
-    return columns_of(found, along=dataset.sizes.get(ANGLE))
+        named.append(Named(str(name), Reversed(values) if turned else values, str(variable.attrs.get("units", ""))))
+    return columns_of(named, along=dataset.sizes.get(ANGLE))
 
 
 def of_numpy(file: Path, stack: contextlib.ExitStack) -> Columns:
@@ -127,12 +127,12 @@ def of_parquet(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the columns of a Parquet file until the stack closes it."""
     parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
     content = stack.enter_context(parquet.ParquetFile(file))
-    found = []
+    named = []
     for field in content.schema_arrow:
         notes = field.metadata or {}
         unit = (notes.get(b"units") or notes.get(b"unit") or b"").decode()
-        found.append(Named(field.name, _ArrowColumn(content, field), unit))
-    return columns_of(found)
+        named.append(Named(field.name, _ArrowColumn(content, field), unit))
+    return columns_of(named)
 
 
 class _ArrowColumn:
@@ -148,8 +148,8 @@ class _ArrowColumn:
             self.dtype = np.dtype(object)
 
     def __getitem__(self, _: Any) -> NDArray[Any]:
-        found = self._content.read(columns=[self._name])[self._name]
-        values: NDArray[Any] = (found.cast("double") if self._cast else found).to_numpy()
+        column = self._content.read(columns=[self._name])[self._name]
+        values: NDArray[Any] = (column.cast("double") if self._cast else column).to_numpy()
         return values
 
 
@@ -179,9 +179,9 @@ class _Decoded:
         for key, end in (("valid_min", low), ("valid_max", high)):
             bound = self._marks.get(key, [end])[0]
             missing |= raw < bound if key == "valid_min" else raw > bound
-        found = marked(raw.astype(np.float64), missing)
+        numbers = marked(raw.astype(np.float64), missing)
         (scale, *_), (offset, *_) = self._marks.get("scale_factor", [1.0]), self._marks.get("add_offset", [0.0])
-        return found if (scale, offset) == (1.0, 0.0) else found * scale + offset
+        return numbers if (scale, offset) == (1.0, 0.0) else numbers * scale + offset
 
     def _of_type(self, key: str, dtype: np.dtype[Any]) -> list[Any]:
         """Return the values of a mark as the array would hold them; one that it cannot hold marks nothing."""

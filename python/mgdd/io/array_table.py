@@ -82,8 +82,8 @@ class Column(NamedTuple):
         if self.across is None:
             return np.asarray(self.values[tuple(index)])[None]
         index[self.across] = slice(self.number, self.number + count)
-        found = np.asarray(self.values[tuple(index)])
-        return found.T if self.along < self.across else found
+        table = np.asarray(self.values[tuple(index)])
+        return table.T if self.along < self.across else table
 
 
 Columns = list[tuple[str, str, Column]]  # name, unit, column
@@ -91,14 +91,14 @@ Columns = list[tuple[str, str, Column]]  # name, unit, column
 
 def columns_of(arrays: Iterable[Named], along: int | None = None) -> Columns:
     """Give name, unit and column: a matrix column by column, along the samples of a vector, else its longer side."""
-    found = []
+    named = []
     for name, values, unit in arrays:
         axes = [k for k, size in enumerate(values.shape) if size != 1]
         if values.dtype.kind in "fiub" and len(axes) in (1, 2) and 0 not in values.shape:
-            found.append((name, unit, values, axes))
-    lengths = {values.shape[axes[0]] for _, _, values, axes in found if len(axes) == 1} if along is None else {along}
+            named.append((name, unit, values, axes))
+    lengths = {values.shape[axes[0]] for _, _, values, axes in named if len(axes) == 1} if along is None else {along}
     columns: Columns = []
-    for name, unit, values, axes in found:
+    for name, unit, values, axes in named:
         if len(axes) == 1:
             columns.append((name, unit, Column(values, axes[0])))
             continue
@@ -172,9 +172,9 @@ class ArrayTable(Table):
 
 
 def _complete(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """Refuse fewer numbers than the head of a file told, which NumPy would repeat or leave out."""
+    """Refuse fewer numbers than the head of a file states, which NumPy would repeat or leave out."""
     if values.shape != shape:
-        raise ValueError(f"{values.shape} numbers where {shape} are said to be")
+        raise ValueError(f"{values.shape} numbers where the head states {shape}")
     return values
 
 

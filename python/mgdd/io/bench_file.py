@@ -120,10 +120,10 @@ def read(
 
 def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *, name: str) -> xr.Dataset:
     """Cut and label what a layout of a table says."""
-    kept = kept_channels(table, layout, channels)
-    wanted = {channel.name for channel in kept}
+    chosen = kept_channels(table, layout, channels)
+    chosen_names = {channel.name for channel in chosen}
     cylinders = [channel for channel in layout.channels if channel.kind == "pressure"]
-    fast = [channel for channel in kept if channel.kind == "fast"]
+    fast = [channel for channel in chosen if channel.kind == "fast"]
     pressures = [pressure_of(table, layout.heads, [*each.columns], layout.how, layout.angle) for each in cylinders]
     for channel, pressure in zip(cylinders, pressures, strict=True):
         if len(cylinders) > 1:
@@ -138,15 +138,15 @@ def bench_record(table: Table, layout: Layout, channels: Sequence[str] | None, *
         variables[CYCLE] = cycle_count(count)
     for channel, array in zip([*cylinders, *fast], cut, strict=True):
         whole = count > 1 and len(array) > 1
-        if channel.name in wanted:
+        if channel.name in chosen_names:
             variables[channel.name] = _labelled(channel, ((CYCLE, ANGLE), array) if whole else ((ANGLE,), array[0]))
     notes = [note for pressure in pressures for note in pressure.notes if note not in record.notes]
-    notes += _add_slow(table, layout, kept, variables, sources)
-    notes += _add_per_cycle(table, kept, record, variables, asked=channels is not None)
-    if bare := [channel.name for channel in kept if channel.units is None and channel.name in variables]:
-        notes.append(f"the file gives no unit of {columns_shown(bare)}: their numbers stand as they are")
+    notes += _add_slow(table, layout, chosen, variables, sources)
+    notes += _add_per_cycle(table, chosen, record, variables, asked=channels is not None)
+    if bare := [channel.name for channel in chosen if channel.units is None and channel.name in variables]:
+        notes.append(f"the file gives no unit of {columns_shown(bare)}: their numbers are unchanged")
     made = labelled_dataset(variables, attrs=record_attrs(record._replace(notes=record.notes + notes), name))
-    sources |= {channel.name: channel.source for channel in kept}
+    sources |= {channel.name: channel.source for channel in chosen}
     for name_of, variable in made.variables.items():  # made[name] would look at every other variable each time
         variable.attrs["source"] = sources[str(name_of)]
     return made
@@ -213,12 +213,12 @@ def _labelled(channel: Channel, entry: tuple[Any, Any]) -> tuple[Any, ...]:
 
 
 def _add_slow(
-    table: Table, layout: Layout, kept: Sequence[Channel], variables: dict[str, Any], sources: dict[str, str]
+    table: Table, layout: Layout, chosen: Sequence[Channel], variables: dict[str, Any], sources: dict[str, str]
 ) -> list[str]:
     """Add the channels of other rasters over their own times."""
     names: dict[int, str] = {}
     notes = []
-    for channel in kept:
+    for channel in chosen:
         if channel.kind != "slow" or channel.time is None:
             continue
         if channel.time not in names:
@@ -234,11 +234,11 @@ def _add_slow(
 
 
 def _add_per_cycle(
-    table: Table, kept: Sequence[Channel], record: Record, variables: dict[str, Any], *, asked: bool
+    table: Table, chosen: Sequence[Channel], record: Record, variables: dict[str, Any], *, asked: bool
 ) -> list[str]:
     """Add what has one value per cycle; what has neither a time nor that is left out, by name."""
     count, left = len(record.bar), []
-    for channel in kept:
+    for channel in chosen:
         if channel.kind != "other":
             continue
         values = _values(table, channel)[0]

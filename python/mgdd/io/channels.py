@@ -96,19 +96,19 @@ def kept_channels(table: Table, layout: Layout, names: Sequence[str] | None) -> 
         return layout.channels
     if isinstance(names, str):
         names = [names]
-    known: dict[str, Channel] = {}
+    by_name: dict[str, Channel] = {}
     for channel in layout.channels:
         header = [table.header[i] for i in channel.columns] if table.header else []
         stems = [stem(header[0])] if len(header) > 1 else []
-        known |= dict.fromkeys((*stems, *header, channel.name), channel)
-    strange = next((name for name in names if name not in known), None)
+        by_name |= dict.fromkeys((*stems, *header, channel.name), channel)
+    strange = next((name for name in names if name not in by_name), None)
     if strange is not None:
         have = columns_shown([channel.name for channel in layout.channels])
-        near = did_you_mean(str(strange), known)
+        near = did_you_mean(str(strange), by_name)
         raise DataError(
             f"{table.source}: {argument('channels', repr(strange))}: {near or 'no such channel'}; there are {have}"
         )
-    chosen = {known[name].name for name in names}
+    chosen = {by_name[name].name for name in names}
     return [channel for channel in layout.channels if channel.name in chosen]
 
 
@@ -146,14 +146,14 @@ def _pressures(
     table: Table, heads: Sequence[Heading], how: Reading, angle: Angle, fast: Sequence[int]
 ) -> list[tuple[int, ...]]:
     """Return the columns of each cylinder's pressure."""
-    said = [i for i in fast if heads[i].quantity == "pressure"]
-    exact = [i for i in said if heads[i].name == "pressure_bar"]
-    if how.pressure_column is not None or not said:
+    pressures = [i for i in fast if heads[i].quantity == "pressure"]
+    exact = [i for i in pressures if heads[i].name == "pressure_bar"]
+    if how.pressure_column is not None or not pressures:
         columns = choose_pressure(table, heads, how.pressure_column, angle)
         if how.pressure_column is None:
             return [tuple(columns)]
     else:
-        columns = exact if len(exact) == 1 else said
+        columns = exact if len(exact) == 1 else pressures
     if foreign := [i for i in columns if i not in fast]:
         raise DataError(
             f"{table.source}: {table.called(foreign[0])} has another raster than the crank angle, "
@@ -202,8 +202,8 @@ def _series(
     def numbers(group: Sequence[int]) -> list[str | None]:
         return [last_number(heads[i].name) for i in group]
 
-    wanted = numbers(pressure)
-    return sorted(part for group in groups for part in ([group] if numbers(group) == wanted else [(i,) for i in group]))
+    target = numbers(pressure)
+    return sorted(part for group in groups for part in ([group] if numbers(group) == target else [(i,) for i in group]))
 
 
 def _named_pressures(table: Table, heads: Sequence[Heading], groups: Sequence[tuple[int, ...]]) -> list[Channel]:
@@ -231,14 +231,14 @@ def _channel(
     """Name a channel as none in `used` is, and add its name there."""
     index = columns[0]
     header = heads[index].name
-    said = stated_unit(header, table.unit(index))
-    units = None if said is None else _printed(said)
+    unit = stated_unit(header, table.unit(index))
+    units = None if unit is None else _printed(unit)
     words = stem(header) if len(columns) > 1 else without_brackets(header)
     name = re.sub(r"\W+", "_", words).strip("_") or f"column_{index}"
     name = f"c_{name}" if name[0].isdigit() else name
-    known = VARIABLES[name].units if name in VARIABLES else units
+    name_units = VARIABLES[name].units if name in VARIABLES else units
     reserved = name in used or re.fullmatch(r"time_\d+_s", name)
-    if reserved or attribute_units(known or "-") != attribute_units(units or "-"):
+    if reserved or attribute_units(name_units or "-") != attribute_units(units or "-"):
         name = f"{name}_of_file"
     name = _unused(name, used)
     used.add(name)
@@ -259,12 +259,12 @@ def _source(table: Table, columns: Sequence[int]) -> str:
 
 def _printed(text: str) -> str:
     """Return a unit as results print it; one that is not a product of units is kept as a remark."""
-    known = spelled_unit(text)
+    unit = spelled_unit(text)
     bare = text.strip().strip("[](){}").strip()
-    if known in (None, "other"):
+    if unit in (None, "other"):
         written = _WRITTEN.get(bare.lower(), re.sub(r"(?<=[A-Za-z])([23])(?!\d)", r"^\1", bare))
     else:
-        written = re.sub(r"(?<=[A-Za-z])2$", "^2", known or "")
+        written = re.sub(r"(?<=[A-Za-z])2$", "^2", unit or "")
     try:
         attribute_units(written)
     except ValueError:

@@ -144,18 +144,18 @@ class _Plan(NamedTuple):
         """Give the cycles, so many at a time."""
         at, done, mean = self.first, 0, None
         notes = [f"{at} samples before the first cycle left out: incomplete"] if at else []
-        asked = cycles * self.every + self.reach  # tells whether another cycle follows
+        asked = cycles * self.every + self.reach  # shows whether another cycle follows
         last = False
         while not last:
             source = f"{self.source} from cycle {done + 1} on" if done else self.source
-            found = self.samples(at, at + asked, source)
-            held = found.values.shape[1]
+            samples = self.samples(at, at + asked, source)
+            held = samples.values.shape[1]
             last = self.count(held) <= cycles
             count = self.count(held) if last else cycles
             left = held - (count - 1) * self.every - int(np.ptp(self.place)) - 1
             if last and left:
                 notes.append(f"{left} samples behind the last cycle left out: incomplete")
-            record = self.cut(found, count, source)
+            record = self.cut(samples, count, source)
             here = record.bar.mean(axis=0)
             if mean is not None:
                 ends = ("the first chunk", f"cycles {done + 1} to {done + count}")
@@ -167,15 +167,15 @@ class _Plan(NamedTuple):
 
     def samples(self, start: int, stop: int, source: str) -> Pressure:
         """Read samples of the pressure, as one row, and refuse angles that are not those of the first cycle."""
-        wanted = [*self.angle.columns, self.column]
-        parts, lines = [np.empty((len(wanted), 0))], [np.empty(0, np.int64)]
+        indices = [*self.angle.columns, self.column]
+        parts, lines = [np.empty((len(indices), 0))], [np.empty(0, np.int64)]
         following = stop - self.reach  # where the next chunk begins, which must not be passed by
         table = self.part(start, start)
         for at, end in itertools.pairwise([*range(start, following, _ROWS), following, stop]):
             table = self.part(at, end)
             if not table.height:
                 break
-            parts.append(table.matrix(wanted))
+            parts.append(table.matrix(indices))
             lines.append(table.lines)
         values = np.concatenate(parts, axis=1)
         degrees: NDArray[Any] = np.arange(values.shape[1]) * (self.how.angle_step_deg or 0.0)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mgdd.errors import DataError
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
-# Spellings of a unit, in small letters, comma between them; "other" are those of quantities that nobody asks for.
+# Spellings of a unit, in small letters, comma between them; "other" are those of quantities that are not used.
 _SPELLINGS = {
     "bar": "bar, dan/cm2",
     "kPa": "kpa, kn/m2, kn/m²",
@@ -99,29 +99,29 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
 
 @lru_cache(maxsize=1024)  # the files of a folder have the same names
 def _heading(name: str, units_row: str | None) -> Heading:
-    said, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
+    written, gauge = name, bool(_SAYS_GAUGE.search(f"{name} {units_row}"))
     name, name_gauge = _without_reference(name)
     units_row, row_gauge = _without_reference(units_row or "")
-    in_name, in_row = _known(_unit_word(name, lone=not units_row) or ""), _known(units_row)
+    in_name, in_row = _unit_of(_unit_word(name, lone=not units_row) or ""), _unit_of(units_row)
     if in_name and in_row and in_name != in_row:
         raise DataError(f"the header says {in_name} and the units row {units_row!r}: correct the one that is wrong")
     unit = in_row or in_name
     words = _words(_BRACKETS.sub(" ", name))
     quantity = _QUANTITIES.get(unit or "")
-    found = next((kind for kind, known in _KINDS.items() if words & known), None)
-    if quantity is None or (quantity == "pressure" and found == "other"):
-        quantity = found or quantity
+    quantity_found = next((kind for kind, known in _KINDS.items() if words & known), None)
+    if quantity is None or (quantity == "pressure" and quantity_found == "other"):
+        quantity = quantity_found or quantity
     cylinder = _CYLINDER.search(name.lower())
     units = [units_row, *_SQUARE.findall(name)]
     letter = in_name == "other" and not in_row and len(_unit_word(name) or "") == 1 and not _BRACKETS.search(name)
     return Heading(
-        name=said,
+        name=written,
         unit=None if unit == "other" else unit,
         quantity=quantity,
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
         gauge=gauge or name_gauge or row_gauge,
-        other=next((text.strip() for text in units if _known(text) == "other"), None),
+        other=next((text.strip() for text in units if _unit_of(text) == "other"), None),
         strange=_first_strange(units),
         unclear=_first_strange(_maybe_units(name)) or (_unit_word(name) if letter else None),
     )
@@ -144,19 +144,19 @@ def _without_reference(text: str) -> tuple[str, bool]:
 def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool]:
     """Return what stands where a unit stands, None for nothing, and whether it can be nothing else."""
     for texts, sure in (([units_row or "", *_SQUARE.findall(name)], True), (_maybe_units(name), False)):
-        said = next((text.strip() for text in texts if text.strip()), None)
-        if said is not None:
-            return said, sure
+        unit = next((text.strip() for text in texts if text.strip()), None)
+        if unit is not None:
+            return unit, sure
     return None, False
 
 
 def _first_strange(texts: list[str]) -> str | None:
-    return next((text for text in texts if text.strip(" -") and _known(text) is None), None)
+    return next((text for text in texts if text.strip(" -") and _unit_of(text) is None), None)
 
 
 def _maybe_units(name: str) -> list[str]:
     """Return what round brackets hold, remarks left out, and a last word with a slash in it."""
-    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _known(text) or _words(text) - _REMARKS]
+    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _unit_of(text) or _words(text) - _REMARKS]
     ratio = _ratio(name)
     return [*texts, ratio] if ratio else texts
 
@@ -167,7 +167,7 @@ def _ratio(name: str) -> str | None:
     if "/" not in last.strip("/") or _BRACKETS.search(last):
         return None
     below = last.partition("/")[2]
-    return below if _known(last) is None and _known(below) is not None else last
+    return below if _unit_of(last) is None and _unit_of(below) is not None else last
 
 
 @lru_cache(maxsize=256)
@@ -176,7 +176,7 @@ def spelled_unit(text: str) -> str | None:
     return _UNITS.get(_without_reference(text)[0].strip().lower())
 
 
-def _known(text: str) -> str | None:
+def _unit_of(text: str) -> str | None:
     unit = spelled_unit(text)
     return _AMONG_PRESSURES.get(unit or "", unit)
 
@@ -189,8 +189,8 @@ def check_choice(name: str, value: object, allowed: Collection[str]) -> None:
 
 def stated_unit(name: str, units_row: str | None = None) -> str | None:
     """Return the unit of a column as the file writes it, known or not; None where it gives none."""
-    said = next((text.strip() for text in (units_row or "", *_SQUARE.findall(name)) if text.strip()), None)
-    return said or _unit_word(name)
+    unit = next((text.strip() for text in (units_row or "", *_SQUARE.findall(name)) if text.strip()), None)
+    return unit or _unit_word(name)
 
 
 def _unit_word(name: str, *, lone: bool = True) -> str | None:
@@ -199,9 +199,9 @@ def _unit_word(name: str, *, lone: bool = True) -> str | None:
     A lone letter is one where `lone`: with a row of units below, Channel A is a name.
     """
     for text in reversed(_BRACKETS.findall(name)):
-        if _known(text) is not None:
+        if _unit_of(text) is not None:
             return str(text)
-    if (ratio := _ratio(name)) and _known(ratio):
+    if (ratio := _ratio(name)) and _unit_of(ratio):
         return ratio
     own = [part for part in name.split(".") if not part.strip().isdecimal()]  # behind those of its structs and groups
     words = [word for word in re.split(r"[\s_/,;\-]+", own[-1].strip() if own else "") if word and not word.isdecimal()]
@@ -209,7 +209,7 @@ def _unit_word(name: str, *, lone: bool = True) -> str | None:
         return None
     if len(words[-1]) == 1 and (not lone or len(words) == 1 or (words[-1] != "V" and words[0].lower() in _PLACES)):
         return None  # a lone letter is a name, and p_a is a cylinder rather than an ampere
-    return words[-1] if _known(words[-1]) is not None else None
+    return words[-1] if _unit_of(words[-1]) is not None else None
 
 
 def stem(name: str) -> str:
@@ -221,17 +221,17 @@ def stem(name: str) -> str:
 
 def last_number(name: str) -> str | None:
     """Return the last number in a name, its unit in brackets left out."""
-    found = re.findall(r"\d+", without_brackets(name))
-    return found[-1] if found else None
+    numbers = re.findall(r"\d+", without_brackets(name))
+    return numbers[-1] if numbers else None
 
 
 def without_brackets(name: str) -> str:
     """Return a name without the brackets that hold a unit; remarks stay."""
 
-    def kept(found: re.Match[str]) -> str:
-        return " " if found[0].startswith("[") or _known(found[1]) is not None else f" {found[1]} "
+    def cleaned(bracket: re.Match[str]) -> str:
+        return " " if bracket[0].startswith("[") or _unit_of(bracket[1]) is not None else f" {bracket[1]} "
 
-    return _BRACKETS.sub(kept, name).strip()
+    return _BRACKETS.sub(cleaned, name).strip()
 
 
 def _words(name: str) -> set[str]:

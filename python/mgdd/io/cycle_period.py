@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CYCLE_DEG = 720.0
-# Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed told as half.
+# Repetitions are sought from here on [deg]: above the width of one pressure peak, below a speed stated as half.
 _SHORTEST_DEG = 200.0
 _ALIKE, _WHOLE_ALIKE = 0.9, 0.6
 

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Compression before any burn, a spark-ignited one too [°CA aTDC]: cycles differ there by level and factor alone. It is
-# drawn out towards TDC, where the shift tells itself from the factor, while what is left stays noise.
+# drawn out towards TDC, where the shift is separable from the factor, while what is left stays noise.
 _FROM_CAD, _TO_CAD, _LEAST_CAD = -110.0, -60.0, 40.0
 _LATER_CAD, _AS_QUIET = (-50.0, -40.0, -30.0, -20.0, -10.0), 1.05
 # The median cycle is known so far beyond: within it a cycle may be shifted without leaving it.
 _MARGIN_CAD = 4.0
 COMPRESSION_CAD = _FROM_CAD - _MARGIN_CAD, _LATER_CAD[-1] + _MARGIN_CAD  # all that `phases` looks at
-# 0.2 °CA from first to last is 0.1 °CA in the mean and 1 % of the work; less is not told from the exponent.
+# 0.2 °CA from first to last is 0.1 °CA in the mean and 1 % of the work; less is not separable from the exponent.
 DRIFT_CAD = 0.2
 _JUMP_CAD, _REFUSED_CAD = 0.75, 2.0
 SIGNIFICANT = 4.0  # standard errors
@@ -46,12 +46,12 @@ class Jump(NamedTuple):
     cad: float
 
 
-def odd_bound(looks: int, chance: float = 1e-3) -> float:
-    """Give the deviations from the median that one of so many cycles passes by `chance`: 4.9 of 10, 5.8 of 300.
+def odd_bound(looks: int, probability: float = 1e-3) -> float:
+    """Give the deviations from the median that one of so many cycles passes by `probability`: 4.9 of 10, 5.8 of 300.
 
     A quarter more than of a normal law, for the heavy tails of a burn.
     """
-    return 1.25 * NormalDist().inv_cdf(1.0 - 0.5 * chance / max(looks, 1))
+    return 1.25 * NormalDist().inv_cdf(1.0 - 0.5 * probability / max(looks, 1))
 
 
 class Phases(NamedTuple):
@@ -145,15 +145,15 @@ def phases(cad: NDArray[np.float64], pressure: NDArray[np.float64]) -> Phases | 
         return None
     cad, pressure = _thinned(cad, pressure)
     usual = np.median(pressure, axis=0)
-    found = _placed(cad, pressure, usual, _TO_CAD)
-    if found is None:
+    fit = _placed(cad, pressure, usual, _TO_CAD)
+    if fit is None:
         return None
     for end in _LATER_CAD:
-        longer = _placed(cad, pressure, usual, end, found.change)
-        if longer is None or (longer.left > _AS_QUIET * found.left).any() or not _agree(found.phases, longer.phases):
+        longer = _placed(cad, pressure, usual, end, fit.change)
+        if longer is None or (longer.left > _AS_QUIET * fit.left).any() or not _agree(fit.phases, longer.phases):
             break
-        found = longer
-    return found.phases
+        fit = longer
+    return fit.phases
 
 
 def _thinned(
@@ -265,26 +265,26 @@ def phase_warnings(
     """
     turned = lost_turn(cad, pressure)
     if turned is not None:
-        what = f"from cycle {turned + 1} on firing TDC stands at gas exchange: a turn of the shaft is missing before it"
+        what = f"from cycle {turned + 1} on firing TDC is at gas exchange: a turn of the shaft is missing before it"
         return [f"{what}; cut the record there, each part with its own firing_tdc_deg"]
-    found = phases(cad, pressure)
-    if found is None:
+    fit = phases(cad, pressure)
+    if fit is None:
         return []
     step = float(np.median(np.diff(cad)))
-    off = found.late_cad - np.median(found.late_cad)
+    off = fit.late_cad - np.median(fit.late_cad)
     odd = int(np.argmax(np.abs(off)))
-    drift, _ = found.drift_cad
-    jump = None if over_time else found.jump(step)
+    drift, _ = fit.drift_cad
+    jump = None if over_time else fit.jump(step)
     # A clock has no slips of its own: what is beyond the noise is the speed, however many cycles share it.
-    visible = max(_JUMP_CAD, odd_bound(off.size) * found.stderr_cad) if over_time else found.visible_cad
+    visible = max(_JUMP_CAD, odd_bound(off.size) * fit.stderr_cad) if over_time else fit.visible_cad
     stands_apart = len(pressure) > 2 and abs(off[odd]) > visible
     if jump is not None:
         what = f"from cycle {jump.cycle + 1} on compression lies {jump.cad:+.2g} °CA off"
-    elif found.drifts:
+    elif fit.drifts:
         first, last = ends or ("cycle 1", f"cycle {len(pressure)}")
         what = f"compression moves by {drift:+.2g} °CA from {first} to {last}"
     elif stands_apart:
-        what = f"compression of cycle {odd + 1} lies {off[odd]:+.2g} °CA off the others (±{found.stderr_cad:.1g})"
+        what = f"compression of cycle {odd + 1} lies {off[odd]:+.2g} °CA off the others (±{fit.stderr_cad:.1g})"
     else:
         return []
     causes = "the speed changes within the record" if over_time else "lost pulses, or cycles with clocks apart"

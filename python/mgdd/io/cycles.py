@@ -171,19 +171,19 @@ def _stacked(
             f"{place.row(b.start)}: cycle {inner[0]} of {len(blocks)} runs from {degrees[b.start]:g} to "
             f"{degrees[b.stop - 1]:g}, the others from {low:g} to {high:g}: repair it or remove its rows"
         )
-    kept = [b for b, complete in zip(blocks, whole, strict=True) if complete]
-    grid = degrees[kept[0]]
-    for b in kept:
+    whole_blocks = [b for b, complete in zip(blocks, whole, strict=True) if complete]
+    grid = degrees[whole_blocks[0]]
+    for b in whole_blocks:
         if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > SAME_ANGLE * step:
             raise DataError(
                 f"{place.row(b.start)}: the cycle that starts here has other crank angles than the one at "
-                f"{place.row(kept[0].start)}: give all cycles the same angles"
+                f"{place.row(whole_blocks[0].start)}: give all cycles the same angles"
             )
     which = f"cycle{'s' if len(dropped) > 1 else ''} {' and '.join(map(str, dropped))}"
     notes = [f"{which} of {len(blocks)} left out: incomplete"] if dropped else []
     taken = tuple(k for k, complete in enumerate(whole) if complete)
-    cut = np.stack([values[:, b] for b in kept], axis=1)
-    return Cycles(grid, cut, rows[kept[0]], tuple(notes), taken, len(blocks))
+    cut = np.stack([values[:, b] for b in whole_blocks], axis=1)
+    return Cycles(grid, cut, rows[whole_blocks[0]], tuple(notes), taken, len(blocks))
 
 
 def _running(
@@ -202,16 +202,16 @@ def _running(
             f"{place.row(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual "
             f"step is {step:g}; fill it or cut the record there"
         )
-    found = None if counts_turns else repetition(degrees, values[0], firing_tdc_deg)
+    period = None if counts_turns else repetition(degrees, values[0], firing_tdc_deg)
     samples = CYCLE_DEG / step
     encoded = abs(samples - round(samples)) < _WHOLE
-    if found is not None and found.differs and not (encoded and abs(found.degrees / CYCLE_DEG - 1.0) < _LOSABLE):
-        factor = CYCLE_DEG / found.degrees
+    if period is not None and period.differs and not (encoded and abs(period.degrees / CYCLE_DEG - 1.0) < _LOSABLE):
+        factor = CYCLE_DEG / period.degrees
         if abs(samples / factor - round(samples / factor)) < _NEARLY_WHOLE:
             factor = samples / round(samples / factor)
         raise DataError(
-            f"{place.source}: the angle runs on and the pressure repeats every {found.degrees:.6g} degrees, not every "
-            f"720, over {found.cycles} cycles: correct the step of the angle by a factor of {factor:.6g}, "
+            f"{place.source}: the angle runs on and the pressure repeats every {period.degrees:.6g} degrees, not every "
+            f"720, over {period.cycles} cycles: correct the step of the angle by a factor of {factor:.6g}, "
             f"{argument('angle_step_deg', format(step * factor, '.6g'))} for a file without an angle"
         )
     first = float(degrees[0])
@@ -270,13 +270,13 @@ def _without_losses(
     out: set[int] = set()
     notes = []
     for _ in range(_PLACES):
-        kept = np.array([k for k in range(count) if k not in out])
-        placed = phases(past, values[0, kept])
+        kept_cycles = np.array([k for k in range(count) if k not in out])
+        placed = phases(past, values[0, kept_cycles])
         jump = None if placed is None else placed.jump(step)
         lost = 0 if jump is None else -round(jump.cad / step)
         if jump is None or not lost:
             break
-        behind = int(kept[jump.cycle])
+        behind = int(kept_cycles[jump.cycle])
         begins[behind:] -= lost
         out |= {behind - 1, behind}
         what = f"{abs(lost)} samples {'are missing' if lost > 0 else 'too many'}"

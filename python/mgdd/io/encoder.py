@@ -90,7 +90,7 @@ class Encoder:
         -------
         xarray.Dataset
             ``crank_angle_deg(time_s)``, running on, 0 at a mark: the first edge behind the gap, the edge of the index,
-            or the first edge; NaN before the first and behind the last turn that can be told. ``speed_rpm(turn)`` from
+            or the first edge; NaN before the first and behind the last countable turn. ``speed_rpm(turn)`` from
             mark to mark, ``mark_s(turn)``; ``lost``, ``extra`` (edges) and ``lost_marks`` are counts, ``slipped_deg``
             (stretch, end) are turns whose count is wrong, and the neighbourhoods of edges that come early or late: the
             angle is right at their ends only.
@@ -102,32 +102,32 @@ class Encoder:
         DataError, ShapeError
             Unlike lengths, a sample that is not finite, a signal that stands, or one of another wheel, which is named.
         """
-        found = _found(self, time_s, signal, index)
-        marks = found["mark_s"]
+        result = _encoder_angle(self, time_s, signal, index)
+        marks = result["mark_s"]
         speed = 60.0 / np.diff(marks)
-        slipped = np.array(found["slipped_deg"], dtype=np.float64).reshape(-1, 2)
+        slipped = np.array(result["slipped_deg"], dtype=np.float64).reshape(-1, 2)
         return labelled_dataset(
             {
                 "time_s": ("time_s", np.asarray(time_s, dtype=np.float64)),
                 "turn": ("turn", np.arange(1, speed.size + 1), "-", "turn"),
                 "slip": ("slip", np.arange(1, len(slipped) + 1), "-", "stretch of miscounted or displaced edges"),
                 "end": ("end", np.array(["from", "to"]), "-", "end of a stretch"),
-                "crank_angle_deg": ("time_s", found["angle_deg"], "deg", "crank angle from a mark on"),
+                "crank_angle_deg": ("time_s", result["angle_deg"], "deg", "crank angle from a mark on"),
                 "mark_s": ("turn", marks[:-1], "s", "time of the mark that begins a turn"),
                 "speed_rpm": ("turn", speed, "rpm", "engine speed"),
                 "slipped_deg": (("slip", "end"), slipped, "deg", "miscounted or displaced edges"),
-                **{name: ((), found[name], "-", name.replace("_", " ")) for name in ("lost", "extra", "lost_marks")},
+                **{name: ((), result[name], "-", name.replace("_", " ")) for name in ("lost", "extra", "lost_marks")},
             }
         )
 
 
-def _found(encoder: Encoder, time_s: ArrayLike, signal: ArrayLike, index: ArrayLike | None) -> dict[str, Any]:
+def _encoder_angle(encoder: Encoder, time_s: ArrayLike, signal: ArrayLike, index: ArrayLike | None) -> dict[str, Any]:
     e = encoder
-    found: dict[str, Any] = _core.encoder_angle(
+    result: dict[str, Any] = _core.encoder_angle(
         time_s, signal, index, teeth=e.teeth, missing_teeth=e.missing_teeth, falling=e.falling, level=e.level
     )
-    displaced = _displaced(np.asarray(found["angle_deg"]), np.asarray(time_s, np.float64), e.teeth)
-    return {**found, "slipped_deg": sorted([*found["slipped_deg"], *displaced])}
+    displaced = _displaced(np.asarray(result["angle_deg"]), np.asarray(time_s, np.float64), e.teeth)
+    return {**result, "slipped_deg": sorted([*result["slipped_deg"], *displaced])}
 
 
 def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth: int) -> list[tuple[float, float]]:
@@ -135,8 +135,8 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
 
     What a place of the wheel has in every turn, as a bent tooth, is left to it.
     """
-    told, pitch = np.isfinite(degrees), 360.0 / teeth
-    angle, time = degrees[told], time_s[told]
+    valid, pitch = np.isfinite(degrees), 360.0 / teeth
+    angle, time = degrees[valid], time_s[valid]
     at = np.arange(angle[0] + pitch, angle[-1] - pitch, pitch / _PER_PITCH)
     if not at.size:
         return []
@@ -153,7 +153,7 @@ def _displaced(degrees: NDArray[np.float64], time_s: NDArray[np.float64], teeth:
 
 
 class Turning(NamedTuple):
-    """The angle of every sample of a table by its encoder, its columns, and what is to be said of it."""
+    """The angle of every sample of a table by its encoder, its columns, and the remarks on it."""
 
     degrees: NDArray[np.float64]
     columns: tuple[int, ...]
@@ -178,14 +178,14 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
         even_step(seconds, where=f"{table.source}, {table.called(clock)}, row {{}}".format)
     pulse = None if index is None else table.numbers(index)
     try:
-        found = _found(encoder, seconds, table.numbers(column), pulse)
+        result = _encoder_angle(encoder, seconds, table.numbers(column), pulse)
     except DataError as error:
         raise error.reworded(f"{table.source}, {table.called(column)}: {error}") from error
-    marks, notes = found["mark_s"], []
+    marks, notes = result["mark_s"], []
     for count, what in (
-        (found["lost"], "edge{} missing, the angle runs through"),
-        (found["extra"], "edge{} too many, left out"),
-        (found["lost_marks"], "mark{} of the turn missing or false"),
+        (result["lost"], "edge{} missing, the angle runs through"),
+        (result["extra"], "edge{} too many, left out"),
+        (result["lost_marks"], "mark{} of the turn missing or false"),
     ):
         if count:
             notes.append(f"{table.called(column)}: {count} {what.format('s' if count > 1 else '')}")
@@ -194,7 +194,7 @@ def turning_of(table: Table, heads: Sequence[Heading], encoder: Encoder, time: i
         notes.append(f"{table.called(column)} has no mark of the turn: that no edge is missing is taken for granted")
     speed = 60.0 * (len(marks) - 1) / float(marks[-1] - marks[0]) if clock is not None and len(marks) > 1 else None
     used = tuple(i for i in (column, index, clock) if i is not None)
-    return Turning(found["angle_deg"], used, speed, found["slipped_deg"], notes, has_mark)
+    return Turning(result["angle_deg"], used, speed, result["slipped_deg"], notes, has_mark)
 
 
 def _time(table: Table, heads: Sequence[Heading], size: int, column: int) -> int | None:
@@ -212,15 +212,15 @@ def on_even_angles(
     The first channel is a cylinder pressure; `tdc_deg` is the angle of TDC behind a mark of the turn. Firing TDC is the
     one of the two turns with the higher pressure.
     """
-    told = np.flatnonzero(np.isfinite(turning.degrees))
-    part = slice(int(told[0]), int(told[-1]) + 1)
+    valid = np.flatnonzero(np.isfinite(turning.degrees))
+    part = slice(int(valid[0]), int(valid[-1]) + 1)
     degrees = turning.degrees[part]
     usual = float(np.median(np.diff(degrees)))
     step: float = step_deg or max((each for each in _STEPS_DEG if each <= usual * 1.001), default=_STEPS_DEG[0])
     first = int(np.ceil(degrees[0] / step))
     count = int(np.floor(degrees[-1] / step)) - first + 1
     if count * step < CYCLE_DEG:
-        raise DataError(f"{source}: the encoder tells {max(count * step, 0.0):.4g} degrees: a cycle of 720 is needed")
+        raise DataError(f"{source}: the encoder covers {max(count * step, 0.0):.4g} degrees: a cycle of 720 is needed")
     bad = np.flatnonzero(~np.isfinite(channels[0]))
     if bad.size:
         raise DataError(

@@ -83,9 +83,9 @@ def require_free(file: Path, needed: int) -> None:
 def decoded(raw: bytes, origin: str, *, only_utf8: bool = False, line: int = 1) -> str:
     """Decode a text: UTF-8, UTF-16 that begins with its mark, or Windows-1252 as older tools write it."""
 
-    def refused(error: UnicodeDecodeError, said: str) -> DataError:
+    def refused(error: UnicodeDecodeError, reason: str) -> DataError:
         at = raw.count(b"\n", 0, error.start) + line
-        return DataError(f"{origin}, line {at}: {said}")
+        return DataError(f"{origin}, line {at}: {reason}")
 
     if raw.startswith(_UTF16):
         if only_utf8:
@@ -130,8 +130,8 @@ def parsed(
         raise DataError(too_deep) from None
     except ValueError as error:
         # A plain one comes from `int`, which reads no more than some thousand digits.
-        said = "a whole number has too many digits" if type(error) is ValueError else error
-        raise DataError(f"{origin}: not valid {form}: {said}: correct the file, or write it again") from error
+        reason = "a whole number has too many digits" if type(error) is ValueError else error
+        raise DataError(f"{origin}: not valid {form}: {reason}: correct the file, or write it again") from error
     level = [content]
     for _ in range(_DEEPEST + 1):
         inner: list[Any] = []
@@ -152,7 +152,7 @@ def _object(pairs: list[tuple[str, Any]], decode: Callable[[dict[str, Any]], Any
     made = dict(pairs)
     if len(made) < len(pairs):
         names = [name for name, _ in pairs]
-        raise DataError(f"the key {next(name for name in made if names.count(name) > 1)!r} stands twice")
+        raise DataError(f"the key {next(name for name in made if names.count(name) > 1)!r} occurs twice")
     return made if decode is None else decode(made)
 
 

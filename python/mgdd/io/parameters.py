@@ -172,8 +172,8 @@ class ParameterFile:
         for table, values in self.tables.items():
             out += ["", f"[{_quoted(table)}]"]
             for key, entry in values.items():
-                said = {part: getattr(entry, part) for part in _PARTS}
-                parts = ", ".join(_key_line(part, value) for part, value in said.items() if value is not None)
+                fields = {part: getattr(entry, part) for part in _PARTS}
+                parts = ", ".join(_key_line(part, value) for part, value in fields.items() if value is not None)
                 out.append(f"{_quoted(key)} = {{ {parts} }}")
         return "\n".join(out) + "\n"
 
@@ -209,10 +209,10 @@ class ParameterFile:
         """
         if self.kind not in kinds:
             raise DataError(f"{self.origin}: kind = {self.kind!r}: must be {' or '.join(map(repr, kinds))}")
-        known = [table.removesuffix("?") for table in tables]
-        odd = [name for name in self.tables if name not in known] + [name for name in self.notes if name not in notes]
+        names = [table.removesuffix("?") for table in tables]
+        odd = [name for name in self.tables if name not in names] + [name for name in self.notes if name not in notes]
         if odd:
-            hint = _near(odd[0], [*(f"[{table}]" for table in known), *notes])
+            hint = _near(odd[0], [*(f"[{table}]" for table in names), *notes])
             raise ParameterError(f"{self.origin}: unknown key {odd[0]!r}: {hint}")
         for table in tables:
             if table == table.removesuffix("?") and table not in self.tables:
@@ -220,9 +220,9 @@ class ParameterFile:
 
     def values(self, table: str, wanted: Mapping[str, Wanted]) -> dict[str, Any]:
         """Take the values of a table, none of one that may be missing: numbers as float, lists as they stand."""
-        found = self.tables.get(table, {})
+        entries = self.tables.get(table, {})
         out = {}
-        for key, entry in found.items():
+        for key, entry in entries.items():
             where = f"{self.origin}: [{table}] {key}"
             if key not in wanted:
                 raise ParameterError(f"{where}: unknown key: {_near(key, wanted)}")
@@ -239,7 +239,7 @@ class ParameterFile:
                 if not (fits(value, need) or (part != "value" and value is None)):
                     raise ParameterError(f"{where}: {part} = {_short(value)}: must be {FORMS[need]}")
             out[key] = float(entry.value) if form == "number" else entry.value
-        missing = [key for key, want in wanted.items() if want.required and key not in found]
+        missing = [key for key, want in wanted.items() if want.required and key not in entries]
         if missing:
             example = _example(missing[0], wanted[missing[0]].unit)
             raise DataError(f"{self.origin}: [{table}] lacks {', '.join(missing)}: write {example}")

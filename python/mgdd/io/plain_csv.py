@@ -113,9 +113,9 @@ def long_columns(dataset: xr.Dataset) -> dict[str, tuple[NDArray[Any], str, str]
             "write netCDF (.nc), or less of it"
         )
     whole = dataset[names].transpose(*dims)
-    kept = [str(dim) for dim in dims if not (dim == CYCLE and ANGLE in dims)]
+    index_dims = [str(dim) for dim in dims if not (dim == CYCLE and ANGLE in dims)]
     out = {}
-    for name in (*kept, *names):
+    for name in (*index_dims, *names):
         values = whole[name].broadcast_like(whole[names[0]]).transpose(*dims).to_numpy().ravel()
         out[name] = (values, *label_of(dataset[name]))
     return out

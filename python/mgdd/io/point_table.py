@@ -70,7 +70,7 @@ def _of_csv(table: TextTable, names: Sequence[str] | None, always: Collection[st
     own = [name for name, _ in split]
     twice = next((name for name in own if name and own.count(name) > 1), None)
     if twice is not None:
-        raise DataError(f"{table.source}: column {twice!r} stands twice: rename or remove one")
+        raise DataError(f"{table.source}: column {twice!r} occurs twice: rename or remove one")
     if names is None:
         numeric = table.numeric([*range(table.width)])
         places = [k for k, name in enumerate(own) if name not in ("", POINT) and (k in numeric or name in always)]
@@ -103,23 +103,23 @@ def flat_points(data: xr.Dataset, names: Sequence[str] | None, origin: str) -> x
     if POINT in data.dims and inputs:
         raise DataError(f"{origin}: stands over {POINT} and {', '.join(inputs)}: select one entry of each")
     have = [*inputs, *(str(name) for name in data.data_vars)]
-    wanted = have if names is None else [have[_place(name, have, origin)] for name in names]
-    for name in wanted:
+    chosen = have if names is None else [have[_place(name, have, origin)] for name in names]
+    for name in chosen:
         if not {"units", "long_name"} <= set(data[name].attrs):
             raise DataError(f"{origin}: {name} has no units or no long_name: say both in its attributes")
     if not inputs:
-        return data[wanted]
-    flat = data.drop_vars([name for name in data.data_vars if name not in wanted])
+        return data[chosen]
+    flat = data.drop_vars([name for name in data.data_vars if name not in chosen])
     flat = flat.stack({POINT: inputs}).reset_index(POINT).reset_coords(inputs)
     numbers = (POINT, np.arange(flat.sizes[POINT]), {"units": "1", "long_name": "number of the point"})
     for name in inputs:
         flat[name].attrs = dict(data[name].attrs)
-    return flat.assign_coords({POINT: numbers})[wanted]
+    return flat.assign_coords({POINT: numbers})[chosen]
 
 
 def _named(head: str) -> tuple[str, str | None]:
-    found = _BRACKETS.fullmatch(head)
-    return (found[1], found[2].strip()) if found else (head, None)
+    match = _BRACKETS.fullmatch(head)
+    return (match[1], match[2].strip()) if match else (head, None)
 
 
 def _place(name: str, own: Sequence[str], origin: str) -> int:
@@ -129,23 +129,23 @@ def _place(name: str, own: Sequence[str], origin: str) -> int:
     raise DataError(f"{origin}: no column {name!r}: {near}")
 
 
-def _label(name: str, said: str | None, where: str) -> Label:
+def _label(name: str, text: str | None, where: str) -> Label:
     """Return the given unit, which must be that of the name where the name has one."""
-    known = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
-    if said in (None, "", "-", "1"):
-        return known
-    unit = _AS_WRITTEN.get(str(said).lower(), str(said))
+    label = named_label(name) if "_" in name or name in VARIABLES else Label("-", name)  # n is a speed, not a newton
+    if text in (None, "", "-", "1"):
+        return label
+    unit = _AS_WRITTEN.get(str(text).lower(), str(text))
     try:
         written = attribute_units(unit)
     except ValueError as error:
         raise DataError(f"{where}: unit {error}") from None
-    if known.units == "-" and name not in VARIABLES:
-        return Label(unit, known.long_name)
-    if attribute_units(known.units) != written:
+    if label.units == "-" and name not in VARIABLES:
+        return Label(unit, label.long_name)
+    if attribute_units(label.units) != written:
         raise DataError(
-            f"{where}: unit {said!r}: must be {known.units!r}, as the name says; convert the numbers or change the name"
+            f"{where}: unit {text!r}: must be {label.units!r}, as the name says; convert the numbers or change the name"
         )
-    return known
+    return label
 
 
 # Open bounds of what a bench can mean, closed where zero means something; an injection or spark far outside is another
@@ -177,8 +177,8 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
         raise DataError(f"{table.source}: the header needs a column 'file' that names each trace")
     unknown = [name for name in header if name != "file" and name not in _BOUNDS]
     if unknown or len(set(header)) != len(header):
-        known = ", ".join(map(repr, ("file", *_BOUNDS)))
-        raise DataError(f"{table.source}: unknown or repeated column in {header}: known are {known}, once each")
+        columns = ", ".join(map(repr, ("file", *_BOUNDS)))
+        raise DataError(f"{table.source}: unknown or repeated column in {header}: known are {columns}, once each")
     conditions: dict[str, dict[str, float]] = {}
     for line, row in zip(table.lines.tolist(), table.cells, strict=True):
         cells = dict(zip(header, row, strict=True))

@@ -28,7 +28,7 @@ _BAR_PER = {
     "kgf/cm2": 0.980665, "atm": 1.01325, "torr": 1.01325 / 760.0,
 }  # fmt: skip
 PRESSURE_UNITS = (*_PER_BAR, *_BAR_PER)
-# That a remedy names: the others are too near to one of these to be told by a number.
+# That a remedy names: the others are too near to one of these to be told apart by a number.
 _USUAL = PRESSURE_UNITS[:6]
 # Peak pressure from a throttled motored engine to twice today's diesels; traces without TDC get a floor.
 PEAK_BAR = (4.0, 500.0)
@@ -280,7 +280,7 @@ def _check_peak(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: 
     near = float(inside.max()) if inside.size else 0.0
     if np.ptp(degrees) >= 180.0 and bar[top] > 2.0 * near:
         raise DataError(
-            f"{source}: the highest pressure {bar[top]:g} bar stands at {degrees[top]:g}, far from firing "
+            f"{source}: the highest pressure {bar[top]:g} bar is at {degrees[top]:g}, far from firing "
             f"TDC: {CONVENTION}; {_remedy_0_720()}"
         )
 
@@ -296,6 +296,6 @@ def _check_tdc(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: s
         at = degrees[int(np.argmax(sustained)) + 2]
         milliseconds = f"{argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
         raise DataError(
-            f"{source}: the pressure at angle 0 is {here:.3g} bar, the peak of {peak:.3g} bar stands at {at:g}: 0 "
+            f"{source}: the pressure at angle 0 is {here:.3g} bar, the peak of {peak:.3g} bar is at {at:g}: 0 "
             f"cannot be firing TDC; {_remedy_0_720()}; a column of milliseconds needs {milliseconds}"
         )

@@ -306,7 +306,7 @@ def _unit_of_pressure(
     table: Table, heads: Sequence[Heading], columns: Sequence[int], unit: str | None, *, gain: bool
 ) -> tuple[str, bool]:
     """Return the unit of the pressure columns, and whether the file says it; volts need a gain."""
-    said = {heads[i].unit for i in columns}
+    units = {heads[i].unit for i in columns}
     strange = next((heads[i].strange for i in columns if heads[i].strange), None)
     if strange is not None:
         raise DataError(
@@ -319,33 +319,33 @@ def _unit_of_pressure(
             f"{table.source}: {unclear!r} in the header may be a unit, and none that is known: convert it to one of "
             f"{', '.join(PRESSURE_UNITS)}, or pass {argument('pressure_unit', '')} if the pressure is in one of them"
         )
-    if len(said) > 1:
+    if len(units) > 1:
         raise DataError(
-            f"{table.source}: pressures in {', '.join(map(str, sorted(said, key=str)))}: name columns of one unit"
+            f"{table.source}: pressures in {', '.join(map(str, sorted(units, key=str)))}: name columns of one unit"
         )
-    (known,) = said
-    volts = known in ("V", "mV")
+    (file_unit,) = units
+    volts = file_unit in ("V", "mV")
     foreign = [i for i in columns if heads[i].other]
-    if foreign or (known is not None and known not in PRESSURE_UNITS and not volts):
+    if foreign or (file_unit is not None and file_unit not in PRESSURE_UNITS and not volts):
         at = (foreign or list(columns))[0]
-        what = f"{table.called(at)} is in {heads[at].other or known}, which is not a pressure"
+        what = f"{table.called(at)} is in {heads[at].other or file_unit}, which is not a pressure"
         raise DataError(f"{table.source}: {what}: name another")
     if volts and not gain:
         raise DataError(
-            f"{table.source}: the file says {known} for the pressure: pass {argument('gain_bar_per_v', '')} and "
+            f"{table.source}: the file says {file_unit} for the pressure: pass {argument('gain_bar_per_v', '')} and "
             f"{argument('offset_bar', '')} of the charge amplifier"
         )
-    if gain and (unit is not None or (known is not None and not volts)):
+    if gain and (unit is not None or (file_unit is not None and not volts)):
         raise DataError(
-            f"{table.source}: {argument('gain_bar_per_v')} is for volts, and the pressure is said to be in "
-            f"{unit or known}: give one of them"
+            f"{table.source}: {argument('gain_bar_per_v')} is for volts, and the pressure is given in "
+            f"{unit or file_unit}: give one of them"
         )
-    if unit is not None and known is not None and unit != known:
+    if unit is not None and file_unit is not None and unit != file_unit:
         raise DataError(
-            f"{table.source}: the file says {known!r} for the pressure: pass "
-            f"{argument('pressure_unit', repr(known))} instead of {unit!r}, or correct the file"
+            f"{table.source}: the file says {file_unit!r} for the pressure: pass "
+            f"{argument('pressure_unit', repr(file_unit))} instead of {unit!r}, or correct the file"
         )
-    return (known or "V") if gain else (unit or known or "bar"), known is not None
+    return (file_unit or "V") if gain else (unit or file_unit or "bar"), file_unit is not None
 
 
 def _counts(values: NDArray[np.float64]) -> bool:

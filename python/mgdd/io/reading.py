@@ -70,7 +70,7 @@ class Reading:
             raise DataError(f"{argument(idle)} and {argument('encoder')} are two ways to an angle: leave one out")
         if self.firing_tdc_deg is None:
             raise DataError(
-                f"{argument('encoder')} says nothing of TDC: pass {argument('firing_tdc_deg', '')} with the angle of "
+                f"{argument('encoder')} gives no TDC: pass {argument('firing_tdc_deg', '')} with the angle of "
                 "TDC behind the mark of the turn, 0 to 360"
             )
         if not 0.0 <= self.firing_tdc_deg <= CYCLE_DEG:

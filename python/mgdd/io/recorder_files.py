@@ -28,22 +28,22 @@ def of_tdms(file: Path, stack: contextlib.ExitStack) -> Columns:
         warnings.warn(f"{file}: the record was cut off: its last samples are missing", UserWarning, stacklevel=2)
     channels = [channel for group in content.groups() for channel in group.channels()]
     names = Counter(channel.name for channel in channels)
-    found: list[Named] = []
+    named: list[Named] = []
     for channel in channels:
         count = len(channel)
         name = channel.name if names[channel.name] == 1 else f"{channel.group_name}.{channel.name}"
         clock = _clock(channel.properties)
-        if clock and count and not any(each.values.shape == (count,) and each.unit == "s" for each in found):
+        if clock and count and not any(each.values.shape == (count,) and each.unit == "s" for each in named):
             time = Samples(count, np.float64, partial(_ticks, *clock, count))
-            plain = not found and "time" not in names
-            found.append(Named("time" if plain else f"time ({name})", time, "s"))
+            plain = not named and "time" not in names
+            named.append(Named("time" if plain else f"time ({name})", time, "s"))
         unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
-        found.append(Named(name, Samples(count, channel.dtype, partial(channel.__getitem__, slice(None))), str(unit)))
-    return columns_of(found)
+        named.append(Named(name, Samples(count, channel.dtype, partial(channel.__getitem__, slice(None))), str(unit)))
+    return columns_of(named)
 
 
 def _clock(properties: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Give start and step of a channel's time [s]; None where its properties tell no time, as a step of 0 does."""
+    """Give start and step of a channel's time [s]; None where its properties give no time, as a step of 0 does."""
     given = (properties.get("wf_start_offset", 0.0), properties.get("wf_increment"))
     start, step = (float(each) if isinstance(each, int | float | np.number) else np.nan for each in given)
     return (start, step) if np.isfinite(start) and np.isfinite(step) and step > 0.0 else None
@@ -56,7 +56,7 @@ def _ticks(start_s: float, step_s: float, count: int) -> NDArray[Any]:
 def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
     """Open the channels of an MDF file, each group with its time, until the stack closes it."""
     asammdf = import_extra("asammdf", "mdf", "an MDF file")
-    found: list[Named] = []
+    named: list[Named] = []
     stream = stack.enter_context(file.open("rb"))
     # One that its recorder did not finish by its path: asammdf does so, in a copy.
     content = stack.enter_context(asammdf.MDF(stream if stream.peek(1).startswith(b"MDF ") else file))
@@ -66,18 +66,18 @@ def of_mdf(file: Path, stack: contextlib.ExitStack) -> Columns:
         if not own or not count:
             continue
         master = partial(content.get_master, number)
-        if not _has_time(found, count, master):
-            found.append(Named(f"time {number}" if found else "time", Samples(count, np.float64, master), "s"))
+        if not _has_time(named, count, master):
+            named.append(Named(f"time {number}" if named else "time", Samples(count, np.float64, master), "s"))
         for k in own:
             read = partial(_samples, content, number, k)
             first = read(record_offset=0, record_count=1)
             if first.ndim == 1:
                 unit = str(content.get_channel_unit(group=number, index=k))
-                found.append(Named(group.channels[k].name, Samples(count, first.dtype, read), unit))
+                named.append(Named(group.channels[k].name, Samples(count, first.dtype, read), unit))
             else:
                 whole = content.select([(None, number, k)], validate=False)[0]
-                found.append(Named(whole.name, marked(whole.samples, read(bits=True)), whole.unit))
-    return columns_of(found)
+                named.append(Named(whole.name, marked(whole.samples, read(bits=True)), whole.unit))
+    return columns_of(named)
 
 
 def _virtual(content: Any, channel: Any) -> bool:
@@ -85,9 +85,9 @@ def _virtual(content: Any, channel: Any) -> bool:
     return bool(channel.channel_type in (3, 6) if content.version >= "4" else not channel.bit_count)
 
 
-def _has_time(found: list[Named], count: int, master: Callable[[], NDArray[Any]]) -> bool:
+def _has_time(named: list[Named], count: int, master: Callable[[], NDArray[Any]]) -> bool:
     """Whether a column of seconds holds these times already."""
-    times = [each.values for each in found if each.unit == "s" and each.values.shape == (count,)]
+    times = [each.values for each in named if each.unit == "s" and each.values.shape == (count,)]
     return bool(times) and any(np.array_equal(each[...], master()) for each in times)
 
 

@@ -55,9 +55,9 @@ class Place:
         """Return row and column."""
         return f"{self.row(index)}, {self.column(name)}"
 
-    def only(self, kept: NDArray[np.intp]) -> Place:
+    def only(self, samples: NDArray[np.intp]) -> Place:
         """Return the place of some of the samples, in this order."""
-        return replace(self, rows=None if self.rows is None else np.asarray(self.rows)[kept])
+        return replace(self, rows=None if self.rows is None else np.asarray(self.rows)[samples])
 
 
 @dataclass(frozen=True)
@@ -136,11 +136,11 @@ class Table(ABC):
     def require_units_of_names(self, *texts: str) -> None:
         """Refuse a units row that contradicts the names, which say the units; columns of `texts` have none."""
         for name in self.header or ():
-            said, unit = self.unit(self.index(name)), unit_of(name)
-            if said in (None, "", "-", unit) or name in texts or (unit in _ANGLES and said in _ANGLES):
+            given, unit = self.unit(self.index(name)), unit_of(name)
+            if given in (None, "", "-", unit) or name in texts or (unit in _ANGLES and given in _ANGLES):
                 continue
             raise DataError(
-                f"{self.source}, column {name!r}: unit {said!r}: must be {unit!r}; convert the values, units stand in "
+                f"{self.source}, column {name!r}: unit {given!r}: must be {unit!r}; convert the values, units stand in "
                 "the names"
             )
 
@@ -188,25 +188,25 @@ class TextTable(Table):
     def numeric(self, indices: Sequence[int]) -> list[int]:
         """Return the columns in which any cell holds a number."""
         self._read(indices)
-        return [i for i in indices if i in self._known or self._holds_number(i)]
+        return [i for i in indices if i in self._parsed or self._holds_number(i)]
 
     def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
         """Return columns as the rows of an array, or name the first bad cell."""
         self._read(indices)
-        return np.stack([self._known[index] if index in self._known else self._slow(index) for index in indices])
+        return np.stack([self._parsed[index] if index in self._parsed else self._slow(index) for index in indices])
 
     @cached_property
-    def _known(self) -> dict[int, NDArray[np.float64]]:
+    def _parsed(self) -> dict[int, NDArray[np.float64]]:
         """Columns that were read already and hold nothing but finite numbers."""
         return {}
 
     def _read(self, indices: Sequence[int]) -> None:
         # To find a row's cells costs as much as a few numbers: of a narrow table all columns are read in one go.
-        wanted = range(self.width) if self.width <= _NARROW and not self._known else indices
-        lacking = sorted(set(wanted) - self._known.keys())
+        needed = range(self.width) if self.width <= _NARROW and not self._parsed else indices
+        lacking = sorted(set(needed) - self._parsed.keys())
         if lacking:
             values, plain = self.rows.numbers(lacking, self.mark, self.decimal)
-            self._known.update((index, values[k]) for k, index in enumerate(lacking) if plain[k])
+            self._parsed.update((index, values[k]) for k, index in enumerate(lacking) if plain[k])
 
     def _holds_number(self, index: int) -> bool:
         return any(index < len(row) and parse_number(row[index], self.decimal) is not None for row in self.cells)

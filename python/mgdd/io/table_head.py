@@ -25,26 +25,26 @@ def first_row_of(content: Rows, delimiter: str | None, decimal: str) -> int:
     def mark_of(text: str) -> str | None:
         return delimiter if delimiter is not None else separator_of(text, decimal)
 
-    def said(text: str, mark: str | None) -> tuple[str, ...]:
+    def filled_cells(text: str, mark: str | None) -> tuple[str, ...]:
         cells = cells_of(text, mark)  # without the empty ones that a spreadsheet adds
         return cells[: max((k + 1 for k, cell in enumerate(cells) if cell), default=1)]
 
     last_head: int | None = None
     for at, (_, text) in enumerate(content):
         mark = mark_of(text)
-        cells = said(text, mark)
+        cells = filled_cells(text, mark)
         if _is_head(cells):
             continue
         if _like_number(cells[0]) or (not cells[0] and all(_like_number(cell) for cell in cells if cell)):
             return at  # one of another width is refused by its line
         if last_head is None:
             later = ((k, content[k][1]) for k in range(len(content) - 1, at, -1))
-            last_head = next((k for k, row in later if _is_head(said(row, mark_of(row)))), at)
+            last_head = next((k for k, row in later if _is_head(filled_cells(row, mark_of(row)))), at)
         if at >= last_head:
             return at
-        above = said(content[at - 1][1], mark) if at else ()
+        above = filled_cells(content[at - 1][1], mark) if at else ()
         named = len(above) == len(cells) and _is_head(above)  # rows that begin with a label
-        below = [said(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
+        below = [filled_cells(row, mark) for _, row in content.part(at + 1, at + _ROWS)]
         if named and all(len(one) == len(cells) and one[0] != _HEADER_ENDS for one in below):
             return at
     return len(content)
@@ -88,9 +88,9 @@ def units_filled(
 def spells_units(cells: Sequence[str]) -> bool:
     """Return whether a row holds units, and nothing else that is not empty."""
     texts = [bare_unit(cell) for cell in cells]
-    known = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
+    are_units = [spelled_unit(text) is not None or _RATIO.fullmatch(text) is not None for text in texts if text]
     bracketed = [cell.startswith(("[", "(")) for cell in cells if cell]
-    return (bool(known) and all(known)) or (bool(bracketed) and all(bracketed))
+    return (bool(are_units) and all(are_units)) or (bool(bracketed) and all(bracketed))
 
 
 def _is_head(cells: tuple[str, ...]) -> bool:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-# The first unit of each column is taken where nothing is said.
+# The first unit of each column is taken where none is given.
 _UNITS = {
     "time_s": ("s", "ms"), "duty": ("-", "%"), "angle_deg": ("deg", "rad", "%"), "current_a": ("A",), "supply_v": ("V",)
 }  # fmt: skip
@@ -173,8 +173,8 @@ def read_throttle_log(
             check_choice(_ASKED[key], unit, _UNITS[key])
     if not 0.0 < travel_deg <= 95.0:
         raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
-    wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
-    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
+    columns_asked = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
+    columns, place, units = _read(path, columns_asked, given, delimiter=delimiter, decimal=decimal, sheet=sheet)
     scales = {"time_s": 0.001 if units["time_s"] == "ms" else 1.0, "duty": 0.01 if units["duty"] == "%" else 1.0}
     scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(units["angle_deg"], 1.0)
     columns = {key: values * scales.get(key, 1.0) for key, values in columns.items()}
@@ -202,7 +202,7 @@ def _column(key: str, values: ArrayLike, name: str) -> NDArray[np.float64]:
 
 def _read(
     path: str | os.PathLike[str],
-    wanted: dict[str, int | str | None],
+    columns_asked: dict[str, int | str | None],
     given: Mapping[str, str | None],
     *,
     delimiter: str | None,
@@ -213,7 +213,7 @@ def _read(
     units = {key: given.get(key) or usual for key, (usual, *_) in _UNITS.items()}
     columns: dict[str, NDArray[np.float64]] = {}
     with open_table(path, delimiter=delimiter, decimal=decimal, sheet=sheet) as table:
-        for key, column in wanted.items():
+        for key, column in columns_asked.items():
             chosen = key if column is None and key in (table.header or ()) else column
             if chosen is not None:
                 index = table.index(chosen)
@@ -224,11 +224,11 @@ def _read(
 
 def _unit_of_column(key: str, asked: str | None, table: Table, index: int) -> str:
     """Return what the file says, else what is asked for, else the usual unit; the first two must agree."""
-    said, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
+    text, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
     units = _UNITS[key]
-    if said is None or (said == "-" and "-" not in units):
+    if text is None or (text == "-" and "-" not in units):
         return asked or units[0]
-    unit, where = spelled_unit(said), f"{table.source}: {table.called(index)} is in {said!r} as the file says"
+    unit, where = spelled_unit(text), f"{table.source}: {table.called(index)} is in {text!r} as the file says"
     if unit not in units:
         if not sure and asked is not None:
             return asked  # a remark, as who reads the file knows

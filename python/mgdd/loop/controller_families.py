@@ -127,7 +127,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class Family:
-    """A kind of controller: what of it is tuned, how it is built, and how far its shipped numbers have been seen to go.
+    """A kind of controller: what of it is tuned, how it is built, and how far its shipped numbers were tested.
 
     The numbers were tuned at samples of 1 ms with a delay of one. Up to `longest_sample_s`, and up to `longest_dead_s`
     of delay and half a sample, at most 2 % of 108 runs on 36 throttles within 20 % of the presets end in a limit cycle

@@ -123,12 +123,12 @@ def simulate_drive(
     kpa = start_kpa
     rows = np.empty((pedal.size, 9))
     for k in range(pedal.size):
-        wanted = tracker.step(pedal[k], speed[k], kpa if measured_pressure else math.nan)
-        duty = float(steers.step(wanted["reference_deg"], sensed))
+        demand = tracker.step(pedal[k], speed[k], kpa if measured_pressure else math.nan)
+        duty = float(steers.step(demand["reference_deg"], sensed))
         drop = truth.ambient_kpa - kpa
         air_nm = drop * float(_core.throttle.airflow_torque(load, [angle])[0]) if air_torque else 0.0
         rows[k] = (
-            wanted["torque_nm"], wanted["air_g_per_s"], wanted["pressure_kpa"], wanted["reference_deg"],
+            demand["torque_nm"], demand["air_g_per_s"], demand["pressure_kpa"], demand["reference_deg"],
             angle, sensed, duty, air_nm, kpa,
         )  # fmt: skip
         plate.apply({"duty": duty, "airflow_torque_nm": air_nm})
@@ -140,17 +140,17 @@ def simulate_drive(
         "wanted_torque_nm", "wanted_air_g_per_s", "wanted_pressure_kpa", "reference_deg",
         "angle_deg", "sensed_angle_deg", "duty", "airflow_torque_nm", "pressure_kpa",
     )  # fmt: skip
-    found = dict(zip(names, rows.T, strict=True))
-    travel = np.clip(found["angle_deg"], 0.0, 90.0)  # an end stop gives way a little
-    found["throttle_air_g_per_s"] = np.asarray(truth.throttle_g_per_s(travel, found["pressure_kpa"]))
-    found["cylinder_air_g_per_s"] = np.asarray(truth.cylinder_g_per_s(found["pressure_kpa"], speed))
-    found["torque_nm"] = np.asarray(truth.torque_nm(found["cylinder_air_g_per_s"], speed))
+    columns = dict(zip(names, rows.T, strict=True))
+    travel = np.clip(columns["angle_deg"], 0.0, 90.0)  # an end stop gives way a little
+    columns["throttle_air_g_per_s"] = np.asarray(truth.throttle_g_per_s(travel, columns["pressure_kpa"]))
+    columns["cylinder_air_g_per_s"] = np.asarray(truth.cylinder_g_per_s(columns["pressure_kpa"], speed))
+    columns["torque_nm"] = np.asarray(truth.torque_nm(columns["cylinder_air_g_per_s"], speed))
     return labelled_dataset(
         {
             "time_s": ("time_s", np.arange(pedal.size) * sample_s),
             "pedal_percent": ("time_s", pedal, "%", "pedal"),
             "speed_rpm": ("time_s", speed, "rpm", "engine speed"),
-            **{name: ("time_s", found[name], *label) for name, label in _LABELS.items()},
+            **{name: ("time_s", columns[name], *label) for name, label in _LABELS.items()},
         },
         attrs={"sample_s": sample_s, "seed": seed},
     )

@@ -49,7 +49,7 @@ class FrontResult(Result):
     models : dict of str to ResponseModel
         Of every objective and limit, over the inputs.
     findings : tuple of Finding
-        What speaks against it: codes ``few_cycles``, ``one_best``, ``above_limit``, ``uncertain``, ``interrupted``, and
+        Reasons to doubt it: codes ``few_cycles``, ``one_best``, ``above_limit``, ``uncertain``, ``interrupted``, and
         those of the fits, with the name of the objective or limit in front.
     """
 
@@ -67,7 +67,7 @@ class FrontResult(Result):
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + findings_html("What speaks against it", self.findings)
+        return super()._repr_html_() + findings_html("Reasons to doubt it", self.findings)
 
     def _draw(self, ax: Axes | None) -> Axes:
         from mgdd.plot.style import BLUE, GREY, legend, new_axes
@@ -111,11 +111,11 @@ def front_of(
 ) -> FrontResult:
     """Fit every quantity to all readings, `late` cycles after their inputs, and find the front of the fits."""
     names, wanted = [one.name for one in inputs], list(signs)
-    known = ~void[late:]
-    caused = applied[: len(applied) - late][known]
+    valid = ~void[late:]
+    caused = applied[: len(applied) - late][valid]
     columns = dict(zip(names, caused.T, strict=True))
-    fits = {name: fit_of(columns, measured[late:][known][:, k]) for k, name in enumerate(wanted)}
-    fits |= {limit.name: fit_of(columns, measured_limits[late:][known][:, k]) for k, limit in enumerate(limits)}
+    fits = {name: fit_of(columns, measured[late:][valid][:, k]) for k, name in enumerate(wanted)}
+    fits |= {limit.name: fit_of(columns, measured_limits[late:][valid][:, k]) for k, limit in enumerate(limits)}
     models = {name: fit.model for name, fit in fits.items()}
     at, kept = _front_inputs(models, signs, limits, caused, seed)
     at = at[_spaced(_signed(models, signs, at), points)]
@@ -160,15 +160,15 @@ def front_of(
 def fit_of(columns: Mapping[str, Numbers], values: Numbers) -> ResponseFit:
     """Fit the polynomial of the lowest degree that predicts left-out readings about as well as any."""
     inputs = len(columns)
-    found: list[tuple[float, ResponseFit]] = []
+    fits: list[tuple[float, ResponseFit]] = []
     for degree in _DEGREES:
         terms = math.comb(inputs + degree, degree)
-        if found and (terms > _MOST_TERMS or 2 * terms > values.size):
+        if fits and (terms > _MOST_TERMS or 2 * terms > values.size):
             break
         fit = fit_response(columns, values, degree=degree)
-        found.append((math.inf if fit.test is None else fit.test.rmse, fit))
-    least = min(error for error, _ in found)
-    return next(fit for error, fit in found if error <= _SLACK * least)
+        fits.append((math.inf if fit.test is None else fit.test.rmse, fit))
+    least = min(error for error, _ in fits)
+    return next(fit for error, fit in fits if error <= _SLACK * least)
 
 
 def _signed(models: Mapping[str, ResponseModel], signs: Mapping[str, float], at: Numbers) -> Numbers:
@@ -232,7 +232,7 @@ def _doubts(mean: Numbers, sd: Numbers, names: Sequence[str], cycles: int, input
 
 
 def _of_fits(fits: Mapping[str, ResponseFit]) -> list[Finding]:
-    """Repeat what speaks against the fits; readings that follow a seeker are neither even nor in random order."""
+    """Repeat the reasons to doubt the fits; readings that follow a seeker are neither even nor in random order."""
     own = {"poor_prediction", "few_points", "lack_of_fit"}
     return [
         Finding(one.code, (name, *one.names), f"{name}: {one.text}", one.remedy)

@@ -242,10 +242,10 @@ class FunctionPlant:
         )
 
     def _named(self, answer: Any) -> Measurement:
-        wanted = (*self._values, *self.limit_names)
-        if not isinstance(answer, Mapping) or set(wanted) - set(answer):
-            raise DataError(f"function gave {answer!r}{self._where()}: must map {', '.join(wanted)} to numbers")
-        numbers = {name: self._number(name, answer[name]) for name in wanted}
+        names = (*self._values, *self.limit_names)
+        if not isinstance(answer, Mapping) or set(names) - set(answer):
+            raise DataError(f"function gave {answer!r}{self._where()}: must map {', '.join(names)} to numbers")
+        numbers = {name: self._number(name, answer[name]) for name in names}
         return Measurement(values=numbers, limits={name: numbers[name] for name in self.limit_names})
 
     def _number(self, name: str, value: Any) -> float:
@@ -269,7 +269,7 @@ class FunctionPlant:
 
     def __getstate__(self) -> dict[str, Any]:
         if self._core is not None:
-            raise TypeError("a FunctionPlant of a compiled function stands in this process only: take threads")
+            raise TypeError("a FunctionPlant of a compiled function works in this process only: take threads")
         return vars(self)
 
     def __repr__(self) -> str:

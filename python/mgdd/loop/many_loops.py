@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError
 from mgdd.guide import FeedForward, GuidedEngine
-from mgdd.guide.feed_forward import Said, answers_along
+from mgdd.guide.feed_forward import AnswerSpan, answers_along
 from mgdd.loop.function_plant import FunctionPlant
 from mgdd.loop.plant_loop import require_inputs_of, require_point_for
 from mgdd.loop.summary import FIGURES_OF_INPUT, LoopCriteria, limit_label, of_first_input, with_a_limit
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     _Plant = VirtualEngine | FunctionPlant
     _Seeker = Seeker | FeedForward | GuidedEngine
-    _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]]]
+    _Call = tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[AnswerSpan]], list[Mapping[str, Any]]]
 
 _SUMMARY = {
     "cycles_to": ("cycle", "first cycle at which the estimate has arrived"),
@@ -171,7 +171,7 @@ def _loops(
     benches: Sequence[_Plant],
     seekers: Sequence[_Seeker],
     seeds: Sequence[int],
-    answers: Sequence[list[Said]],
+    answers: Sequence[list[AnswerSpan]],
     goals: Sequence[Mapping[str, Any]],
     cycles: int,
     form: str,
@@ -189,7 +189,7 @@ def _loops(
 
 
 def _in_chunks(
-    call: tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[Said]], list[Mapping[str, Any]], int, str],
+    call: tuple[list[_Plant], list[_Seeker], Sequence[int], list[list[AnswerSpan]], list[Mapping[str, Any]], int, str],
     *,
     executor: MakesExecutor | None,
     workers: int | None,
@@ -233,7 +233,7 @@ def _functions_of(plants: Sequence[_Plant]) -> list[FunctionPlant]:
     return functions
 
 
-def _answers(plant: _Plant, seeker: _Seeker, cycles: int) -> list[Said]:
+def _answers(plant: _Plant, seeker: _Seeker, cycles: int) -> list[AnswerSpan]:
     require_point_for(plant, seeker)
     if isinstance(seeker, FeedForward) and isinstance(plant, VirtualEngine):
         return answers_along(seeker, plant.settings["schedule"], cycles)

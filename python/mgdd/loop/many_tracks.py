@@ -77,22 +77,22 @@ def track_many(
     >>> bool(mse.sel(controller="guided") < mse.sel(controller="PID"))
     True
     """
-    wanted = [reference_of(reference) for reference in references]
-    if not wanted or not controllers or not throttles:
+    all_references = [reference_of(reference) for reference in references]
+    if not all_references or not controllers or not throttles:
         raise ParameterError("controllers, references and throttles: give at least one each")
-    if len({reference.sample_s for reference in wanted}) > 1:
+    if len({reference.sample_s for reference in all_references}) > 1:
         raise ParameterError("references: must all have the same sample_s")
     for name, controller in controllers.items():
         if core_of(controller) is None:
             raise ParameterError.of(f"controllers[{name!r}]", controller, "a controller of mgdd; run others with track")
     flows = dict(airflow_torque_nm or {})
-    unknown = set(flows) - {reference.name for reference in wanted}
+    unknown = set(flows) - {reference.name for reference in all_references}
     if unknown:
         raise ParameterError.of("airflow_torque_nm", sorted(unknown), "names of references")
-    airflow = [column_of("airflow_torque_nm", flows.get(r.name), len(r.angle_deg)) for r in wanted]
+    airflow = [column_of("airflow_torque_nm", flows.get(r.name), len(r.angle_deg)) for r in all_references]
     sensors = sensors_of(noise_deg)
     plants = [
-        plant_of(throttle_of(each), wanted[0], None, sensors, first_seed + number)
+        plant_of(throttle_of(each), all_references[0], None, sensors, first_seed + number)
         for number, each in enumerate(throttles)
     ]
 
@@ -100,20 +100,20 @@ def track_many(
         return _core.loop.track_throttles(
             plants,
             [core_of(controller) for controller in controllers.values()],
-            [(r.angle_deg, flow, np.empty(0), r.from_sample) for r, flow in zip(wanted, airflow, strict=True)],
+            [(r.angle_deg, flow, np.empty(0), r.from_sample) for r, flow in zip(all_references, airflow, strict=True)],
             delay_samples=delay_samples,
-            band_deg=[r.band_deg for r in wanted],
+            band_deg=[r.band_deg for r in all_references],
             threads=threads_of(workers),
         )
 
     (figures, finished), stop = or_partial(run)
-    shape = len(throttles), len(controllers), len(wanted)
+    shape = len(throttles), len(controllers), len(all_references)
     finished = np.asarray(finished).reshape(shape)
     dims = ("throttle", "controller", "reference")
     variables: dict[str, tuple[Any, ...]] = {
         "throttle": ("throttle", np.arange(len(throttles)), "-", "number of the throttle"),
         "controller": ("controller", list(controllers), "-", "controller"),
-        "reference": ("reference", [r.name for r in wanted], "-", "reference"),
+        "reference": ("reference", [r.name for r in all_references], "-", "reference"),
     }
     for name in FIGURES:
         values = np.asarray(figures[name]).reshape(shape)

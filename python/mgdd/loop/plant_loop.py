@@ -16,7 +16,7 @@ from mgdd.errors import Interrupted, ParameterError, ShapeError, hinted
 from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.function_plant import core_of
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
-from mgdd.loop.plant_record import Cycles, Row, cycles_told, dataset_of
+from mgdd.loop.plant_record import Cycles, Row, cycles_given, dataset_of
 from mgdd.loop.summary import LoopCriteria, summarize_cycles
 from mgdd.optimize import Seeker
 from mgdd.parallel.finished import hand_over, or_partial
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class OwnSeeker:
-    """Hold the user's object as `own`, which maximises; it is told what its ``tell`` takes."""
+    """Hold the user's object as `own`, which maximises; it receives what its ``tell`` takes."""
 
     component_count = 1
     findings: tuple[Finding, ...] = ()
@@ -52,12 +52,12 @@ class OwnSeeker:
 
     @staticmethod
     def is_one(seeker: Any) -> bool:
-        """Whether an object can be asked and told, and says where it believes the best."""
+        """Whether an object has ``ask``, ``tell`` and ``estimate``."""
         return not isinstance(seeker, type) and all(hasattr(seeker, name) for name in ("ask", "tell", "estimate"))
 
     @property
     def estimate(self) -> NDArray[np.float64]:
-        """Where it believes the best, in the order of the inputs."""
+        """Its estimate of the optimum, in the order of the inputs."""
         return np.atleast_1d(np.array(self.own.estimate, np.float64))
 
     @property
@@ -84,14 +84,14 @@ class OwnSeeker:
     ) -> None:
         """Pass a reading on; a failed cycle is asked again where ``tell`` takes no ``misfire``."""
         self.cycle += 1
-        told: dict[str, Any] = {"limits": limits, "misfire": misfire}
+        reading: dict[str, Any] = {"limits": limits, "misfire": misfire}
         if applied is not None:
-            told["applied"] = np.array([applied[name] for name in self.input_names])
+            reading["applied"] = np.array([applied[name] for name in self.input_names])
         elif any(one.step for one in self._inputs):
-            told["applied"] = self._asked
+            reading["applied"] = self._asked
         if not misfire or "misfire" in self._takes:
             j = float(J) if self.settings["maximize"] else -float(J)
-            self.own.tell(j, **{name: value for name, value in told.items() if name in self._takes})
+            self.own.tell(j, **{name: value for name, value in reading.items() if name in self._takes})
 
     def restart(self) -> None:
         """Begin anew at another operating point, where it can."""
@@ -166,8 +166,8 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     announcing = plant if isinstance(plant, AnnouncingPlant) else None
     first, log, interrupted = seeker.cycle, list[Row](), False
 
-    def told() -> LoopRun:
-        """Give the run so far, without a cycle that was measured and not told: it is asked again."""
+    def run_so_far() -> LoopRun:
+        """Give the run so far, without a cycle that was measured and not reported: it is asked again."""
         del log[seeker.cycle - first :]
         guided = _guided(seeker, len(log))
         own = Cycles.of(log, len(plant.input_names))
@@ -176,7 +176,7 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
     if isinstance(seeker, Seeker) and (compiled := core_of(plant, seeker)) is not None:
         run_function: Any = _core.loop.run_function  # one overload for each class of seeker
         done, stop = or_partial(lambda: int(run_function(compiled, seeker, cycles)))
-        own = cycles_told(seeker, done)
+        own = cycles_given(seeker, done)
         run = _run_of(plant, seeker, own, first, criteria, uppers, {}, interrupted=stop is not None)
         return hand_over(run, stop)
     try:
@@ -186,9 +186,9 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
         interrupted = True
     except Exception as error:
         with contextlib.suppress(AttributeError):  # of a class with slots
-            error.partial = told()  # type: ignore[attr-defined]
+            error.partial = run_so_far()  # type: ignore[attr-defined]
         raise
-    run = told()
+    run = run_so_far()
     if interrupted:
         raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
     return run
@@ -253,15 +253,15 @@ def _one_cycle(
     late = announcing is None and bool(measured.values.get(_CHANGED, 0.0))
     void = measured.misfire or bool(measured.values.get("unphysical", 0.0)) or late
     summed = seeker.component_count == 1
-    told = measured.performance if summed else np.array(measured.components)
+    performance = measured.performance if summed else np.array(measured.components)
     limits = [measured.limits[name] for name in seeker.limit_names]
     applied = _applied(plant.input_names, asked, measured)
     log.append(Row(estimate, asked, applied, void, measured))
-    told_inputs = dict(zip(plant.input_names, applied.tolist(), strict=True)) if seeker.input_names else applied
-    reading: dict[str, Any] = {"misfire": void, "applied": told_inputs if measured.applied else None}
+    applied_inputs = dict(zip(plant.input_names, applied.tolist(), strict=True)) if seeker.input_names else applied
+    reading: dict[str, Any] = {"misfire": void, "applied": applied_inputs if measured.applied else None}
     if isinstance(seeker, GuidedEngine):
         reading["pressure_bar"] = measured.pressure_bar
-    seeker.tell(told, limits if limits else None, **reading)
+    seeker.tell(performance, limits if limits else None, **reading)
     if late:
         seeker.restart()
 

@@ -126,9 +126,9 @@ class Cycles:
             return {name: np.array([table.get(name, math.nan) for table in tables]) for name in names}
 
         limits = columns([row.limits for row in rows])
-        known = None
+        noise_free = None
         if any(row.noise_free_limits for row in rows):
-            known = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
+            noise_free = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
         return cls(
             estimate=np.array([row.estimate for row in log], np.float64).reshape(-1, inputs),
             asked=np.array([row.asked for row in log], np.float64).reshape(-1, inputs),
@@ -139,11 +139,11 @@ class Cycles:
             void=np.array([row.void for row in log], np.bool_),
             limits=limits,
             values=columns([row.values for row in rows]),
-            noise_free=known,
+            noise_free=noise_free,
         )
 
 
-def cycles_told(seeker: Seeker, count: int) -> Cycles:
+def cycles_given(seeker: Seeker, count: int) -> Cycles:
     """Take the last cycles from the history of a seeker, of a plant that applies what it is asked for."""
     history = {name: column[len(column) - count :] for name, column in seeker._history_columns().items()}
     missed = history["misfire"] != 0.0
@@ -186,8 +186,8 @@ def dataset_of(cycles: Cycles, first: int, inputs: tuple[str, ...], guided: Mapp
             variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
         elif name not in _OWN:
             labels: dict[str, tuple[str, str]] = OWN_LABELS if "intake_o2_fraction" in columns else {}  # of a bench
-            said: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
-            variables[name] = ("cycle", values, *said)
+            label: tuple[str, ...] = () if name in VARIABLES else labels.get(name, (_UNKNOWN, name))
+            variables[name] = ("cycle", values, *label)
     width = cycles.components.shape[1]
     variables["component"] = ("component", np.arange(width), "-", "term of the performance")
     variables["components"] = (("cycle", "component"), cycles.components, "unit of J", "component of the performance")

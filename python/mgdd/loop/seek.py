@@ -46,7 +46,7 @@ def seek(
     settings: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> SeekResult:
-    """Seek the best inputs of a plant or a function, with a seeker that is chosen and said in the result.
+    """Seek the best inputs of a plant or a function, with a seeker that is chosen and named in the result.
 
     `mgdd engine seek` and ``task = "seek"`` of an experiment are this call. By itself one input is sought by
     `CurveSeeking`, with the curve of the guide or with a parabola. Several inputs are sought by
@@ -67,7 +67,7 @@ def seek(
         `ask`, `tell` and `estimate`, which goes on where it stands and changes.
     start : mapping of str to float, or float for one input, optional
         First inputs; limits should hold there. Left out: the best of the guide, or of `known`, or the middle; with
-        limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where nobody knows one
+        limits the side on which engines keep them, as the latest `soc_cad` for ``p_max_bar``. Where none is known
         it is the middle, with a finding.
     cycles : int, optional
         How many; the first readings to every side at least. Left out: 200, and 25 more per cycle that J is late; of a
@@ -88,7 +88,7 @@ def seek(
         start of combustion.
     known : DataFrame, Dataset or mapping of columns, optional
         Readings of before, in their order: a column per input and limit, and ``j``, as the Dataset of a result is. A
-        row whose J is not finite failed. They are told first, to ``curve_seeking`` or ``gaussian_process_seeking``.
+        row whose J is not finite failed. They are given first, to ``curve_seeking`` or ``gaussian_process_seeking``.
     maximize : bool
         False to minimise J.
     settings : mapping of str to any, optional
@@ -99,7 +99,7 @@ def seek(
     Returns
     -------
     SeekResult
-        Best inputs, J and limits there, the gain over the start, which seeker and why, what speaks against the result,
+        Best inputs, J and limits there, the gain over the start, which seeker and why, reasons to doubt the result,
         and every cycle.
 
     Raises
@@ -133,10 +133,10 @@ def seek(
     """
     if cycles is not None and (isinstance(cycles, bool) or not isinstance(cycles, int | np.integer)):
         raise ParameterError.of("cycles", cycles, "a whole number")
-    wanted = both_sides(limits)
+    sides = both_sides(limits)
     own = Seeker | FeedForward | GuidedEngine | OwnSeeker
     if not isinstance(seeker, own) and OwnSeeker.is_one(seeker):
-        seeker = OwnSeeker(seeker, seek_inputs(inputs), wanted, maximize=maximize)
+        seeker = OwnSeeker(seeker, seek_inputs(inputs), sides, maximize=maximize)
     if isinstance(seeker, own):
         left_out = {
             "start": start is None, "noise_sd": noise_sd is None, "delay_cycles": not delay_cycles,
@@ -146,12 +146,12 @@ def seek(
         }  # fmt: skip
         if named := [name for name, out in left_out.items() if not out]:
             raise ParameterError(f"{', '.join(named)}: the seeker given has its own: leave it out, or name the seeker")
-        asked = _question_of(seeker, inputs, wanted, plant)
+        asked = _question_of(seeker, inputs, sides, plant)
         choice = Choice(seeker, "as given", 1, asked.budget(seeker))
     else:
         given = seek_inputs(inputs)
         asked = Question(
-            inputs=given, start=started(start, given), limits=wanted, noise_sd=noise_sd, delay_cycles=delay_cycles,
+            inputs=given, start=started(start, given), limits=sides, noise_sd=noise_sd, delay_cycles=delay_cycles,
             lag_cycles=lag_cycles, components=components, guide=guide, maximize=maximize, seed=seed,
             settings=dict(settings or {}), point=getattr(guide, "point", None) or getattr(plant, "point", None),
         )  # fmt: skip
@@ -216,8 +216,8 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
         if there and {one.name: (one.lower, one.upper) for one in given} != {
             one.name: (one.lower, one.upper) for one in there
         }:
-            said = ", ".join(f"{one.name} in [{one.lower:g}, {one.upper:g}]" for one in there)
-            raise ParameterError(f"inputs: the seeker given has {said}: leave them out")
+            bounds_text = ", ".join(f"{one.name} in [{one.lower:g}, {one.upper:g}]" for one in there)
+            raise ParameterError(f"inputs: the seeker given has {bounds_text}: leave them out")
         there = there or given
     if not there:
         if not isinstance(plant, Plant):
@@ -228,8 +228,8 @@ def _question_of(seeker: Any, inputs: Any, limits: tuple[Limit, ...], plant: Any
         there = inputs_of({name: (a, b) for name, a, b in bounds})
     held = tuple(own["limits"])
     if limits and {one.name: one.upper for one in limits} != {one.name: one.upper for one in held}:
-        said = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
-        raise ParameterError(f"limits: the seeker given has {said}: leave them out")
+        limits_text = ", ".join(f"{one.name} <= {one.upper:g}" for one in held) or "none"
+        raise ParameterError(f"limits: the seeker given has {limits_text}: leave them out")
     begun = dict(zip([one.name for one in there], seeker.estimate.tolist(), strict=True))
     return Question(
         inputs=there, start=begun, limits=held, components=own.get("components"), maximize=own["maximize"],
@@ -303,8 +303,8 @@ def tell_known(asked: Question, seeker: Any, choice: Choice, known: Any) -> tupl
     read = np.isfinite(j) & np.isfinite(limits).all(axis=1)
     if asked.start is None and asked.late_cycles == 0.0 and read.any():
         uppers = np.array([limit.upper for limit in asked.limits])
-        kept = read & (limits <= uppers).all(axis=1)
-        worth = np.where(kept if kept.any() else read, j if asked.maximize else -j, -math.inf)
+        feasible = read & (limits <= uppers).all(axis=1)
+        worth = np.where(feasible if feasible.any() else read, j if asked.maximize else -j, -math.inf)
         best = dict(zip(names, x[int(np.argmax(worth))].tolist(), strict=True))
         asked = replace(asked, start=best)
         choice = chosen(asked, seeker)

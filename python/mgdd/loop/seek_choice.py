@@ -89,9 +89,9 @@ class Question:
 
     @property
     def started_blindly(self) -> bool:
-        """Whether nobody says that the limits hold where it begins."""
-        told = self.start is not None or isinstance(self.guide, EngineGuide)
-        return bool(self.limits) and not told and not safe_side(self.inputs, self.limits)
+        """Whether it is unknown if the limits hold where it begins."""
+        has_start = self.start is not None or isinstance(self.guide, EngineGuide)
+        return bool(self.limits) and not has_start and not safe_side(self.inputs, self.limits)
 
     def first(self, scales: float = 0.0) -> dict[str, float]:
         """Give where to begin: the start, else the safe side less so many scales of the input, else the middle."""
@@ -103,7 +103,7 @@ class Question:
     def made(self, cls: type[Seeker], start: Mapping[str, float] | None, **own: Any) -> Seeker:
         """Make a seeker of that class; ParameterError for what is known that it cannot know."""
         takes = inspect.signature(cls).parameters
-        known: dict[str, Any] = {
+        arguments: dict[str, Any] = {
             "inputs": list(self.inputs), "maximize": self.maximize, "limits": list(self.limits),
             "start": start or self.first(0.0 if cls in _FIRST else _DITHER),
         }  # fmt: skip
@@ -112,7 +112,7 @@ class Question:
         if any(late.values()) and lags is not None:
             raise ParameterError("components: hold the delays: leave delay_cycles and lag_cycles out")
         if "delay_cycles" in takes and lags is None:
-            known |= late
+            arguments |= late
         elif self.late_cycles > 0.0:
             if "components" not in takes:
                 late_ones = ", ".join(name for name, one in SEEKERS.items() if _bears_delay(one))
@@ -120,24 +120,24 @@ class Question:
                     f"{argument('seeker', _name_of(cls))}: takes J of the same cycle, and J is late here: take one of "
                     f"{late_ones}"
                 )
-            known["components"] = lags or [ComponentLag(**late)]
+            arguments["components"] = lags or [ComponentLag(**late)]
             if "period" in takes:
-                slowest = max(known["components"], key=lambda lag: lag.delay_cycles + lag.lag_cycles)
+                slowest = max(arguments["components"], key=lambda lag: lag.delay_cycles + lag.lag_cycles)
                 slow = tune(
                     1.0, -1.0, delay_cycles=slowest.delay_cycles, lag_cycles=slowest.lag_cycles
                 )  # whose period does not depend on noise and curvature
-                known["period"] = max(takes["period"].default, slow.period)
+                arguments["period"] = max(takes["period"].default, slow.period)
         elif lags is not None:
-            known["components"] = lags
+            arguments["components"] = lags
         if self.noise_sd is not None and "noise_sd" in takes:
-            known["noise_sd"] = self.noise_sd
+            arguments["noise_sd"] = self.noise_sd
         elif cls is GoldenSection and "noise_sd" not in self.settings:
             raise ParameterError(
                 f"{argument('seeker', _name_of(cls))}: needs {argument('noise_sd')}, the standard deviation of one "
                 "reading"
             )
         if "seed" in takes:
-            known["seed"] = self.seed
+            arguments["seed"] = self.seed
         for name in self.settings:
             if name in _OWN_WORDS:
                 raise ParameterError(
@@ -149,14 +149,14 @@ class Question:
                     hinted(f"{argument('settings')}: {name!r}: {cls.kind} takes {', '.join(have)}", name, have)
                 )
         try:
-            return cls(**known | own | dict(self.settings))
+            return cls(**arguments | own | dict(self.settings))
         except ParameterError as error:
             if error.field not in self.settings:
                 raise
             raise error.reworded(f"{argument('settings')}: {error}") from error
 
     def budget(self, seeker: Any) -> int:
-        """How many cycles a search takes where nobody says."""
+        """How many cycles a search takes by default."""
         kind = getattr(seeker, "_seeker_kind", None) or seeker.kind
         if kind in {cls.kind for cls in _FIRST}:
             return _CYCLES + math.ceil(_PER_LATE * self.late_cycles)
@@ -184,8 +184,8 @@ def _class_of(seeker: Any) -> type[Seeker]:
         named = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", seeker).lower()
         if named in SEEKERS:
             return SEEKERS[named]
-        said = f"{argument('seeker', seeker)}: must be auto or one of {', '.join(SEEKERS)}"
-        raise ParameterError(hinted(said, seeker, list(SEEKERS)), field="seeker", value=seeker)
+        message = f"{argument('seeker', seeker)}: must be auto or one of {', '.join(SEEKERS)}"
+        raise ParameterError(hinted(message, seeker, list(SEEKERS)), field="seeker", value=seeker)
     raise ParameterError.of("seeker", seeker, f"auto, a name ({', '.join(SEEKERS)}) or a seeker")
 
 
@@ -229,8 +229,8 @@ def _automatic(asked: Question) -> tuple[Seeker, str]:
     """Take a curve for one input, a Gaussian process for several and for components of their own delays."""
     guide, inputs = asked.guide, asked.inputs
     if asked.components is None and (isinstance(guide, Curve) or (guide is None and len(inputs) == 1)):
-        told = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
-        return _by_curve(asked), f"{told}, placed by the readings"
+        basis = "one input and the curve of a guide" if guide else "one input: a parabola serves as the guide"
+        return _by_curve(asked), f"{basis}, placed by the readings"
     start = asked.start
     if start is None and guide is not None and not asked.limits and asked.components is None:
         start = _best_of(guide, inputs, asked.maximize)
@@ -240,7 +240,7 @@ def _automatic(asked: Question) -> tuple[Seeker, str]:
     by = " and a guide" if guided else ""
     return (
         asked.made(GaussianProcessSeeking, start, **guided),
-        f"{count}{by}{kept}: it loses least on the way, whatever their units",
+        f"{count}{by}{kept}: smallest cumulative loss, whatever their units",
     )
 
 
@@ -254,12 +254,12 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
         raise ParameterError(f"{argument('guide')}: the plant has no operating point: give EngineGuide its point")
     plain = replace(asked, guide=None)
     if isinstance(guide, TimingMap):
-        said = guide(point)
-        if said is None:
+        timing_cad = guide(point)
+        if timing_cad is None:
             raise ParameterError(
-                f"{argument('guide_table')}: has nothing to say at {point}; its axes end before: widen them"
+                f"{argument('guide_table')}: gives no timing at {point}: its axes end before: widen them"
             )
-        inner = _inner(plain, seeker, float(said))
+        inner = _inner(plain, seeker, float(timing_cad))
         return FeedForward(inner, guide, keep_start=True), f"{inner.kind} after the timing of a table"
     model = guide.model((one.lower, one.upper))
     if guide.kind == "feed_forward":
@@ -294,7 +294,7 @@ def _led(asked: Question, seeker: Any) -> tuple[Any, str]:
 
 
 def _inner(asked: Question, seeker: Any, best: float) -> Seeker:
-    """Make the seeker of what is left; a dither that knows nothing of J is the default behind a feed-forward."""
+    """Make the seeker of what is left; a dither without a model of J is the default behind a feed-forward."""
     cls = ExtremumSeeking if seeker == "auto" else _class_of(seeker)
     if cls in (GoldenSection, CurveSeeking):
         raise ParameterError(

@@ -1,4 +1,4 @@
-"""Two objectives at once: seekers of weighted sums of them, all of which hear every reading."""
+"""Two objectives at once: seekers of weighted sums of them, all of which receive every reading."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def seek_front(
 ) -> FrontResult:
     """Seek the front of two objectives, as efficiency and NOx over timing and EGR.
 
-    Several `GaussianProcessSeeking` take turns, each on a weighted sum of both objectives, and every one hears every
+    Several `GaussianProcessSeeking` take turns, each on a weighted sum of both objectives, and every one receives every
     reading. The first three tenths of the cycles look for the best of each objective alone; the ranges between these
     two make the scales of the sums. At last each objective is fitted once to all readings, by a polynomial, and the
     front is what no other input beats in both fits, within what was tried.
@@ -79,7 +79,7 @@ def seek_front(
     Returns
     -------
     FrontResult
-        Points of the front with inputs, predictions and their uncertainty; models; every cycle; what speaks against it.
+        Points of the front with inputs, predictions and their uncertainty; models; every cycle; reasons to doubt it.
 
     Raises
     ------
@@ -175,7 +175,7 @@ class _Search:
         return weight, self._asked[weight]
 
     def tell(self, row: _Row, names: Sequence[str]) -> None:
-        """Let all hear what was measured at the input that was applied."""
+        """Give all of them what was measured at the input that was applied."""
         for weight, seeker in self._seekers.items():
             self._tell(seeker, weight, row, names)
 

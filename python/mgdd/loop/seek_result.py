@@ -1,4 +1,4 @@
-"""What one call of `seek` found: the best inputs, what they give, which seeker sought, and what speaks against it."""
+"""Result of one call of `seek`: the best inputs, what they give, the seeker, and reasons to doubt the result."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ class Readings:
         """Average the readings whose inputs were nearest to the last estimate."""
         late = round(late_cycles)
         read, caused = values[late:], self.applied[: max(values.size - late, 0)]
-        known = np.isfinite(read)
-        away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[known]
-        return _mean(read[known][np.argsort(away, kind="stable")[:_NEAREST]])
+        finite = np.isfinite(read)
+        away = np.linalg.norm((caused - self._estimate) / self.width, axis=1)[finite]
+        return _mean(read[finite][np.argsort(away, kind="stable")[:_NEAREST]])
 
     def velocities(self, late_cycles: float, *, maximize: bool) -> list[Mean]:
         """Give the steady velocity of the best of every input per cycle in the last half, NaN where there is none.
@@ -88,19 +88,19 @@ class Readings:
             return out
         half = np.array_split(np.arange(cycles // 2, cycles), _BLOCKS)
         steps = np.diff([self.estimates[block].mean(axis=0) for block in half], axis=0) / (len(half[0]))
-        known = np.flatnonzero(np.isfinite(self.j[max(cycles // 2, late) :])) + max(cycles // 2, late)
-        u = (self.applied[known - late] - self.applied[known - late].mean(axis=0)) / self.width
-        k = (known - known.mean()) / cycles
+        cycles_read = np.flatnonzero(np.isfinite(self.j[max(cycles // 2, late) :])) + max(cycles // 2, late)
+        u = (self.applied[cycles_read - late] - self.applied[cycles_read - late].mean(axis=0)) / self.width
+        k = (cycles_read - cycles_read.mean()) / cycles
         for i in range(names):
             mean, sd = float(steps[:, i].mean()), float(np.std(steps[:, i], ddof=1)) / math.sqrt(len(steps))
             slower = 2.0 * abs(steps[-2:, i].mean()) < abs(steps[:2, i].mean())  # as towards a best that stands still
             if slower or abs(mean) <= _GOES_ON * sd or abs(mean) * cycles / 2 <= _FAR * self.width[i]:
                 continue
             terms = np.column_stack([np.ones_like(k), k, k**2, u, u**2, k * u[:, i]])
-            fit, left, rank, _ = np.linalg.lstsq(terms, self.j[known], rcond=None)
-            if rank < terms.shape[1] or len(known) <= rank:
+            fit, left, rank, _ = np.linalg.lstsq(terms, self.j[cycles_read], rcond=None)
+            if rank < terms.shape[1] or len(cycles_read) <= rank:
                 continue
-            turn = math.sqrt(float(left[0]) / (len(known) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
+            turn = math.sqrt(float(left[0]) / (len(cycles_read) - rank) * np.linalg.inv(terms.T @ terms)[-1, -1])
             if math.copysign(1.0 if maximize else -1.0, mean) * float(fit[-1]) > _SURE * turn:
                 out[i] = Mean(mean, sd)
         return out
@@ -128,7 +128,7 @@ def _mean(values: NDArray[np.float64]) -> Mean:
 def doubts_about(
     seeker: Any, run: LoopRun, readings: Readings, gain: Mean, kept: Mapping[str, Mean], asked: Question
 ) -> list[Finding]:
-    """Say what speaks against a result: its gain over the start, positive is better, and its limits as they are."""
+    """Give reasons to doubt a result: its gain over the start, positive is better, and its limits as they are."""
     return [
         *_about_run(run, readings, asked, gain),
         *_about_limits(readings, asked, kept),
@@ -169,15 +169,15 @@ def _about_run(run: LoopRun, readings: Readings, asked: Question, gain: Mean) ->
         yield Finding("no_gain", (), text, "start elsewhere, or measure start and best in turn")
 
 
-def _about_limits(readings: Readings, asked: Question, kept: Mapping[str, Mean]) -> Iterator[Finding]:
+def _about_limits(readings: Readings, asked: Question, estimates: Mapping[str, Mean]) -> Iterator[Finding]:
     if asked.started_blindly:
         names = tuple(measured_names(asked.limits))
-        text = f"no start was given, and nobody knows where {', '.join(names)} would hold: it began where that was open"
+        text = f"no start given, and it is unknown where {', '.join(names)} would hold: it began where that was open"
         yield Finding("start_unknown", names, text, f"give {argument('start')} where the limits hold")
     for limit in asked.limits:
         values = readings.limit(limit.name)
         values = values[np.isfinite(values)]
-        mean = kept[limit.name]
+        mean = estimates[limit.name]
         name, side = plain_name(limit.name)
         bound = f"{'above its' if side > 0.0 else 'below its lower'} limit, {side * limit.upper:.6g}"
         if values.size and values[0] > limit.upper:
@@ -200,10 +200,10 @@ def _about_seeker(seeker: Any, asked: Question, cycles: int, *, seen: bool) -> I
     elif guided and getattr(seeker, "trust", 1.0) < _TRUSTED:
         text = f"the guide explains the readings badly: trust {float(seeker.trust):.2f}"
         yield Finding("untrusted_guide", (), text, "look at its shape and its height")
-    told, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
-    if seen and isinstance(taken, int | float) and asked.components is None and taken != told:
-        text = f"the readings fit a delay of {taken:g} cycles, not {told:g} as stated"
-        yield Finding("delay", (), text, "mend delay_cycles")
+    stated, taken = asked.delay_cycles, getattr(seeker, "delay_cycles", None)
+    if seen and isinstance(taken, int | float) and asked.components is None and taken != stated:
+        text = f"the readings fit a delay of {taken:g} cycles, not {stated:g} as configured"
+        yield Finding("delay", (), text, "correct delay_cycles")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -229,13 +229,13 @@ class SeekResult(Result):
     reason : str
         Why that one.
     findings : tuple of Finding
-        What speaks against the result: codes ``few_cycles``, ``moving``, ``not_settled``, ``at_bound``, ``no_gain``,
+        Reasons to doubt the result: codes ``few_cycles``, ``moving``, ``not_settled``, ``at_bound``, ``no_gain``,
         ``start_unknown``, ``start_above_limit``, ``limit_broken``, ``no_reading``, ``unexplained``, ``handed_over``,
         ``untrusted_guide``, ``delay``, ``interrupted``, and those of the seeker.
     run : LoopRun
         Every cycle.
     asked : Question
-        Inputs, limits and what was said of J.
+        Inputs, limits and what was given of J.
     """
 
     inputs: dict[str, float]
@@ -267,13 +267,13 @@ class SeekResult(Result):
         rows.append(Row("gain", f"{self.gain:.4g} ± {self.gain_sd:.2g}", "unit of J"))
         for limit in self.asked.limits:
             name, side = plain_name(limit.name)
-            said = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
-            rows.append(Row(name, said, unit_of(name)))
+            reading = f"{self.limits[name]:.6g} ({'limit' if side > 0.0 else 'lower limit'} {side * limit.upper:.6g})"
+            rows.append(Row(name, reading, unit_of(name)))
         rows.append(Row("cycles", str(self.run.dataset.sizes["cycle"])))
         return rows + [Row("doubt", str(finding)) for finding in self.findings]
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + findings_html("What speaks against it", self.findings)
+        return super()._repr_html_() + findings_html("Reasons to doubt it", self.findings)
 
     @property
     def interrupted(self) -> bool:
@@ -320,7 +320,7 @@ class SeekResult(Result):
         names = ("inputs", "value", "value_sd", "gain", "gain_sd", "start", "limits", "reason", "interrupted")
         out = {name: getattr(self, name) for name in names}
         out |= {"seeker": self._kind, "findings": [finding.to_dict() for finding in self.findings]}
-        out |= {name: _known(getattr(self.seeker, name, None)) for name in ("estimate_sd", "trust")}
+        out |= {name: _finite(getattr(self.seeker, name, None)) for name in ("estimate_sd", "trust")}
         figures = {name: value for name, value in self.run.summary.items() if math.isfinite(value)}
         plain: dict[str, Any] = to_jsonable(out | {"cycles": self.run.dataset.sizes["cycle"], "figures": figures})
         return plain
@@ -337,12 +337,12 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     if getattr(seeker, "expected_sd", 0.0) > 0.0:  # 0 before the process is fitted
         at_best = Mean(float(seeker.expected), float(seeker.expected_sd))
     gained = readings.gain(asked.late_cycles)
-    kept = {
+    estimates = {
         limit.name: readings.near_estimate(readings.limit(limit.name), limit.delay_cycles + limit.lag_cycles)
         for limit in asked.limits
     }
     gain = Mean(sign * gained.value, gained.sd)
-    doubts = doubts_about(seeker, run, readings, gain, kept, asked)
+    doubts = doubts_about(seeker, run, readings, gain, estimates, asked)
     return SeekResult(
         inputs=dict(zip([one.name for one in asked.inputs], seeker.settable.tolist(), strict=True)),
         value=at_best.value,
@@ -350,7 +350,7 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
         gain=gain.value,
         gain_sd=gain.sd,
         start=dict(start),
-        limits={name: sign * kept[given].value for given in kept for name, sign in [plain_name(given)]},
+        limits={name: sign * estimates[given].value for given in estimates for name, sign in [plain_name(given)]},
         seeker=seeker,
         reason=reason,
         findings=unique([*seeker.findings, *doubts]),
@@ -359,5 +359,5 @@ def found_by(seeker: Any, reason: str, run: LoopRun, start: Mapping[str, float],
     )
 
 
-def _known(value: Any) -> float | None:
+def _finite(value: Any) -> float | None:
     return float(value) if isinstance(value, float) and math.isfinite(value) else None

@@ -75,13 +75,13 @@ def steady_map(quiet: VirtualEngine, inputs: ArrayLike | Mapping[str, ArrayLike]
 
 def limits_to_keep(limits: Any) -> tuple[Limit, ...]:
     """Read limits that have a steady value, lower ones as upper ones of the negated quantity."""
-    kept = both_sides(limits)
-    check_request(OBJECTIVES[0], measured_names(kept), bench_limits)
-    return kept
+    upper_limits = both_sides(limits)
+    check_request(OBJECTIVES[0], measured_names(upper_limits), bench_limits)
+    return upper_limits
 
 
 def find_optimum(
-    quiet: VirtualEngine, kept: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
+    quiet: VirtualEngine, upper_limits: tuple[Limit, ...], bounds: Mapping[str, tuple[float, float]], scatter_cad: float
 ) -> Optimum:
     """Find the best inputs of such a bench, whose limits are those to keep, and what this scatter of SOC would do."""
     windows = quiet.input_bounds
@@ -91,7 +91,7 @@ def find_optimum(
             raise ParameterError(
                 f"bounds: {name} = ({low:g}, {high:g}): must increase and lie in [{least:g}, {greatest:g}]"
             )
-    caps = {limit.name: limit.upper - limit.margin for limit in kept}
+    caps = {limit.name: limit.upper - limit.margin for limit in upper_limits}
     best, free = _best(quiet, caps, bounds)
     around = [_settled(quiet, (free[0] + away,))["j"] for away in (-_SECANT_CAD, 0.0, _SECANT_CAD) if len(bounds) == 1]
     at, limited = _settled(quiet, best), _limited(quiet, best)
@@ -106,7 +106,7 @@ def find_optimum(
         objective="j",
         value=float(at["j"]),
         values={**numbers, **limited, **spread},
-        limits=kept,
+        limits=upper_limits,
         active_limits=tuple(name for name, cap in caps.items() if sides[name] > cap - 1e-3 * max(1.0, abs(cap))),
         at_bound=min(edges) < 1e-3,
         bounds=dict(bounds),
@@ -135,12 +135,12 @@ def _best(
     free = _climbed(j, None, grid[np.argsort(-values)[:_STARTS]]) if low.size > 1 else _peak(j, grid, values)
     if room(free).min(initial=1.0) >= 0.0:
         return low + free * span, low + free * span
-    kept = np.flatnonzero(least >= 0.0)
-    starts = grid[kept[np.argsort(-values[kept])[:_STARTS]]] if kept.size else grid[np.argsort(-least)[:_STARTS]]
+    valid = np.flatnonzero(least >= 0.0)
+    starts = grid[valid[np.argsort(-values[valid])[:_STARTS]]] if valid.size else grid[np.argsort(-least)[:_STARTS]]
     best = _climbed(j, room, starts)
     if room(best).min() < -_EDGE:
         asked = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in bounds.items())
-        raise ConvergenceError(f"no {asked} keeps {_said(caps)}: move a limit")
+        raise ConvergenceError(f"no {asked} keeps {_listed(caps)}: move a limit")
     return low + best * span, low + free * span
 
 
@@ -150,8 +150,8 @@ def _peak(j: Any, grid: NDArray[np.float64], values: NDArray[np.float64]) -> NDA
 
     top = int(values.argmax())
     ends = grid[max(top - 1, 0), 0], grid[min(top + 1, len(grid) - 1), 0]
-    found = minimize_scalar(lambda z: -j(np.array([z])), bounds=ends, method="bounded", options={"xatol": 2.5e-6})
-    return np.array([found.x])
+    solution = minimize_scalar(lambda z: -j(np.array([z])), bounds=ends, method="bounded", options={"xatol": 2.5e-6})
+    return np.array([solution.x])
 
 
 def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -165,11 +165,11 @@ def _climbed(j: Any, room: Any, starts: NDArray[np.float64]) -> NDArray[np.float
 
     ends = list(starts)
     for start in starts:
-        found = minimize(
+        solution = minimize(
             lambda z: -j(z), start, method="SLSQP", bounds=[(0.0, 1.0)] * start.size, constraints=rules,
             options={"eps": 1e-5, "ftol": 1e-10, "maxiter": 200},
         )  # fmt: skip
-        ends.append(np.clip(found.x, 0.0, 1.0))
+        ends.append(np.clip(solution.x, 0.0, 1.0))
     return np.asarray(max(ends, key=worth))
 
 
@@ -180,7 +180,7 @@ def _settled(quiet: VirtualEngine, inputs: Point) -> dict[str, Any]:
     return quiet.step(first, further)
 
 
-def _said(caps: Mapping[str, float]) -> str:
+def _listed(caps: Mapping[str, float]) -> str:
     """Write limits as they were given."""
     sides = [(*plain_name(name), cap) for name, cap in caps.items()]
     return ", ".join(f"{name} {'<=' if side > 0.0 else '>='} {side * cap:g}" for name, side, cap in sides)

@@ -110,8 +110,8 @@ class LoopCriteria:
 
     def attributes(self, names: tuple[str, ...], uppers: Sequence[float]) -> dict[str, float]:
         """Give what a figure of the run marks: ``optimum``, and ``limit_NAME`` where there is one."""
-        found = {f"limit_{name}": upper for name, upper in zip(names, uppers, strict=True) if math.isfinite(upper)}
-        return found if self.optimum is None else {"optimum": float(self.optimum), **found}
+        references = {f"limit_{name}": upper for name, upper in zip(names, uppers, strict=True) if math.isfinite(upper)}
+        return references if self.optimum is None else {"optimum": float(self.optimum), **references}
 
     def to_core(self, names: tuple[str, ...]) -> dict[str, Any]:
         """Give what the loops of the core take."""
@@ -203,8 +203,8 @@ FIGURES_OF_INPUT = {
 
 def of_first_input(figures: Mapping[str, Any], inputs: Sequence[str]) -> dict[str, Any]:
     """Name the figures that the core has of the first input alone, as angles, as FIGURE_INPUT."""
-    known = {f"{figure}_cad": f"{figure}_{inputs[0]}" for figure in FIGURES_OF_INPUT}
-    return {known.get(name, name): value for name, value in figures.items()}
+    new_names = {f"{figure}_cad": f"{figure}_{inputs[0]}" for figure in FIGURES_OF_INPUT}
+    return {new_names.get(name, name): value for name, value in figures.items()}
 
 
 def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -> dict[str, float]:

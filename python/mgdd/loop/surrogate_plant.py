@@ -104,10 +104,10 @@ class SurrogatePlant:
         for what, names in (("objective", self._weights), ("limits", [n for n in self.limit_names if n != _LEVERAGE])):
             if unknown := [name for name in names if name not in signals]:
                 raise ParameterError(f"{what}: {unknown[0]!r} is not a signal: must be one of {signals}")
-        known = tuple(surrogate.support.inputs)
-        if tuple(inputs)[:1] != ("soi_cad",) or len(set(inputs)) < len(inputs) or not set(inputs) <= set(known):
+        model_inputs = tuple(surrogate.support.inputs)
+        if tuple(inputs)[:1] != ("soi_cad",) or len(set(inputs)) < len(inputs) or not set(inputs) <= set(model_inputs):
             raise ParameterError(
-                f"inputs = {list(inputs)}: must begin with soi_cad and be among {list(known)}, once each"
+                f"inputs = {list(inputs)}: must begin with soi_cad and be among {list(model_inputs)}, once each"
             )
         self._applied: tuple[float, ...] | None = None
         self.surrogate = surrogate
@@ -149,12 +149,12 @@ class SurrogatePlant:
         reading = self.step(soi, dict(zip(self.input_names[1:], others, strict=True)))
         support, point = self.surrogate.support, self._point_applied
         applied = dict(zip(support.inputs, point.tolist(), strict=True)) if self._outside == "clamp" else {}
-        known = {**reading, _LEVERAGE: float(support.leverage(point[None])[0]) / support.leverage_limit}
+        values = {**reading, _LEVERAGE: float(support.leverage(point[None])[0]) / support.leverage_limit}
         return Measurement(
             components=tuple(weight * float(reading[name]) for name, weight in self._weights.items()),
-            limits={name: float(known[name]) for name in self.limit_names},
+            limits={name: float(values[name]) for name in self.limit_names},
             values={name: float(value) for name, value in reading.items()},
-            noise_free_limits={name: self._noise_free.get(name, known[name]) for name in self.limit_names},
+            noise_free_limits={name: self._noise_free.get(name, values[name]) for name in self.limit_names},
             applied={name: value for name, value in applied.items() if name in self.input_names},
         )
 

@@ -119,9 +119,9 @@ def track(
     >>> float(run["settling_ms"]) < 30.0, run["settling_ms"].units
     (True, 'ms')
     """
-    wanted = reference_of(reference)
-    plant = plant_of(throttle, wanted, start_deg, sensors or sensors_of(noise_deg), seed)
-    n = len(wanted.angle_deg)
+    target = reference_of(reference)
+    plant = plant_of(throttle, target, start_deg, sensors or sensors_of(noise_deg), seed)
+    n = len(target.angle_deg)
     airflow, supply = column_of("airflow_torque_nm", airflow_torque_nm, n), column_of("supply_v", supply_v, n)
     inner = core_of(controller)
     if inner is not None:
@@ -129,30 +129,30 @@ def track(
             inner,
             plant,
             delay_samples=delay_samples,
-            reference_deg=wanted.angle_deg,
+            reference_deg=target.angle_deg,
             airflow_torque_nm=airflow,
             supply_v=supply,
-            from_sample=wanted.from_sample,
-            band_deg=wanted.band_deg,
+            from_sample=target.from_sample,
+            band_deg=target.band_deg,
         )
         figures = {name: float(column[0]) for name, column in run.pop("figures").items()}
     elif callable(getattr(controller, "step", None)):
-        run = _run_in_python(controller, plant, wanted.angle_deg, delay_samples, airflow, supply)
+        run = _run_in_python(controller, plant, target.angle_deg, delay_samples, airflow, supply)
         figures = _core.loop.tracking_figures(
-            reference_deg=wanted.angle_deg,
+            reference_deg=target.angle_deg,
             angle_deg=run["angle_deg"],
             duty=run["duty"],
-            sample_s=wanted.sample_s,
-            from_sample=wanted.from_sample,
-            band_deg=wanted.band_deg,
+            sample_s=target.sample_s,
+            from_sample=target.from_sample,
+            band_deg=target.band_deg,
         )
     else:
         raise ParameterError.of(
             "controller", controller, "an object with step(reference_deg, measurement_deg); "
             "tuned_controller('guided', model) makes one for a throttle, a preset or a fit"
         )  # fmt: skip
-    variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", np.arange(n) * wanted.sample_s)}
-    variables["reference_deg"] = ("time_s", wanted.angle_deg)
+    variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", np.arange(n) * target.sample_s)}
+    variables["reference_deg"] = ("time_s", target.angle_deg)
     for name, column in run.items():
         variables[name] = ("time_s", column)
     for name in FIGURES:
@@ -160,7 +160,7 @@ def track(
     for name, column in (("airflow_torque_nm", airflow), ("supply_v", supply)):
         if len(column):
             variables[name] = ("time_s", column)
-    attributes = {"reference": wanted.name, "band_deg": wanted.band_deg, "delay_samples": delay_samples, "seed": seed}
+    attributes = {"reference": target.name, "band_deg": target.band_deg, "delay_samples": delay_samples, "seed": seed}
     return labelled_dataset(variables, attrs=attributes)
 
 
@@ -222,8 +222,8 @@ def _run_in_python(
     out = {name: np.empty(len(reference_deg)) for name in names}
     still = plant._still
     measured = plant.start_deg
-    for k, wanted in enumerate(reference_deg):
-        out["duty"][k] = controller.step(float(wanted), measured)
+    for k, target_deg in enumerate(reference_deg):
+        out["duty"][k] = controller.step(float(target_deg), measured)
         values = plant.step(
             duty=out["duty"][k - delay_samples] if k >= delay_samples else 0.0,
             supply_v=supply[k] if len(supply) else still["supply_v"],

@@ -62,10 +62,10 @@ def draw_throttles(throttle: Throttle, n: int, *, spread: float = 0.2, seed: int
 
 def tuning_references() -> dict[str, tuple[Reference, float]]:
     """Give the references of the tuner with their wanted settling time [ms], of the sine its mean square error."""
-    wanted = {(20, 60): 70.0, (60, 25): 70.0, (40, 42): 25.0, (42, 41): 20.0, (4, 20): 50.0, (20, 4): 50.0}
+    settling_ms = {(20, 60): 70.0, (60, 25): 70.0, (40, 42): 25.0, (42, 41): 20.0, (4, 20): 50.0, (20, 4): 50.0}
     steps = [
         (Reference.step(a, b, hold_s=0.4, after_s=0.6, band_deg=max(0.2, 0.02 * abs(b - a))), ms)
-        for (a, b), ms in wanted.items()
+        for (a, b), ms in settling_ms.items()
     ]
     sine = Reference.sine(40.0, 10.0, 1.0, duration_s=2.0, skip_s=0.5)
     return {reference.name: (reference, goal) for reference, goal in [*steps, (sine, 0.05)]}

@@ -55,7 +55,7 @@ def tuned_controller(
     ------
     mgdd.errors.ParameterError
         An unknown kind, a model without groups, unknown numbers; a delay for a kind that cannot know one and whose
-        shipped numbers do not bear it.
+        shipped numbers work with shorter ones only.
 
     Examples
     --------
@@ -101,14 +101,14 @@ def tuned_with_doubts(
 
 
 def require_known_delay(kind: str, sample_s: float, delay_samples: int) -> None:
-    """Raise ParameterError where a kind that cannot know a delay is given one that its shipped numbers do not bear."""
+    """Raise ParameterError where a kind that takes no delay is given one beyond that of its shipped numbers."""
     family = family_of(kind)
     if delay_samples <= 0 or family.knows_delay or _dead_s(sample_s, delay_samples) <= family.longest_dead_s:
         return
     knowing = ", ".join(name for name, one in FAMILIES.items() if one.knows_delay)
     raise ParameterError.of(
         "delay_samples", delay_samples,
-        f"left out with {kind!r}, which cannot know a delay, and whose shipped numbers do not bear this one; take "
+        f"left out with {kind!r}, which takes no delay, and whose shipped numbers work with shorter ones only; take "
         f"{knowing}, or numbers that tune_controller({kind!r}, ..., delay_samples=...) finds",
     )  # fmt: skip
 
@@ -122,21 +122,21 @@ def _dead_s(sample_s: float, delay_samples: int) -> float:
 
 
 def _doubts(kind: str, family: Family, sample_s: float, delay_samples: int) -> tuple[str, ...]:
-    """Say where shipped numbers are used beyond what they have been seen to bear."""
+    """Say where shipped numbers are used beyond what they were tested for."""
     remedy = "look at a run of mgdd.loop.track with both, take a shorter sample time, or give own numbers"
-    told = []
+    doubts = []
     if sample_s > family.longest_sample_s * _SAME:
-        told.append(
-            f"sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at 0.001 s and have been seen to serve up to "
+        doubts.append(
+            f"sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at 0.001 s and have been tested up to "
             f"{family.longest_sample_s:g} s; {remedy}"
         )
     elif _dead_s(sample_s, delay_samples) > family.longest_dead_s:
         most = family.longest_dead_s / sample_s - 0.5
-        told.append(
+        doubts.append(
             f"delay_samples = {delay_samples} at sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at "
-            f"0.001 s and have been seen to serve up to {most:.3g} samples here; {remedy}"
+            f"0.001 s and have been tested up to {most:.3g} samples here; {remedy}"
         )
-    return tuple(told)
+    return tuple(doubts)
 
 
 def family_of(kind: str) -> Family:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from mgdd.results.dataset import Dataset
 
-_SEARCHED_CAD = (-30.0, 10.0)  # where nobody says, as `mgdd engine seek` does
+_SEARCHED_CAD = (-30.0, 10.0)  # by default, as `mgdd engine seek` does
 _RANDOM = (
     "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
     "wall_heat_drift_per_kcycle",
@@ -110,8 +110,8 @@ class VirtualEngine(_core.loop.VirtualEngine):
         except ParameterError as error:
             if error.field != "limits" or not isinstance(error.value, str):
                 raise
-            known = str(error.bound).removeprefix("one of ").split(", ")
-            raise error.reworded(hinted(str(error), error.value, known)) from None
+            names = str(error.bound).removeprefix("one of ").split(", ")
+            raise error.reworded(hinted(str(error), error.value, names)) from None
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -313,11 +313,11 @@ class VirtualEngine(_core.loop.VirtualEngine):
         >>> round(VirtualEngine().find_optimum()["soc_cad"], 2)
         -5.63
         """
-        kept = limits_to_keep(limits)
+        upper_limits = limits_to_keep(limits)
         split_inputs(self.input_names, bounds or {}, None)
         searched = self.input_bounds | {"soc_cad": _SEARCHED_CAD} | dict(bounds or {})
-        quiet = self._quiet(cycle, limits=measured_names(kept))
-        return find_optimum(quiet, kept, searched, float(self.settings["soc_scatter_cad"]))
+        quiet = self._quiet(cycle, limits=measured_names(upper_limits))
+        return find_optimum(quiet, upper_limits, searched, float(self.settings["soc_scatter_cad"]))
 
     def _quiet(self, cycle: int, **changes: Any) -> VirtualEngine:
         """Copy the bench without anything random or slow, at the operating point of one cycle."""

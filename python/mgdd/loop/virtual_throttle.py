@@ -79,7 +79,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
-        self._given: dict[str, Any] = {
+        self._settings: dict[str, Any] = {
             "throttle": self.throttle,
             "inputs": self.input_names,
             "sensors": sensors or SensorPair(),
@@ -92,7 +92,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         }
         super().__init__(
             throttle=self.throttle,
-            sensors=self._given["sensors"],
+            sensors=self._settings["sensors"],
             faults=fault_pair([fault for fault in faults if fault.sensor is not None]),
             plant_faults=[fault.to_core() for fault in faults if fault.sensor is None],
             sample_s=sample_s,
@@ -103,7 +103,7 @@ class VirtualThrottle(_core.loop.VirtualThrottle):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (type(self), self._given, self.state, self._applied)
+        return _restored, (type(self), self._settings, self.state, self._applied)
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next sample.

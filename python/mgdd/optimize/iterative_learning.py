@@ -254,10 +254,10 @@ class IterativeLearning(_core.optimize.IterativeLearning):
         no error remains
         """
         if self._report is None:
-            found = super().convergence()
-            if found["limit_error_map"] is not None:
-                found["limit_error_map"].flags.writeable = False
-            self._report = ConvergenceReport(**found)
+            report = super().convergence()
+            if report["limit_error_map"] is not None:
+                report["limit_error_map"].flags.writeable = False
+            self._report = ConvergenceReport(**report)
         return self._report
 
     @property

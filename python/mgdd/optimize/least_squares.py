@@ -215,14 +215,14 @@ def quality_of(run: xr.Dataset) -> FitQuality:
 def fit_of(report: FitReport, model: Any, run: xr.Dataset | None, errors: Iterable[float], **more: Any) -> Fit:
     """Make a fit of the best report, its model and free run, the errors of all searches, and what else is known."""
     ranked = tuple(sorted(errors))
-    known = {
+    fields = {
         "kind": model.kind,
         "train": None if run is None else quality_of(run),
         "findings": report.findings,
         "unidentifiable": report.unidentifiable,
         "n_best": n_best_of(ranked),
     }
-    return Fit(report=report, model=model, run=run, draw=draw_run, start_rmse=ranked, **{**known, **more})
+    return Fit(report=report, model=model, run=run, draw=draw_run, start_rmse=ranked, **{**fields, **more})
 
 
 def draw_run(fit: Fit, ax: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Noise, curvature and optimum of a measured map of one input or several: what a tuner has to know."""
+"""Noise, curvature and optimum of a measured map of one input or several: inputs of the tuning."""
 
 from __future__ import annotations
 
@@ -88,14 +88,14 @@ def _unknown(
     optimum: NDArray[np.float64],
     names: tuple[str, ...],
 ) -> tuple[Finding, ...]:
-    """Say of which inputs J does not show a bend, or no optimum between those that were measured."""
+    """Say of which inputs J shows no curvature, or no optimum between those that were measured."""
     out = []
     bends, errors = np.diag(curvature), np.diag(stderr)
     for index, (low, high) in enumerate(zip(x.min(axis=0), x.max(axis=0), strict=True)):
         name = names[index] if names else "theta" if x.shape[1] == 1 else f"theta[{index}]"
         at = float(optimum[index])
         if abs(bends[index]) < _SURE * errors[index]:
-            text = f"J does not bend over {name} by more than its noise: {bends[index]:.3g} ± {errors[index]:.2g}"
+            text = f"J has no curvature over {name} beyond its noise: {bends[index]:.3g} ± {errors[index]:.2g}"
             remedy = f"measure farther out, or more often; tune with amplitude_max of at most {(high - low) / 2:.3g}"
             out.append(Finding("no_bend", (name,), text, remedy))
         if not low <= at <= high:
@@ -191,16 +191,16 @@ def measure_map(
     moved = narrow.optimum - wider.optimum
     covariance = noise[0] * narrow.optimum_variance + np.outer(moved, moved)
     bend_sd = np.sqrt(noise[0] * narrow.curvature_variance)
-    found: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "curvature": narrow.curvature,
         "curvature_stderr": np.hypot(bend_sd, narrow.curvature - wider.curvature),
         "optimum": narrow.optimum,
         "optimum_stderr": np.sqrt(np.diag(covariance)),
     }
     if inputs == 1:
-        found = {name: value.item() for name, value in found.items()}
+        figures = {name: value.item() for name, value in figures.items()}
     else:
-        found |= {"optimum_covariance": covariance, "bends": narrow.bends, "directions": narrow.directions}
+        figures |= {"optimum_covariance": covariance, "bends": narrow.bends, "directions": narrow.directions}
     findings += _unknown(x, narrow.curvature, bend_sd, narrow.optimum, names)
     return MeasuredMap(
         noise_sd=math.sqrt(noise[0]),
@@ -208,5 +208,5 @@ def measure_map(
         points=int(np.count_nonzero(kept)),
         findings=findings,
         inputs=names,
-        **found,
+        **figures,
     )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _SIGNIFICANCE = 0.01  # of the test of lack of fit
-_FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test believes
+_FEWEST_REPEATS = 3  # degrees of freedom of a noise that the test trusts
 _ILL = 1e8  # condition of a design that shows nothing
 
 
@@ -62,32 +62,32 @@ def fit_surface(x: Array, y: Array, *, maximize: bool, names: tuple[str, ...], w
     variance = float(residual @ residual) / max(freedom, 1)
     spread = np.linalg.inv(design.T @ design)
 
-    slope, bend = c[1 : count + 1], np.zeros((count, count))
+    slope, hessian = c[1 : count + 1], np.zeros((count, count))
     bend_variance = np.zeros((count, count))
     for place, (i, j) in enumerate(pairs, start=count + 1):
-        bend[i, j] = bend[j, i] = c[place] * (2.0 if i == j else 1.0)
+        hessian[i, j] = hessian[j, i] = c[place] * (2.0 if i == j else 1.0)
         bend_variance[i, j] = bend_variance[j, i] = spread[place, place] * (4.0 if i == j else 1.0)
-    found = np.linalg.eigh(bend)
-    order = np.argsort(-np.abs(found.eigenvalues))
-    bends, directions = found.eigenvalues[order], found.eigenvectors[:, order].T
+    eigen = np.linalg.eigh(hessian)
+    order = np.argsort(-np.abs(eigen.eigenvalues))
+    bends, directions = eigen.eigenvalues[order], eigen.eigenvectors[:, order].T
     directions *= np.sign(directions[np.arange(count), np.abs(directions).argmax(axis=1)])[:, None]
     terms = np.array([[2.0 * d[i] * d[j] for i, j in pairs] for d in directions])
     own = spread[count + 1 :, count + 1 :]
     doubt = np.sqrt(np.maximum(variance * np.einsum("ij,jk,ik->i", terms, own, terms), 0.0))
     _check_bends(bends, doubt, directions, half, maximize=maximize, names=named, where=where)
 
-    best = -np.linalg.solve(bend, slope)
+    best = -np.linalg.solve(hessian, slope)
     lever = np.zeros((count, design.shape[1]))
     lever[:, 1 : count + 1] = np.eye(count)
     for place, (i, j) in enumerate(pairs, start=count + 1):
         lever[i, place] += best[j]
         lever[j, place] += best[i]
-    lever = np.asarray(-np.linalg.solve(bend, lever))
+    lever = np.asarray(-np.linalg.solve(hessian, lever))
     area = np.outer(half, half)
     return Surface(
         variance=variance,
         freedom=freedom,
-        curvature=bend / area,
+        curvature=hessian / area,
         curvature_variance=bend_variance / area**2,
         optimum=middle + half * best,
         optimum_variance=(lever @ spread @ lever.T) * area,
@@ -197,28 +197,28 @@ def narrowed(
 
     x has the shape (n, inputs); the farthest distinct point, in scaled columns, is left out first.
     """
-    kept = np.ones(y.size, dtype=np.bool_)
+    used = np.ones(y.size, dtype=np.bool_)
     narrow, noise = wide, (wide.variance, wide.freedom)
     richer = _richer(x, y)
     if richer is None:
-        return narrow, kept, noise
+        return narrow, used, noise
     free = (float((y - richer[0]) @ (y - richer[0])) / richer[1], richer[1])
     scale = _scaled(x)[2]
     best = x[np.argmax(richer[0] if maximize else -richer[0])]
-    while not _fits(x[kept], y[kept], narrow, free):
+    while not _fits(x[used], y[used], narrow, free):
         noise = free
-        at = np.unique(x[kept], axis=0)
+        at = np.unique(x[used], axis=0)
         away = np.linalg.norm((at - best) / scale, axis=1)
         farthest = at[away.size - 1 - away[::-1].argmax()]
-        fewer = kept & (x != farthest).any(axis=1)
+        fewer = used & (x != farthest).any(axis=1)
         points = fewest(x.shape[1])
         if len(at) <= points or np.count_nonzero(fewer) < points + 2:
             break
         if _unseen(x[fewer], _numbered(x)) is not None:
             break
-        kept = fewer
-        narrow = fit(x[kept], y[kept], f" in {span_of(x[kept])}, over the whole of it J is not a parabola")
-    return narrow, kept, noise
+        used = fewer
+        narrow = fit(x[used], y[used], f" in {span_of(x[used])}, over the whole of it J is not a parabola")
+    return narrow, used, noise
 
 
 def span_of(x: Array) -> str:
@@ -228,8 +228,8 @@ def span_of(x: Array) -> str:
     return f"the {len(np.unique(x, axis=0))} points nearest to the best one"
 
 
-def twice_as_wide(x: Array, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def twice_as_wide(x: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which points lie in a range twice as wide as that of the kept ones."""
-    low, high = x[kept].min(axis=0), x[kept].max(axis=0)
+    low, high = x[used].min(axis=0), x[used].max(axis=0)
     around: NDArray[np.bool_] = (np.abs(x - 0.5 * (low + high)) <= high - low).all(axis=1)
     return around

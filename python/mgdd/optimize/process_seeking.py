@@ -160,8 +160,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
         Delay and lag of each component of J, for example efficiency at once and NOx behind its analyser; `tell` then
         takes one number per component, each with a process of its own.
     delay_uncertainty : int
-        Cycles by which a delay may be shorter or longer than told, at most 20; ``delay_cycles`` says which one the
-        readings show. A delay of 0, and one beside a lag, is taken as told.
+        Cycles by which a delay may be shorter or longer than given, at most 20; ``delay_cycles`` says which one the
+        readings show. A delay of 0, and one beside a lag, is taken as given.
     guide : callable, fitted response or DataArray, optional
         What a model says of J over one to five inputs: a callable of what `ask` gives or of plain numbers, asked on a
         grid between the bounds; a fit of `mgdd.surrogate.fit_response`; or a map with one dimension and its coordinates
@@ -186,8 +186,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
     -----
     Readings that the process does not explain age what was known by ten times `memory_cycles`; `doubts` counts that.
     Where forty inputs in a row have stayed at the estimate, the search is over until the next of these, and a small
-    dither around it goes on: with `memory_cycles` at 143, some 0.02 bounds where noise is a hundredth of the bend.
-    Cycles told as misfires have a process of their own, which keeps the search out of what is likely to fail.
+    dither around it goes on: with `memory_cycles` at 143, some 0.02 bounds where noise is a hundredth of the curvature.
+    Cycles reported as misfires have a process of their own, which keeps the search out of what is likely to fail.
     `trust` says how much of J a guide explains.
     Of a limit whose readings stand well above 0 the logarithm is learnt: quantities as NOx spread over powers of ten.
 
@@ -258,8 +258,8 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
 
     def _believe(self, applied: Any) -> None:
         """Tell what is expected there: J of the best input, limits as last read near it."""
-        told = self._history_columns()
-        fired = told["misfire"] == 0.0
+        history = self._history_columns()
+        fired = history["misfire"] == 0.0
         names = self.input_names
         at = np.array([applied[name] for name in names] if names else applied, np.float64)
         if not fired.any():
@@ -269,10 +269,10 @@ class GaussianProcessSeeking(Seeker, _core.optimize.GaussianProcessSeeking):
             return
         own = self.settings
         bounds = [(one.lower, one.upper) for one in own["inputs"]] or list(zip(own["lower"], own["upper"], strict=True))
-        away = np.linalg.norm((told["applied"] - at)[fired] / np.ptp(bounds, axis=1), axis=1)
+        away = np.linalg.norm((history["applied"] - at)[fired] / np.ptp(bounds, axis=1), axis=1)
         near = np.flatnonzero(fired)[np.argmin(away)]
-        j = float(self.expected) if self.expected_sd > 0.0 else float(told["objective"][near])
-        self.tell(j, told["limits"][near].tolist() or None, applied=applied)
+        j = float(self.expected) if self.expected_sd > 0.0 else float(history["objective"][near])
+        self.tell(j, history["limits"][near].tolist() or None, applied=applied)
 
     def tell(
         self,

@@ -223,11 +223,11 @@ class Seeker(SeekerFindings):
             The file cannot be read.
         """
         kind, settings, state = _read(path)
-        known = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
-        if kind not in known:
-            raise DataError(hinted(f"{Path(path)}: holds a {kind}, not a {' or '.join(known)}", kind, known))
+        classes = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
+        if kind not in classes:
+            raise DataError(hinted(f"{Path(path)}: holds a {kind}, not a {' or '.join(classes)}", kind, classes))
         try:
-            seeker: Self = rebuilt(known[kind], settings, state, None)
+            seeker: Self = rebuilt(classes[kind], settings, state, None)
         except (Error, TypeError, KeyError) as error:
             raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
         return seeker
@@ -252,13 +252,13 @@ def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, 
     file = Path(path)
     try:
         content = parsed(read_plain_text(file, only_utf8=True), "content", "JSON", _decode)
-        found = content["format"]
+        version = content["format"]
         kind, settings, state = content["kind"], content["settings"], content["state"]
     except (ValueError, KeyError, TypeError) as error:
-        said = str(error) if isinstance(error, DataError) else repr(error)
-        raise DataError(f"{file}: is not a seeker written by save(): {said}") from error
-    if found != _FORMAT:
-        raise DataError(f"{file}: has format {found!r}: this version of mgdd reads format {_FORMAT}")
+        reason = str(error) if isinstance(error, DataError) else repr(error)
+        raise DataError(f"{file}: is not a seeker written by save(): {reason}") from error
+    if version != _FORMAT:
+        raise DataError(f"{file}: has format {version!r}: this version of mgdd reads format {_FORMAT}")
     if not (isinstance(kind, str) and isinstance(settings, dict) and isinstance(state, dict)):
         raise DataError(f"{file}: is not a seeker written by save(): kind, settings or state are not what they must be")
     return kind, settings, state

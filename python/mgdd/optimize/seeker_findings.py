@@ -1,4 +1,4 @@
-"""What a seeker has found out that speaks against its run, in words."""
+"""Findings of a seeker: reasons to doubt its run, in words."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class SeekerFindings(_CoreSeeker):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What speaks against the run so far.
+        """Reasons to doubt the run so far.
 
         Codes: ``failing_inputs``, ``failing_everywhere``, ``failing_cycles`` (a tenth of all, and no input is known
         to fail), ``limit_delay``, ``frozen`` (a channel read the same to the last bit, twelve cycles in a row, at
@@ -95,21 +95,21 @@ def findings_of(settings: Mapping[str, Any], watched: Mapping[str, Any]) -> tupl
         for index in np.flatnonzero(np.isfinite(edges)):
             name, edge = _name(settings, int(index)), float(edges[index])
             text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
-            remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
+            remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or correct what makes it fail"
             out.append(Finding("failing_inputs", (name,), text, remedy))
     cycle, misfires, alike = watched["cycle"], watched["misfires"], watched["alike"]
     if not out and misfires >= max(4, 0.1 * cycle):
         text = f"{misfires} of {cycle} cycles gave no reading: J is learnt from the others"
         out.append(
-            Finding("failing_cycles", (), text, "mend what makes them fail, or set bounds inside of where they do")
+            Finding("failing_cycles", (), text, "correct what makes them fail, or set bounds inside of where they do")
         )
     for limit in settings["limits"]:
         taken = watched["limit_delays"][limit.name]
         if taken != limit.delay_cycles:
-            text = f"readings of {limit.name} fit a delay of {taken:g} cycles, not {limit.delay_cycles:g} as stated"
+            text = f"readings of {limit.name} fit a delay of {taken:g} cycles, not {limit.delay_cycles:g} as configured"
             at_end = abs(taken - limit.delay_cycles) >= limit.delay_uncertainty
             more = ", and raise delay_uncertainty: it is the end of the search" if at_end else ""
-            out.append(Finding("limit_delay", (limit.name,), text, f"mend delay_cycles of the limit{more}"))
+            out.append(Finding("limit_delay", (limit.name,), text, f"correct delay_cycles of the limit{more}"))
     limits = [limit.name for limit in settings["limits"]]
     components = len(alike) - len(limits)
     channels = ["J" if components == 1 else f"J[{index}]" for index in range(components)] + limits

@@ -114,13 +114,13 @@ class Tuning(InputNumbers):
             f"cost in J: {self.dither_cost:.3g} by the perturbation, {self.jitter_cost:.3g} by the error",
         ]
         if self.delay_cycles > 0.0 or self.lag_cycles > 0.0:
-            known = "turned back" if self.compensated else "not compensated"
+            state = "turned back" if self.compensated else "not compensated"
             shares = " and ".join(f"{100.0 * share:.0f} %" for share in np.ravel(self.sensor_gain))
             turns = " and ".join(f"{phase:.0f} deg" for phase in np.ravel(self.sensor_phase_deg))
-            lines.append(f"the sensor leaves {shares} of the echo and turns it by {turns} ({known})")
+            lines.append(f"the sensor leaves {shares} of the echo and turns it by {turns} ({state})")
         if np.ndim(self.curvature) and (flattest := coupling_of(self.curvature)[0][0]) < _COUPLED:
             lines.append(
-                f"the inputs are coupled: in the flattest direction J bends {flattest:.2g} of what it does along the "
+                f"the inputs are coupled: in the flattest direction J has {flattest:.2g} of its curvature along the "
                 f"inputs, and the approach takes {1.0 / flattest:.2g} times as long"
             )
         if self.delay_uncertainty > 0.0:
@@ -327,8 +327,8 @@ def tune(
     check_wish(noise_sd, method, delay_uncertainty, cycles)
     several, of = np.ndim(hessian) > 0, of_each(np.atleast_2d(hessian), names)
     each = {name: per_input(name, named_values(name, value, names), of) for name, value in lengths.items()}
-    wanted: dict[str, Any] = {"method": method, "delay_uncertainty": delay_uncertainty, "cycles": cycles}
-    values = tuned(noise_sd, np.atleast_2d(hessian), of, lengths=each, **wanted, **lag)
+    options: dict[str, Any] = {"method": method, "delay_uncertainty": delay_uncertainty, "cycles": cycles}
+    values = tuned(noise_sd, np.atleast_2d(hessian), of, lengths=each, **options, **lag)
     if not several:
         del values["harmonics"]
         values = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in values.items()}

@@ -36,8 +36,8 @@ def coupling_of(hessian: Array) -> tuple[Array, Array]:
     """Return eigenvalues and eigenvectors of a matrix of curvatures whose diagonal is scaled to ones."""
     size = np.sqrt(np.abs(np.diag(hessian)))
     scaled = np.abs(hessian[0, 0]) / hessian[0, 0] * hessian / np.outer(size, size)
-    found = np.linalg.eigh(scaled)
-    return found.eigenvalues, found.eigenvectors
+    eigen = np.linalg.eigh(scaled)
+    return eigen.eigenvalues, eigen.eigenvectors
 
 
 def harmonics_of(inputs: int, *, least: int, per_harmonic: float = 0.0) -> tuple[int, tuple[int, ...]]:
@@ -51,8 +51,8 @@ def harmonics_of(inputs: int, *, least: int, per_harmonic: float = 0.0) -> tuple
         fastest = min((period - 1) // 2, int(period / per_harmonic) if per_harmonic > 0.0 else period)
         for top in range(inputs, fastest + 1):
             for below in combinations(range(top - 1, 0, -1), inputs - 1):  # close to each other: less ripple
-                if _apart(found := (*below[::-1], top), period):
-                    return period, found
+                if _apart(harmonics := (*below[::-1], top), period):
+                    return period, harmonics
         period += 1
 
 
@@ -163,16 +163,16 @@ def _dither(
     decades = float(np.log(ratio).max())
     # The fastest direction keeps to the bound of averaging, the slowest one has to arrive.
     tau_least = bends[-1] * max((4.0 if lagged and compensated else 2.0) * period, _DELAYS_PER_TAU * (whole + doubt))
-    wished = cycles if cycles is not None else max(_CYCLES, (period + tau_least / bends[0] * decades) / _RESERVE)
-    tau = max(tau_least, bends[0] * (_RESERVE * wished - period) / decades)
+    cycles_wanted = cycles if cycles is not None else max(_CYCLES, (period + tau_least / bends[0] * decades) / _RESERVE)
+    tau = max(tau_least, bends[0] * (_RESERVE * cycles_wanted - period) / decades)
 
     def scatter(amplitude: Array) -> Array:
         """Solve the stationary covariance of z with the noise of the slopes that its steps take in."""
         noise = (along.T * (2.0 * (noise_sd / (echo * amplitude * tau)) ** 2)) @ along
         share = bends / tau
         if batch:
-            kept = 1.0 - period * share
-            own = period * noise / (1.0 - np.outer(kept, kept))
+            decay = 1.0 - period * share
+            own = period * noise / (1.0 - np.outer(decay, decay))
         else:
             own = noise / np.add.outer(share, share)
         return np.asarray(along @ own @ along.T)
@@ -203,46 +203,46 @@ def _dither(
     return out, final
 
 
-def spsa_moments(bend: Array, q: float, c: Array) -> Array:
+def spsa_moments(hessian: Array, q: float, c: Array) -> Array:
     """Return what an iteration makes of the second moments of c z, row by row: each slope bears those of all inputs."""
     count = c.size
-    slopes, eye = bend * np.outer(c, 1.0 / c), np.eye(count)
+    slopes, eye = hessian * np.outer(c, 1.0 / c), np.eye(count)
     squares = np.kron(slopes, slopes).reshape(count, count, count * count)
     spread = 2.0 * squares
     spread[np.arange(count), np.arange(count)] = np.trace(squares)
-    kept = np.eye(count * count) - q * (np.kron(slopes, eye) + np.kron(eye, slopes))
-    return np.asarray(kept + q * q * spread.reshape(count * count, -1))
+    linear = np.eye(count * count) - q * (np.kron(slopes, eye) + np.kron(eye, slopes))
+    return np.asarray(linear + q * q * spread.reshape(count * count, -1))
 
 
 def _spsa(
     noise_sd: float, coupling: tuple[Array, Array], spec: Mapping[str, Array], cycles: float | None
 ) -> tuple[dict[str, Any], Array]:
     count = coupling[0].size
-    wished = _CYCLES if cycles is None else cycles
+    cycles_wanted = _CYCLES if cycles is None else cycles
     decades = float(np.log(spec["distance"] / spec["arrival"]).max())
-    bend = _matrix(coupling)
+    hessian = _matrix(coupling)
 
     def shrinks(q: float) -> float:
-        return float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, spec["amplitude_max"]))).max())
+        return float(np.abs(np.linalg.eigvals(spsa_moments(hessian, q, spec["amplitude_max"]))).max())
 
     # Steps above 1/(inputs + 1) gain little: the slopes of the other inputs scatter them.
     steps = np.linspace(0.0, 1.0 / (count + 1), 201)[1:]
     factors = np.array([shrinks(q) for q in steps])
     q = float(steps[factors.argmin()])
-    wanted = math.exp(-4.0 * decades / (_RESERVE * wished))
-    if factors.min() < wanted:
+    target = math.exp(-4.0 * decades / (_RESERVE * cycles_wanted))
+    if factors.min() < target:
         low, high = 0.0, q
         for _ in range(60):
             q = 0.5 * (low + high)
-            low, high = (low, q) if shrinks(q) < wanted else (q, high)
+            low, high = (low, q) if shrinks(q) < target else (q, high)
 
     def scatter(c: Array) -> Array:
         noise = (0.5 * (q * noise_sd) ** 2 * np.eye(count)).ravel()
-        own = np.linalg.solve(np.eye(count * count) - spsa_moments(bend, q, c), noise).reshape(count, count)
+        own = np.linalg.solve(np.eye(count * count) - spsa_moments(hessian, q, c), noise).reshape(count, count)
         return np.asarray(own / np.outer(c, c))
 
     c = _amplitudes(spec["amplitude_max"], spec, scatter)
-    time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(bend, q, c))).max()))
+    time_constant = -4.0 / math.log(float(np.abs(np.linalg.eigvals(spsa_moments(hessian, q, c))).max()))
     out = {
         "amplitude": c,
         "period": 2,
@@ -275,33 +275,33 @@ def hessian_of(curvature: Any, inputs: Sequence[str]) -> tuple[Any, tuple[str, .
     if isinstance(curvature, Mapping):
         names = names or tuple(map(str, curvature))
         curvature = named_values("curvature", curvature, names)
-    found = np.asarray(curvature, dtype=np.float64)
-    if found.size == 1:
-        found = found.reshape(())
-    count = len(found) if found.ndim else 1
-    if found.ndim > 2 or found.shape not in ((), (count,), (count, count)) or count > _MOST_INPUTS:
+    values = np.asarray(curvature, dtype=np.float64)
+    if values.size == 1:
+        values = values.reshape(())
+    count = len(values) if values.ndim else 1
+    if values.ndim > 2 or values.shape not in ((), (count,), (count, count)) or count > _MOST_INPUTS:
         raise ShapeError(
-            f"curvature has shape {found.shape}: must be a number, one per input, or the matrix of at most "
+            f"curvature has shape {values.shape}: must be a number, one per input, or the matrix of at most "
             f"{_MOST_INPUTS} inputs"
         )
     if names and len(names) != count:
         raise ShapeError(f"inputs has {len(names)} entries: must have {count}, one per input of curvature")
-    for value in np.ravel(found if found.ndim < 2 else np.diag(found)):
+    for value in np.ravel(values if values.ndim < 2 else np.diag(values)):
         if not (math.isfinite(value) and value != 0.0):
             raise ParameterError.of("|curvature|", abs(value), "> 0; measure J at three points per input or more")
-    if not found.ndim:
-        return float(found), names
-    if found.ndim == 1:
-        return np.diag(-np.abs(found)), names
-    if not np.isfinite(found).all() or not np.allclose(found, found.T, rtol=1e-6, atol=0.0):
+    if not values.ndim:
+        return float(values), names
+    if values.ndim == 1:
+        return np.diag(-np.abs(values)), names
+    if not np.isfinite(values).all() or not np.allclose(values, values.T, rtol=1e-6, atol=0.0):
         raise ParameterError("curvature: must be a symmetric matrix of finite numbers")
-    sizes = coupling_of(found)[0]
-    if (np.diag(found) > 0.0).any() != (np.diag(found) > 0.0).all() or not sizes[0] > _FLAT:
+    sizes = coupling_of(values)[0]
+    if (np.diag(values) > 0.0).any() != (np.diag(values) > 0.0).all() or not sizes[0] > _FLAT:
         raise ParameterError(
             "curvature: J must bend one way in every direction; its scaled matrix has the eigenvalues "
             f"{', '.join(f'{size:.3g}' for size in sizes)}: measure again, or give one number per input"
         )
-    return found, names
+    return values, names
 
 
 def of_each(hessian: NDArray[np.float64], names: Sequence[str]) -> tuple[str, ...]:

@@ -181,10 +181,10 @@ class ActuatorGuard(AroundPlant):
         limits: Mapping[str, float] | Sequence[Limit] = (),
         hold_cycles: int = 1,
     ) -> None:
-        names, kept = plant.input_names, limits_of(limits)
+        names, limits_kept = plant.input_names, limits_of(limits)
         for argument, given in (("start", start), ("bounds", bounds), ("rates", rates)):
             _require_known(argument, given, names)
-        _require_known("limits", [limit.name for limit in kept], plant.limit_names)
+        _require_known("limits", [limit.name for limit in limits_kept], plant.limit_names)
         for name in names:
             if name not in bounds or name not in start:
                 raise ParameterError(f"{name}: needs a start and bounds")
@@ -202,9 +202,9 @@ class ActuatorGuard(AroundPlant):
         self.start = {name: float(start[name]) for name in names}
         self.bounds = {name: (float(bounds[name][0]), float(bounds[name][1])) for name in names}
         self.rates = {name: float(rate) for name, rate in rates.items()}
-        self.limits = kept
+        self.limits = limits_kept
         self.hold_cycles = int(hold_cycles)
-        self._delay = max((_delay(limit) for limit in kept), default=0)
+        self._delay = max((_delay(limit) for limit in limits_kept), default=0)
         self._goods = [self.start]
         self._applied: dict[str, float] | None = None
         self._recent: deque[dict[str, float]] = deque(maxlen=self._delay + 1)

@@ -259,17 +259,17 @@ class ReplayRig(OpenOnce):
         if self.sample >= len(self.record):
             raise RigError(f"the record ends after {len(self.record)} samples: ask for fewer")
         recorded = self.record[self.sample]
-        found = [
+        differences = [
             Difference(self.sample, name, asked, recorded.inputs[name])
             for name, asked in self._asked.items()
             if not abs(asked - recorded.inputs[name]) <= self.tolerance
         ]
-        if found and self.strict:
-            one = found[0]
+        if differences and self.strict:
+            one = differences[0]
             raise RigError(
                 f"sample {one.sample}: {one.name} = {one.asked:g} was asked for, {one.recorded:g} is recorded; "
                 "strict=False goes on and lists the differences"
             )
-        self.differences += found
+        self.differences += differences
         self.sample += 1
         return recorded.measurement

@@ -76,9 +76,9 @@ def export_record(
     """
     record, whole = existing_file(source), Path(target)
     chosen = whole.suffix.removeprefix(".").lower() if kind is None else kind
-    known = (*LOG_WRITERS, "mf4", *_TABLE_WRITERS)
-    if chosen not in known:
-        raise ParameterError.of("kind", chosen, f"one of {', '.join(known)}")
+    kinds = (*LOG_WRITERS, "mf4", *_TABLE_WRITERS)
+    if chosen not in kinds:
+        raise ParameterError.of("kind", chosen, f"one of {', '.join(kinds)}")
     if chosen in _TABLE_WRITERS:
         if whole.exists():
             raise RigError(f"{whole} exists already: name a new folder")

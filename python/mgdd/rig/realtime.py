@@ -87,7 +87,7 @@ class RealtimeLoop:
     reference_deg : float
         First reference [deg].
     reference_timeout_s : float, optional
-        A driven loop that hears of no new reference for so long aborts: against a Python that hangs [s].
+        A driven loop that receives no new reference for so long aborts: against a Python that hangs [s].
     transmit : bool
         False: everything but sending, a dry run.
     stop_frames : int
@@ -179,7 +179,7 @@ class RealtimeLoop:
             reference_timeout_s=reference_timeout_s, transmit=transmit, stop_frames=stop_frames, realtime=realtime,
             priority=priority, lock_memory=lock_memory, sample_capacity=sample_capacity, queue_capacity=queue_capacity,
         )  # fmt: skip
-        self._pause_s = max(_PAUSE_S, 2.0 * self.envelope.cycle_s)  # one request is heard per cycle
+        self._pause_s = max(_PAUSE_S, 2.0 * self.envelope.cycle_s)  # one request is taken per cycle
         self._origin_ns: int | None = None
         # Also at the end of the interpreter: a thread of the core must not outlive it.
         self._end = weakref.finalize(self, self._core.stop, self._core.patience_s)
@@ -267,9 +267,9 @@ class RealtimeLoop:
             time.sleep(_PAUSE_S)
             self._require_running()
 
-    def _ask(self, request: str, wanted: str, timeout_s: float) -> None:
+    def _ask(self, request: str, target_mode: str, timeout_s: float) -> None:
         until = time.monotonic() + timeout_s
-        while self.mode != wanted:
+        while self.mode != target_mode:
             self._require_running()
             if time.monotonic() > until:
                 why = self.cause if self.cause != "none" else f"too few good frames, or the wrong mode, {self.mode}"

@@ -184,9 +184,9 @@ def readable_record(path: str | os.PathLike[str]) -> RecordedRun:
 
 def _warn_of_rest(path: str | os.PathLike[str], ignored_bytes: int) -> None:
     if ignored_bytes:
-        said = "are not readable and left out: mgdd.rig.repair_record looks behind them"
+        state = "are not readable and left out: mgdd.rig.repair_record looks behind them"
         warnings.warn(
-            f"{printable(os.fspath(path))}: {ignored_bytes} bytes at its end {said}", UserWarning, stacklevel=3
+            f"{printable(os.fspath(path))}: {ignored_bytes} bytes at its end {state}", UserWarning, stacklevel=3
         )
 
 
@@ -230,8 +230,8 @@ def _table_dataset(table: Mapping[str, Any], start: int) -> xr.Dataset:
     for place, given in enumerate(table["columns"]):
         name = _free(given, variables)
         values = table["values"][:, place]
-        known = VARIABLES.get(name)
-        label = known or (unit_of(name), name.replace("_", " ").strip() or repr(name))
+        standard = VARIABLES.get(name)
+        label = standard or (unit_of(name), name.replace("_", " ").strip() or repr(name))
         variables[name] = ("time_s", values, *label)
     return labelled_dataset(variables)
 

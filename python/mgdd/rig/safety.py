@@ -43,21 +43,21 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
 
     def to_parameters(self) -> ParameterFile:
         """Give all fields, as `to_toml` writes them."""
-        units = {name: wanted.unit for name, wanted in _wanted().items()}
+        units = {name: wanted.unit for name, wanted in _entries().items()}
         return ParameterFile(kind=_KIND, tables={"parameters": entries(self.to_dict(), units)})
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> SafetyEnvelope:
         """Make the envelope of a file that `to_toml` wrote."""
         file.expect(kinds=(_KIND,), tables=("parameters",), notes=("name", "title", "source"))
-        return cls(**file.values("parameters", _wanted()))
+        return cls(**file.values("parameters", _entries()))
 
     def replace(self, **changes: Any) -> SafetyEnvelope:
         """Give a validated copy with some fields changed; an unknown name is a ParameterError."""
         return type(self)(**super().replace(**changes).to_dict())
 
 
-def _wanted() -> dict[str, Wanted]:
+def _entries() -> dict[str, Wanted]:
     fields = _core.rig.SafetyEnvelope.fields()
     return {n: Wanted(form="text") if n == _CHOICE else Wanted(field["unit"]) for n, field in fields.items()}
 
@@ -295,7 +295,7 @@ class GatedThrottle:
 
 
 def facts_of(values: Mapping[str, float] | None, cycle_s: float) -> dict[str, Any]:
-    """Give what measured values of a throttle tell a gate; a measurement is new while its age is below a cycle."""
+    """Give a gate's inputs from measured values of a throttle; a measurement is new while its age is below a cycle."""
     if values is None:
         return {}
     age_s = values.get("age_s", 0.0)

@@ -113,7 +113,7 @@ def test_info_says_what_each_column_is_taken_for(capsys: Capsys) -> None:
     assert taken["t_ms"] == ("time_1_s", "time_1_s")
     assert taken["T_exh"] == ("T_exh", "time_1_s")
     assert taken["imep"] == ("imep", "cycle")
-    assert shown["doubts"] == ["the file gives no unit of 'imep': their numbers stand as they are"]
+    assert shown["doubts"] == ["the file gives no unit of 'imep': their numbers are unchanged"]
     assert main(["data", "info", "all.h5"]) == 0
     text = capsys.readouterr().out.splitlines()
     assert text[2].split() == ["column", "unit", "rows", "lowest", "highest", "taken", "for", "over"]

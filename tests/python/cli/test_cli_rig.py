@@ -60,7 +60,7 @@ def test_a_hub_says_its_bus_and_at_the_end_its_counts() -> None:
     ("arguments", "text"),
     [
         (["hub", "--fault", "dropp:p=1"], "fault = 'dropp': must be one of drop"),
-        (["node", "--bus", BUS], "nobody answers there"),
+        (["node", "--bus", BUS], "no answer there"),
         (["node", "--bus", "can0"], "bus = 'can0': must be INTERFACE:CHANNEL"),
         (["node", "--bus", BUS, "--map", "etp"], "no such file: shipped maps are etb, engine, surrogate"),
         (["node", "--bus", BUS, "--duration-s", "-1"], "--duration-s = -1: must be > 0"),

@@ -120,7 +120,7 @@ GOOD = "speed_rpm,fuel_mg,timing_cad,sd_cad\n900,6,-2,1\n900,20,-4,1\n1500,6,-3,
         ("fuel_mg,timing_cad,support\n6,-2,1\n20,-4,-1\n", "line 3, column 'support': -1: must be >= 0"),
         ("fuel_mg,timing_cad\nkg,rad\n6,-2\n20,-3\n", "column 'fuel_mg': unit 'kg': must be 'mg'.*convert"),
         ("6,-2\n20,-3\n", "no header"),
-        ("fuel_mg,fuel_mg,timing_cad\n6,7,-2\n20,8,-3\n", "column 'fuel_mg' stands twice"),
+        ("fuel_mg,fuel_mg,timing_cad\n6,7,-2\n20,8,-3\n", "column 'fuel_mg' occurs twice"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_place_and_the_remedy(text: str, said: str, tmp_path: Path) -> None:

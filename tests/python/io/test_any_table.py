@@ -374,7 +374,7 @@ def test_fewer_numbers_than_a_file_told_are_refused(tmp_path: Path) -> None:
     columns = columns_of([Named("v", Samples(5, float, lambda: np.ones(1)))])
     table = ArrayTable("a", ("v",), None, (columns[0][2],), tmp_path / "a")
     for read in (table.loaded, lambda: table.numbers(0)):
-        with pytest.raises(DataError, match=r"numbers where \((1, )?5,?\) are said to be"):
+        with pytest.raises(DataError, match=r"numbers where the head states \((1, )?5,?\)"):
             read()
 
 

@@ -185,7 +185,7 @@ def test_what_is_wrong_is_said(bench, tmp_path: Path, options, said: str) -> Non
 
 def test_a_short_record_and_a_hole_are_named(bench, tmp_path: Path) -> None:
     short = bench[bench["behind"].between(300.0, 900.0)]
-    with pytest.raises(DataError, match=r"the encoder tells [56]\d\d\.?\d* degrees: a cycle of 720 is needed"):
+    with pytest.raises(DataError, match=r"the encoder covers [56]\d\d\.?\d* degrees: a cycle of 720 is needed"):
         read_pressure(saved(short, tmp_path, "time [s]", "crank", "pcyl [bar]"), encoder=WHEEL, firing_tdc_deg=TDC_DEG)
     holed = bench.copy()
     holed.loc[777, "pcyl [bar]"] = np.nan

@@ -184,7 +184,7 @@ ARRAY_FAULTS = {
         np.arange(0.0, 361.0),
         2.0 + 100.0 * np.exp(-((np.arange(0.0, 361.0) - 355.0) ** 2) / 900.0),
         {},
-        "102 bar stands at 355, far from firing TDC: .*firing_tdc_deg=",
+        "102 bar is at 355, far from firing TDC: .*firing_tdc_deg=",
     ),
     "radians": (np.deg2rad(ANGLES), BAR, {}, r"span only 4\.64\d+ degrees: this looks like radians; .*'rad'"),
     "degrees": (ANGLES, BAR, {"angle_unit": "rad"}, "span 266 rad: this looks like degrees; .*'deg'"),

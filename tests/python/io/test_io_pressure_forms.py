@@ -205,7 +205,7 @@ def test_samples_without_an_angle(write: Write) -> None:
     np.testing.assert_array_equal(closed["pressure_bar"], BAR)
     unnamed = read_pressure(write([np.arange(BAR.size), BAR]), angle_step_deg=1.0, angle_start_deg=-143.0)
     np.testing.assert_array_equal(unnamed["pressure_bar"], BAR)
-    with pytest.raises(DataError, match=r"says nothing of firing TDC: pass angle_start_deg= .*firing_tdc_deg="):
+    with pytest.raises(DataError, match=r"gives no firing TDC: pass angle_start_deg= .*firing_tdc_deg="):
         read_pressure(path, angle_step_deg=0.5)
     with pytest.raises(DataError, match=r"angle_step_deg is for samples without .*, angle_column for a column"):
         read_pressure(path, angle_step_deg=0.5, angle_column=0)
@@ -226,7 +226,7 @@ def test_times_become_angles(write: Write, unit: str, per_s: float, header: str)
     trace = read_pressure(path, speed_rpm=1500.0, angle_start_deg=-143.0, **said)
     np.testing.assert_allclose(trace[ANGLE], CLOSED, atol=1e-8)
     assert trace.attrs["speed_rpm"] == 1500.0
-    with pytest.raises(DataError, match="a time says nothing of firing TDC: pass angle_start_deg="):
+    with pytest.raises(DataError, match="a time gives no firing TDC: pass angle_start_deg="):
         read_pressure(path, speed_rpm=1500.0, **said)
     if header:
         with pytest.raises(DataError, match=f"is in {unit} as the file says: leave angle_unit out"):
@@ -288,9 +288,9 @@ def test_volts(write: Write) -> None:
     np.testing.assert_allclose(
         read_pressure(milli, gain_bar_per_v=25.0, offset_bar=-7.5)["pressure_bar"], BAR, atol=1e-12
     )
-    with pytest.raises(DataError, match="is for volts, and the pressure is said to be in bar: give one"):
+    with pytest.raises(DataError, match="is for volts, and the pressure is given in bar: give one"):
         read_pressure(path, gain_bar_per_v=25.0, pressure_unit="bar")
-    with pytest.raises(DataError, match="said to be in kPa"):
+    with pytest.raises(DataError, match="is given in kPa"):
         read_pressure(write([CLOSED, BAR], "angle,p_kPa"), gain_bar_per_v=25.0)
     with pytest.raises(DataError, match="offset_bar acts on volts only"):
         read_pressure(path, offset_bar=1.0)

@@ -113,7 +113,7 @@ def test_the_same_trace_in_every_format(form: str, write: Write, tmp_path: Path)
         if form not in WITHOUT_UNITS:
             assert bench[name].attrs["units"] == expected[name].attrs["units"]
     if form in WITHOUT_UNITS:
-        said = "the file gives no unit of 'p_intake', 'torque': their numbers stand as they are"
+        said = "the file gives no unit of 'p_intake', 'torque': their numbers are unchanged"
         assert said in bench.attrs["warnings"] or "'torque', 'p_intake'" in bench.attrs["warnings"]
         assert bench["torque"].attrs["units"] == "1"
 
@@ -234,7 +234,7 @@ def test_names_and_units_of_the_file(write: Write) -> None:
     }  # fmt: skip
     assert bench["level"].attrs["long_name"] == "level, unit of inH2O"
     assert bench.attrs["warnings"] == (
-        "the file gives no unit of 'c_2nd_lift', 'cycle_of_file': their numbers stand as they are"
+        "the file gives no unit of 'c_2nd_lift', 'cycle_of_file': their numbers are unchanged"
     )
 
 

@@ -46,7 +46,7 @@ def test_a_unit_is_found(head: str, name: str, unit: str, tmp_path: Path) -> Non
     [
         ("p_max_bar\nkPa\n100\n", "column 'p_max_bar': unit 'kPa': must be 'bar', as the name says"),
         ("n [per minute!],\n100,\n", "column 'n': unit 'per minute!' is not a product"),
-        ("a,a\n1,2\n", "column 'a' stands twice"),
+        ("a,a\n1,2\n", "column 'a' occurs twice"),
         ("1,2\n3,4\n", "no header"),
         ("a,b\nx,y\nz,w\nq,1/min2\n", "no numeric rows below the header"),
         ("point,a\nP1,3.5\n", "line 2, column 'point': 'P1' is not a number"),

@@ -310,7 +310,7 @@ def test_copies_share_the_function_and_no_other_process_has_it(library: ctypes.C
         each.apply({"soc_cad": -3.0})
     assert len({each.measure().performance for each in (plant, *twins)}) == 1
     assert twins[0].cycle == 8
-    with pytest.raises(TypeError, match="stands in this process only"):
+    with pytest.raises(TypeError, match="works in this process only"):
         pickle.dumps(plant)
     with pytest.raises(ParameterError, match="this process only"):
         monte_carlo(plant, SEEKERS["Spsa first_order"](), range(4), cycles=5, executor=lambda: ProcessPoolExecutor(1))

@@ -251,7 +251,7 @@ DAMAGE = [
     ("csv", edited("mgdd_map,1\n", "mgdd_map,1\nmgdd_map,1\n"), "line 2: mgdd_map,1: stands in the file already"),
     ("csv", edited("columns,fuel_mg,mg,", "columns,fuel_mg,mg,fuel,"), "a name with commas stands in quotes"),
     ("csv", edited("value,soc_cad,", 'value,soc_cad,"'), "correct the quotes and cells there"),
-    ("json", edited('"format": 1,', '"format": 1, "name": "soc_cad",'), "the key 'name' stands twice"),
+    ("json", edited('"format": 1,', '"format": 1, "name": "soc_cad",'), "the key 'name' occurs twice"),
     ("json", lambda text: text[:200], "not valid JSON"),
     ("json", edited('"kind": "calibration_map"', '"kind": "spsa"'), "kind must be 'calibration_map'"),
     ("json", edited('"format": 1', '"format": 7'), "format = 7"),

@@ -162,7 +162,7 @@ def test_other_units_change_nothing_else(method: str) -> None:
 def test_coupling_slows_the_approach_and_is_told() -> None:
     plain, bound = (tune(NOISE, MAPS[name]) for name in ("two", "two coupled"))
     assert bound.time_constant_cycles == pytest.approx(plain.time_constant_cycles * 1.6 / 0.4)
-    assert "the inputs are coupled: in the flattest direction J bends 0.4" in bound.summary()
+    assert "the inputs are coupled: in the flattest direction J has 0.4" in bound.summary()
     assert "2.5 times as long" in bound.summary()
     assert "coupled" not in plain.summary()
 

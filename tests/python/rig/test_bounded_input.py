@@ -179,7 +179,7 @@ def test_nesting_is_counted_in_levels() -> None:
     assert parsed("[" * 64 + "]" * 64, "a", "JSON") is not None
     with pytest.raises(DataError, match="a: nests more than 64 levels"):
         parsed("[" * 66 + "]" * 66, "a", "JSON")
-    with pytest.raises(DataError, match="the key 'b' stands twice"):
+    with pytest.raises(DataError, match="the key 'b' occurs twice"):
         parsed('{"a": {"b": 1, "b": 2}}', "a", "JSON")
     with pytest.raises(DataError, match="a whole number of 4004 bits: at most 64"):
         parsed("x = 0x" + "f" * 1001, "a", "TOML")

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
 def test_nothing_is_sent_because_an_argument_was_forgotten() -> None:
     with CanTransport("virtual", "forgotten") as spy:
-        with pytest.raises(ParameterError, match="mode = 'simulate': must be said for a bus: 'hil'"):
+        with pytest.raises(ParameterError, match="mode = 'simulate': must be given for a bus: 'hil'"):
             CanRig("etb", "virtual:forgotten")
         with pytest.raises(ParameterError, match="plant = None: must be given for mode='simulate'"):
             CanRig("etb")

@@ -140,7 +140,7 @@ def test_check_says_what_would_run_and_who_is_not_there(tmp_path: Path, capsys: 
         assert heard["commands"] == 0
         assert heard["checks"]["ETB_Status"]["ok"] > 0
     assert main(run) == 2
-    assert "nobody answers there" in json.loads(capsys.readouterr().out)["error"]["message"]
+    assert "no answer there" in json.loads(capsys.readouterr().out)["error"]["message"]
 
 
 def test_a_wrong_map_is_refused_before_anything_is_opened(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,7 +73,7 @@ def test_frames_cross_a_hub_in_order() -> None:
             "channel 'mgdd_none' of interface socketcan cannot be opened: .*(no CAN|No such device)",
         ),
         ("socketcand:can0", "socketcand needs host and port"),
-        ("socketcand:can0?host=127.0.0.1&port=1", "nobody answers there: .*start the hub first: mgdd rig hub"),
+        ("socketcand:can0?host=127.0.0.1&port=1", "no answer there: .*start the hub first: mgdd rig hub"),
         ("pcan:PCAN_USBBUS1", "channel 'PCAN_USBBUS1' of interface pcan cannot be opened"),
     ],
 )
@@ -94,7 +94,7 @@ def test_something_else_at_the_port_of_a_hub() -> None:
 
         answer = threading.Thread(target=greet)
         answer.start()
-        with pytest.raises(RigError, match=r"not socketcand: it said b'SSH-2.0'"):
+        with pytest.raises(RigError, match=r"not socketcand: it sent b'SSH-2.0'"):
             CanTransport.parse(f"socketcand:can0?host=127.0.0.1&port={port}").open()
         answer.join()
 

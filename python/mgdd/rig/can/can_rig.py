@@ -56,12 +56,12 @@ def require_key(
     line = key_line(signal_map)
     if key_file is not None:
         try:
-            said = read_plain_text(key_file).splitlines()
+            lines = read_plain_text(key_file).splitlines()
         except FileNotFoundError as error:
             raise RigError(
                 f"{key_file}: no such key file: write the line {line!r} into it when the bench is safe"
             ) from error
-        if line not in said:
+        if line not in lines:
             raise RigError(f"{key_file}: holds no key of this DBC: it must have the line {line!r}")
         return
     if not sys.stdin.isatty():
@@ -78,7 +78,7 @@ def bus_of(mode: str, signal_map: SignalMap, bus: Bus | str | None, plant: Plant
         raise ParameterError.of("mode", mode, f"one of simulate, {', '.join(BUS_MODES)}")
     if mode == "simulate":
         if bus is not None:
-            bound = "said for a bus: 'hil', 'dry_run' or 'bench'; 'simulate' takes a plant instead"
+            bound = "given for a bus: 'hil', 'dry_run' or 'bench'; 'simulate' takes a plant instead"
             raise ParameterError.of("mode", mode, bound)
         if plant is None:
             raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
@@ -190,9 +190,9 @@ class CanRig:
         """
         self._require_open()
         values = checked_inputs(inputs, self.input_names)
-        known = self.map.inputs
+        mapped = self.map.inputs
         clamped = {
-            name: min(max(value, known[name].lower), known[name].upper)
+            name: min(max(value, mapped[name].lower), mapped[name].upper)
             for name, value in zip(self.input_names, values, strict=True)
         }
         self._take_all()
@@ -212,7 +212,7 @@ class CanRig:
         self._require_open()
         if self._inputs is None:
             raise RigError("measure() before apply(): apply the inputs first")
-        if not self._heard(self.timeout_s):
+        if not self._receive_cycle(self.timeout_s):
             raise RigError(f"{self.bus.name}: within {self.timeout_s * 1e3:g} ms {self._inbox.no_answer()}")
         if self._inbox.failed and self._sends:
             raise RigError(
@@ -224,7 +224,7 @@ class CanRig:
         return measured
 
     def arm(self) -> None:
-        """Send safe frames until the node is ready to be driven; RigError where it is silent or stays failed."""
+        """Send safe frames until the node is ready to be driven; RigError where it does not answer or stays failed."""
         self._require_open()
         self._take_all()
         self._inbox.skip()  # what waited says nothing of now
@@ -237,20 +237,20 @@ class CanRig:
             if self._sends:
                 self._send_safe()
             rounds += 1
-            heard = self._heard(self.map.cycle_s if self.bus.shared else 0.0)
+            received = self._receive_cycle(self.map.cycle_s if self.bus.shared else 0.0)
             self._inbox.skip()
             refuses = self._sends and (self._inbox.failed or self._inbox.unarmed)
-            if heard and not refuses and (rounds >= enough or not self._sends):
-                self._hear_out(before + (rounds if self._sends and self.bus.shared else 0))
+            if received and not refuses and (rounds >= enough or not self._sends):
+                self._drain_answers(before + (rounds if self._sends and self.bus.shared else 0))
                 return
             if time.monotonic() > until if self.bus.shared else rounds > _PEER_CYCLES:
-                if heard:
+                if received:
                     raise RigError(f"{self.bus.name}: the node stays in state {self.state!r}: it cannot be armed")
                 raise RigError(
                     f"{self.bus.name}: within {wait_s:g} s {self._inbox.no_answer()}; is the node on, is this its DBC?"
                 )
 
-    def _hear_out(self, answers: int) -> None:
+    def _drain_answers(self, answers: int) -> None:
         """Wait for answers that are late: one to a safe frame must not pass for that to the first command."""
         until = time.monotonic() + self.timeout_s
         while self._inbox.answers < answers and (left_s := until - time.monotonic()) > 0.0:
@@ -279,7 +279,7 @@ class CanRig:
             raise
 
     def close(self) -> None:
-        """Send five safe frames, then fall silent and disconnect; closing twice does nothing."""
+        """Send five safe frames, then stop sending and disconnect; closing twice does nothing."""
         if not self._is_open:
             return
         self._is_open = False
@@ -322,7 +322,7 @@ class CanRig:
         until = time.monotonic() + max(_LISTEN_S, _LISTEN_CYCLES * max([*cycles, self.map.cycle_s]))
         while (left := until - time.monotonic()) > 0.0:
             self._receive(left)
-        self._punctual.is_timed = self._inbox.answers > 0  # nobody has asked it anything yet
+        self._punctual.is_timed = self._inbox.answers > 0  # it has received no request yet
         if jumping := self._inbox.jumping():
             raise RigError(f"{self.bus.name}: {jumping}: two nodes send it, or most frames are lost")
 
@@ -356,7 +356,7 @@ class CanRig:
             if message.safe:
                 self._hand_over(self._sender.frames(message, message.payloads({}, message.safe)), final=final)
 
-    def _heard(self, timeout_s: float) -> bool:
+    def _receive_cycle(self, timeout_s: float) -> bool:
         """Wait for a whole cycle, then take all that came: the newest state counts, the oldest cycle is next."""
         until = time.monotonic() + timeout_s
         while not self._inbox.ready:

@@ -33,7 +33,7 @@ _FILLERS = r"signal|sig|sensor|value|val|data|indicator|is|the|or|and|[0-9]+|0x[
 _WORDS = re.compile(r"[A-ZÄÖÜ]+(?![a-zäöüß])|[A-ZÄÖÜ]?[a-zäöüß]+|0x[0-9A-Fa-f]+|[0-9]+")
 _IS_NO_VALUE = re.compile(rf"(?:(?:{_FILLERS}) )*(?:(?:{_NO_VALUE}) (?:(?:{_FILLERS}) )*)+")
 _IS_WRONG = re.compile(rf"(?:(?:{_FILLERS}) )*(?:(?:{_NO_VALUE}|{_WRONG}) (?:(?:{_FILLERS}) )*)+")
-_MOST_SAID = 200  # letters of what the parser says: it may quote half a file
+_LONGEST_REASON = 200  # letters of what the parser says: it may quote half a file
 _BYTES, _BITS = 64, 64  # of a CAN FD frame, of a signal
 
 
@@ -117,10 +117,10 @@ class DbcFile:
             logging.getLogger("cantools").setLevel(logging.ERROR)  # of one identifier twice we speak ourselves
             database = cantools.database.load_string(text, database_format="dbc", strict=False)
         except Exception as error:  # the parser raises what it stumbles over
-            said = " ".join(str(error).split())
-            said = said if len(said) <= _MOST_SAID else f"{said[:_MOST_SAID]}…"
+            reason = " ".join(str(error).split())
+            reason = reason if len(reason) <= _LONGEST_REASON else f"{reason[:_LONGEST_REASON]}…"
             raise DataError(
-                f"{file}: cannot be read as a DBC: {said}; correct it there, or map a copy of the file that has only "
+                f"{file}: cannot be read as a DBC: {reason}; correct it there, or map a copy of the file that has only "
                 "the messages you need"
             ) from error
         odd = _taken_twice(database.messages)
@@ -153,7 +153,7 @@ class DbcFile:
 
 
 def _taken_twice(messages: Sequence[Any]) -> dict[str, str]:
-    """Find messages of one name or identifier: which of them is meant, nobody knows."""
+    """Find messages of one name or identifier: which of them is meant is unknown."""
     taken: dict[Any, str] = {}
     odd: dict[str, str] = {}
     for message in messages:
@@ -165,9 +165,9 @@ def _taken_twice(messages: Sequence[Any]) -> dict[str, str]:
     return odd
 
 
-def near(name: str, known: Mapping[str, Any]) -> str:
+def near(name: str, names: Mapping[str, Any]) -> str:
     """Ask for the nearest name, or list them."""
-    return did_you_mean(name, known) or f"it has {', '.join(known) or 'none'}"
+    return did_you_mean(name, names) or f"it has {', '.join(names) or 'none'}"
 
 
 def _message(message: Any) -> DbcMessage:
@@ -219,6 +219,6 @@ def _signal(signal: Any) -> DbcSignal:
 def _missing_of(names: Mapping[int, str], *, quantity: bool) -> tuple[int, ...]:
     """Raw values that are no measurement by their names: "not available" first, then errors of a quantity."""
     words = {raw: "".join(f"{word.lower()} " for word in _WORDS.findall(name)) for raw, name in names.items()}
-    missing = [raw for raw, said in words.items() if _IS_NO_VALUE.fullmatch(said)]
-    wrong = [raw for raw, said in words.items() if quantity and _IS_WRONG.fullmatch(said)]
+    missing = [raw for raw, text in words.items() if _IS_NO_VALUE.fullmatch(text)]
+    wrong = [raw for raw, text in words.items() if quantity and _IS_WRONG.fullmatch(text)]
     return tuple(dict.fromkeys((*missing, *wrong)))

@@ -110,7 +110,7 @@ class Inbox:
 
     def __init__(self, signal_map: SignalMap) -> None:
         self.map = signal_map
-        self.skipped = 0  # whole cycles that nobody read before the next command
+        self.skipped = 0  # whole cycles that were not read before the next command
         self.state = ""  # that the node reported last
         self._receiver = Receiver(signal_map.measurements)
         self._cycles = 0
@@ -156,15 +156,15 @@ class Inbox:
 
     @property
     def ready(self) -> bool:
-        """Whether there is a whole cycle that nobody has read."""
+        """Whether there is an unread whole cycle."""
         return bool(self._whole)
 
     def read(self) -> tuple[int, Measurement]:
-        """Give the oldest whole cycle that nobody has read, and when it arrived [ns]."""
+        """Give the oldest unread whole cycle, and when it arrived [ns]."""
         return self._whole.popleft()
 
     def skip(self) -> None:
-        """Note that nobody will read what came until now."""
+        """Skip what came until now without reading it."""
         self.skipped += len(self._whole)
         self._whole.clear()
 
@@ -181,21 +181,21 @@ class Inbox:
     def no_answer(self) -> str:
         """Say what came instead of a valid trigger message."""
         trigger = self.map.measurements[self.map.trigger].message
-        wanted = f"{trigger.name} ({trigger.frame_id:#x})"
+        message = f"{trigger.name} ({trigger.frame_id:#x})"
         seen = self._receiver.seen
         if trigger.frame_id in seen and self._receiver.valid(trigger.name):
             return (
-                f"no new frame {wanted} came; those before were valid: the node stopped or was late, or this computer "
+                f"no new frame {message} came; those before were valid: the node stopped or was late, or this computer "
                 "is too busy; a longer time limit (timeout_ms of the bus) waits for it"
             )
         if trigger.frame_id in seen:
             checks = {status: n for status, n in self.counts.get(trigger.name, {}).items() if n}
             return (
-                f"{seen[trigger.frame_id]} frames {wanted} came, too few of them valid ({checks}): another data "
+                f"{seen[trigger.frame_id]} frames {message} came, too few of them valid ({checks}): another data "
                 "identifier, or two senders of it"
             )
         others = ", ".join(f"{identifier:#x}" for identifier in sorted(seen)) or "none"
-        return f"no frame {wanted} came; identifiers seen: {others}"
+        return f"no frame {message} came; identifiers seen: {others}"
 
     def _end_cycle(self, arrived_ns: int) -> None:
         for name, values in self._pending.items():
@@ -209,10 +209,10 @@ class Inbox:
     def _measurement(self) -> Measurement:
         values: dict[str, float] = {}
         for name, message in self.map.measurements.items():
-            known = self._values.get(name, {})
+            last_values = self._values.get(name, {})
             age = self._cycles - 1 - self._cycle_of.get(name, -1)
             fresh = message.timeout_s is None or age <= math.ceil(message.timeout_s / self.map.cycle_s)
-            values |= {key: known.get(key, math.nan) if fresh else math.nan for key in message.signals}
+            values |= {key: last_values.get(key, math.nan) if fresh else math.nan for key in message.signals}
         return Measurement(
             components=tuple(weight * values[name] for name, weight in self.map.objective.items()),
             limits={name: values[name] for name in self.map.limits},

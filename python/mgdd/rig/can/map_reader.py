@@ -60,8 +60,8 @@ class MapReader:
                     sorted(driven),
                     f"given a value of {signal.name} too: it is neither an input nor protected",
                 )
-        said = table.table("safe")
-        safe = self._raws(message, said)
+        safe_table = table.table("safe")
+        safe = self._raws(message, safe_table)
         if safe or message.cycle_s is not None:
             for entry in inputs.values():
                 if entry.signal.name not in safe:
@@ -88,7 +88,7 @@ class MapReader:
         if not inputs:
             raise DataError(f"{table.origin}: [commands] has no input: give at least one")
         if not any(message.safe for message in commands.values()):
-            raise DataError(f"{table.origin}: no command has safe values: say what is sent when the rig is left")
+            raise DataError(f"{table.origin}: no command has safe values: give what is sent when the rig is left")
         if not any(message.signals for message in measurements.values()):
             raise DataError(f"{table.origin}: [measurements] has no value: give at least one")
         for name in commands:
@@ -115,12 +115,12 @@ class MapReader:
         for mode, state in names.items():
             if state != mode and state not in signal.choices:
                 raise named.error(mode, state, f"a name of the value table: {', '.join(signal.choices) or 'none'}")
-        known = {mode: state for mode, state in names.items() if state in signal.choices}
-        failed = tuple(table.take("failed", "texts", [known[mode] for mode in ("limp", "fault") if mode in known]))
+        states = {mode: state for mode, state in names.items() if state in signal.choices}
+        failed = tuple(table.take("failed", "texts", [states[mode] for mode in ("limp", "fault") if mode in states]))
         for state in failed:
             if state not in signal.choices:
                 raise table.error("failed", state, f"a name of the value table: {', '.join(signal.choices) or 'none'}")
-        return StateSignal(message=name, signal=signal, failed=failed, names=known)
+        return StateSignal(message=name, signal=signal, failed=failed, names=states)
 
     def _message(self, name: str, table: TomlTable) -> DbcMessage:
         try:
@@ -130,8 +130,8 @@ class MapReader:
 
     def _signal(self, message: DbcMessage, name: str, table: TomlTable, key: str) -> DbcSignal:
         if name not in message.signals:
-            known = near(name, message.signals)
-            raise table.error(key, name, f"a signal of {message.name} in {self.dbc.file.name}: {known}")
+            hint = near(name, message.signals)
+            raise table.error(key, name, f"a signal of {message.name} in {self.dbc.file.name}: {hint}")
         return message.signals[name]
 
     def _timeout(self, message: DbcMessage, table: TomlTable) -> float | None:

@@ -154,9 +154,9 @@ class StateSignal:
     def codes(self) -> dict[str, int]:
         """Give the raw value by mode of a safety gate; ParameterError where a mode has no state."""
         if missing := [mode for mode in GATE_MODES if mode not in self.names]:
-            known = ", ".join(self.signal.choices) or "none"
+            choices = ", ".join(self.signal.choices) or "none"
             raise ParameterError.of(
-                f"states of {self.message}.{self.signal.name}", known,
+                f"states of {self.message}.{self.signal.name}", choices,
                 f"named for the modes {', '.join(missing)} of a virtual node: add names = "
                 f'{{ {missing[0]} = "STATE", ... }} to [state] of the map',
             )  # fmt: skip

@@ -31,7 +31,7 @@ class LocalBus:
     """
 
     name = "the node in this process"
-    shared = False  # nobody else is here, and time is virtual
+    shared = False  # no other node, and time is virtual
 
     def __init__(self, plant: Plant, signal_map: SignalMap) -> None:
         self.core = NodeCore(node_plant(plant), signal_map)
@@ -115,10 +115,10 @@ def node_of(
     """Make the virtual plant of the inputs of a map, a throttle for ``duty``, an engine for ``soc_cad``."""
     names = signal_map.input_names
     if "duty" in names:
-        known = [ThrottleFault(kind=kind, **given) for kind, given in (fault_of(text, _FAULT_KEYS) for text in faults)]
+        parsed = [ThrottleFault(kind=kind, **given) for kind, given in (fault_of(text, _FAULT_KEYS) for text in faults)]
         plant = VirtualThrottle(
             inputs=(*names, "bridge_open"),
-            faults=known,
+            faults=parsed,
             sample_s=signal_map.cycle_s if sample_s is None else sample_s,
             seed=seed,
         )
@@ -126,8 +126,8 @@ def node_of(
     if faults:
         raise ParameterError.of("fault", faults[0], "left out: only a throttle has faults of its own")
     if names == ("soc_cad",):
-        wanted = [name for name in ("cov_imep_percent", *signal_map.limits) if name in signal_map.value_names]
-        return node_plant(VirtualEngine(limits=wanted, seed=seed))
+        limits = [name for name in ("cov_imep_percent", *signal_map.limits) if name in signal_map.value_names]
+        return node_plant(VirtualEngine(limits=limits, seed=seed))
     raise ParameterError.of(
         "inputs of the map", ", ".join(names), "those of a virtual throttle (duty) or engine bench (soc_cad)"
     )

@@ -49,7 +49,7 @@ class NodePlant(Protocol):
         """Time in the plant per sample [s]; None: that of the map."""
 
     def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...] | None:
-        """Give the names of what it measures at some inputs, and take no time; None where only a sample tells."""
+        """Give the names of what it measures at some inputs, and take no time; None where only a sample shows them."""
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
         """Tell a gate what the sensors say, as `mgdd.rig.SafetyGate.observe` takes it; no time passes."""
@@ -68,12 +68,12 @@ class _Throttle:
         self.sample_s: float | None = plant.sample_s
 
     def value_names(self, inputs: Mapping[str, float]) -> tuple[str, ...]:  # noqa: ARG002 - a throttle always measures
-        return tuple(self._known())
+        return tuple(self._latest_values())
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
-        return facts_of(self._known(), envelope.cycle_s)
+        return facts_of(self._latest_values(), envelope.cycle_s)
 
-    def _known(self) -> Mapping[str, float]:
+    def _latest_values(self) -> Mapping[str, float]:
         if self._values is None:  # nothing was sampled yet: a look ahead, taken back
             before = self._plant.state
             self.sample(None)
@@ -104,7 +104,7 @@ class _Cyclic:
         return tuple(ahead.sample(inputs).values)
 
     def facts(self, envelope: SafetyEnvelope) -> dict[str, Any]:
-        # No plate to look at: told one in mid-travel, the same gate judges commands alone. An `ActuatorGuard` needs
+        # No plate to look at: given one in mid-travel, the same gate judges commands alone. An `ActuatorGuard` needs
         # bounds and limits, which the experiment of the host has and the node has not.
         half_v = 0.5 * envelope.sensor_sum_v
         middle_deg = 0.5 * (envelope.closed_deg + envelope.open_deg)
@@ -148,7 +148,7 @@ class NodeCore:
         self._receiver = Receiver(signal_map.commands)
         self._sender = Sender()
         self._inputs: dict[str, float] = {}
-        self._said: dict[str, str] = {}  # by message: rest, drive or other
+        self._command_kinds: dict[str, str] = {}  # by message: rest, drive or other
         self._fresh: set[str] = set()
         self._good: Counter[str] = Counter()  # commands by message that the gate does not know of yet
         self._bad = 0
@@ -218,8 +218,8 @@ class NodeCore:
         self._deaf_until_ns = now_ns
         self._missed = max(self._missed, int((now_ns - since_ns) * 1e-9 / self.gate.envelope.cycle_s))
         self._receiver.reset()
-        for known in (self._said, self._fresh, self._good):
-            known.clear()
+        for memory in (self._command_kinds, self._fresh, self._good):
+            memory.clear()
         self._bad = self._safe_frames = 0
         self._is_asked_to_arm = False
 
@@ -258,14 +258,14 @@ class NodeCore:
             return True
         self._good[message.name] += 1
         rests, drives = message.rests(payload), message.drives(payload)
-        self._said[message.name] = "rest" if rests else "drive" if drives else "other"
+        self._command_kinds[message.name] = "rest" if rests else "drive" if drives else "other"
         self._safe_frames = self._safe_frames + 1 if self._all_say("rest") else 0
         if self._safe_frames >= _ARMING_FRAMES * len(self._timeouts_s):
             self._is_asked_to_arm = True
         return True
 
     def _all_say(self, word: str) -> bool:
-        return all(self._said.get(name) == word for name in self._timeouts_s)
+        return all(self._command_kinds.get(name) == word for name in self._timeouts_s)
 
     def _passed(self, command_age_s: float | None) -> dict[str, float] | None:
         """Tell the gate of this cycle, and give the inputs that it lets pass; None: without drive."""
@@ -313,15 +313,15 @@ class NodeCore:
         """Refuse a map with a value that the plant does not measure and its signal cannot say to be missing."""
         if self._known_values is None:
             return
-        known = dict.fromkeys((*self._known_values, *_OWN), 0.0)
+        zeros = dict.fromkeys((*self._known_values, *_OWN), 0.0)
         for message in self.map.measurements.values():
-            if lacking := _unsayable(message.signals, known):
+            if lacking := _without_code(message.signals, zeros):
                 raise ParameterError.of(
                     f"values of {message.name}", ", ".join(lacking),
                     f"measured by the plant ({', '.join(self._known_values)}), or give the signal a raw value "
                     '"not available" in its value table (VAL_), or take it out of the map',
                 )  # fmt: skip
-            if lacking := [name for name in message.signals if name not in known]:
+            if lacking := [name for name in message.signals if name not in zeros]:
                 _LOG.warning("%s: the plant does not measure %s: sent as missing", message.name, ", ".join(lacking))
 
     def _report(self, sampled: Sampled) -> list[Frame]:
@@ -333,21 +333,21 @@ class NodeCore:
             every = round((message.message.cycle_s or self.map.cycle_s) / self.map.cycle_s)
             if self.samples % max(1, every):
                 continue
-            if not stands and _unsayable(message.signals, values):
+            if not stands and _without_code(message.signals, values):
                 continue  # no number is better than a wrong one: its receiver sees it grow old
             raws: dict[str, Any] = {}
             state = self.map.state
             if state is not None and state.message == message.name:
                 raws[state.signal.name] = self._codes[self.gate.mode]
-            known = _carried(message.signals, values)
+            carried = _carried(message.signals, values)
             applied = _carried(message.applied, sampled.applied)
-            frames += self._sender.frames(message, message.payloads(known, raws, applied))
+            frames += self._sender.frames(message, message.payloads(carried, raws, applied))
         self.samples += 1
         return frames
 
 
-def _unsayable(entries: Mapping[str, MappedSignal], values: Mapping[str, float]) -> list[str]:
-    """Names of what is missing and cannot be said to be."""
+def _without_code(entries: Mapping[str, MappedSignal], values: Mapping[str, float]) -> list[str]:
+    """Names of missing values whose signal has no code for "not available"."""
     return [
         name
         for name, entry in entries.items()

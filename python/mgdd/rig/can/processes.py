@@ -24,20 +24,20 @@ _END_S = 5.0
 class Child:
     """A module of Python in a process of its own, which says a line when it is ready; it ends with this process.
 
-    RigError, with what it said, where it ends before that.
+    RigError, with its error output, where it ends before that.
     """
 
     def __init__(self, module: str, *words: str) -> None:
-        said = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 stop() closes it
+        errors = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 stop() closes it
         process = subprocess.Popen(
             [sys.executable, "-m", module, *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            stderr=said,
+            stderr=errors,
             text=True,
             start_new_session=True,  # a Ctrl-C in the terminal is for the run, which then ends them
         )
-        self.process, self._said = process, said
+        self.process, self._errors = process, errors
         assert process.stdout is not None  # noqa: S101 - PIPE
         until = time.monotonic() + _START_S
         with selectors.DefaultSelector() as selector:
@@ -46,10 +46,10 @@ class Child:
         if not line:
             process.kill()
             process.wait()
-            said.seek(0)
-            text = said.read().strip()
+            errors.seek(0)
+            text = errors.read().strip()
             self.stop()
-            raise RigError(f"{' '.join((module, *words[:2]))} did not start: {text or 'it said nothing'}")
+            raise RigError(f"{' '.join((module, *words[:2]))} did not start: {text or 'no error output'}")
         self.line = line.strip()
 
     def stop(self) -> None:
@@ -62,7 +62,7 @@ class Child:
             self.process.wait()
         if self.process.stdout is not None:
             self.process.stdout.close()
-        self._said.close()
+        self._errors.close()
 
 
 class VirtualNode:
@@ -129,7 +129,7 @@ class VirtualNode:
         return self._bus
 
     def start(self) -> None:
-        """Start both processes, and wait until they are ready; RigError, with what it said, where one of them ended."""
+        """Start both processes, and wait until they are ready; RigError, with its error output, where one ended."""
         try:
             bus = self._start("hub", ["--port", "0", *self._hub_options])
             self._start("node", ["--bus", bus, *self._node_options])

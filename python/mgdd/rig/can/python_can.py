@@ -95,8 +95,8 @@ def connected(interface: str, channel: str | int, options: Mapping[str, Any], na
         _require_hub(name, options)
     if interface not in can.VALID_INTERFACES:
         guess = did_you_mean(interface, can.VALID_INTERFACES)
-        known = f"must be one of {', '.join(sorted(can.VALID_INTERFACES))}"
-        raise RigError(f"interface {interface!r}: python-can has no such interface: {guess or known}")
+        names = f"must be one of {', '.join(sorted(can.VALID_INTERFACES))}"
+        raise RigError(f"interface {interface!r}: python-can has no such interface: {guess or names}")
     try:
         for _ in range(_GREETINGS):
             try:
@@ -128,14 +128,14 @@ def _require_hub(name: str, options: Mapping[str, Any]) -> None:
         )
     port = options["port"]
     if not (str(port).isdigit() and 0 < int(port) < 65536):
-        raise RigError.of(f"{name}: port", port, "a whole number in [1, 65535], as the hub says it")
+        raise RigError.of(f"{name}: port", port, "a whole number in [1, 65535], as the hub prints it")
     try:
         with socket.create_connection((options["host"], options["port"]), timeout=_GREETING_S) as stream:
             greeting = stream.recv(16)
     except OSError as error:
-        raise RigError(f"{name}: nobody answers there: {error}; start the hub first: mgdd rig hub") from error
+        raise RigError(f"{name}: no answer there: {error}; start the hub first: mgdd rig hub") from error
     if not greeting.startswith(b"< hi"):
-        raise RigError(f"{name}: what answers there is not socketcand: it said {greeting!r}")
+        raise RigError(f"{name}: what answers there is not socketcand: it sent {greeting!r}")
 
 
 class Reception:

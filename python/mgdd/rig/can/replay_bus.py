@@ -17,7 +17,7 @@ class RecordedBus:
         self.bus, self.recorder = bus, recorder
         self.name, self.shared, self.stays_here = bus.name, bus.shared, bool(getattr(bus, "stays_here", False))
         self.open, self.close, self.claim = bus.open, bus.close, bus.claim
-        # Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
+        # Identifiers that another socket of this process sends: what is received of them is recorded as sent.
         self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
 
     @property

@@ -86,8 +86,8 @@ class SignalMap:
         except FileNotFoundError as error:
             if file.suffix:
                 raise
-            known = f"no such file: shipped maps are {', '.join(SHIPPED)}; the path of a file ends in .toml"
-            raise FileNotFoundError(errno.ENOENT, known, named) from error
+            hint = f"no such file: shipped maps are {', '.join(SHIPPED)}; the path of a file ends in .toml"
+            raise FileNotFoundError(errno.ENOENT, hint, named) from error
         table.only(_KEYS)
         kind, version = table.take("kind", "text"), table.take("format", "integer")
         if kind != "signal_map":
@@ -127,18 +127,18 @@ class SignalMap:
 
         ParameterError for a name that is not measured, or a weight that is not finite.
         """
-        wanted = self.limits if limits is None else tuple(limit_names_of(limits))
+        chosen_limits = self.limits if limits is None else tuple(limit_names_of(limits))
         weights = dict(self.objective if objective is None else objective)
-        known = self.value_names
-        for what, names in (("limits", wanted), ("objective", tuple(weights))):
+        value_names = self.value_names
+        for what, names in (("limits", chosen_limits), ("objective", tuple(weights))):
             for name in names:
-                if name not in known:
-                    guess = did_you_mean(name, known)
+                if name not in value_names:
+                    guess = did_you_mean(name, value_names)
                     raise ParameterError.of(what, name, f"a measured value{'; ' + guess if guess else ''}")
         for name, weight in weights.items():
             if not math.isfinite(weight):
                 raise ParameterError.of(f"objective of {name}", weight, "finite")
-        return replace(self, limits=wanted, objective=weights)
+        return replace(self, limits=chosen_limits, objective=weights)
 
     @property
     def input_names(self) -> tuple[str, ...]:

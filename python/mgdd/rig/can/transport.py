@@ -58,7 +58,7 @@ def changed(frame: Frame, **fields: Any) -> Frame:
     return Frame(**{**frame.to_dict(), **fields})
 
 
-_QUEUE = 4096  # frames that nobody has read
+_QUEUE = 4096  # unread frames
 _FATAL = frozenset({"bus_off", "error_passive"})
 
 

@@ -152,9 +152,9 @@ def _checked(experiment: Experiment) -> CheckedExperiment:
     if isinstance(settings, SeekTask):
         plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder, seed=experiment.seed), None, None
     else:
-        # Over a bus the DBC of the recorded run said the time between its samples.
-        said = None if recorded is None else recorded.config.get("sample_s")
-        sample_s = _sample_s(experiment, signal_map) if said is None else float(said)
+        # Over a bus the DBC of the recorded run gave the time between its samples.
+        recorded_s = None if recorded is None else recorded.config.get("sample_s")
+        sample_s = _sample_s(experiment, signal_map) if recorded_s is None else float(recorded_s)
         envelope = SafetyEnvelope.load(beside(experiment.folder, experiment.safety.envelope)).replace(cycle_s=sample_s)
         plan = _throttle_plan(settings, sample_s, experiment, envelope)
     if mode in _SIMULATED:

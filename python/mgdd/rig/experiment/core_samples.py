@@ -50,8 +50,8 @@ class LoopSamples:
         self._samples, self._sample_s = samples, sample_s
         self._missing = dict.fromkeys(value_names, math.nan)
         self._before: dict[str, float] | None = None
-        self._told, self._untold = 0, deque[Cycle]()
-        self._kept = _columns()
+        self._reported, self._unreported = 0, deque[Cycle]()
+        self._recorded = _columns()
         self._first: int | None = None
         self._running = False
 
@@ -77,14 +77,14 @@ class LoopSamples:
             self._take(deadline_ns, row)
 
     def tell(self) -> None:
-        """Tell the listener of the cycles that it has not heard of; what it raises ends the run."""
-        while self._untold:
-            self._told += 1
-            self._listener(self._untold.popleft())
+        """Report to the listener the cycles that it has not received; what it raises ends the run."""
+        while self._unreported:
+            self._reported += 1
+            self._listener(self._unreported.popleft())
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Give what the task came to, a row per grid point; see `task_columns`."""
-        return task_columns(self._kept, self._samples)
+        return task_columns(self._recorded, self._samples)
 
     def _take(self, deadline_ns: int, now: dict[str, float]) -> None:
         if self._recorder is not None:
@@ -96,7 +96,7 @@ class LoopSamples:
         if self._running and not began:
             self._first = int(now["cycle"])
         if self._first is not None and not over:
-            _keep(self._kept, now)
+            _keep(self._recorded, now)
         if before is None:
             return
         exchange = Exchange({"duty": before["duty"]}, self._measurement(before, now))
@@ -105,9 +105,9 @@ class LoopSamples:
             asked, thinking_s = {"duty": before["asked_duty"]}, before["compute_us"] * 1e-6
             period_s = (now["cycle"] - before["cycle"]) * self._sample_s
             cycle = Cycle(
-                self._told + len(self._untold), asked, exchange.measurement, thinking_s, period_s - thinking_s
+                self._reported + len(self._unreported), asked, exchange.measurement, thinking_s, period_s - thinking_s
             )
-            self._untold.append(cycle)
+            self._unreported.append(cycle)
 
     def _measurement(self, before: Mapping[str, float], now: Mapping[str, float]) -> Measurement:
         values = {name: now[name] for name in _MAP_NAMES.values()}
@@ -151,8 +151,8 @@ def task_columns(kept: Mapping[str, Sequence[float]], samples: int) -> dict[str,
 
 
 def _applied(before: Mapping[str, float], after: Mapping[str, float]) -> float:
-    said = after["applied_duty"]
-    return before["duty"] if math.isnan(said) else said
+    duty = after["applied_duty"]
+    return before["duty"] if math.isnan(duty) else duty
 
 
 def loop_rows(recorded: RecordedRun) -> list[dict[str, float]]:

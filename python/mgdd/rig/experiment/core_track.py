@@ -31,7 +31,7 @@ from mgdd.rig.safety import drive_taken, said_of
 _ALL_BITS = {False: 0x7FF, True: 0x1FFF_FFFF}
 _FAILED_FRAMES = 3
 _SWITCH_S = 5e-4
-_LAST_S = 0.5  # for the last commands of the loop to be heard
+_LAST_S = 0.5  # for the last commands of the loop to be received
 LEAD_S = 0.06  # of the references before their cycle: so long may Python stand still, and then the bridge opens
 _LOOK_S = 0.005
 _PATIENCE_S = 2.0  # at least, for the gate
@@ -43,8 +43,8 @@ class WatchedBus:
 
     def __init__(self, bus: Bus, signal_map: SignalMap) -> None:
         self.bus, self._map, self.name = bus, signal_map, bus.name
-        known = signal_map.state
-        self._key = None if known is None else signal_map.measurements[known.message].key
+        state = signal_map.state
+        self._key = None if state is None else signal_map.measurements[state.message].key
         self._in_a_row = 0
         self.state = ""
 
@@ -100,10 +100,10 @@ class BridgedBus:
 
 
 class SocketBus:
-    """The loop has a raw socket of its own, and the bus of the rig hears and records what passes between loop and node.
+    """The loop has its own raw socket, and the bus of the rig receives and records what passes between loop and node.
 
-    Commands that the rig hears are those of the loop: its claim to them rests. Another sender shows itself at the
-    socket of the loop: that one never hears its own frames, and lets nothing pass but commands and what the loop reads.
+    Commands that the rig receives are those of the loop: its claim to them rests. Another sender shows itself at the
+    socket of the loop: it never receives its own frames, and lets nothing pass but commands and what the loop reads.
     """
 
     def __init__(
@@ -120,23 +120,23 @@ class SocketBus:
         filters = [(one.can_id, _ALL_BITS[one.extended], one.extended) for one in (command, *measurements)]
         self.transport = SocketCanTransport(channel, filters=filters)
         self.error: BaseException | None = None
-        self._heard = 0
+        self._received = 0
         self._foreign: int | None = None
 
     @property
     def counters(self) -> dict[str, int]:
-        """How many commands of the loop were heard, and so recorded."""
-        return {"commands_heard": self._heard}
+        """How many commands of the loop were received, and so recorded."""
+        return {"commands_heard": self._received}
 
     def look(self, report: Callable[[], Mapping[str, Any]]) -> None:
         """Take and record all that came; from the second time on another sender of our commands is an error."""
-        while self._hear(0.0):
+        while self._receive(0.0):
             pass
         if self._ours is None:
             return
-        said = report()
-        # Counted in this order, an error frame is never taken for a stranger.
-        foreign = said["frames"]["foreign"] - said["bus"]["error_frames"]
+        counts = report()
+        # Counted in this order, an error frame is never taken for a frame of another sender.
+        foreign = counts["frames"]["foreign"] - counts["bus"]["error_frames"]
         if self._foreign is None:  # before, the last safe frames of the rig itself may have been among them
             self._foreign = foreign
         elif foreign > self._foreign and self.error is None:
@@ -152,11 +152,11 @@ class SocketBus:
     def __exit__(self, *_: object) -> None:
         until = time.monotonic() + _LAST_S
         with held_back():
-            while self._heard < self.transport.counts["sent"] and (left_s := until - time.monotonic()) > 0.0:
-                if not self._hear(left_s):
+            while self._received < self.transport.counts["sent"] and (left_s := until - time.monotonic()) > 0.0:
+                if not self._receive(left_s):
                     break
 
-    def _hear(self, timeout_s: float) -> bool:
+    def _receive(self, timeout_s: float) -> bool:
         """Take a frame; whether one came."""
         try:
             frame = self._bus.receive(timeout_s)
@@ -164,7 +164,7 @@ class SocketBus:
             self.error = self.error or error
             return False
         if frame is not None and (frame.id, frame.extended) == self._ours:
-            self._heard += 1
+            self._received += 1
         return frame is not None
 
 
@@ -230,7 +230,7 @@ class _CoreRun:
             )
         )
         self._record, self._lead = record, max(4, math.ceil(LEAD_S / sample_s))
-        self._wanted, self._handed_over = wanted, 1
+        self._references_deg, self._handed_over = wanted, 1
         self._patience_s = max(_PATIENCE_S, 20.0 * (checked.envelope.good_frames if checked.envelope else 0) * sample_s)
         self.changes: Counter[str] = Counter()
         self.samples = LoopSamples(
@@ -292,7 +292,7 @@ class _CoreRun:
             raise self.bus.error or error from None
 
     def _follow(self) -> None:
-        while self.samples.done < len(self._wanted):
+        while self.samples.done < len(self._references_deg):
             time.sleep(_LOOK_S)
             self._feed()
             self._take()
@@ -320,8 +320,8 @@ class _CoreRun:
         room = self._lead - self.loop.queued_references
         if room > 0 and self.loop.mode in ("armed", "run"):
             begin = self._handed_over
-            places = np.minimum(np.arange(begin, begin + room), len(self._wanted) - 1)
-            self.loop.queue_references(self._wanted[places])
+            places = np.minimum(np.arange(begin, begin + room), len(self._references_deg) - 1)
+            self.loop.queue_references(self._references_deg[places])
             self._handed_over += room
 
     def _take(self) -> None:

@@ -174,9 +174,9 @@ class Experiment:
         for part, keys in _FILES.items():
             record = getattr(self, part)
             named = {key: getattr(record, key, None) for key in keys}
-            found = {key: self.folder / name for key, name in named.items() if name and (self.folder / name).is_file()}
-            if found:
-                changed[part] = replace(record, **{key: put(path) for key, path in found.items()})
+            paths = {key: self.folder / name for key, name in named.items() if name and (self.folder / name).is_file()}
+            if paths:
+                changed[part] = replace(record, **{key: put(path) for key, path in paths.items()})
         return replace(self, **changed)
 
     @property

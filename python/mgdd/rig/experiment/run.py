@@ -113,17 +113,17 @@ class RunFolder:
 
 def versions() -> dict[str, Any]:
     """Give time, versions and machine of a run."""
-    found: dict[str, str | None] = {}
+    packages: dict[str, str | None] = {}
     for name in _PACKAGES:
         try:
-            found[name] = metadata.version(name)
+            packages[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = None
+            packages[name] = None
     return {
         "begun": datetime.now(UTC).isoformat(timespec="seconds"),
         "mgdd": _core.__version__,
         "python": platform.python_version(),
-        "packages": found,
+        "packages": packages,
         "system": platform.platform(),
         "arguments": sys.argv[1:],
     }
@@ -233,7 +233,7 @@ def run_experiment(
             run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
             run.json("run.json", {**versions(), **checked.to_dict()})
         with RunRecord(None if run is None else run.path / "run.rec", checked) as record:
-            outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
+            outcome, counters, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
     except BaseException:
         if run is not None and (record is None or not record.began):
             run.discard()
@@ -243,7 +243,7 @@ def run_experiment(
         figures=dict(outcome.figures),
         dataset=outcome.dataset,
         timing=timing,
-        counters=stand_said,
+        counters=counters,
         events=tuple(record.events),
         interrupted=outcome.interrupted,
         folder=None if run is None else run.path,

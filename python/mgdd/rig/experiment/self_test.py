@@ -1,4 +1,4 @@
-"""The ways to die, tried out on this machine: a process drives a throttle over a bus and ends badly, six times."""
+"""Failure cases, tried out on this machine: a process drives a throttle over a bus and ends badly, six times."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ _SIGNALS = {"sigint": signal.SIGINT, "sigterm": signal.SIGTERM, "sigkill": signa
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SelfTest(NumbersResult):
-    """How long the plate took to limp-home after each way to die."""
+    """How long the plate took to limp-home after each failure."""
 
     ways_to_die: Mapping[str, float | None]  # seconds from the end of the process to limp-home; None: see notes
     limit_s: float
@@ -134,7 +134,7 @@ def _time_home(host: _Host, truth: Path, home_deg: float) -> float:
     rows = _rows(truth)
     while not rows or rows[-1][0] < until_ns:  # a busy machine: the log comes, but later
         if time.monotonic() > waited:
-            raise RigError("the node says nothing of that time")
+            raise RigError("the node reported nothing of that time")
         time.sleep(0.05)
         rows = _rows(truth)
     before = [angle for at_ns, angle in rows if at_ns <= died_ns]
@@ -156,7 +156,7 @@ def _rows(truth: Path) -> list[tuple[int, float]]:
 
 
 class _Host:
-    """The process that dies; it is started early, and drives when it is told to die."""
+    """The process that dies; it is started early, and drives when the command to die comes."""
 
     def __init__(self, way: str, connection: str, loop: str) -> None:
         self.way = way
@@ -194,7 +194,7 @@ class _Host:
         if not line.startswith(word):
             self._process.kill()
             _, complaint = self._process.communicate()
-            raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'it said nothing'}")
+            raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'no error output'}")
         return line
 
 

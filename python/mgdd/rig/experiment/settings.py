@@ -22,7 +22,7 @@ PACES = ("step", "real_time")
 LOOPS = ("auto", "core", "python")
 TASKS = ("identify", "track", "seek")
 SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
-_BOUNDS_CAD = {"soc_cad": (-30.0, 10.0)}  # of a search, where nobody says; as of `mgdd engine seek`
+_BOUNDS_CAD = {"soc_cad": (-30.0, 10.0)}  # of a search, by default; as of `mgdd engine seek`
 _T = TypeVar("_T")
 
 
@@ -64,8 +64,8 @@ class Settings:
 
 def _bounds(table: TomlTable) -> dict[str, tuple[float, ...]]:
     """Take bounds of inputs, and behind them the step in which one is set."""
-    found = table.items()
-    for name, value in found.items():
+    items = table.items()
+    for name, value in items.items():
         stepped = isinstance(value, list) and len(value) == 3
         form = "[lower, upper] or [lower, upper, step], numbers"
         low, high = _pair(table, name, value[:2] if stepped else value, form)
@@ -75,13 +75,13 @@ def _bounds(table: TomlTable) -> dict[str, tuple[float, ...]]:
             raise table.error(name, value, "lower < upper, both finite")
         if name.endswith("_cad") and not -60.0 <= low < high <= 60.0:
             raise table.error(name, value, "lower < upper, in [-60, 60]")
-    return {name: tuple(map(float, value)) for name, value in found.items()} or dict(_BOUNDS_CAD)
+    return {name: tuple(map(float, value)) for name, value in items.items()} or dict(_BOUNDS_CAD)
 
 
 def _limits(table: TomlTable) -> dict[str, Any]:
     """Take upper values, and pairs of a lower and an upper one, of which one may be infinite."""
-    found, form = table.items(), "a finite number, or [lower, upper], one of which may be -inf or inf"
-    for name, value in found.items():
+    items, form = table.items(), "a finite number, or [lower, upper], one of which may be -inf or inf"
+    for name, value in items.items():
         if fits(value, "number"):
             if not math.isfinite(value):
                 raise table.error(name, value, form)
@@ -89,7 +89,7 @@ def _limits(table: TomlTable) -> dict[str, Any]:
         low, high = _pair(table, name, value, form)
         if not low < high or (math.isinf(low) and math.isinf(high)):
             raise table.error(name, value, f"lower < upper: {form}")
-    return {name: [float(one) for one in value] if isinstance(value, list) else value for name, value in found.items()}
+    return {name: [float(one) for one in value] if isinstance(value, list) else value for name, value in items.items()}
 
 
 def _pair(table: TomlTable, name: str, value: Any, form: str) -> tuple[float, float]:
@@ -99,11 +99,11 @@ def _pair(table: TomlTable, name: str, value: Any, form: str) -> tuple[float, fl
 
 
 def _numbers(table: TomlTable) -> dict[str, float]:
-    found = table.items()
-    for name, value in found.items():
+    items = table.items()
+    for name, value in items.items():
         if not (fits(value, "number") and math.isfinite(value)):
             raise table.error(name, value, "a finite number")
-    return {name: float(value) for name, value in found.items()}
+    return {name: float(value) for name, value in items.items()}
 
 
 _TABLES = {"scales": _numbers, "bounds": _bounds, "limits": _limits, "any": TomlTable.items}
@@ -218,11 +218,11 @@ def beside(folder: Path, name: str) -> Path | str:
 
 def scaled(record: _T, scale: Mapping[str, float], what: str) -> _T:
     """Multiply fields of a record; friction takes stiction along, as `mgdd throttle track --plant-scale` does."""
-    known = type(record).fields()  # type: ignore[attr-defined]
+    fields = type(record).fields()  # type: ignore[attr-defined]
     factors = dict(scale)
     for name in factors:
-        if name not in known or not isinstance(getattr(record, name), float):
-            raise ParameterError.of(f"{what}.scale", name, f"a number of {type(record).__name__}: {', '.join(known)}")
+        if name not in fields or not isinstance(getattr(record, name), float):
+            raise ParameterError.of(f"{what}.scale", name, f"a number of {type(record).__name__}: {', '.join(fields)}")
     if "coulomb_nm" in factors:
         factors.setdefault("stiction_nm", factors["coulomb_nm"])
     changed = {name: getattr(record, name) * factor for name, factor in factors.items()}

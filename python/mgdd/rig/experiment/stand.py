@@ -86,7 +86,7 @@ class Cycle(NamedTuple):
 
 
 class Watched(AroundPlant):
-    """A plant whose cycles are told to a listener, with the time that they took."""
+    """A plant whose cycles are reported to a listener, with the time that they took."""
 
     def __init__(self, plant: Plant, listener: Callable[[Cycle], None]) -> None:
         super().__init__(plant)
@@ -102,7 +102,7 @@ class Watched(AroundPlant):
         self.plant.apply(inputs)
 
     def measure(self) -> Measurement:
-        """Pass the measurement back, and tell the listener."""
+        """Pass the measurement back, and report it to the listener."""
         measured = self.plant.measure()
         now = time.perf_counter()
         cycle = Cycle(self.cycles, self._asked, measured, self._applied_s - self._measured_s, now - self._applied_s)
@@ -173,11 +173,11 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
     recorded = RecordingRig(rig, record.row, keep=False)
 
     def counters() -> dict[str, Any]:
-        told: dict[str, Any] = dict(getattr(rig, "counters", {}))
+        counts: dict[str, Any] = dict(getattr(rig, "counters", {}))
         if isinstance(rig, ReplayRig):
-            sizes = [(found.sample, abs(found.asked - found.recorded)) for found in rig.differences]
-            told["replay"] = compared(rig.sample, len(rig.record), sizes)
-        return told
+            sizes = [(difference.sample, abs(difference.asked - difference.recorded)) for difference in rig.differences]
+            counts["replay"] = compared(rig.sample, len(rig.record), sizes)
+        return counts
 
     def left() -> int | None:
         return len(rig.record) - rig.sample if isinstance(rig, ReplayRig) else None
@@ -202,15 +202,15 @@ def guarded(checked: CheckedExperiment, rig: Any, record: RunRecord) -> Stand:
         rates={"soc_cad": safety.rate_cad, **safety.rates} if "soc_cad" in plan.start else safety.rates,
         limits=[Limit(name, upper) for name, upper in safety.limits.items()],
     )
-    told = 0
+    reported = 0
 
     def new_events() -> list[str]:
-        nonlocal told
-        log, told_before = guard.log, told
-        told = len(log)
+        nonlocal reported
+        log, reported_before = guard.log, reported
+        reported = len(log)
         return [
             f"guard: cycle {e.cycle}: {e.reason} {e.name}: {dict(e.asked)} -> {dict(e.applied)}"
-            for e in log[told_before:]
+            for e in log[reported_before:]
         ]
 
     return Stand(

@@ -100,22 +100,22 @@ class TrackPlan:
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant whose last measured angle is given, for at most so many samples."""
         controller = self.controller()
-        wanted = self.reference.angle_deg
+        reference_deg = self.reference.angle_deg
 
         def duty_at(sample: int, measured_deg: float) -> float:
-            return float(controller.step(float(wanted[sample]), measured_deg))
+            return float(controller.step(float(reference_deg[sample]), measured_deg))
 
         columns, interrupted = _drive(plant, _fewer(self.samples, most), duty_at, first_angle_deg)
         return self.outcome(columns, interrupted=interrupted)
 
     def outcome(self, columns: dict[str, NDArray[np.float64]], *, interrupted: bool) -> Outcome:
         """Give the figures and signals of columns: ``asked_duty``, ``duty`` and the angle that followed."""
-        wanted = self.reference.angle_deg
+        reference_deg = self.reference.angle_deg
         n = len(columns["asked_duty"])
         if n == 0:
             return Outcome(figures={}, dataset=_dataset(columns, self.sample_s, {}, {}), interrupted=True)
-        more = {"reference_deg": wanted[:n]}
-        # `settling_ms` and so on are those of `mgdd.loop.track`, of the true angle: most plants do not tell it.
+        more = {"reference_deg": reference_deg[:n]}
+        # `settling_ms` and so on are those of `mgdd.loop.track`, of the true angle: most plants do not give it.
         sensed = self._figures(columns, "sensed_angle_deg")
         numbers = {name if name == _OF_THE_DUTY else f"sensed_{name}": value for name, value in sensed.items()}
         if "angle_deg" in columns:
@@ -135,10 +135,10 @@ class TrackPlan:
         )
 
     def _figures(self, columns: dict[str, NDArray[np.float64]], angle: str) -> dict[str, float]:
-        wanted, n = self.reference, len(columns["duty"])
+        target, n = self.reference, len(columns["duty"])
         figures = _core.loop.tracking_figures(
-            reference_deg=wanted.angle_deg[:n], angle_deg=columns[angle], duty=columns["duty"], sample_s=self.sample_s,
-            from_sample=min(wanted.from_sample, n - 1), band_deg=wanted.band_deg,
+            reference_deg=target.angle_deg[:n], angle_deg=columns[angle], duty=columns["duty"], sample_s=self.sample_s,
+            from_sample=min(target.from_sample, n - 1), band_deg=target.band_deg,
         )  # fmt: skip
         return {name: float(figures[name]) for name in FIGURES}
 
@@ -161,22 +161,22 @@ class IdentifyPlan:
         samples = _fewer(self.samples, most)
         columns, interrupted = _drive(plant, samples, lambda sample, _: float(self.duty[sample]), first_angle_deg)
         dataset = _dataset(columns, self.sample_s, {}, {})
-        said: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
+        figures: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
         if interrupted or samples < self.samples:
-            return Outcome(figures=said, dataset=dataset, interrupted=interrupted)
+            return Outcome(figures=figures, dataset=dataset, interrupted=interrupted)
         time_s = np.arange(len(columns["duty"])) * self.sample_s
         angle_deg = np.r_[first_angle_deg, columns["sensed_angle_deg"][:-1]]  # a log holds the angle before its duty
         log = throttle_log(time_s, columns["duty"], angle_deg, name="recorded")
         fit = identify.identify_throttle(
             log, self.task.model, two_sided=self.task.side == "both", options=FitOptions(seed=self.seed)
         )
-        said |= {
+        figures |= {
             "model": fit.kind, **figures_of(fit), "parameters": dict(fit.to_dict()["parameters"]),
             "findings": [str(finding) for finding in fit.findings], "success": bool(fit.report.success),
         }  # fmt: skip
         validation = identify.validate_throttle(fit, log)
         return Outcome(
-            figures=said,
+            figures=figures,
             dataset=dataset,
             files={"fit.toml": fit.to_toml()},
             drawings={"identify": partial(_draw_fit, validation)},
@@ -267,19 +267,19 @@ class SeekPlan:
 
     def _prepare(self, task: SeekTask, folder: Path, seed: int) -> None:
         try:
-            known = engine_named(task.model, folder)
+            engine = engine_named(task.model, folder)
         except Error as error:
             raise error.reworded(f"seek.model = {task.model!r}: {error}") from error
-        guide, cylinder = None, scaled(known.cylinder, task.scale, "seek")
+        guide, cylinder = None, scaled(engine.cylinder, task.scale, "seek")
         if task.guide != "none":
-            guide = EngineGuide(cylinder=cylinder, kind=task.guide, point=known.point)
+            guide = EngineGuide(cylinder=cylinder, kind=task.guide, point=engine.point)
         inputs = seek_inputs(task.inputs)
         self._asked = Question(
             inputs=inputs, start=started(task.start or None, inputs), limits=both_sides(task.limits),
             noise_sd=task.noise_sd, delay_cycles=task.delay_cycles or 0.0, lag_cycles=task.lag_cycles or 0.0,
-            guide=guide, seed=seed, point=known.point, settings=dict(task.settings),
+            guide=guide, seed=seed, point=engine.point, settings=dict(task.settings),
         )  # fmt: skip
-        self._known = None if task.known is None else read_points(beside(folder, task.known))
+        self._earlier_points = None if task.known is None else read_points(beside(folder, task.known))
         self._still = stillness(self._asked, task.tolerance or None)
         choice = self._chosen()
         self.samples = choice.cycles if task.cycles is None else task.cycles
@@ -288,9 +288,9 @@ class SeekPlan:
 
     def _chosen(self) -> Choice:
         choice = chosen(self._asked, self.task.seeker)
-        if self._known is None:
+        if self._earlier_points is None:
             return choice
-        return tell_known(self._asked, self.task.seeker, choice, self._known)[1]
+        return tell_known(self._asked, self.task.seeker, choice, self._earlier_points)[1]
 
     def estimate(self) -> dict[str, float]:
         """Give what the running seeker takes for the best inputs, and standard deviations: NaN where it has none."""
@@ -306,16 +306,16 @@ class SeekPlan:
         choice = self._chosen()
         self._running = choice.seeker
         try:
-            found = searched(plant, choice, self._asked, _fewer(self.samples, most), self._still)
+            result = searched(plant, choice, self._asked, _fewer(self.samples, most), self._still)
         except Interrupted as stop:
             if not isinstance(stop.partial, SeekResult):
                 raise
-            found = stop.partial
+            result = stop.partial
         return Outcome(
-            figures=found.to_dict() | {"guide": self.task.guide},
-            dataset=found.run.dataset,
-            interrupted=found.interrupted,
-            drawings={"seek": partial(_draw, found.run.dataset)},
+            figures=result.to_dict() | {"guide": self.task.guide},
+            dataset=result.run.dataset,
+            interrupted=result.interrupted,
+            drawings={"seek": partial(_draw, result.run.dataset)},
         )
 
 

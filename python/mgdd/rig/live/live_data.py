@@ -113,17 +113,17 @@ class LiveData:
             self.events.append(((stamp - start_ns) * 1e-9, f"{category}: {text}"))
             if category == "safety gate":
                 self.gate, _, self.reason = text.rpartition(" -> ")[2].partition(": ")
-            elif category == "guard":  # of an engine: it tells of what it held back
+            elif category == "guard":  # of an engine: it reports what it held back
                 self.gate, self.reason = category, text
         self.frames += len(news.frames)
         if self._inbox is not None and not {"loop", "rig"} & self.tables.keys():
-            self._hear(self._inbox, news.frames, start_ns)
+            self._receive(self._inbox, news.frames, start_ns)
         self.version += bool(news.rows or news.events or news.frames or news.restarted)
 
-    def _hear(self, inbox: Inbox, frames: list[Frame], start_ns: int) -> None:
+    def _receive(self, inbox: Inbox, frames: list[Frame], start_ns: int) -> None:
         """Read frames by the map: a row per cycle."""
-        known = inbox.map
-        commands = {m.key: m for m in known.commands.values()}
+        signal_map = inbox.map
+        commands = {m.key: m for m in signal_map.commands.values()}
         rows: list[tuple[int, dict[str, float]]] = []
         for frame in frames:
             inbox.take(frame)
@@ -139,11 +139,11 @@ class LiveData:
                 rows.append((stamp, row | {f"applied.{name}": value for name, value in measured.applied.items()}))
         self.gate = inbox.state or self.gate
         if rows:
-            names = [f"{part}.{name}" for name in known.input_names for part in ("input", "applied")]
-            names += [f"value.{name}" for name in known.value_names]
+            names = [f"{part}.{name}" for name in signal_map.input_names for part in ("input", "applied")]
+            names += [f"value.{name}" for name in signal_map.value_names]
             values = np.array([[row.get(name, math.nan) for name in names] for _, row in rows])
             self._add("bus", names, np.array([stamp for stamp, _ in rows]), values, start_ns)
-            troubles = [name for name in known.value_names if name.startswith(("wrong_", "command_"))]
+            troubles = [name for name in signal_map.value_names if name.startswith(("wrong_", "command_"))]
             last = rows[-1][1]
             self.cause = ", ".join(name for name in troubles if last.get(f"value.{name}") == 1.0) or "none"
 
@@ -182,7 +182,7 @@ class LiveData:
         return float(min(EDGES_US[1 + int(np.searchsorted(total, share * total[-1]))], self.largest_us[name]))
 
     def panels(self) -> dict[str, list[Line]]:
-        """Give the lines by the label of their axis; a rig whose loop tells of itself is not shown twice."""
+        """Give the lines by the label of their axis; a rig whose loop reports itself is not shown twice."""
         names: list[str] = [n for n in ("seeker", "loop", "rig", "bus") if n in self.tables]
         names += [n for n in self.tables if n not in names]
         if "loop" in names and "rig" in names:
@@ -212,18 +212,18 @@ def _axis(part: str, base: str) -> tuple[str, str]:
     """Give the label of the axis that a column belongs to, and its own."""
     if part == "component":
         return "objective J [unit of J]", f"component {base}"
-    known = named_label(base)
-    long = known.long_name.strip() or base
+    label = named_label(base)
+    long = label.long_name.strip() or base
     if base in _DUTIES:
         return "duty [-]", _DUTIES[base]
-    if known.units in ("-", ""):
+    if label.units in ("-", ""):
         return f"{base} [-]", long
-    if known.units == "°CA aTDC" and part in _OF_PARTS:
+    if label.units == "°CA aTDC" and part in _OF_PARTS:
         return "timing [°CA aTDC]", long
     if base.startswith("imep_"):
         return "IMEP [bar]", long
-    what = _QUANTITIES.get(known.units) or long.partition(",")[0]
-    return f"{what} [{known.units}]", long
+    what = _QUANTITIES.get(label.units) or long.partition(",")[0]
+    return f"{what} [{label.units}]", long
 
 
 def _named(names: tuple[str, ...], codes: NDArray[np.float64] | None, before: str) -> str:

@@ -65,7 +65,7 @@ def watch(
     ImportError
         The extra ``watch`` is not installed.
     mgdd.errors.RigError
-        The server did not start; the message holds what it said.
+        The server did not start; the message holds its error output.
 
     Examples
     --------

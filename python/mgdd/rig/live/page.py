@@ -24,7 +24,7 @@ _LOG = logging.getLogger(__name__)
 _TICK_MS, _ALIVE_TICKS = 500, 2
 _UNSEEN = 3  # updates that a slow browser may owe: what is more would pile up here
 _WINDOWS_S = {"10 s": 10.0, "60 s": 60.0, "all": np.inf}
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # told apart by the colour-blind, too
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # distinct to the colour-blind, too
 _GOOD = {"run": "#2e7d32", "armed": "#b26a00", "init": "#555", "limp": "#c62828", "fault": "#c62828"}
 _SD_OF_95 = 1.96
 _HEIGHT, _LEGEND_ROW, _WIDE_LABEL, _LONGEST_LABEL = 240, 22, 26, 34  # pixels, and letters
@@ -38,8 +38,8 @@ color: white; font: bold 16px sans-serif; }</style>
 {% endblock %}
 {% block contents %}<div id="lost">No news from the server: this page stands still, and its stop button does nothing.
 Use Ctrl-C where the rig runs, or the emergency stop; then load the page again.</div>{{ super() }}
-<script>window.mgdd_heard = Date.now() + 20000; setInterval(() => {
-document.getElementById("lost").style.display = Date.now() - window.mgdd_heard > BROKEN ? "block" : "none" }, 500)
+<script>window.mgdd_updated = Date.now() + 20000; setInterval(() => {
+document.getElementById("lost").style.display = Date.now() - window.mgdd_updated > BROKEN ? "block" : "none" }, 500)
 </script>{% endblock %}""".replace("BROKEN", str(1000 * _BROKEN_S))
 
 
@@ -71,7 +71,7 @@ class _View:
             "tags",
             models.CustomJS(
                 args={"seen": self._seen},
-                code="window.mgdd_heard = Date.now(); seen.data = {n: [cb_obj.tags[0]]}",
+                code="window.mgdd_updated = Date.now(); seen.data = {n: [cb_obj.tags[0]]}",
             ),
         )
         self._figures = models.Row(
@@ -210,7 +210,7 @@ def _status_text(source: Source, trouble: str) -> str:
     data = source.data
     colour = _GOOD.get(data.gate, "#555")
     gate = escape(data.gate or "not in this record")
-    why = escape(data.reason or ("not told by the bus" if data.frames else "–"))
+    why = escape(data.reason or ("not reported by the bus" if data.frames else "–"))
     lines = [f"<b>{escape(source.name)}</b>: {escape(source.state)}"]
     lines += [
         f"safety gate: <b style='color:white;background:{colour};padding:2px 8px;border-radius:4px'>{gate}</b>"

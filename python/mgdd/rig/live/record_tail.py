@@ -84,7 +84,7 @@ class RecordTail:
                 break  # it is being written
             if not _SMALLEST <= length <= _LARGEST or zlib.crc32(view[at + 8 : end]) != crc:
                 self.trouble = (
-                    f"{self.path}: damaged at byte {self._at + at}: what stands behind is not shown; "
+                    f"{self.path}: damaged at byte {self._at + at}: what follows is not shown; "
                     "mgdd.rig.repair_record keeps it"
                 )
                 break

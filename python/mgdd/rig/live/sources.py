@@ -29,23 +29,23 @@ _SAFE_FRAMES, _SAFE_PAUSE_S = 5, 0.002
 def writer_of(path: Path) -> int | None:
     """Give the process that has a file open for writing: what a record belongs to while it runs."""
     try:
-        wanted = path.stat()
+        record_stat = path.stat()
     except OSError:
         return None
     for process in os.listdir("/proc") if os.path.isdir("/proc") else []:  # noqa: PTH112, PTH208 - ten thousand paths
-        if process.isdigit() and _writes(process, wanted):
+        if process.isdigit() and _writes(process, record_stat):
             return int(process)
     return None
 
 
-def _writes(process: str, wanted: os.stat_result) -> bool:
+def _writes(process: str, record_stat: os.stat_result) -> bool:
     try:
         for number in os.listdir(f"/proc/{process}/fd"):  # noqa: PTH208
             try:
-                found = os.stat(f"/proc/{process}/fd/{number}")  # noqa: PTH116
+                open_stat = os.stat(f"/proc/{process}/fd/{number}")  # noqa: PTH116
             except OSError:
                 continue
-            if (found.st_dev, found.st_ino) == (wanted.st_dev, wanted.st_ino):
+            if (open_stat.st_dev, open_stat.st_ino) == (record_stat.st_dev, record_stat.st_ino):
                 text = Path(f"/proc/{process}/fdinfo/{number}").read_text(encoding="ascii")
                 if int(text.partition("flags:")[2].split()[0], 8) & _WRITES:
                     return True
@@ -57,7 +57,7 @@ def _writes(process: str, wanted: os.stat_result) -> bool:
 class RecordSource:
     """A record, of a run that goes on or is over. Stop is Ctrl-C to the process that writes it, as from its terminal.
 
-    A second click is SIGTERM, for one that a shell told to ignore the first.
+    A second click is SIGTERM, for one that a shell made ignore the first.
     """
 
     def __init__(self, path: Path, signal_map: SignalMap | None = None, *, name: str = "") -> None:
@@ -139,7 +139,7 @@ class BusSource:
         self._map, self._bus = signal_map, CanTransport.parse(bus)
         self.name, self.said = self._bus.name, ""
         self.data = LiveData(signal_map)
-        self._frames: deque[Frame] = deque(maxlen=100_000)  # of a page that nobody looks at
+        self._frames: deque[Frame] = deque(maxlen=100_000)  # of a page that is not open
         self._over, self._stop = threading.Event(), threading.Event()
         self._begun_ns = time.monotonic_ns()
         self._bus.open()
@@ -159,7 +159,7 @@ class BusSource:
             self.said = "STOP FAILED: the bus is gone: use the emergency stop"
 
     def close(self) -> None:
-        """Fall silent."""
+        """Close the bus."""
         self._over.set()
         self._thread.join()
         self._bus.close()
@@ -177,13 +177,13 @@ class BusSource:
             self.trouble, self.state = str(error), "the bus is gone"
 
     def _send_safe(self) -> None:
-        """Go on from the counter that was heard last: the node takes the frames, and refuses those of its host."""
+        """Go on from the counter that was received last: the node takes the frames, and refuses those of its host."""
         commands = [message for message in self._map.commands.values() if message.safe]
         sender, sent = Sender(), 0
         for message in commands:
-            heard = self.data.last_commands.get(message.name)
-            if heard is not None:
-                sender.go_on(message, heard)
+            last = self.data.last_commands.get(message.name)
+            if last is not None:
+                sender.go_on(message, last)
         try:
             for _ in range(_SAFE_FRAMES):
                 for message in commands:
@@ -197,7 +197,7 @@ class BusSource:
         if not sent:
             self.said = "STOP FAILED: the map has no safe frame: use the emergency stop"
             return
-        self.said = f"{sent} safe frames sent at {time.strftime('%H:%M:%S')}: look whether the node lets go"
+        self.said = f"{sent} safe frames sent at {time.strftime('%H:%M:%S')}: check that the node opens its bridge"
 
 
 class SimulatedSource(RecordSource):
