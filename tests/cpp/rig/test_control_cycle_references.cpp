@@ -11,7 +11,6 @@
 namespace mgdd::rig {
 namespace {
 
-using test::bus_envelope;
 using test::period;
 using test::start;
 using Rig = test::CycleRig;
