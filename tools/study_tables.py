@@ -133,7 +133,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("points", _number("points", 0)),
             ("cycles averaged", _number("averaged_cycles", 0)),
             ("engine cycles", _number("cycles", 0)),
-            ("lost, mean of the cells [points]", _between("lost_percent", 3)),
+            ("loss, mean of the cells [points]", _between("lost_percent", 3)),
             ("worst cell [points]", _between("worst_lost_percent", 3)),
             ("between cells [points]", _between("between_lost_percent", 3)),
             ("every cell within 0.1, 0.2, 0.5 points [% of maps]", lambda row: ", ".join(
@@ -144,7 +144,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
         "parts": (
             ("fit of 64 points", _words("way")),
             ("part", _words("part")),
-            ("lost, mean of the cells [points]", _between("lost_percent", 4)),
+            ("loss, mean of the cells [points]", _between("lost_percent", 4)),
             ("largest in a cell [points]", _number("largest_of_a_cell_percent", 3)),
             ("cells above a limit, of 30", _number("cells_above", 1)),
             ("furthest above [%]", _number("largest_excess_percent", 1)),
@@ -152,7 +152,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
         "other_engines": (
             ("engine", _words("engine")),
             ("best timing moved [°CA]", _number("optimum_moved_cad", 1)),
-            ("lost, mean of the cells [points]", _between("lost_percent", 3)),
+            ("loss, mean of the cells [points]", _between("lost_percent", 3)),
             ("worst cell [points]", _between("worst_lost_percent", 2)),
             ("cells above a limit, of 30", _between("cells_above", 1)),
             ("furthest above [%]", _number("largest_excess_percent", 1)),
@@ -160,7 +160,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
         "guides": (
             ("engine", _words("engine")),
             ("timing from", _words("guide")),
-            ("lost per cycle [points]", _between("lost_percent", 3)),
+            ("loss per cycle [points]", _between("lost_percent", 3)),
             ("first 50 cycles at a point", _between("early_lost_percent", 3)),
             ("last 50", _between("late_lost_percent", 3)),
             ("less than the plain seeker [%]", _between("saved_percent", 0)),
@@ -169,7 +169,7 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
         ),
         "learnt": (
             ("engine", _words("engine")),
-            ("map alone, lost before [points]", _between("lost_before_percent", 3)),
+            ("map alone, loss before [points]", _between("lost_before_percent", 3)),
             ("after", _between("lost_after_percent", 3)),
             ("gone [%]", _between("gone_percent", 0)),
             ("cycles above a limit before [%]", _between("above_before_percent", 1)),

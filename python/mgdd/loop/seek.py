@@ -124,7 +124,7 @@ def seek(
     ...     return 56.0 - 0.03 * (x["soc_cad"] + 4.0) ** 2 - 300.0 * (x["egr"] - 0.15) ** 2
     >>> found = seek(engine, {"soc_cad": (-25.0, 15.0), "egr": (0.0, 0.4)}, cycles=60)
     >>> found.reason
-    '2 inputs: it loses least on the way, whatever their units'
+    '2 inputs: smallest cumulative loss, whatever their units'
     >>> round(found.inputs["soc_cad"]), round(found.inputs["egr"], 2), found.findings
     (-4, 0.15, ())
     >>> more = seek(engine, seeker=found.seeker, cycles=10)
