@@ -17,7 +17,7 @@ from mgdd.errors import Interrupted
 from mgdd.io.point_table import read_points
 from mgdd.results.labels import labelled_dataset
 from mgdd.sweep import sweep
-from mgdd.sweep.cycles import input_labels
+from mgdd.sweep.cases import input_labels
 
 _POINT = Options(sweep, "soc_cad")
 

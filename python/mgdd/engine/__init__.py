@@ -10,9 +10,10 @@ from mgdd._rooms import furnish as _furnish
 from mgdd.engine.cycle import sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import ignition_delay
 from mgdd.engine.indicating import Indicating
-from mgdd.engine.nox import ThermalNo, fit_nox_proxy, nox_at_reference_humidity, nox_g_per_kwh
+from mgdd.engine.nox import fit_nox_proxy, nox_at_reference_humidity, nox_g_per_kwh
 from mgdd.engine.optimum import find_optimum
 from mgdd.engine.pressure_check import PressureCheck, check_pressure
+from mgdd.engine.thermal_no import ThermalNo
 from mgdd.engine.trace import analyze
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Models that guide a seeker: the model leads, the measurements decide.
+"""Models that guide a seeker: the model proposes a starting point, measured cycles correct it.
 
 A guide is any function of the operating point that says where the optimum should be: `ModelOptimum` asks the cycle
 model, `TimingMap` a table, and a function of your own will do. `FeedForward` puts it in front of a seeker of

@@ -13,7 +13,8 @@ from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.family import ModelFamily
 from mgdd.identify.engine.profile import wall_heat_profile
 from mgdd.identify.engine.tdc import estimate_tdc
-from mgdd.identify.ode import OdeModel, fit_ode
+from mgdd.identify.ode import fit_ode
+from mgdd.identify.ode_model import OdeModel
 from mgdd.identify.throttle.excitation import check_excitation, design_excitation
 from mgdd.identify.throttle.fits import load_throttle_model
 from mgdd.identify.throttle.identify import identify_throttle

@@ -64,6 +64,14 @@ def of_hdf5(file: Path, stack: contextlib.ExitStack) -> Columns:
     netcdf = "_NCProperties" in content.attrs
     columns = []
     for name, item in items:
+        if item.external or item.is_virtual:  # a missing file would give numbers that nobody measured
+            raise DataError(
+                f"{file}: the numbers of data set {name!r} are in other files: those are not read; copy them into one, "
+                "as h5repack does"
+            )
+        needed, held = item.size * item.id.get_type().get_size(), item.id.get_storage_size()
+        if item.id.get_offset() is not None and held < needed:  # the library would give whatever is in memory
+            raise ValueError(f"data set {name!r} has {held} of {needed} bytes")
         values = _Decoded(item, item.attrs, unwritten=netcdf)
         unit = next(filter(None, (_text(item.attrs.get(key)) for key in ("units", "unit"))), "")
         columns.append(Named(name, Reversed(values) if matlab else values, unit))

@@ -220,9 +220,9 @@ class ParameterFile:
 
     def values(self, table: str, wanted: Mapping[str, Wanted]) -> dict[str, Any]:
         """Take the values of a table, none of one that may be missing: numbers as float, lists as they stand."""
-        entries = self.tables.get(table, {})
+        rows = self.tables.get(table, {})
         out = {}
-        for key, entry in entries.items():
+        for key, entry in rows.items():
             where = f"{self.origin}: [{table}] {key}"
             if key not in wanted:
                 raise ParameterError(f"{where}: unknown key: {_near(key, wanted)}")
@@ -239,7 +239,7 @@ class ParameterFile:
                 if not (fits(value, need) or (part != "value" and value is None)):
                     raise ParameterError(f"{where}: {part} = {_short(value)}: must be {FORMS[need]}")
             out[key] = float(entry.value) if form == "number" else entry.value
-        missing = [key for key, want in wanted.items() if want.required and key not in entries]
+        missing = [key for key, want in wanted.items() if want.required and key not in rows]
         if missing:
             example = _example(missing[0], wanted[missing[0]].unit)
             raise DataError(f"{self.origin}: [{table}] lacks {', '.join(missing)}: write {example}")

@@ -107,13 +107,13 @@ def _line_of(x: Any, shades: Any) -> str:
 def _cells_of(shades: Any) -> str:
     width, height = 240 // len(shades), 50 // len(shades[0])
     dark_to_pale = ((0, 124, 254), (34, 123, 232), (78, 120, 56))  # red, green and blue of cividis
-    html = ""
+    cells = ""
     for (i, j), shade in np.ndenumerate(shades):
         if np.isfinite(shade):
             color = ",".join(f"{np.interp(shade, (0.0, 0.5, 1.0), channel):.0f}" for channel in dark_to_pale)
             size = f"width='{width}' height='{height}'"
-            html += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
-    return html
+            cells += f"<rect x='{i * width}' y='{50 - (j + 1) * height}' {size} fill='rgb({color})'></rect>"
+    return cells
 
 
 def as_figure(title: str, rows: Iterable[Row], ax: Axes | None = None) -> Axes:
@@ -215,8 +215,8 @@ def _shown(value: Any) -> str:
     if hasattr(value, "sizes") and hasattr(value, "dims"):
         return "Dataset (" + ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items()) + ")"
     if isinstance(value, Mapping | Sequence | set | frozenset):
-        named = value.items() if isinstance(value, Mapping) else [("", text) for text in value]
-        entries = [f"{name} {_shown(text)}".lstrip() for name, text in named]
+        named = value.items() if isinstance(value, Mapping) else [("", entry) for entry in value]
+        entries = [f"{name} {_shown(entry)}".lstrip() for name, entry in named]
         joined = ", ".join(entries) or "none"
         short = textwrap.shorten(joined, _LONG, placeholder=" …")
         return short if short == joined else f"{len(value)}: {short}"
@@ -254,9 +254,9 @@ def _markup_of_core(self: Any) -> str:
 
 def _wrapped(plain: Callable[[Any], str]) -> Callable[[Any], str]:
     def text(self: Any) -> str:
-        text = plain(self)
-        lines = textwrap.wrap(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-        return text if len(text) <= _WIDTH else "\n".join(lines)
+        whole = plain(self)
+        lines = textwrap.wrap(whole, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        return whole if len(whole) <= _WIDTH else "\n".join(lines)
 
     return text
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.seek import learn_map
+from mgdd.cli.guide_map import learn_map
 from mgdd.engine import Performance
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.loop import VirtualEngine, run_seeker

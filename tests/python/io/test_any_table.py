@@ -382,3 +382,19 @@ def test_a_misspelt_column_is_told_the_near_one(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("angle;p\n" + ROWS)
     with pytest.raises(DataError, match=r"no column 'angel': did you mean 'angle'\? the header has 'angle', 'p'"):
         read_pressure(tmp_path / "t.csv", angle_column="angel")
+
+
+@pytest.mark.parametrize("kind", ["external", "virtual"])
+def test_numbers_of_hdf5_in_other_files_are_not_read(kind: str, tmp_path: Path) -> None:
+    """A missing one would give its fill value."""
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as content:
+        if kind == "external":
+            content.create_dataset("p_bar", (100,), "f8", external=[(tmp_path / "gone", 0, 800)])
+        else:
+            layout = h5py.VirtualLayout((100,), "f8")
+            layout[:] = h5py.VirtualSource(tmp_path / "gone.h5", "p", (100,))
+            content.create_virtual_dataset("p_bar", layout)
+    with pytest.raises(DataError, match=r"a\.h5: the numbers of data set 'p_bar' are in other files"):
+        read_any_table(tmp_path / "a.h5")

@@ -16,7 +16,8 @@ from mgdd import datasets, io
 from mgdd.cli import demo, engine, main
 from mgdd.errors import Interrupted, ShapeError
 from mgdd.report import calibration_report
-from mgdd.report.calibration import move_of, shipped_report
+from mgdd.report.calibration import shipped_report
+from mgdd.report.calibration_page import move_of
 
 
 def pressed(make: Callable[..., Any]) -> Callable[..., Any]:

@@ -21,7 +21,7 @@ from mgdd.results.labels import check_labels
 from mgdd.surrogate import ResponseModel, fit_response
 from mgdd.surrogate.polynomial import leverage_of
 from mgdd.surrogate.process import ProcessSurface
-from mgdd.surrogate.response_fit import outlier_bound
+from mgdd.surrogate.response_diagnostics import outlier_bound
 from mgdd.sweep import sweep
 
 FACTORS = {"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0), "soi_cad": (-20.0, 5.0)}

@@ -23,7 +23,8 @@ from mgdd.engine import Cylinder, NoxProxy, OperatingPoint, simulate, timing_swe
 from mgdd.errors import ParameterError, ShapeError, WorkerLostError
 from mgdd.results.labels import check_labels
 from mgdd.sweep import sweep
-from mgdd.sweep.cycles import case_of, input_labels, simulate_cases
+from mgdd.sweep.cases import case_of, input_labels
+from mgdd.sweep.cycles import simulate_cases
 
 CYLINDER = Cylinder(burn_shape="wiebe", wall_heat_scale=0.7, bore_mm=83.0)
 POINT = OperatingPoint(speed_rpm=1750.0, fuel_mg=17.0)
@@ -176,7 +177,8 @@ def test_any_chunks_give_the_same_bits(cuts: set[int]) -> None:
 
 
 def chunked(kept: list[Any] = []) -> Any:  # noqa: B006 - the whole is computed once
-    from mgdd.sweep.cycles import NOX, Request, cases_of
+    from mgdd.sweep.cases import cases_of
+    from mgdd.sweep.cycles import NOX, Request
 
     if not kept:
         cases = cases_of(GRID, points=False)
