@@ -162,17 +162,7 @@ def test_ten_parameters_from_python_reach_the_noise_floor():
         SmoothThrottle().fit(log, start_values=truth, options=FitOptions(seed=1), **box)
 
 
-GROUPS = {
-    "tau_s": 0.0197,
-    "gain_deg_per_s2_per_duty": 83_597.0,
-    "beta_above_duty": 0.1292,
-    "kappa_above_duty_per_deg": 4.96e-4,
-    "delta_duty": 0.0927,
-    "beta_below_duty": 0.15,
-    "kappa_below_duty_per_deg": 1.5e-3,
-    "limp_home_deg": 8.0,
-    "electrical_s": 1e-3,
-}
+GROUPS = TRUTH | {"electrical_s": 1e-3}
 MOVING = ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")
 
 
