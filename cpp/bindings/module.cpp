@@ -31,7 +31,7 @@ PYBIND11_MODULE(_core, m) {
   bind_errors(m);
   static_cast<void>(mgdd::wanted_instruction_set());  // refuses a wrong MGDD_INSTRUCTION_SET here, by name
   const std::vector<Room> rooms{
-      {"math", "Look-up tables, and rows of numbers in a text.", {&bind_lookup_table, &bind_number_rows}},
+      {"math", "Places in look-up tables, and rows of numbers in a text.", {&bind_tables, &bind_number_rows}},
       {"optimize", "Fits, seekers and learners.", {&bind_least_squares, &bind_limits, &bind_seekers, &bind_learning}},
       {"control", "Controllers of a throttle plate.", {&bind_controllers, &bind_guided_predictive, &bind_supervisor}},
       {"engine",
@@ -44,9 +44,8 @@ PYBIND11_MODULE(_core, m) {
        "Fits of the cylinder and the throttle, update while running.",
        {&bind_cylinder_fit, &bind_throttle_fit, &bind_online}},
       {"guide",
-       "Models that guide a seeker: feed-forward, curves, trust, maps.",
-       {&bind_curve, &bind_feed_forward, &bind_model_optimum, &bind_timing_map, &bind_online_calibration,
-        &bind_guided_engine}},
+       "Models that guide a seeker: feed-forward, curves, trust.",
+       {&bind_curve, &bind_feed_forward, &bind_model_optimum, &bind_online_calibration, &bind_guided_engine}},
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop",
        "Virtual benches and the loops over them.",

@@ -5,7 +5,7 @@
 
 namespace mgdd::bindings {
 
-void bind_lookup_table(pybind11::module_& m);
+void bind_tables(pybind11::module_& m);
 void bind_number_rows(pybind11::module_& m);
 void bind_least_squares(pybind11::module_& m);
 void bind_limits(pybind11::module_& m);
@@ -31,7 +31,6 @@ void bind_throttle_fit(pybind11::module_& m);
 void bind_online(pybind11::module_& m);
 void bind_feed_forward(pybind11::module_& m);
 void bind_model_optimum(pybind11::module_& m);
-void bind_timing_map(pybind11::module_& m);
 void bind_online_calibration(pybind11::module_& m);
 void bind_benchmark_models(pybind11::module_& m);
 void bind_curve(pybind11::module_& m);

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.guide import FeedForward, ModelOptimum
+from mgdd.guide import FeedForward, ModelOptimum, TimingMap
 from mgdd.loop import VirtualEngine
 from mgdd.maps import optimize_map
 from mgdd.optimize import ExtremumSeeking, Limit
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from mgdd.guide import TimingMap
     from mgdd.maps import CalibrationMap
 
     Array = NDArray[np.float64]
@@ -176,7 +175,7 @@ def route(seed: int) -> tuple[Array, Array]:
 
 def timing_map(table: CalibrationMap) -> TimingMap:
     """Make the table of the guide of a map; it forgets nothing, since its engine stays as it is."""
-    return table.to_timing_map(prior_sd_cad=PRIOR_SD_CAD, forgetting=1.0)
+    return TimingMap(table, prior_sd_cad=PRIOR_SD_CAD, forgetting=1.0)
 
 
 def drive(cylinder: Cylinder, guide: Any, seed: int, *, learns: bool = False) -> Drive:

@@ -296,9 +296,8 @@ def _driven_by(engine: str, maps: Maps) -> Guided:
         drives["plain seeker"].append(drive(cylinder, None, seed))
         drives["rough model"].append(drive(cylinder, rough_model(), seed))
         drives["map that learns"].append(drive(cylinder, learning, seed, learns=True))
-        taught = timing_map(one.table.learned_from(learning))
         before.append(drive_by_map(cylinder, old, seed + _OTHER_ROUTE))
-        after.append(drive_by_map(cylinder, taught, seed + _OTHER_ROUTE))
+        after.append(drive_by_map(cylinder, learning, seed + _OTHER_ROUTE))
     return Guided(engine=engine, drives=drives, before=before, after=after)
 
 

@@ -65,7 +65,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "seeker": lambda: ExtremumSeeking(**seeking),
         "feed-forward": lambda: FeedForward(ExtremumSeeking(**seeking), lambda _: -5.0),
         "model optimum": lambda: ModelOptimum(Cylinder()),
-        "timing map": lambda: TimingMap({"speed_rpm": [900.0, 3000.0], "fuel_mg": [6.0, 20.0, 40.0]}, -5.0),
+        "timing map": lambda: TimingMap(CalibrationMap({"fuel_mg": [6.0, 20.0]}, -5.0, name="soc_cad")),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
         "run": lambda: run_seeker(VirtualEngine(), ExtremumSeeking(**seeking), 300),
         "steady": lambda: VirtualEngine(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0}),

@@ -32,7 +32,7 @@ from mgdd.engine import (
     timing_sweep,
 )
 from mgdd.engine.cycle import convergence
-from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
+from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.validation import ThrottleValidation
@@ -244,7 +244,6 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "guide.FeedForward.history": lambda _: guided().history,
     "guide.GuidedEngine.history": lambda _: guided_engine().history,
     "guide.OnlineCalibration.history": lambda _: taught().history,
-    "guide.TimingMap.to_dataset": lambda _: TimingMap({"fuel_mg": [6.0, 20.0]}, -5.0).to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "surrogate.random_step_records": lambda _: random_step_records(50),
     "io.Encoder.angle": lambda _: wheel_angle(),

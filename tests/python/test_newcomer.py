@@ -115,8 +115,8 @@ def test_save_and_load_each_result(tmp_path: Path) -> None:
     run.to_netcdf(tmp_path / "run.nc")
     assert mgdd.plot.seeking(xr.load_dataset(tmp_path / "run.nc")).get_ylabel() == "soc_cad [°CA aTDC]"
     table = mgdd.maps.CalibrationMap({"fuel_mg": [10, 20]}, [1.0, 2.0], name="soc_cad")
-    mgdd.maps.write_map(table, tmp_path / "map.csv")
-    assert mgdd.maps.read_map(tmp_path / "map.csv") == table
+    table.save(tmp_path / "map.nc")
+    assert mgdd.maps.CalibrationMap.load(tmp_path / "map.nc") == table
     fit = mgdd.identify.identify_throttle(frame(), "first_principle", options=mgdd.optimize.FitOptions(n_starts=1))
     (tmp_path / "throttle.toml").write_text(fit.to_toml(), encoding="utf-8")
     assert mgdd.identify.load_throttle_model(tmp_path / "throttle.toml") == fit.model

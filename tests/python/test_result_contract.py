@@ -21,7 +21,7 @@ from map_cases import sweep as map_sweep
 from mgdd import datasets, identify, io, plot, presets
 from mgdd.engine import Indicating, analyze, check_pressure, find_optimum, ignition_delay, simulate
 from mgdd.errors import Error, ParameterError
-from mgdd.guide import OnlineCalibration, TimingMap
+from mgdd.guide import OnlineCalibration
 from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.loop import SurrogatePlant, VirtualEngine, run_seeker, seek, seek_front, tune_controller
 from mgdd.maps import optimize_map
@@ -117,7 +117,6 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "ExcitationCheck": lambda _: identify.check_excitation(chirp(offset=0.15, amplitude=0.1), Throttle()),
     "RecordContent": lambda _: identify.check_excitation(chirp(offset=0.15, amplitude=0.1), Throttle()).content,
     "CalibrationMap": lambda _: optimize_map(map_sweep(), "efficiency_gross"),
-    "TimingMap": lambda _: TimingMap({"speed_rpm": [900.0, 1500.0], "fuel_mg": [6.0, 20.0]}, -5.0),
     "Optimum": lambda _: find_optimum("puma_single", limits={"p_max_bar": 95.0}),
     "Timing": lambda _: ignition_delay("puma_single", soi_cad=-10.0),
     "MeasuredMap": lambda _: measure_map([-2, -1, 0, 1, 2], [-4.0, -1.1, 0.0, -0.9, -4.0]),

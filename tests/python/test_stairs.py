@@ -14,8 +14,8 @@ CPP = "common > math > dynamics > optimize > control > engine throttle > identif
 # parallel knows errors alone: whatever is long enough to leave the machine may use it.
 PYTHON = (
     "_guesses > errors > _arguments _settings > _core > _rooms > parallel results > signals > io plot > presets"
-    " > optimize > control > engine throttle > identify > surrogate > guide"
-    " > loop sweep design datasets > maps > rig > report > cli > __main__ > mgdd_studies"
+    " > optimize > control > engine throttle > identify > surrogate > maps > guide"
+    " > loop sweep design datasets > rig > report > cli > __main__ > mgdd_studies"
 )
 
 STRANGERS = [("identify/engine", "identify/throttle")]  # parts of one room that do not know each other

@@ -108,7 +108,7 @@ def test_a_map_learns_where_it_was_driven_and_nowhere_else(made: Made) -> None:
     learning, worn = drives.timing_map(made.table), ENGINES["worn"]
     run = drives.drive(worn, learning, 2, learns=True)
     assert 10 <= run.learnt <= drives.PLACES
-    taught = made.table.learned_from(learning)
+    taught = learning.table
     seen = taught.cells["source"] == "learned"
     np.testing.assert_array_equal(taught.values[~seen], made.table.values[~seen])
     own = Truth.of(worn)

@@ -1,5 +1,5 @@
 """
-Models that guide a seeker: feed-forward, curves, trust, maps.
+Models that guide a seeker: feed-forward, curves, trust.
 """
 from __future__ import annotations
 import collections.abc
@@ -8,7 +8,7 @@ import mgdd._core.optimize
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Curve', 'CurveSeeking', 'FeedForward', 'GuidedEngine', 'ModelOptimum', 'OnlineCalibration', 'TimingMap', 'calibrated_parameters']
+__all__: list[str] = ['Curve', 'CurveSeeking', 'FeedForward', 'GuidedEngine', 'ModelOptimum', 'OnlineCalibration', 'calibrated_parameters']
 class Curve:
     """
     What a model says of one quantity over one input: a smooth curve through given points.
@@ -474,30 +474,6 @@ class ModelOptimum:
         """
         Keyword arguments that, with `cylinder`, make this guide again.
         """
-class TimingMap:
-    """
-    A map of the best timing; see mgdd.guide.TimingMap.
-    """
-    def __init__(self, *, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], values_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], prior_sd_cad: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def _learn(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], value_cad: typing.SupportsFloat | typing.SupportsIndex, sd_cad: typing.SupportsFloat | typing.SupportsIndex) -> bool:
-        """
-        One confirmed optimum; False where it was not taken.
-        """
-    def _lookup(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> tuple[float, float, float, bool]:
-        """
-        Value, its standard deviation, support, and whether it is held outside of the axes.
-        """
-    @property
-    def _columns(self) -> dict[str, list[float]]:
-        """
-        Values, variances and support of all cells.
-        """
-    @_columns.setter
-    def _columns(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
 class OnlineCalibration:
     """
     Calibration while an engine runs; use mgdd.guide.OnlineCalibration.

@@ -1,23 +1,23 @@
 """
-Look-up tables, and rows of numbers in a text.
+Places in look-up tables, and rows of numbers in a text.
 """
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['LookupTable', 'cell_counts', 'row_numbers', 'text_rows']
-class LookupTable:
+__all__: list[str] = ['TableAxes', 'cell_counts', 'row_numbers', 'text_rows']
+class TableAxes:
     """
-    A look-up table over one or two axes; see mgdd.maps.CalibrationMap.
+    The axes of a table, one or two; see mgdd.maps.CalibrationMap.
     """
-    def __init__(self, *, names: collections.abc.Sequence[str], axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def __init__(self, *, names: collections.abc.Sequence[str], entries: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
     def __repr__(self) -> str:
         ...
-    def at(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
+    def places(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple:
         """
-        Values at points, one row per axis, and which of them lie outside of the axes and are held at the edge.
+        Cells around points, one row per axis, their weights, and which points lie outside of the axes.
         """
 def cell_counts(text: bytes, begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], end: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], mark: str) -> numpy.typing.NDArray[numpy.int64]:
     """

@@ -21,7 +21,7 @@ class Command(NamedTuple):
     endings: str = ".json"  # of -o FILE
 
 
-_MAP = ".csv, .json or .nc, which hold everything; .dcm or .cdfx for calibration tools"
+_MAP = ".nc, which holds everything; .csv for spreadsheets, .dcm or .cdfx for calibration tools"
 # fmt: off
 COMMANDS = {
     "demo": Command("calibrate four measured traces, find their best timing, report; a guided seeker, a throttle",
@@ -48,8 +48,7 @@ COMMANDS = {
     "engine sweep": Command(
         "simulate a cycle for every point of a grid, or of a file; -o FILE.nc or FILE.csv keeps the table",
         "--over soc_cad=-20:5:51 --over speed_rpm=1000:3000:9 -o table.nc --json", "sweep", ".nc, netCDF, or .csv"),
-    "map": Command("calibration maps, from the points of an experiment to a DCM file (the table of mgdd engine seek "
-                   "--guide-map is another file: mgdd map export --guide-map writes it)"),
+    "map": Command("calibration maps, from the points of an experiment to a DCM file"),
     "map design": Command(
         "choose the points of an experiment, inside limits that the model of the engine predicts",
         "--over speed_rpm=1000:3000 --over fuel_mg=6:30 --over soc_cad=-16:4 --points 64 --limit p_max_bar=130 "
@@ -64,26 +63,24 @@ COMMANDS = {
         "-o table.nc", "map_fit", ".nc, netCDF, or .csv"),
     "map optimize": Command(
         "find the best value of an input at every operating point of a table, under limits",
-        "table.nc --maximize efficiency_gross --along soc_cad --limit p_max_bar=130 --max-loss 0.002 -o best.json",
+        "table.nc --maximize efficiency_gross --along soc_cad --limit p_max_bar=130 --max-loss 0.002 -o best.nc",
         "map_optimize", _MAP),
     "map smooth": Command(
         "smooth a map inside of the allowed ranges of its cells, under limits on its slopes",
-        "best.json --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.json", "map_optimize", _MAP),
+        "best.nc --slope-limit speed_rpm=0.004 --slope-limit fuel_mg=0.6 -o smooth.nc", "map_optimize", _MAP),
     "map show": Command(
         "show a map with breakpoints, units, and the limits and sources of its cells",
-        "smooth.json --sweep table.nc --figure smooth.png", "map_show", ".csv, .json, .nc, .dcm or .cdfx, the map"),
+        "smooth.nc --sweep table.nc --figure smooth.png", "map_show", _MAP),
     "map diff": Command(
         "subtract one map from another at the breakpoints of both",
-        "best.json smooth.json --tolerance 1 --figure diff.png", "map_show", ".nc, the differences, or .json"),
+        "best.nc smooth.nc --tolerance 1 --figure diff.png", "map_show", ".nc, the differences, or .json"),
     "map trade-off": Command(
         "set two variables of a table against each other along an input: what one costs in the other",
-        "table.nc --right p_max_bar --up efficiency_gross --at speed_rpm=2200 --map smooth.json "
+        "table.nc --right p_max_bar --up efficiency_gross --at speed_rpm=2200 --map smooth.nc "
         "--figure trade_off.png", "map_trade_off"),
     "map export": Command(
-        "write maps in another form: CSV, JSON, netCDF, DCM, CDFX, or the table of a guide",
-        "smooth.json --label SocBase -o engine.dcm", "map_export",
-        ".csv, .json or .nc, which hold everything; .dcm or .cdfx, which may hold several maps; with --guide-map .csv "
-        "or .toml"),
+        "write maps in another form: netCDF, CSV, DCM, CDFX", "smooth.nc --label SocBase -o engine.dcm", "map_export",
+        f"{_MAP}, which may hold several maps"),
     "throttle": Command("an electronic throttle: simulate, demand, excite, identify, validate, track, tune"),
     "throttle simulate": Command(
         "simulate a throttle from rest and print the summary of its step; -o FILE.csv writes the run",

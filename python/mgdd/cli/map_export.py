@@ -1,10 +1,10 @@
-"""`mgdd map export`: a map in another file form, a measured engine as a map, and the table of a guide."""
+"""`mgdd map export`: a map in another file form, and a measured engine as a map."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mgdd import datasets
 from mgdd.cli.from_library import Options
@@ -12,14 +12,9 @@ from mgdd.cli.map_files import FORMS, MAP_ENDINGS, READING, map_in
 from mgdd.cli.options import option, refuse_idle
 from mgdd.cli.output import check_file, emit, wrote
 from mgdd.errors import ParameterError
-from mgdd.io.files import write_whole_text
 from mgdd.maps import CalibrationMap, write_map
 
-if TYPE_CHECKING:
-    from mgdd.guide import TimingMap
-
 _ENGINES = ("volkswagen", "mercedes")  # in the order of the set
-_GUIDE = (".csv", ".toml")
 _WRITING = Options(write_map, "encoding")
 
 
@@ -33,14 +28,12 @@ def _add_export(parser: Any) -> None:
            "instead of a file: the measured map of this engine of the data set advisor_engine_maps, whose variable "
            "--name says (default: bsfc_g_per_kwh, brake specific fuel consumption [g/kWh])",
            choices=_ENGINES)  # fmt: skip
-    option(parser, "--guide-map",
-           "write the table that mgdd engine seek --guide map --guide-map reads, another form of file")  # fmt: skip
 
 
 def _export(args: argparse.Namespace) -> None:
     if args.output is None:
         raise ParameterError("-o is needed: name the file to write, for example -o engine.dcm")
-    check_file("-o", args.output, _GUIDE if args.guide_map else MAP_ENDINGS)
+    check_file("-o", args.output, MAP_ENDINGS)
     maps = _maps(args)
     has_labels = Path(args.output).suffix in (".dcm", ".cdfx")
     if not has_labels:
@@ -55,16 +48,13 @@ def _export(args: argparse.Namespace) -> None:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise ParameterError(f"two maps would be called {twice!r} in {args.output}: give each a --label")
-    if args.guide_map:
-        _write_guide(maps[0].to_timing_map(), args)
-    elif has_labels:
+    if has_labels:
         write_map(dict(zip(names, maps, strict=True)), args.output, **_WRITING.given(args))
     else:
         write_map(maps[0], args.output)
     wrote(args.output)
     file, args.output = args.output, None
-    kept = {"sd"} if args.guide_map else set()
-    lost = sorted({*_lost(maps)} - kept) if has_labels or args.guide_map else []
+    lost = sorted({*_lost(maps)}) if Path(file).suffix != ".nc" else []
     payload = {
         "file": file,
         "maps": [
@@ -75,7 +65,7 @@ def _export(args: argparse.Namespace) -> None:
     }
     text = [f"{name}: {repr(table)[1:-1]}" for name, table in zip(names, maps, strict=True)]
     if lost:
-        text.append(f"this form has no place for {', '.join(lost)}: keep the map as .json, .csv or .nc too")
+        text.append(f"this form has no place for {', '.join(lost)}: keep the map as .nc too")
     emit(args, payload, text="\n".join(text))
 
 
@@ -99,15 +89,8 @@ def _lost(maps: list[CalibrationMap]) -> list[str]:
         name
         for table in maps
         for name, column in table.cells.items()
-        if not all(str(entry) == str(plain[name][0]) for entry in column.ravel().tolist())
+        if not all(str(entry) == str(plain[name][0]) for entry in column.ravel().tolist() if name in plain)
     ]
-
-
-def _write_guide(timing: TimingMap, args: argparse.Namespace) -> None:
-    if Path(args.output).suffix == ".csv":
-        timing.write_csv(args.output)
-    else:
-        write_whole_text(args.output, timing.to_toml())
 
 
 COMMANDS = {"export": (_add_export, _export)}

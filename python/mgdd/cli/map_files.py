@@ -23,7 +23,6 @@ from mgdd.io.plain_csv import write_columns
 from mgdd.io.point_table import POINT, read_points
 from mgdd.maps import read_map, write_map
 from mgdd.maps.cells import NUMBERS, TEXTS
-from mgdd.maps.files import map_content
 from mgdd.plot import map_cells
 from mgdd.plot.style import drawn
 from mgdd.report import Table
@@ -37,9 +36,9 @@ if TYPE_CHECKING:
 
 
 CSV = Options(read_points, "delimiter", "decimal")
-MAP_ENDINGS = (".csv", ".json", ".nc", ".dcm", ".cdfx")
+MAP_ENDINGS = (".nc", ".csv", ".dcm", ".cdfx")
 READING = Options(read_map, "name", "decimal", "rows", "columns", "sheet")
-FORMS = "a map of any form: .csv, .json, .nc, .dcm, .cdfx, a grid or points of a spreadsheet or program"
+FORMS = "a map of any form: .nc, .dcm, .cdfx, a grid or points of a spreadsheet or program"
 _SIZE = (6.6, 4.6)
 
 
@@ -95,10 +94,25 @@ def _write_table(data: xr.Dataset, file: str) -> None:
         write_netcdf(data, file)
 
 
+def map_content(table: CalibrationMap) -> dict[str, Any]:
+    """Give everything that a map holds, as JSON."""
+    return {
+        "kind": "calibration_map",
+        "format": 1,
+        "name": table.name,
+        "axes": [{"name": name, "entries": entries} for name, entries in table.axes.items()],
+        "labels": {name: list(label) for name, label in table.labels.items()},
+        "values": table.values,
+        "cells": dict(table.cells),
+        "task": None if table.task is None else table.task.to_dict(),
+        "provenance": dict(table.provenance),
+    }
+
+
 def emit_map(
     args: argparse.Namespace, table: CalibrationMap, text: Any, *, draw: Callable[..., Any] = map_cells, **more: Any
 ) -> None:
-    """Write a map to ``-o`` and its picture to ``--figure``, then print it: as text, or its JSON file and more."""
+    """Write a map to ``-o`` and its picture to ``--figure``, then print it: as text, or as JSON and more."""
     write = dict.fromkeys(MAP_ENDINGS, partial(write_map, table))
     picture = partial(drawn, draw, table.to_dataset(), size=_SIZE)
     emit(args, {**map_content(table), **more}, text=text, write=write, figure=picture)

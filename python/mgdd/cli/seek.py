@@ -103,8 +103,8 @@ def _seek(args: argparse.Namespace) -> None:
             if not isinstance(stop.partial, SeekResult):
                 raise
             found = stop.partial
-    run, table = found.run, guide if isinstance(guide, TimingMap) else None
-    learnt, unlearnt = learn_map(args, table, found.seeker, bench.point, interrupted=run.interrupted)
+    run, timing = found.run, guide if isinstance(guide, TimingMap) else None
+    learnt, unlearnt = learn_map(args, timing, found.seeker, bench.point, interrupted=run.interrupted)
     doubts = [*map(str, found.findings), *unlearnt]
     warn(*doubts)
     payload = found.to_dict() | {"preset": preset, "sensor": args.sensor, "seed": bench.seed}

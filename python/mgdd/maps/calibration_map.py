@@ -10,9 +10,9 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._arguments import shown
+from mgdd.engine.conditions import numbers_of
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.guide.conditions import numbers_of
-from mgdd.maps.cells import MapTask, checked_cells, checked_label, checked_name
+from mgdd.maps.cells import MapTask, checked_cells, checked_label, checked_name, further_columns
 from mgdd.maps.forms import MapForms
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.labels import Label
@@ -20,7 +20,23 @@ from mgdd.results.labels import Label
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-_TIMING = "°CA aTDC"
+
+class MapPlace(NamedTuple):
+    """Where points lie in a map.
+
+    Parameters
+    ----------
+    cells : numpy.ndarray of int
+        The two or four cells around each point, first dimension, by their numbers in rows.
+    weights : numpy.ndarray
+        The share of each; they add up to one.
+    held_outside : numpy.ndarray of bool
+        Which points lie outside of the axes: their place is that of the edge.
+    """
+
+    cells: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    held_outside: NDArray[np.bool_]
 
 
 class MapPoints(NamedTuple):
@@ -41,8 +57,9 @@ class MapPoints(NamedTuple):
 class CalibrationMap(MapForms):
     """A table over one or two axes as a control unit holds it: (bi)linear between its cells, held at its edges.
 
-    It does not change. Beside its value each cell has its source, its support, its standard deviation, the range in
-    which the value may lie and the limit that holds it.
+    It does not change; `mgdd.guide.TimingMap` learns. Beside its value each cell has its source, its support, its
+    standard deviation, the range in which the value may lie and the limit that holds it, and whatever columns are added
+    with their units: values of further inputs, probabilities of limits. ``save`` to ``.nc`` and `load` keep all of it.
 
     Parameters
     ----------
@@ -53,13 +70,12 @@ class CalibrationMap(MapForms):
     name : str
         What the values are, for example ``soc_cad``.
     labels : mapping of str to (str, str), optional
-        Unit and long name of the value and of axes; left out, they are those of the name.
+        Unit and long name of the value, of axes and of further columns; left out, they are those of the name.
     cells : mapping of str to array_like, optional
         Columns of one entry per cell, or of one for all: ``source`` (``given``, ``measured``, ``predicted``,
         ``extrapolated``, ``optimised``, ``smoothed``, ``interpolated``, ``held``, ``learned``; without a value
-        ``infeasible`` or ``unattainable``),
-        ``support`` (points behind the value), ``sd``, ``low`` and ``high`` [unit of the value], ``objective`` and
-        ``active_limit``.
+        ``infeasible`` or ``unattainable``), ``support`` (points behind the value), ``sd``, ``low`` and ``high`` [unit
+        of the value], ``objective`` and ``active_limit``; and numbers by any other name, which needs a label.
     task : MapTask, optional
         What the cells were optimised for, as `optimize_map` notes it.
     provenance : mapping of str to str, optional
@@ -104,12 +120,14 @@ class CalibrationMap(MapForms):
         if table.ndim and table.shape != shape:
             raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(columns)} make {shape}")
         self._values = np.ascontiguousarray(np.broadcast_to(table, shape))
-        self._table = _table(columns, self._values)
+        entries = [column.tolist() for column in columns.values()]
+        self._table = _core.math.TableAxes(names=list(columns), entries=entries)
         given = dict(labels or {})
-        self._labels = {each: checked_label(each, given.pop(each, None)) for each in (*columns, name)}
+        further = further_columns(cells or {}, given, (*columns, name))
+        self._labels = {each: checked_label(each, given.pop(each, None)) for each in (*columns, name, *further)}
         if given:
             raise ParameterError.of("labels", next(iter(given)), f"of {', '.join(self._labels)}")
-        self._cells = checked_cells(self._values, columns, cells or {})
+        self._cells = checked_cells(self._values, columns, cells or {}, further)
         self._task, self._provenance = task, _texts(provenance or {})
         for array in (*columns.values(), self._values):
             array.setflags(write=False)
@@ -142,7 +160,7 @@ class CalibrationMap(MapForms):
 
     @property
     def labels(self) -> Mapping[str, Label]:
-        """Unit and long name of axes and value."""
+        """Unit and long name of axes, value and further columns."""
         return MappingProxyType(self._labels)
 
     @property
@@ -157,15 +175,19 @@ class CalibrationMap(MapForms):
 
     def __call__(self, points: Mapping[str, ArrayLike] | Any = None, **coordinates: ArrayLike) -> NDArray[np.float64]:
         """Read the values alone, as `lookup` does."""
-        return self.lookup(points, **coordinates).values
+        return self.lookup(points, column=None, **coordinates).values
 
-    def lookup(self, points: Mapping[str, ArrayLike] | Any = None, **coordinates: ArrayLike) -> MapPoints:
-        """Read the map at points, in the C++ core.
+    def lookup(
+        self, points: Mapping[str, ArrayLike] | Any = None, *, column: str | None = None, **coordinates: ArrayLike
+    ) -> MapPoints:
+        """Read the map at points.
 
         Parameters
         ----------
         points : mapping of str to array_like, or OperatingPoint
             Coordinates by the names of the axes, broadcast together; other names are ignored.
+        column : str, optional
+            A column of numbers of `cells` instead of the value.
         **coordinates
             The same by keyword, ``speed_rpm=1200.0, fuel_mg=13.0``.
 
@@ -177,11 +199,47 @@ class CalibrationMap(MapForms):
         Raises
         ------
         mgdd.errors.ParameterError
+            An axis or the column is missing.
+        """
+        at = self.place(points, **coordinates)
+        numbers = [name for name, entries in self._cells.items() if entries.dtype.kind == "f"]
+        if column is not None and column not in numbers:
+            raise ParameterError.of("column", column, f"one of {', '.join(numbers)}")
+        table = (self._values if column is None else self._cells[column]).ravel()
+        parts = at.weights * table[at.cells]
+        parts[at.weights == 0.0] = 0.0  # a cell without weight does not count, whatever it holds
+        return MapPoints(parts.sum(axis=0), at.held_outside)
+
+    def place(self, points: Mapping[str, ArrayLike] | Any = None, **coordinates: ArrayLike) -> MapPlace:
+        """Find the cells around points, in the C++ core.
+
+        Parameters
+        ----------
+        points : mapping of str to array_like, or OperatingPoint
+            As by `lookup`.
+        **coordinates
+            The same by keyword.
+
+        Returns
+        -------
+        MapPlace
+            Cells, weights and which points lie outside; NaN weights of a point that is NaN.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
             An axis is missing.
         """
         if coordinates:
             points = {**({} if points is None else points), **coordinates}
-        return self._read(self._table, points)
+        given = points if isinstance(points, Mapping) else {} if points is None else numbers_of(points)
+        lacking = [name for name in self._axes if name not in given]
+        if lacking:
+            raise ParameterError.of("points", list(given), f"coordinates with {' and '.join(self._axes)}")
+        columns = np.broadcast_arrays(*(np.asarray(given[name], np.float64) for name in self._axes))
+        cells, weights, outside = self._table.places(np.stack([column.ravel() for column in columns]))
+        shape = columns[0].shape
+        return MapPlace(cells.reshape(-1, *shape), weights.reshape(-1, *shape), outside.reshape(shape))
 
     def replaced(self, values: ArrayLike | None = None, **changes: Any) -> Self:
         """Give a map on the same axes with other values, cells, task or provenance.
@@ -191,7 +249,7 @@ class CalibrationMap(MapForms):
         values : array_like, optional
             As of a new map.
         **changes
-            ``cells`` (columns that are not named stay), ``task``, ``provenance`` (entries that are not named stay).
+            ``cells``, ``labels`` and ``provenance`` (entries that are not named stay), ``task``.
 
         Returns
         -------
@@ -207,20 +265,11 @@ class CalibrationMap(MapForms):
             self._axes,
             self._values if values is None else values,
             name=self._name,
-            labels=self._labels,
+            labels={**self._labels, **changes.pop("labels", {})},
             cells={**self._cells, **changes.pop("cells", {})},
             provenance={**self._provenance, **changes.pop("provenance", {})},
             **{"task": self._task, **changes},
         )
-
-    def _read(self, table: Any, points: Any) -> MapPoints:
-        given = points if isinstance(points, Mapping) else {} if points is None else numbers_of(points)
-        lacking = [name for name in self._axes if name not in given]
-        if lacking:
-            raise ParameterError.of("points", list(given), f"coordinates with {' and '.join(self._axes)}")
-        columns = np.broadcast_arrays(*(np.asarray(given[name], np.float64) for name in self._axes))
-        values, outside = table.at(np.stack([column.ravel() for column in columns]))
-        return MapPoints(values.reshape(columns[0].shape), outside.reshape(columns[0].shape))
 
     def sd_at(self, points: Mapping[str, ArrayLike] | Any) -> NDArray[np.float64]:
         """Read the standard deviation at points, linear between the cells: never below that of independent cells.
@@ -235,7 +284,7 @@ class CalibrationMap(MapForms):
         numpy.ndarray
             [unit of the value]; NaN where it is not known.
         """
-        return self._read(_table(self._axes, self._cells["sd"]), points).values
+        return self.lookup(points, column="sd").values
 
     def __repr__(self) -> str:
         size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
@@ -267,11 +316,6 @@ def _column(name: str, entries: ArrayLike) -> NDArray[np.float64]:
     if column.ndim != 1:
         raise ShapeError(f"{name} has {column.ndim} dimensions: an axis is one column of entries")
     return column
-
-
-def _table(axes: Mapping[str, NDArray[np.float64]], values: NDArray[np.float64]) -> Any:
-    entries = [column.tolist() for column in axes.values()]
-    return _core.math.LookupTable(names=list(axes), axes=entries, values=values)
 
 
 def _texts(provenance: Mapping[str, str]) -> dict[str, str]:

@@ -99,18 +99,26 @@ def checked_label(name: str, given: tuple[str, str] | None) -> Label:
     return label
 
 
+def further_columns(given: Mapping[str, Any], labels: Mapping[str, Any], taken: tuple[str, ...]) -> tuple[str, ...]:
+    """Name the columns that not every map has; each needs a unit."""
+    names = tuple(name for name in given if name not in NUMBERS and name not in TEXTS)
+    for name in names:
+        if name not in labels and name not in VARIABLES:
+            near = did_you_mean(name, (*NUMBERS, *TEXTS)) or f"known are {', '.join((*NUMBERS, *TEXTS))}"
+            raise ParameterError(f"cells: unknown column {name!r}: {near}; labels gives another its unit and long name")
+        checked_name("column", name, taken)
+    return names
+
+
 def checked_cells(
     values: NDArray[np.float64],
     axes: Mapping[str, NDArray[np.float64]],
     given: Mapping[str, ArrayLike],
+    further: tuple[str, ...] = (),
 ) -> dict[str, NDArray[Any]]:
     """Give every column with the shape of the values; NaN is allowed only where the source gives the reason."""
-    for name in given:
-        if name not in NUMBERS and name not in TEXTS:
-            near = did_you_mean(name, (*NUMBERS, *TEXTS)) or f"known are {', '.join((*NUMBERS, *TEXTS))}"
-            raise ParameterError(f"cells: unknown column {name!r}: {near}")
     cells: dict[str, NDArray[Any]] = {}
-    for name, (_, missing, least) in NUMBERS.items():
+    for name, (_, missing, least) in {**NUMBERS, **dict.fromkeys(further, ("", np.nan, -np.inf))}.items():
         cells[name] = _shaped(name, np.array(given.get(name, missing), np.float64), values.shape)
         bad = (cells[name] < least) | np.isinf(cells[name])
         if bad.any():

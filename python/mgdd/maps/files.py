@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import codecs
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from mgdd.errors import DataError, Error, ParameterError, argument, did_you_mean
 from mgdd.io.any_table import cells_as_text, read_any_table
 from mgdd.io.binary_files import read_netcdf, write_netcdf
-from mgdd.io.files import existing_file, parsed, read_plain_text, write_whole_text
+from mgdd.io.files import existing_file, write_whole_text
 from mgdd.io.point_table import POINT
 from mgdd.io.table import text_table
 from mgdd.maps.calibration_map import CalibrationMap, map_of
 from mgdd.maps.cdfx import is_xml
-from mgdd.maps.cells import NUMBERS, MapTask
 from mgdd.maps.dcm_files import read_dcm, write_labels
-from mgdd.maps.grid_csv import csv_of_map, is_map_csv, map_of_csv
-from mgdd.maps.plain_grid import map_of_grid
+from mgdd.maps.plain_grid import map_of_grid, text_of_grid
 from mgdd.maps.point_list import map_of_points
-from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:
     import os
@@ -31,8 +25,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-_KIND, _FORMAT = "calibration_map", 1
-_ENDINGS = (".csv", ".json", ".dcm", ".cdfx", ".nc")
+_ENDINGS = (".nc", ".csv", ".dcm", ".cdfx")
 _HEAD = 1 << 16  # bytes that identify a form
 
 
@@ -43,17 +36,16 @@ def write_map(
     values: Mapping[str, tuple[float, str]] | None = None,
     encoding: str = "utf-8",
 ) -> None:
-    """Write a map in the form that the ending of the file selects; DCM and CDFX hold several, and single values.
+    r"""Write a map in the form that the ending of the file selects; DCM and CDFX hold several, and single values.
 
     Parameters
     ----------
     table : CalibrationMap, or the Dataset of one
         The map. For DCM and CDFX also a sequence of maps, or a mapping of the names of their labels to them.
     path : path-like
-        ``.csv``: a grid with units that a spreadsheet shows as it is; ``.json`` and ``.nc`` (netCDF): these three hold
-        everything. ``.dcm`` and ``.cdfx`` (ASAM CDF 2.0): axes (the first is x), values, units and long name, for
-        calibration tools; the provenance becomes comments, and source, support and standard deviation of the cells have
-        no place. An existing file is replaced in one step.
+        ``.nc`` (netCDF) holds everything, as `CalibrationMap.save`. The others hold axes, values and units, for other
+        programs: ``.csv`` as a grid for spreadsheets; ``.dcm`` and ``.cdfx`` (ASAM CDF 2.0) for calibration tools, with
+        long names, the first axis as x and the provenance as comments. An existing file is replaced in one step.
     values : mapping of str to (float, str), optional
         Single values with their units, for DCM and CDFX.
     encoding : {"utf-8", "latin-1", "cp1252"}
@@ -79,17 +71,10 @@ def write_map(
     ...     write_map(soc, file)
     ...     print(file.read_text(encoding="utf-8"), end="")
     ...     read_map(file) == soc
-    mgdd_map,1
-    value,soc_cad,°CA aTDC,start of combustion
-    rows,speed_rpm,rpm,speed
-    columns,fuel_mg,mg,fuel
-    <BLANKLINE>
-    table,value
-    ,6.0,20.0
+    soc_cad [°CA aTDC],,
+    speed_rpm [rpm] \ fuel_mg [mg],6.0,20.0
     900.0,-1.0,-4.0
     1500.0,-2.0,-6.0
-    <BLANKLINE>
-    end
     True
     """
     ending = _ending(path)
@@ -106,7 +91,7 @@ def write_map(
     if ending == ".nc":
         write_netcdf(single.to_dataset(), path)
     else:
-        write_whole_text(path, csv_of_map(single) if ending == ".csv" else _json_of(single))
+        write_whole_text(path, text_of_grid(single))
 
 
 def read_map(
@@ -141,7 +126,7 @@ def read_map(
     Returns
     -------
     CalibrationMap
-        Equal to the one that was written; of other files what they hold. Cells that are empty are ``unattainable``;
+        What the file holds; of netCDF equal to the one that was written. Cells that are empty are ``unattainable``;
         points of a table that are repeated count with their mean, which ``provenance`` states.
 
     Warns
@@ -169,7 +154,7 @@ def read_map(
     >>> from mgdd.maps import read_map
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder) / "soc.csv"
-    ...     _ = file.write_text("value,soc_cad,°CA aTDC\nrows,fuel_mg,kg\ntable,value\n6,-1\n20,-4\n")
+    ...     _ = file.write_text("fuel_mg [kg],soc_cad\n6,-1\n20,-4\n")
     ...     try:
     ...         read_map(file)
     ...     except DataError as error:
@@ -184,27 +169,19 @@ def read_map(
         data = read_netcdf(file) if form == "nc" else None
         if data is not None and len(data.dims) == 1 and (POINT in data.dims or not data.coords):
             form = ""  # a list of points
-        if form != "" and (rows is not None or columns is not None):
-            which = argument("rows") if rows is not None else argument("columns")
-            raise ParameterError(f"{file}: names its axes itself: leave {which} out")
-        if form == "labels":
-            return _of_labels(file, name)
         if form == "":
             return _of_any(file, name=name, decimal=decimal, rows=rows, columns=columns, sheet=sheet)
+        for option, given in (("rows", rows), ("columns", columns)):
+            if given is not None:
+                raise ParameterError(f"{file}: names its axes itself: leave {argument(option)} out")
         if sheet is not None:
             raise ParameterError(f"{file}: no workbook: leave {argument('sheet')} out")
-        if data is not None:
-            return CalibrationMap.from_dataset(data, name)
-        text = read_plain_text(file, only_utf8=form == "json")
-        made = map_of_csv(text, str(file), decimal) if form == "csv" else _map_of_json(text, str(file))
+        return _of_labels(file, name) if data is None else CalibrationMap.from_dataset(data, name)
     except (Error, TypeError, ValueError, KeyError) as error:
         message = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
         if isinstance(error, DataError | ParameterError) and message.startswith(str(file)):
             raise
         raise DataError(f"{file}: {message}") from error
-    if name is not None and name != made.name:
-        raise ParameterError(f"{file}: holds {made.name!r}, not {name!r}")
-    return made
 
 
 def _form_of(file: Path) -> str:
@@ -212,8 +189,8 @@ def _form_of(file: Path) -> str:
     with file.open("rb") as stream:
         head = stream.read(_HEAD)
     ending = file.suffix.lower()
-    if ending == ".toml":
-        _ending(file)  # a parameter file
+    if ending in (".toml", ".json"):
+        _ending(file)  # parameters, what a command printed
     if head.startswith(b"CDF") or (ending == ".nc" and not head.startswith(b"\x89HDF")):
         return "nc"
     if is_xml(head):
@@ -223,12 +200,7 @@ def _form_of(file: Path) -> str:
         return ""
     text = head.decode("utf-16" if wide else "utf-8", "replace").lstrip("\ufeff").lstrip()
     first = next((line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "*!."), "")
-    if first.lstrip().startswith("KONSERVIERUNG_FORMAT") or ending in (".dcm", ".cdfx"):
-        return "labels"
-    if text.startswith("{") or ending == ".json":
-        return "json"
-    cells = cells_as_text(file)
-    return "csv" if cells is not None and not cells[2] and is_map_csv(cells[1]) else ""
+    return "labels" if first.lstrip().startswith("KONSERVIERUNG_FORMAT") or ending in (".dcm", ".cdfx") else ""
 
 
 def _of_labels(file: Path, name: str | None) -> CalibrationMap:
@@ -265,47 +237,3 @@ def _ending(path: str | os.PathLike[str]) -> str:
     if ending not in _ENDINGS:
         raise ParameterError(f"{path}: a map is written to and read from {', '.join(_ENDINGS)}; give such an ending")
     return ending
-
-
-def map_content(table: CalibrationMap) -> dict[str, Any]:
-    """Give everything that a map holds, as its JSON file has it."""
-    return {
-        "kind": _KIND,
-        "format": _FORMAT,
-        "name": table.name,
-        "axes": [{"name": name, "entries": entries} for name, entries in table.axes.items()],
-        "labels": {name: list(label) for name, label in table.labels.items()},
-        "values": table.values,
-        "cells": dict(table.cells),
-        "task": None if table.task is None else table.task.to_dict(),
-        "provenance": dict(table.provenance),
-    }
-
-
-def _json_of(table: CalibrationMap) -> str:
-    return json.dumps(to_jsonable(map_content(table)), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
-
-
-def _map_of_json(text: str, origin: str) -> CalibrationMap:
-    content = parsed(text, origin, "JSON")
-    if not isinstance(content, dict) or content.get("kind") != _KIND:
-        raise DataError(f"kind must be {_KIND!r}: this is another file")
-    if content.get("format") != _FORMAT:
-        raise DataError(f"format = {content.get('format')!r}: this version of mgdd reads format = {_FORMAT}")
-    for key in ("name", "axes", "values"):
-        if key not in content:
-            raise DataError(f"the field {key!r} is missing: a map has name, axes and values")
-    cells = {
-        name: np.array(column, np.float64) if name in NUMBERS else column
-        for name, column in content.get("cells", {}).items()
-    }
-    task = content.get("task")
-    return CalibrationMap(
-        {axis["name"]: axis["entries"] for axis in content["axes"]},
-        np.array(content["values"], np.float64),
-        name=content["name"],
-        labels={name: tuple(label) for name, label in content.get("labels", {}).items()},
-        cells=cells,
-        task=None if task is None else MapTask(**task),
-        provenance=content.get("provenance"),
-    )

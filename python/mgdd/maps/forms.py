@@ -1,4 +1,4 @@
-"""Forms of a calibration map: the guide's table, a Dataset, a pickle; and when two maps are equal."""
+"""Forms of a calibration map: a Dataset and its file, a pickle; and when two maps are equal."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
-from mgdd.guide import TimingMap
-from mgdd.guide.map_table import SETTINGS
+from mgdd.errors import DataError
+from mgdd.io.binary_files import read_netcdf
 from mgdd.maps.cells import NUMBERS, SOURCES, TEXTS, WITHOUT_VALUE, MapTask
 from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.results.result import Result
 
 if TYPE_CHECKING:
+    import os
+
     import xarray as xr
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-_TIMING = "°CA aTDC"
 
 
 class MapForms(Result):
     """What a calibration map turns into, and out of."""
 
+    unit: Any
     _name: str
     _axes: Mapping[str, NDArray[np.float64]]
     _values: NDArray[np.float64]
@@ -33,72 +33,6 @@ class MapForms(Result):
     _task: MapTask | None
     _provenance: Mapping[str, str]
     replaced: Any
-
-    def to_timing_map(self, *, prior_sd_cad: float | None = None, forgetting: float | None = None) -> TimingMap:
-        """Make the guide's table of it, which learns from confirmed optima.
-
-        Parameters
-        ----------
-        prior_sd_cad, forgetting : float, optional
-            As of `mgdd.guide.TimingMap`.
-
-        Returns
-        -------
-        mgdd.guide.TimingMap
-            With the values as best timings, at most as certain as by `sd`: a cell without it has ``prior_sd_cad``. It
-            has no support yet: that counts confirmed optima.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            The values are not timings, or a cell has none.
-        """
-        if self._labels[self._name].units != _TIMING:
-            raise DataError(f"{self._name} has unit {self._labels[self._name].units!r}: a timing map needs {_TIMING!r}")
-        empty = ~np.isfinite(self._values)
-        if empty.any():
-            raise DataError(
-                f"{self._name}: {empty.sum()} cells have no value: smooth the map with {argument('fill', 'True')}"
-            )
-        prior = SETTINGS["prior_sd_cad"] if prior_sd_cad is None else prior_sd_cad
-        made = TimingMap(
-            self._axes, self._values, prior_sd_cad=prior,
-            forgetting=SETTINGS["forgetting"] if forgetting is None else forgetting,
-        )  # fmt: skip
-        data = made.to_dataset()
-        finite = np.isfinite(self._cells["sd"]) & (self._cells["sd"] > 0.0)
-        data["sd_cad"].values[:] = np.where(finite, np.minimum(self._cells["sd"], prior), prior)
-        return TimingMap.from_dataset(data)
-
-    def learned_from(self, timing: TimingMap) -> Self:
-        """Take over what a timing map has learnt since it was made of this map.
-
-        Parameters
-        ----------
-        timing : mgdd.guide.TimingMap
-            On the same axes.
-
-        Returns
-        -------
-        CalibrationMap
-            Cells with confirmed optima behind them have the source ``learned`` with timing, standard deviation and
-            support of the timing map; their ranges and limits stay.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            Other axes.
-        """
-        same = list(timing.axes) == list(self._axes) and all(
-            np.array_equal(timing.axes[name], entries) for name, entries in self._axes.items()
-        )
-        if not same or self._labels[self._name].units != _TIMING:
-            raise DataError(f"the timing map has other axes than {self._name} over {', '.join(self._axes)}")
-        learnt = timing.support > 0.0
-        new: dict[str, Any] = {"source": "learned", "sd": timing.sd_cad, "support": timing.support, "objective": np.nan}
-        cells = {column: np.where(learnt, entries, self._cells[column]) for column, entries in new.items()}
-        made: Self = self.replaced(np.where(learnt, timing.timing_cad, self._values), cells=cells)
-        return made
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -123,17 +57,10 @@ class MapForms(Result):
             name: (name, entries, *self._labels[name]) for name, entries in self._axes.items()
         }
         variables[self._name] = (dims, self._values, *self._labels[self._name])
-        for name, (long_name, *_) in NUMBERS.items():
-            unit = (
-                self._labels[self._name].units
-                if name in of_value
-                else "unit of the objective"
-                if name == "objective"
-                else "-"
-            )
-            variables[name] = (dims, self._cells[name], unit, long_name)
-        for name, (long_name, _) in TEXTS.items():
-            variables[name] = (dims, self._cells[name], "-", long_name)
+        for name, column in self._cells.items():
+            unit = self.unit if name in of_value else "unit of the objective" if name == "objective" else "-"
+            label = self._labels.get(name) or Label(unit, str({**NUMBERS, **TEXTS}[name][0]))
+            variables[name] = (dims, column, *label)
         attrs: dict[str, Any] = {"map": self._name}
         if self._task is not None:
             attrs |= {"task_objective": self._task.objective, "task_maximize": int(self._task.maximize)}
@@ -190,13 +117,39 @@ class MapForms(Result):
         cells: dict[str, Any] = {"source": np.where(np.isfinite(values), sources, "unattainable")}
         task, provenance = None, {}
         if dataset.attrs.get("map") == value:
-            cells = {each: dataset[each].to_numpy() for each in (*NUMBERS, *TEXTS) if each in dataset}
+            own = [str(each) for each in dataset.data_vars if each != value and set(dataset[each].dims) == set(dims)]
+            cells = {each: dataset[each].transpose(*dims).to_numpy() for each in own}
             task, provenance = _task_of(dataset.attrs), _under(dataset.attrs, "provenance_")
-        labels = {each: label_of(dataset[each]) for each in (*dims, value)}
+        named = [each for each in (*dims, value, *cells) if each not in NUMBERS and each not in TEXTS]
+        labels = {each: label_of(dataset[each]) for each in named}
         axes = {dim: dataset[dim].to_numpy() for dim in dims}
         make: Any = cls
         made: Self = make(axes, values, name=value, labels=labels, cells=cells, task=task, provenance=provenance)
         return made
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a file that `save` wrote.
+
+        Parameters
+        ----------
+        path : path-like
+            Ends in ``.nc``; `read_map` reads other forms too.
+
+        Returns
+        -------
+        CalibrationMap
+            Equal to the one that was saved.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            No netCDF file, or one that holds no map.
+        """
+        try:
+            return cls.from_dataset(read_netcdf(path))
+        except DataError as error:
+            raise error if str(error).startswith(f"{path}") else DataError(f"{path}: {error}") from error
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, MapForms) and self._parts() == other._parts()

@@ -6,7 +6,7 @@ import csv
 import io
 import itertools
 import re
-from collections.abc import Mapping, Sized
+from collections.abc import Mapping, Sequence, Sized
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +16,7 @@ from mgdd.io.column_names import spelled_unit
 from mgdd.io.row_text import parse_number
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.corner import axes_of
-from mgdd.maps.grid_csv import require_rise, trimmed
-from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, unit_from, without_brackets
+from mgdd.maps.written import NOT_GIVEN, Heading, heading_of, unit_from, unit_to, without_brackets
 
 _EMPTY = frozenset({"", "-", "--", "–", "nan", "na", "n/a", "#n/a"})  # how a cell without a value is written
 _MARKS = (";", "\t", ",", None)  # None: blanks
@@ -91,6 +90,33 @@ def map_of_grid(
     )
 
 
+def text_of_grid(table: CalibrationMap) -> str:
+    """Write axes, values and units so that `map_of_grid` reads them, a map over one axis as a table of points."""
+    heads = {name: f"{name} [{unit_to(label.units)}]" for name, label in table.labels.items()}
+    down, *across = table.axes
+    cells = table.values.reshape(table.values.shape[0], -1).tolist()
+    body = [
+        [repr(at), *("" if np.isnan(value) else repr(value) for value in row)]
+        for at, row in zip(table.axes[down].tolist(), cells, strict=True)
+    ]
+    rows = [[heads[down], heads[table.name]], *body]
+    if across:
+        above = table.axes[across[0]].tolist()
+        corner = f"{heads[down]} \\ {heads[across[0]]}"
+        rows = [[heads[table.name], *[""] * len(above)], [corner, *map(repr, above)], *body]
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
+
+
+def require_rise(origin: str, line: int, axis: str, pair: Sequence[float]) -> None:
+    """Refuse two breakpoints of which the second is not above the first."""
+    if not pair[1] > pair[0]:
+        raise DataError(
+            f"{origin}, line {line}: {axis} = {pair[1]:g} after {pair[0]:g}: breakpoints must increase and stand once"
+        )
+
+
 def require_two(origin: str, axes: Mapping[str, Sized]) -> None:
     """Refuse an axis of a single breakpoint."""
     for name, entries in axes.items():
@@ -128,6 +154,14 @@ def number_in(cell: str, decimal: str, where: str, what: str, *, gap: bool = Fal
     else:
         remedy = "correct it"
     raise DataError(f"{where}: {cell[:60]!r} is not a finite number for {what}: {remedy}")
+
+
+def trimmed(cells: list[str]) -> list[str]:
+    """Leave out the empty cells that a spreadsheet adds at the end of a row."""
+    width = len(cells)
+    while width and not cells[width - 1]:
+        width -= 1
+    return cells[:width]
 
 
 def _like_number(cell: str) -> bool:

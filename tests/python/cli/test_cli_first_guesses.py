@@ -29,10 +29,10 @@ preset copy P1 = preset copy
 datasets = data list
 studies --list = study
 convert -> mgdd map export or mgdd data convert
-map convert smooth.json -o map.dcm = map export
+map convert smooth.nc -o map.dcm = map export
 map export --format dcm -> '--output'
 map optimise t.nc --maximize p --along soc_cad = map optimize
-map plot smooth.json = map show
+map plot smooth.nc = map show
 engine optimise = engine optimum
 engine run = engine simulate
 engine run --engine puma_single -> '--preset'

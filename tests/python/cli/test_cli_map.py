@@ -13,11 +13,11 @@ import xarray as xr
 from map_cases import sweep as map_sweep
 from mgdd import presets
 from mgdd.cli import main
+from mgdd.cli.map_files import map_content
 from mgdd.design import FeasibleRegion, design_points
 from mgdd.io.binary_files import write_netcdf
 from mgdd.io.point_table import read_points
 from mgdd.maps import apply_map, compare_maps, optimize_map, read_map, smooth_map
-from mgdd.maps.files import map_content
 from mgdd.results.labels import to_jsonable
 from mgdd.surrogate import ResponseModel, fit_response
 from mgdd.sweep import sweep
@@ -47,9 +47,9 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ["fit", "points.nc", "--response", "p_max_bar", "--degree", "3", "-o", "p_max.toml"],
             ["predict", "efficiency.toml", "p_max.toml", *GRID, "--extrapolate", "-o", "table.nc"],
             ["optimize", "table.nc", "--maximize", "efficiency_gross", "--along", "soc_cad", "--limit",
-             "p_max_bar=105", "--max-loss", "0.002", "-o", "best.json"],
-            ["smooth", "best.json", "--slope-limit", "speed_rpm=0.006", "--slope-limit", "fuel_mg=0.7", "-o",
-             "smooth.json"],
+             "p_max_bar=105", "--max-loss", "0.002", "-o", "best.nc"],
+            ["smooth", "best.nc", "--slope-limit", "speed_rpm=0.006", "--slope-limit", "fuel_mg=0.7", "-o",
+             "smooth.nc"],
         ]  # fmt: skip
         for command in commands:
             assert main(["map", *command, "--quiet"]) == 0, command
@@ -115,8 +115,8 @@ def test_optimum_and_smooth_map_are_those_of_the_library(chain: Path) -> None:
             table, "efficiency_gross", limits={"p_max_bar": 105.0}, max_loss=0.002, provenance={"from": "table.nc"}
         )
         smooth = smooth_map(best, slope_limits={"speed_rpm": 0.006, "fuel_mg": 0.7})
-        assert read_map(chain / "best.json") == best
-        assert read_map(chain / "smooth.json") == smooth
+        assert read_map(chain / "best.nc") == best
+        assert read_map(chain / "smooth.nc") == smooth
         assert "p_max_bar" in best.cells["active_limit"]  # the limit acts
         assert float(apply_map(smooth, table)["loss"].max()) <= 0.002
 
@@ -131,14 +131,14 @@ def test_the_optimum_is_near_that_of_the_model_itself(chain: Path) -> None:
     }
     truth = sweep(preset.cylinder, preset.point, axes, outputs=RESPONSES)
     best = optimize_map(truth, "efficiency_gross", limits={"p_max_bar": 105.0})
-    at = apply_map(read_map(chain / "best.json"), truth)
+    at = apply_map(read_map(chain / "best.nc"), truth)
     assert float(np.abs(best.cells["objective"] - at["efficiency_gross"]).max()) < 0.004
     assert float(at["p_max_bar"].max()) < 107.0
 
 
 def test_nothing_lies_beside_the_files(chain: Path) -> None:
     assert sorted(file.name for file in chain.iterdir()) == [
-        "best.json", "design.csv", "efficiency.toml", "p_max.toml", "points.nc", "smooth.json", "table.nc",
+        "best.nc", "design.csv", "efficiency.toml", "p_max.toml", "points.nc", "smooth.nc", "table.nc",
     ]  # fmt: skip
 
 
@@ -276,14 +276,14 @@ def test_a_map_of_predictions_says_so(chain: Path, here: Path, capsys: Capsys) -
     ran(capsys, "map", "predict", str(chain / "p_max.toml"), *over, "--extrapolate", "-o", "all.nc")
     with xr.open_dataset(here / "all.nc", engine="scipy") as table:
         write_netcdf(table.isel(fuel_mg=0, drop=True).load(), here / "plane.nc")
-    ran(capsys, "map", "export", "plane.nc", "--name", "p_max_bar", "-o", "plane.json")
-    source = read_map(here / "plane.json").cells["source"]
+    ran(capsys, "map", "export", "plane.nc", "--name", "p_max_bar", "-o", "map.nc")
+    source = read_map(here / "map.nc").cells["source"]
     assert set(source[-1]) == {"extrapolated"}  # 4000 rpm were never driven
     assert "predicted" in source
     assert not {"measured", "given"} & set(source.ravel())
 
 
-def test_what_is_printed_is_a_map_file(here: Path, capsys: Capsys) -> None:
+def test_what_is_printed_is_all_of_the_map(here: Path, capsys: Capsys) -> None:
     write_netcdf(map_sweep(), here / "table.nc")
     options = ["--minimize", "p_max_bar", "--limit", "efficiency_gross=0.49", "--sd", "p_max_bar=0.5"]
     told = ran(capsys, "map", "optimize", "table.nc", *options)
@@ -293,8 +293,6 @@ def test_what_is_printed_is_a_map_file(here: Path, capsys: Capsys) -> None:
     )  # fmt: skip
     assert {key: told[key] for key in map_content(best)} == to_jsonable(map_content(best))
     assert sum(told["n_held"].values()) == int((best.cells["active_limit"] != "").sum())
-    (here / "map.json").write_text(json.dumps(told))
-    assert read_map(here / "map.json") == best
 
 
 def test_infeasible_cells_may_stay_empty(here: Path, capsys: Capsys) -> None:
@@ -304,10 +302,10 @@ def test_infeasible_cells_may_stay_empty(here: Path, capsys: Capsys) -> None:
     assert "or pass --infeasible 'keep'" in capsys.readouterr().err
     told = ran(capsys, *command, "--infeasible", "keep", "--max-loss", "0.002", "-o", "best.nc")
     assert None in np.array(told["values"], dtype=object).ravel().tolist()
-    told = ran(capsys, "map", "smooth", "best.nc", "--fill", "--weight", "2", "-o", "smooth.csv")
+    told = ran(capsys, "map", "smooth", "best.nc", "--fill", "--weight", "2", "-o", "smooth.nc")
     with pytest.warns(UserWarning, match="extrapolated 3 cells"):
         expected = smooth_map(read_map(here / "best.nc"), weight=2.0, fill=True)
-    assert read_map(here / "smooth.csv") == expected
+    assert read_map(here / "smooth.nc") == expected
     assert told["largest_shift"] == pytest.approx(
         float(np.nanmax(np.abs(expected.values - read_map(here / "best.nc").values)))
     )
@@ -316,8 +314,8 @@ def test_infeasible_cells_may_stay_empty(here: Path, capsys: Capsys) -> None:
 
 
 def test_show_says_what_a_map_achieves(chain: Path, capsys: Capsys) -> None:
-    smooth = read_map(chain / "smooth.json")
-    told = ran(capsys, "map", "show", str(chain / "smooth.json"), "--sweep", str(chain / "table.nc"))
+    smooth = read_map(chain / "smooth.nc")
+    told = ran(capsys, "map", "show", str(chain / "smooth.nc"), "--sweep", str(chain / "table.nc"))
     with xr.open_dataset(chain / "table.nc", engine="scipy") as table:
         found = apply_map(smooth, table)
     assert list(told["achieved"]) == ["loss", "efficiency_gross", "p_max_bar"]
@@ -329,7 +327,7 @@ def test_show_says_what_a_map_achieves(chain: Path, capsys: Capsys) -> None:
 
 
 def test_diff_is_that_of_the_library(chain: Path, here: Path, capsys: Capsys) -> None:
-    files = str(chain / "best.json"), str(chain / "smooth.json")
+    files = str(chain / "best.nc"), str(chain / "smooth.nc")
     told = ran(capsys, "map", "diff", *files, "--tolerance", "0.5", "--figure", "diff.png", "-o", "diff.nc")
     expected = compare_maps(*map(read_map, files), tolerance=0.5)
     assert told["largest_difference"] == float(expected["largest_difference"])

@@ -36,10 +36,11 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_netcdf(map_sweep(), tmp_path / "table.nc")
     write_netcdf(map_sweep().isel(speed_rpm=0, fuel_mg=0, drop=True), tmp_path / "line.nc")
     best = optimize_map(map_sweep(), "efficiency_gross", limits={"p_max_bar": 140.0}, max_loss=1e-5)
-    write_map(best, tmp_path / "best.json")
-    write_map(timing_table(), tmp_path / "holes.json")
-    write_map(CalibrationMap({"fuel_mg": [6.0, 40.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "rail.json")
-    write_map(CalibrationMap({"fuel_mg": [60.0, 80.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "far.json")
+    write_map(best, tmp_path / "best.nc")
+    write_map(timing_table(), tmp_path / "holes.nc")
+    write_map(CalibrationMap({"fuel_mg": [6.0, 40.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "rail.nc")
+    write_map(CalibrationMap({"fuel_mg": [60.0, 80.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "far.nc")
+    (tmp_path / "told.json").write_text("{}")
     (tmp_path / "bench.csv").write_text(BENCH)
     columns = dict(
         zip(
@@ -81,7 +82,7 @@ design RANGES --points 4 --limit p_max_bar=high -o plan.csv -> --limit p_max_bar
 design RANGES --points 4 --limit p_max_ba=9 -o plan.csv -> --limit = 'p_max_ba': must be a known name
 design RANGES --points 4 --extend design.csv -o plan.csv -> --extend: fuel_mg = 50 of point 1: must be in [6, 40]
 design RANGES --points 4 --extend designs.csv -o plan.csv -> did you mean 'design.csv'
-design RANGES --points 4 --extend rail.json -o plan.csv -> points are read from .csv and .nc
+design RANGES --points 4 --extend p_max.toml -o plan.csv -> points are read from .csv and .nc
 design --over fuel_mg=0:60 --points 4 --extend design.csv -o design.csv -> the file of --extend; new points
 design RANGES --points 4 -o plan.xlsx -> the ending must be one of .csv, .nc, .json
 design RANGES --points 4 -o no/plan.csv -> the folder no does not exist
@@ -103,7 +104,7 @@ predict p_max.toml p_max.toml GRID -> two files hold a model of p_max_bar: give 
 predict bench.csv GRID -> bench.csv: a model ends in .toml, as mgdd map fit -o model.toml writes it
 predict p_min.toml GRID -> did you mean 'p_max.toml'?
 predict p_max.toml GRID -o table.xls -> -o table.xls: the ending must be one of .nc, .csv
-predict p_max.toml --points rail.json -> points are read from .csv and .nc
+predict p_max.toml --points p_max.toml -> points are read from .csv and .nc
 optimize table.nc -> one of the arguments --maximize --minimize is required
 optimize table.nc BEST --minimize p_max_bar -> not allowed with argument
 optimize table.nc --maximize efficiency -> did you mean 'efficiency_gross'?
@@ -115,36 +116,34 @@ optimize table.nc BEST --limit p_max_bar=10 => no soc_cad keeps the limits in an
 optimize table.nc BEST --sd nox_ppm=1 -> 'nox_ppm' is neither the objective nor limited
 optimize bench.csv BEST -> a map is made of a table over a grid, which a CSV file does not keep: write it as netCDF
 optimize tables.nc BEST -> did you mean 'table.nc'?
-optimize table.nc BEST -o best.toml -> the ending must be one of .csv, .json, .nc, .dcm
+optimize table.nc BEST -o best.toml -> the ending must be one of .nc, .csv, .dcm, .cdfx
 optimize table.nc BEST --limit p_max_bar=110 --infeasible keep -o b.dcm -> smooth the map with --fill
-smooth best.json --slope-limit fuel_mg -o smooth.json -> --slope-limit fuel_mg: write NAME=NUMBER
-smooth best.json --slope-limit speed=1 -o smooth.json -> slope_limits: no axis 'speed': did you mean 'speed_rpm'?
-smooth best.json --slope-limit fuel_mg=1e-4 -o smooth.json => widen the ranges: a larger --max-loss, other limits
-smooth rail.json -o smooth.json -> an optimum with --max-loss has one
-smooth best.jsn -o smooth.json -> no such file: did you mean 'best.json'?
-smooth p_max.toml -o smooth.json -> give such an ending
-smooth tables.json -o smooth.json -> no such file
-show best.json --contour -> --contour does not act here; it is a form of the picture
-show best.json --contour --figure a.png --column source -> contradict each other
-show best.json --column lowest -> invalid choice: 'lowest'
-show best.json --name soi_cad -> best.json: holds 'soc_cad', not 'soi_cad'
+smooth best.nc --slope-limit fuel_mg -o smooth.nc -> --slope-limit fuel_mg: write NAME=NUMBER
+smooth best.nc --slope-limit speed=1 -o smooth.nc -> slope_limits: no axis 'speed': did you mean 'speed_rpm'?
+smooth best.nc --slope-limit fuel_mg=1e-4 -o smooth.nc => widen the ranges: a larger --max-loss, other limits
+smooth rail.nc -o smooth.nc -> an optimum with --max-loss has one
+smooth best.jsn -o smooth.nc -> no such file: did you mean 'best.nc'?
+smooth p_max.toml -o smooth.nc -> give such an ending
+smooth tables.json -o smooth.nc -> no such file
+show best.nc --contour -> --contour does not act here; it is a form of the picture
+show best.nc --contour --figure a.png --column source -> contradict each other
+show best.nc --column lowest -> invalid choice: 'lowest'
+show best.nc --name soi_cad -> best.nc: no variable 'soi_cad' over one or two axes: the Dataset has
 show table.nc -> of a sweep make a map first, with optimize_map or mgdd map optimize
-show rail.json --sweep table.nc -> it does not belong to this map
-show p_max.toml -> a map is written to and read from .csv, .json, .dcm, .cdfx, .nc
-diff rail.json far.json -> have nothing in common: pass --grid 'first'
-diff best.json holes.json -o diff.csv -> the ending must be one of .nc, .json
-export best.json -> -o is needed: name the file to write
-export -o a.json -> no map: name a file, or a measured engine with --advisor
-export best.json -o a.toml -> the ending must be one of .csv, .json, .nc, .dcm
-export best.json rail.json -o a.json -> 2 maps fit into a .dcm or .cdfx only
-export best.json --label A -o a.json -> --label does not act here; only a .dcm or .cdfx file
-export best.json --label A --label B -o a.dcm -> 2 for 1 maps: give one per map
-export rail.json far.json -o a.dcm -> two maps would be called 'rail_bar' in a.dcm
-export holes.json -o a.dcm -> a DCM file needs all: smooth the map with --fill
-export holes.json --guide-map -o a.csv -> 1 cells have no value: smooth the map with --fill
-export rail.json --guide-map -o a.csv -> a timing map needs '°CA aTDC'
-export best.json --guide-map -o a.dcm -> the ending must be one of .csv, .toml
-export best.json --advisor mercedes -o a.csv -> --advisor and best.json contradict
+show rail.nc --sweep table.nc -> it does not belong to this map
+show p_max.toml -> a map is written to and read from .nc, .csv, .dcm, .cdfx
+show told.json -> a map is written to and read from .nc, .csv
+diff rail.nc far.nc -> have nothing in common: pass --grid 'first'
+diff best.nc holes.nc -o diff.csv -> the ending must be one of .nc, .json
+export best.nc -> -o is needed: name the file to write
+export -o a.nc -> no map: name a file, or a measured engine with --advisor
+export best.nc -o a.toml -> the ending must be one of .nc, .csv, .dcm, .cdfx
+export best.nc rail.nc -o a.nc -> 2 maps fit into a .dcm or .cdfx only
+export best.nc --label A -o a.nc -> --label does not act here; only a .dcm or .cdfx file
+export best.nc --label A --label B -o a.dcm -> 2 for 1 maps: give one per map
+export rail.nc far.nc -o a.dcm -> two maps would be called 'rail_bar' in a.dcm
+export holes.nc -o a.dcm -> a DCM file needs all: smooth the map with --fill
+export best.nc --advisor mercedes -o a.csv -> --advisor and best.nc contradict
 export --advisor opel -o a.csv -> invalid choice: 'opel'
 """
 
@@ -189,9 +188,3 @@ def test_a_file_that_was_there_stays_as_it_was(here: Path, capsys: Capsys) -> No
     options = "--limit p_max_bar=110 --infeasible keep -o old.dcm"
     assert "value" in _refused(here, capsys, f"optimize table.nc {WORDS['BEST']} {options}")
     assert (here / "old.dcm").read_text() == "old"
-
-
-def test_the_two_kinds_of_map_are_told_apart(capsys: Capsys) -> None:
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    assert "the table of mgdd engine seek --guide-map is another file" in " ".join(capsys.readouterr().out.split())

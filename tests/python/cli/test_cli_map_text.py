@@ -105,20 +105,20 @@ def test_a_wide_map_is_cut_for_the_terminal(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_picture_of_each_kind(here: Path, capsys: Capsys) -> None:
-    write_map(timing_table(), here / "map.json")
+    write_map(timing_table(), here / "map.nc")
     for options in (
         ["--figure", "cells.svg"],
         ["--figure", "sd.pdf", "--column", "sd"],
         ["--figure", "c.png", "--contour"],
     ):
-        assert main(["map", "show", "map.json", *options]) == 0
+        assert main(["map", "show", "map.nc", *options]) == 0
         assert f"wrote {options[1]}" in capsys.readouterr().err
         assert (here / options[1]).stat().st_size > 5_000
     assert (here / "cells.svg").read_text().startswith("<?xml")
 
 
 def test_equal_maps_have_no_difference(here: Path, capsys: Capsys) -> None:
-    write_map(small(), here / "a.json")
+    write_map(small(), here / "a.nc")
     write_map(small(), here / "b.csv")
-    assert main(["map", "diff", "a.json", "b.csv"]) == 0
+    assert main(["map", "diff", "a.nc", "b.csv"]) == 0
     assert "no difference in 5 cells" in capsys.readouterr().out

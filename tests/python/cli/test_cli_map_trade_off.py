@@ -22,14 +22,14 @@ AXES = ["--right", "p_max_bar", "--up", "efficiency_gross"]
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     write_netcdf(map_sweep(), tmp_path / "table.nc")
-    write_map(optimize_map(map_sweep(), "efficiency_gross"), tmp_path / "best.json")
-    write_map(CalibrationMap({"fuel_mg": [6.0, 40.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "rail.json")
+    write_map(optimize_map(map_sweep(), "efficiency_gross"), tmp_path / "best.nc")
+    write_map(CalibrationMap({"fuel_mg": [6.0, 40.0]}, [1.0, 2.0], name="rail_bar"), tmp_path / "rail.nc")
     return tmp_path
 
 
 def test_a_line_per_breakpoint_of_the_axis_that_is_left(here: Path, capsys: Capsys) -> None:
     found = ran(
-        capsys, "map", "trade-off", "table.nc", *AXES, "--at", "speed_rpm=1400", "--map", "best.json",
+        capsys, "map", "trade-off", "table.nc", *AXES, "--at", "speed_rpm=1400", "--map", "best.nc",
         "--figure", "trade.png", "--every", "9",
     )  # fmt: skip
     assert (found["right"], found["up"], found["along"], found["at"]) == (
@@ -61,7 +61,7 @@ def test_every_axis_can_be_fixed_and_the_lines_can_be_kept(here: Path, capsys: C
 
 @pytest.mark.usefixtures("here")
 def test_the_text_has_ranges_with_units(capsys: Capsys) -> None:
-    assert main(["map", "trade-off", "table.nc", *AXES, "--at", "fuel_mg=6", "--map", "best.json"]) == 0
+    assert main(["map", "trade-off", "table.nc", *AXES, "--at", "fuel_mg=6", "--map", "best.nc"]) == 0
     head, first, *others = capsys.readouterr().out.splitlines()
     assert head.split("  ")[0] == "speed_rpm"
     assert "soc_cad [°CA aTDC]" in head
@@ -86,8 +86,8 @@ def test_the_text_has_ranges_with_units(capsys: Capsys) -> None:
         (["--right", "p_max_bar", "--up", "speed_rpm"], "no variable 'speed_rpm': it has efficiency_gross, p_max_bar"),
         ([*AXES, "--at", "fuel_mg=6", "--every", "3"], "--every does not act here; it labels the picture"),
         ([*AXES, "--at", "fuel_mg=6", "--name", "soc_cad"], "--name does not act here; without --map no map is read"),
-        ([*AXES, "--at", "fuel_mg=6", "--map", "rail.json"], "it does not belong to this map"),
-        ([*AXES, "--along", "fuel_mg", "--at", "speed_rpm=900", "--map", "best.json"], "not a map of fuel_mg"),
+        ([*AXES, "--at", "fuel_mg=6", "--map", "rail.nc"], "it does not belong to this map"),
+        ([*AXES, "--along", "fuel_mg", "--at", "speed_rpm=900", "--map", "best.nc"], "not a map of fuel_mg"),
         ([*AXES, "--at", "fuel_mg=6", "--figure", "a.png", "--every", "0"], "every = 0: must be >= 1"),
         ([*AXES, "--at", "fuel_mg=6", "-o", "a.csv"], "the ending must be one of .json"),
     ],

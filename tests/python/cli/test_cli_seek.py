@@ -21,6 +21,7 @@ from mgdd.cli.guide_map import learn_map
 from mgdd.engine import Performance
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.loop import VirtualEngine, run_seeker
+from mgdd.maps import CalibrationMap, read_map, write_map
 from mgdd.optimize import ExtremumSeeking
 from typed import Capsys, commands
 
@@ -229,10 +230,10 @@ OPTIMUM_CAD, LIMITED_CAD = -5.63, -3.08
 
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
-    file = tmp_path / "timing.toml"
-    made = TimingMap({"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20, 40]}, -9.0)
-    file.write_text(made.to_toml(), encoding="utf-8")
-    return file
+    CalibrationMap({"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20, 40]}, -9.0, name="soc_cad").save(
+        tmp_path / "timing.nc"
+    )
+    return tmp_path / "timing.nc"
 
 
 def options(kind: str, table: Path) -> tuple[str, ...]:
@@ -312,8 +313,11 @@ def test_the_start_is_that_of_the_user(kind: str, capsys: Capsys, table: Path, t
         ("--guide-shape parabola", "--guide-shape does not act here; --guide none has no model"),
         ("--guide-map x.toml", "--guide-map does not act here; --guide none has no model"),
         ("--guide map", "--guide map needs --guide-map FILE"),
-        ("--guide map --guide-map x.txt", "--guide-map x.txt: the ending must be one of .csv, .toml"),
-        ("--guide map --guide-map x.csv --guide-map-out y.txt", "--guide-map-out y.txt: the ending must be one of"),
+        ("--guide map --guide-map x.txt", "x.txt: no such file"),
+        (
+            "--guide map --guide-map x.csv --guide-map-out y.txt",
+            "-out y.txt: the ending must be one of .nc, .csv",
+        ),
         ("--guide map --guide-map x.csv --guide-map-out no/y.csv", "no/y.csv: the folder no does not exist; make it"),
         ("--guide map --guide-map none.csv", "none.csv"),
         ("--guide-map-out y.csv", "--guide-map-out does not act here; --guide none has no model"),
@@ -322,7 +326,7 @@ def test_the_start_is_that_of_the_user(kind: str, capsys: Capsys, table: Path, t
             "--guide map --guide-map x.csv --guide-map-out y.csv --limit p_max_bar=95",
             "--guide-map-out does not act here; with --limit a run ends at the best timing within the limit",
         ),
-        ("--guide map --guide-map none.toml", "none.toml"),
+        ("--guide map --guide-map none.toml", "none.toml: no such file"),
         ("--guide map --guide-map x.toml --guide-set wall_heat_scale=1", "--guide-set does not act here; --guide map"),
         ("--guide curve --guide-map x.toml", "--guide-map does not act here; --guide curve has a model"),
         ("--guide feed_forward --guide-shape parabola", "--guide-shape 'parabola': a parabola is not one timing"),
@@ -355,23 +359,27 @@ def test_a_feed_forward_beyond_the_bounds_starts_inside(capsys: Capsys) -> None:
     assert -4.0 < out["start"]["soc_cad"] <= -3.0
 
 
-@pytest.mark.parametrize("ending", ["csv", "toml"])
-def test_a_run_that_settles_writes_its_timing_back(ending: str, capsys: Capsys, table: Path, tmp_path: Path) -> None:
-    before, out_file = tmp_path / "timing.csv", tmp_path / f"learnt.{ending}"
-    TimingMap.from_toml(table.read_text(encoding="utf-8")).write_csv(before, source="by hand")
+@pytest.mark.parametrize(("read", "written"), [("nc", "nc"), ("dcm", "nc"), ("nc", "dcm")])
+def test_a_run_that_settles_writes_its_timing_back(
+    read: str, written: str, capsys: Capsys, table: Path, tmp_path: Path
+) -> None:
+    before, out_file = tmp_path / f"before.{read}", tmp_path / f"learnt.{written}"
+    write_map(read_map(table).replaced(provenance={"from": "by hand"}), before)
     run = ("--guide", "map", "--guide-map", str(before), "--guide-map-out", str(out_file), "--cycles", "1200")
     out = seek(capsys, *run, "--seed", "3", "--fuel-mg", "22")
     assert (out["guide_map_learnt"], out["guide_map_out"]) == (True, str(out_file))
-    learnt = TimingMap.read_csv(out_file) if ending == "csv" else TimingMap.from_toml(out_file.read_text("utf-8"))
+    learnt = read_map(out_file)
     point = {"speed_rpm": 1500.0, "fuel_mg": 22.0}
-    assert learnt(point) == pytest.approx(out["guide_map_cad"], abs=1e-12)
+    assert float(learnt(point)) == pytest.approx(out["guide_map_cad"], abs=1e-12)
     assert abs(learnt(point) - out["figures"]["final_soc_cad"]) < 0.5 < abs(-9.0 - out["figures"]["final_soc_cad"])
-    assert learnt.sd_cad.min() < 1.0
-    assert learnt.support[1, 1] > learnt.support[1, 2] > learnt.support[0, 0] == 0.0
-    text = out_file.read_text(encoding="utf-8")
-    assert "mgdd engine seek at speed_rpm=1500 fuel_mg=22 seed=3" in text
-    if ending == "csv":
-        assert text.count("by hand") == 7  # the run has taught two cells of nine
+    if written == "nc":
+        assert learnt.sd_at(point) == pytest.approx(out["guide_map_sd_cad"])
+        assert out["guide_map_sd_cad"] < 3.0
+        support = learnt.cells["support"]
+        assert support[1, 1] > support[1, 2] > support[0, 0] == 0.0
+        assert np.argwhere(learnt.cells["source"] == "learned").tolist() == [[1, 1], [1, 2]]
+        assert learnt.provenance["learned"] == "mgdd engine seek at speed_rpm=1500 fuel_mg=22 seed=3"
+        assert (learnt.provenance.get("from") == "by hand") is (read == "nc")
     again = seek(capsys, "--guide", "map", "--guide-map", str(out_file), "--fuel-mg", "22", "--cycles", "50")
     assert again["start"]["soc_cad"] == pytest.approx(out["guide_map_cad"], abs=1e-9)
     assert "guide_map_learnt" not in again
@@ -380,7 +388,7 @@ def test_a_run_that_settles_writes_its_timing_back(ending: str, capsys: Capsys, 
 def test_a_run_that_has_not_settled_writes_nothing(
     capsys: Capsys, caplog: pytest.LogCaptureFixture, table: Path, tmp_path: Path
 ) -> None:
-    out_file = tmp_path / "learnt.csv"
+    out_file = tmp_path / "learnt.nc"
     run = ("--guide", "map", "--guide-map", str(table), "--guide-map-out", str(out_file), "--cycles", "60", "--json")
     assert main(["engine", "seek", *run]) == 0
     out = json.loads(capsys.readouterr().out)
@@ -393,22 +401,33 @@ def test_a_run_that_has_not_settled_writes_nothing(
 
 
 def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None:
-    bench, timing = VirtualEngine(seed=2), TimingMap.from_toml(table.read_text(encoding="utf-8"))
+    bench, timing = VirtualEngine(seed=2), TimingMap(CalibrationMap.load(table))
     seeker = FeedForward(ExtremumSeeking(start=-9.0, lower=-30.0, upper=10.0), timing)
     seeker.at(bench.point)
     run_seeker(bench, seeker, 900)
-    args = Namespace(guide_map=str(table), guide_map_out=str(tmp_path / "out.csv"), seed=2)
+    args = Namespace(guide_map=str(table), guide_map_out=str(tmp_path / "out.nc"), seed=2)
     for interrupted in (True, False):
-        before = timing.to_toml()
+        before = timing.table
         figures, doubts = learn_map(args, timing, seeker, bench.point, interrupted=interrupted)
         assert figures["guide_map_learnt"] is not interrupted
-        assert (tmp_path / "out.csv").exists() is not interrupted
-        assert (timing.to_toml() == before) is interrupted
+        assert (tmp_path / "out.nc").exists() is not interrupted
+        assert (timing.table is before) is interrupted
         assert any("interrupted" in doubt for doubt in doubts) is interrupted
 
 
-def test_an_axis_that_no_point_has_is_named(capsys: Capsys, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("speed [rpm],soc_cad\n900,-2\n1500,-5\n",
+         "axis 'speed' is not a number of the operating point: did you mean 'speed_rpm'?"),
+        ("speed_rpm,rail_bar\n900,400\n1500,800\n", "rail_bar has unit 'bar': a timing map needs '°CA aTDC'"),
+        ("speed_rpm,soc_cad\n900,-2\n1500,-\n", "1 cells have no value: smooth the map with --fill"),
+        ("speed_rpm,soc_cad\n900,-2\n1500,late\n", "line 3: 'late' is not a finite number"),
+    ],
+)  # fmt: skip
+def test_a_map_that_cannot_guide_is_named(text: str, said: str, capsys: Capsys, tmp_path: Path) -> None:
     file = tmp_path / "timing.csv"
-    file.write_text("speed,timing_cad\n900,-2\n1500,-5\n", encoding="utf-8")
-    said = refused(capsys, "--guide", "map", "--guide-map", str(file))
-    assert "axis 'speed' is not a number of the operating point: did you mean 'speed_rpm'?" in said
+    file.write_text(text, encoding="utf-8")
+    words = refused(capsys, "--guide", "map", "--guide-map", str(file))
+    assert said in words
+    assert words.count("timing.csv") == 1

@@ -14,7 +14,6 @@ import mgdd
 from mgdd import datasets, io
 from mgdd.cli.main import main
 from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
-from mgdd.guide import TimingMap
 from mgdd.io.plain_csv import write_traces
 from mgdd.throttle import SensorPair, Throttle, simulate_throttle
 
@@ -47,16 +46,7 @@ def of_traces(dataset: Callable[[], xr.Dataset]) -> Callable[[Path], xr.Dataset]
     return write
 
 
-def of_map(path: Path) -> xr.Dataset:
-    timing = TimingMap({"speed_rpm": [900.0, 1500.0], "fuel_mg": [6.0, 20.0, 40.0]}, [[-2, -3, -4], [-5, -6, -8.5]])
-    timing.learn((1100.0, 17.0), -4.5, sd_cad=0.4)
-    timing.write_csv(path)
-    flat = timing.to_dataset().stack(cell=("speed_rpm", "fuel_mg")).reset_index("cell")
-    return flat.assign({name: ("cell", [value] * 6) for name, value in flat.attrs.items()})
-
-
 WRITERS = {
-    "timing map": of_map,
     "write_csv, trace": of_pressure,
     "write_csv, log": of_log,
     "cycle": of_traces(lambda: simulate(Cylinder(), OperatingPoint())),

@@ -1,9 +1,10 @@
-"""Calibration maps: values inside and outside of the axes, refusals, the guide's table and back, comparison."""
+"""Calibration maps: values inside and outside of the axes, further columns, refusals, comparison."""
 
 from __future__ import annotations
 
 import pickle
 import threading
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,7 @@ from hypothesis import strategies as st
 from map_cases import FUEL, SPEED, centre, timing_table
 from mgdd.engine import OperatingPoint
 from mgdd.errors import DataError, Error, ParameterError, ShapeError
-from mgdd.guide import FeedForward, TimingMap
 from mgdd.maps import CalibrationMap, compare_maps
-from mgdd.optimize import ExtremumSeeking
 from mgdd.results.labels import check_labels
 
 AXES = {"speed_rpm": SPEED, "fuel_mg": FUEL}
@@ -71,7 +70,7 @@ def test_reading_many_points_lets_other_threads_run() -> None:
             ticks.append(1)
             stop.wait(1e-4)
 
-    points = {"speed_rpm": np.linspace(800.0, 3100.0, 2_000_000), "fuel_mg": 20.0}
+    points = {"speed_rpm": np.linspace(800.0, 3100.0, 300_000), "fuel_mg": 20.0}
     watcher = threading.Thread(target=tick)
     watcher.start()
     before = len(ticks)
@@ -93,14 +92,18 @@ def test_reading_many_points_lets_other_threads_run() -> None:
         ({"axes": {**AXES, "rail_bar": [1.0, 2.0]}}, ParameterError, "one or two"),
         ({"axes": {"soc_cad": SPEED, "fuel_mg": FUEL}}, ParameterError, "another name"),
         ({"values": np.zeros((5, 3))}, ShapeError, r"soc_cad has shape \(5, 3\).*make \(3, 5\)"),
-        ({"values": np.full((3, 5), np.inf)}, ParameterError, "values"),
+        ({"values": np.full((3, 5), np.inf)}, DataError, "speed_rpm = 900, fuel_mg = 6: the value is inf"),
         ({"values": np.full((3, 5), np.nan)}, DataError, "speed_rpm = 900, fuel_mg = 6: the value is nan"),
         ({"labels": {"fuel_mg": ("kg", "fuel")}}, DataError, "unit of fuel_mg = 'kg': must be 'mg'"),
         ({"labels": {"soc_cad": ("bar", "soc")}}, DataError, "unit of soc_cad = 'bar'"),
         ({"labels": {"torque_nm": ("N m", "torque")}}, ParameterError, "labels = 'torque_nm'"),
         ({"cells": {"source": "guessed"}}, DataError, "source = 'guessed': must be one of given"),
         ({"cells": {"source": "infeasible"}}, DataError, "infeasible"),
-        ({"cells": {"suport": 1.0}}, ParameterError, "did you mean 'support'"),
+        ({"cells": {"suport": 1.0}}, ParameterError, "did you mean 'support'.*labels gives another its unit"),
+        ({"cells": {"egr_percent": 1.0}, "labels": {"egr_percent": ("bar", "EGR")}}, DataError, "unit of egr_percent"),
+        ({"cells": {"a b": 1.0}, "labels": {"a b": ("-", "a")}}, ParameterError, "column = 'a b'"),
+        ({"cells": {"fuel_mg": 1.0}, "labels": {"fuel_mg": ("mg", "a")}}, ParameterError, "column = 'fuel_mg'"),
+        ({"cells": {"egr": np.inf}, "labels": {"egr": ("-", "EGR")}}, DataError, "egr at speed_rpm = 900"),
         ({"cells": {"sd": -0.1}}, DataError, "sd at speed_rpm = 900, fuel_mg = 6 = -0.1: must be finite, >= 0"),
         ({"cells": {"sd": np.zeros((2, 5))}}, ShapeError, r"sd has shape \(2, 5\)"),
         ({"name": "best timing"}, ParameterError, "name = 'best timing'"),
@@ -150,37 +153,45 @@ def test_dataset_and_back() -> None:
         CalibrationMap.from_dataset(data.drop_attrs(deep=False))
 
 
-# --- the guide ----------------------------------------------------------------------------------------------
-def test_the_guide_uses_a_map_and_what_it_learns_comes_back() -> None:
-    table = plane().replaced(cells={"source": "smoothed", "sd": np.where(FUEL < 12.0, 0.4, np.nan) * np.ones((3, 1))})
-    timing = table.to_timing_map(prior_sd_cad=2.0)
-    np.testing.assert_array_equal(timing.timing_cad, table.values)
-    np.testing.assert_allclose(timing.sd_cad, np.where(FUEL < 12.0, 0.4, 2.0) * np.ones((3, 1)))
-    assert table.learned_from(timing) == table  # nothing learnt yet
+def test_cells_hold_further_inputs_and_whatever_has_a_unit(tmp_path: Path) -> None:
+    """As a search over a map leaves it: a second input with its deviation, the probability of a limit, visits."""
+    cells = {
+        "sd": 0.2, "egr_percent": 10.0 + FUEL * np.ones((3, 1)), "egr_percent_sd": np.nan, "p_max_risk": 0.01,
+        "visits": np.arange(15.0).reshape(3, 5),
+    }  # fmt: skip
+    labels = {
+        "egr_percent": ("%", "exhaust gas recirculation"), "egr_percent_sd": ("%", "standard deviation of EGR"),
+        "p_max_risk": ("-", "probability of p_max above its limit"), "visits": ("-", "visits"),
+    }  # fmt: skip
+    table = CalibrationMap(AXES, -5.0, name="soc_cad", cells=cells, labels=labels)
+    assert float(table.lookup({"speed_rpm": 1000.0, "fuel_mg": 12.0}, column="egr_percent").values) == pytest.approx(22)
+    assert table.lookup({"speed_rpm": 1400.0, "fuel_mg": [6.0, 8.0]}, column="visits").values.tolist() == [5.0, 5.5]
+    with pytest.raises(ParameterError, match=r"column = 'source': must be one of support, sd, .*visits"):
+        table.lookup({"speed_rpm": 1400.0, "fuel_mg": 6.0}, column="source")
+    data = table.to_dataset()
+    check_labels(data)
+    assert (data["egr_percent"].attrs["units"], data["visits"].attrs["long_name"]) == ("percent", "visits")
+    table.save(tmp_path / "map.nc")
+    back = CalibrationMap.load(tmp_path / "map.nc")
+    turned = data.assign(visits=data["visits"].transpose(), sd=data["sd"].transpose())
+    assert back == table == CalibrationMap.from_dataset(turned) == pickle.loads(pickle.dumps(table))
+    driven = back.replaced(cells={"visits": cells["visits"] + 1.0, "nox_ppm": 80.0}, labels={"nox_ppm": ("ppm", "NOx")})
+    assert driven != back
+    assert driven.cells["visits"][2, 4] == 15.0
+    assert driven.labels["nox_ppm"] == ("ppm", "NOx")
+    data.drop_attrs(deep=False).to_netcdf(tmp_path / "other.nc", engine="scipy")
+    with pytest.raises(DataError, match=r"other\.nc: the Dataset names no map"):
+        CalibrationMap.load(tmp_path / "other.nc")
 
-    optimum = -7.5
-    seeker = FeedForward(ExtremumSeeking(start=-5.0, lower=-30.0, upper=10.0), timing)
-    point = {"speed_rpm": 1400.0, "fuel_mg": 14.0}
-    seeker.at(point)
-    assert seeker.ask()[0] == pytest.approx(centre(1400.0, 14.0), abs=3.0)
-    timing.learn(point, optimum, sd_cad=0.1)
-    back = table.learned_from(timing)
-    assert back.cells["source"].tolist()[1] == ["smoothed", "smoothed", "learned", "smoothed", "smoothed"]
-    assert back.values[1, 2] == pytest.approx(optimum, abs=0.02)
-    assert back.cells["sd"][1, 2] == pytest.approx(0.1, rel=0.01)
-    assert back.cells["support"][1, 2] == 1.0
-    untouched = back.cells["source"] != "learned"
-    np.testing.assert_array_equal(back.values[untouched], table.values[untouched])
-    assert back.to_timing_map().timing_cad[1, 2] == back.values[1, 2]
 
-
-def test_only_a_whole_timing_map_becomes_a_guide() -> None:
-    with pytest.raises(DataError, match="1 cells have no value"):
-        timing_table().to_timing_map()
-    with pytest.raises(DataError, match="needs '°CA aTDC'"):
-        CalibrationMap({"speed_rpm": SPEED}, 80.0, name="torque_nm").to_timing_map()
-    with pytest.raises(DataError, match="other axes"):
-        plane().learned_from(TimingMap({"fuel_mg": FUEL}, -5.0))
+def test_the_place_of_a_point_is_its_cells_and_their_shares() -> None:
+    at = plane().place({"speed_rpm": [1150.0, 9000.0, np.nan], "fuel_mg": [11.0, 40.0, 10.0]})
+    assert at.cells[:, 0].tolist() == [1, 2, 6, 7]  # in rows of five
+    np.testing.assert_allclose(at.weights[:, 0], [0.375, 0.125, 0.375, 0.125])
+    assert at.weights[:, 1].max() == 1.0
+    assert at.cells[np.argmax(at.weights[:, 1]), 1] == 14
+    assert np.isnan(at.weights[:, 2]).any()
+    assert at.held_outside.tolist() == [False, True, True]
 
 
 # --- comparison ---------------------------------------------------------------------------------------------

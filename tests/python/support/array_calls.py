@@ -159,15 +159,6 @@ def guided(trace: Any) -> Any:
     return [engine.cylinder.wall_heat_scale, *engine.estimate]
 
 
-def mapped(fuel: Any, timing: Any) -> Any:
-    return guide.TimingMap({"fuel_mg": fuel}, timing).lookup({"fuel_mg": 21.0}).timing_cad
-
-
-def mapped_by_guide(fuel: Any) -> Any:
-    table = guide.TimingMap.of_guide(lambda point: -0.3 * point.fuel_mg, {"fuel_mg": fuel}, make=OperatingPoint)
-    return table.lookup({"fuel_mg": 21.0}).timing_cad
-
-
 def wheel(time: Any, signal: Any) -> Any:
     return io.Encoder(teeth=4).angle(time, signal)["crank_angle_deg"].to_numpy()
 
@@ -230,8 +221,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     ),
     "guide.GuidedEngine.tell": (guided, (pressure(),)),
     "guide.OnlineCalibration.offer": (calibrated, (pressure(),)),
-    "guide.TimingMap.__init__": (mapped, (FUEL, TIMING)),
-    "guide.TimingMap.of_guide": (mapped_by_guide, (FUEL,)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "io.Encoder.angle": (wheel, (np.arange(0.0, 0.4, 1e-3), np.sin(200.0 * np.arange(0.0, 0.4, 1e-3)))),
@@ -240,6 +229,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
     "maps.CalibrationMap.replaced": (lambda t: table(FUEL, TIMING, 0.2).replaced(t).values, (TIMING - 1.0,)),
     "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
+    "maps.CalibrationMap.place": (lambda x: table(FUEL, TIMING, 0.2).place({"fuel_mg": x}).weights, (OPEN,)),
     "maps.CalibrationMap.__call__": (lambda x: table(FUEL, TIMING, 0.2)(fuel_mg=x), (OPEN,)),
     "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
     "loop.VirtualEngine.run": (lambda soc: VirtualEngine(seed=1).run(soc)["j"].to_numpy(), (SOC,)),

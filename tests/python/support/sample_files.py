@@ -13,7 +13,6 @@ import numpy as np
 from map_cases import timing_table
 from mgdd import io, presets
 from mgdd.design import design_points
-from mgdd.guide import TimingMap
 from mgdd.identify import load_throttle_model
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.smooth import SmoothThrottle
@@ -98,10 +97,6 @@ def _seeker(path: Path) -> None:
     seeker.save(path)
 
 
-def _timing(path: Path) -> None:
-    TimingMap({"speed_rpm": [1200, 2000], "fuel_mg": [10, 20, 30]}, [[-1, -2, -3], [-2, -4, -6]]).write_csv(path)
-
-
 def _dbc(path: Path) -> None:
     write_foreign(path.parent)
     (path.parent / "foreign.dbc").rename(path)
@@ -160,14 +155,12 @@ SAMPLES: dict[str, Sample] = {
         lambda path: Reference.parse(str(path)), "csv", _text("time_s,reference_deg\n0,10\n0.002,11\n0.004,12\n")
     ),
     "maps.read_map": Sample(read_map, "csv", lambda path: write_map(timing_table(), path)),
-    "maps.read_map json": Sample(read_map, "json", lambda path: write_map(timing_table(), path)),
-    "maps.read_map nc": Sample(read_map, "nc", lambda path: write_map(timing_table(), path)),
+    "maps.CalibrationMap.load": Sample(CalibrationMap.load, "nc", timing_table().save),
     "netcdf": Sample(read_netcdf, "nc", lambda path: write_map(timing_table(), path)),
     "maps.read_dcm": Sample(read_dcm, "dcm", _dcm),
     "maps.read_dcm cdfx": Sample(read_dcm, "cdfx", _dcm),
     "maps.read_map grid": Sample(read_map, "csv", _text(GRID)),
     "maps.read_map points": Sample(read_map, "csv", _text(POINTS)),
-    "guide.TimingMap.read_csv": Sample(TimingMap.read_csv, "csv", _timing),
     "optimize.Seeker.load": Sample(Seeker.load, "json", _seeker),
     "identify.load_throttle_model": Sample(
         load_throttle_model, "toml", lambda path: _write(path, FirstPrincipleModel().to_toml())
@@ -184,7 +177,6 @@ SAMPLES: dict[str, Sample] = {
     "rig.repair_record": Sample(repair_record, "rec", _record),
     "rig.export_record": Sample(_export, "rec", _record),
     "rig.RigRecord.read": Sample(RigRecord.read, "rec", _exchanges),
-    "guide.TimingMap": _of_toml(TimingMap, lambda: TimingMap({"fuel_mg": [10, 20, 30]}, [-1, -2, -3]).to_toml()),
     "identify.FirstPrincipleModel": _of_toml(FirstPrincipleModel, lambda: FirstPrincipleModel().to_toml()),
     "identify.SmoothThrottle": _of_toml(SmoothThrottle, lambda: SmoothThrottle().to_toml()),
     "surrogate.EngineSurrogate": _of_toml(EngineSurrogate, _surrogate),
