@@ -10,7 +10,7 @@ from typing import Any
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.from_library import Options, default_of, named_options
-from mgdd.cli.map_files import FORMS, MAP_ENDINGS
+from mgdd.cli.map_files import FORMS, MAP_ENDINGS, doubts_said
 from mgdd.cli.options import option, refuse_idle
 from mgdd.cli.output import check_file, wrote
 from mgdd.cli.ranges import assignments
@@ -101,7 +101,12 @@ def _named(option: str, given: str = "") -> Iterator[None]:
 
 def _read_map(file: str) -> TimingMap:
     """Read a map whose axes are numbers of the operating point."""
-    table = read_map(file)
+    try:
+        with doubts_said():
+            table = read_map(file)
+    except (DataError, ParameterError) as error:
+        more = f"; mgdd map export {file} -o FILE.nc takes such options" if "--" in str(error) else ""
+        raise error.reworded(f"--guide-map {error}{more}") from error
     try:
         timing = TimingMap(table)
     except DataError as error:

@@ -89,7 +89,7 @@ def _lost(maps: list[CalibrationMap]) -> list[str]:
         name
         for table in maps
         for name, column in table.cells.items()
-        if not all(str(entry) == str(plain[name][0]) for entry in column.ravel().tolist() if name in plain)
+        if name not in plain or any(str(entry) != str(plain[name][0]) for entry in column.ravel().tolist())
     ]
 
 

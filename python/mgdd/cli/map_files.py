@@ -22,7 +22,6 @@ from mgdd.io.binary_files import read_netcdf, write_netcdf
 from mgdd.io.plain_csv import write_columns
 from mgdd.io.point_table import POINT, read_points
 from mgdd.maps import read_map, write_map
-from mgdd.maps.cells import NUMBERS, TEXTS
 from mgdd.plot import map_cells
 from mgdd.plot.style import drawn
 from mgdd.report import Table
@@ -118,7 +117,6 @@ def emit_map(
     emit(args, {**map_content(table), **more}, text=text, write=write, figure=picture)
 
 
-COLUMNS = ("value", *NUMBERS, *TEXTS)
 _DIGITS = 4  # of the largest number of a table
 _GAP = 2  # blanks between two columns, as `show` sets them
 
@@ -141,6 +139,7 @@ def map_blocks(table: CalibrationMap, column: str = "value") -> list[str | Table
     cells = table.values if column == "value" else table.cells[column]
     unit = table.unit if column in ("value", "low", "high") else ""
     unit = table.unit.removesuffix(" aTDC") if column == "sd" else unit  # a difference of angles has no zero
+    unit = table.labels[column].units if column in table.labels else unit
     what = f"{table.labels[table.name].long_name}{'' if column == 'value' else f', {column}'}"
     flags = _flags(table)
     out: list[str | Table] = [repr(table)[1:-1]]

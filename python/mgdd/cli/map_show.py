@@ -10,7 +10,6 @@ import numpy as np
 
 from mgdd.cli.from_library import Options
 from mgdd.cli.map_files import (
-    COLUMNS,
     FORMS,
     READING,
     emit_map,
@@ -40,9 +39,9 @@ _COMPARED = Options(compare_maps, "grid", "tolerance")
 def _add_show(parser: Any) -> None:
     option(parser, "file MAP", FORMS)
     READING.add(parser)
-    option(parser, "--column",
-           "what is shown of the cells: value, its standard deviation, the ends of its range",
-           default="value", choices=COLUMNS)  # fmt: skip
+    option(parser, "--column NAME",
+           "what is shown of the cells: value, sd, low, high, source or another column of theirs",
+           default="value")  # fmt: skip
     option(parser, "--sweep TABLE.nc", "also say what the map achieves in the table that it was made of")
     option(parser, "--figure FILE", "draw the cells of the map (.png, .svg or .pdf)")
     option(parser, "--contour", "draw contours instead of the cells")
@@ -54,6 +53,8 @@ def _show(args: argparse.Namespace) -> None:
     if args.contour and args.column in TEXTS:
         raise ParameterError(f"--contour and --column {args.column} contradict each other: it holds texts")
     table = map_in(args, args.file)
+    if args.column not in ("value", *table.cells):
+        raise ParameterError(f"--column {args.column}: the map has value, {', '.join(table.cells)}")
     text, more = map_blocks(table, args.column), {}
     if args.sweep is not None:
         more["achieved"], said = _achieved(table, grid_table(args.sweep))

@@ -207,7 +207,9 @@ def _of_labels(file: Path, name: str | None) -> CalibrationMap:
     content = read_dcm(file)
     maps = content.maps
     if name is None and len(maps) != 1:
-        raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
+        raise ParameterError(
+            f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one with {argument('name', repr('…'))}"
+        )
     label = next(iter(maps)) if name is None else name
     if label not in maps:
         left_out = next((text for text in content.skipped if text.startswith(f"{label}: ")), None)

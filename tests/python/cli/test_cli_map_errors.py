@@ -127,7 +127,7 @@ smooth p_max.toml -o smooth.nc -> give such an ending
 smooth tables.json -o smooth.nc -> no such file
 show best.nc --contour -> --contour does not act here; it is a form of the picture
 show best.nc --contour --figure a.png --column source -> contradict each other
-show best.nc --column lowest -> invalid choice: 'lowest'
+show best.nc --column lowest -> --column lowest: the map has value, support, sd, low
 show best.nc --name soi_cad -> best.nc: no variable 'soi_cad' over one or two axes: the Dataset has
 show table.nc -> of a sweep make a map first, with optimize_map or mgdd map optimize
 show rail.nc --sweep table.nc -> it does not belong to this map

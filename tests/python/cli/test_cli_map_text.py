@@ -9,7 +9,7 @@ import pytest
 
 from map_cases import timing_table
 from mgdd.cli import main, output
-from mgdd.cli.map_files import COLUMNS, map_blocks
+from mgdd.cli.map_files import map_blocks
 from mgdd.cli.output import show
 from mgdd.maps import CalibrationMap, write_map
 from typed import Capsys
@@ -63,13 +63,14 @@ def test_a_curve_is_two_columns() -> None:
     ]
 
 
-@pytest.mark.parametrize("column", COLUMNS)
+@pytest.mark.parametrize("column", ["value", "p_max_bar", *timing_table().cells])
 def test_every_column_can_be_shown(column: str, here: Path, capsys: Capsys) -> None:
-    write_map(timing_table(), here / "map.nc")
+    table = timing_table().replaced(cells={"p_max_bar": np.arange(15.0).reshape(3, 5)})
+    write_map(table, here / "map.nc")
     assert main(["map", "show", "map.nc", "--column", column]) == 0
     lines = capsys.readouterr().out.splitlines()
     row = next(line for line in lines if line.startswith("     1400")).replace(" c", "").split()[1:]
-    cells = timing_table().values if column == "value" else timing_table().cells[column]
+    cells = table.values if column == "value" else table.cells[column]
     if cells.dtype.kind == "U":
         assert row == [text or "–" for text in cells[1]]
     else:
@@ -78,6 +79,7 @@ def test_every_column_can_be_shown(column: str, here: Path, capsys: Capsys) -> N
     title = next(place for place, line in enumerate(lines) if line.startswith("down: ")) - 1
     assert lines[title].endswith("[°CA aTDC]") == (column in ("value", "low", "high"))
     assert lines[title].endswith("[°CA]") == (column == "sd")
+    assert lines[title].endswith("[bar]") == (column == "p_max_bar")
 
 
 @pytest.mark.parametrize("size", [1e-9, 0.03, 1.0, 4e4, 3e9])

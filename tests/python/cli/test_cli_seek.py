@@ -423,6 +423,7 @@ def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None
         ("speed_rpm,rail_bar\n900,400\n1500,800\n", "rail_bar has unit 'bar': a timing map needs '°CA aTDC'"),
         ("speed_rpm,soc_cad\n900,-2\n1500,-\n", "1 cells have no value: smooth the map with --fill"),
         ("speed_rpm,soc_cad\n900,-2\n1500,late\n", "line 3: 'late' is not a finite number"),
+        ("n/M,10,20\n900,-1,-2\n1500,-3,-5\n", "pass --rows 'n' if n runs down, "),
     ],
 )  # fmt: skip
 def test_a_map_that_cannot_guide_is_named(text: str, said: str, capsys: Capsys, tmp_path: Path) -> None:
@@ -430,4 +431,5 @@ def test_a_map_that_cannot_guide_is_named(text: str, said: str, capsys: Capsys, 
     file.write_text(text, encoding="utf-8")
     words = refused(capsys, "--guide", "map", "--guide-map", str(file))
     assert said in words
-    assert words.count("timing.csv") == 1
+    assert words.count("timing.csv") == 1 + ("mgdd map export" in words)  # which takes --rows
+    assert ("mgdd map export" in words) is ("--rows" in words)
