@@ -138,8 +138,8 @@ def learn_map(
     if learnt:
         own = point.to_dict()
         where = " ".join(f"{name}={own[name]:g}" for name in timing.table.axes)
-        said = f"mgdd engine seek at {where} seed={args.seed or 0}"
-        write_map(timing.table.replaced(provenance={"learned": said}), args.guide_map_out)
+        origin = f"mgdd engine seek at {where} seed={args.seed or 0}"
+        write_map(timing.table.replaced(provenance={"learned": origin}), args.guide_map_out)
         wrote(args.guide_map_out)
     else:
         spread_cad, cycles = (default_of(TimingMap.learn_from, name) for name in ("spread_cad", "cycles"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -12,46 +12,21 @@ from mgdd import _core
 from mgdd._arguments import shown
 from mgdd.engine.conditions import numbers_of
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.maps.cells import MapTask, checked_cells, checked_label, checked_name, further_columns
+from mgdd.maps.cells import (
+    MapPlace,
+    MapPoints,
+    MapTask,
+    checked_cells,
+    checked_label,
+    checked_name,
+    further_columns,
+)
 from mgdd.maps.forms import MapForms
 from mgdd.results.describe import Row, rows_of
 from mgdd.results.labels import Label
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-
-class MapPlace(NamedTuple):
-    """Where points lie in a map.
-
-    Parameters
-    ----------
-    cells : numpy.ndarray of int
-        The two or four cells around each point, first dimension, by their numbers in rows.
-    weights : numpy.ndarray
-        The share of each; they add up to one.
-    held_outside : numpy.ndarray of bool
-        Which points lie outside of the axes: their place is that of the edge.
-    """
-
-    cells: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    held_outside: NDArray[np.bool_]
-
-
-class MapPoints(NamedTuple):
-    """What a map gives at points.
-
-    Parameters
-    ----------
-    values : numpy.ndarray
-        In the unit of the map; NaN where a cell without a value takes part.
-    held_outside : numpy.ndarray of bool
-        Which points lie outside of the axes: their value is that of the edge.
-    """
-
-    values: NDArray[np.float64]
-    held_outside: NDArray[np.bool_]
 
 
 class CalibrationMap(MapForms):

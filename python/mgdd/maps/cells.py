@@ -1,4 +1,4 @@
-"""What a calibration map holds of each cell beside its value, and the one check of it."""
+"""What a calibration map holds of each cell beside its value, the one check of it, and cells around points."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -66,6 +66,39 @@ class MapTask:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(MapTask, **self.to_dict()), ()  # a view of the limits cannot be pickled
+
+
+class MapPlace(NamedTuple):
+    """Where points lie in a map.
+
+    Parameters
+    ----------
+    cells : numpy.ndarray of int
+        The two or four cells around each point, first dimension, by their numbers in rows.
+    weights : numpy.ndarray
+        The share of each; they add up to one.
+    held_outside : numpy.ndarray of bool
+        Which points lie outside of the axes: their place is that of the edge.
+    """
+
+    cells: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    held_outside: NDArray[np.bool_]
+
+
+class MapPoints(NamedTuple):
+    """What a map gives at points.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+        In the unit of the map; NaN where a cell without a value takes part.
+    held_outside : numpy.ndarray of bool
+        Which points lie outside of the axes: their value is that of the edge.
+    """
+
+    values: NDArray[np.float64]
+    held_outside: NDArray[np.bool_]
 
 
 def checked_name(what: str, name: object, taken: tuple[str, ...] = ()) -> str:

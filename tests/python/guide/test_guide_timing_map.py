@@ -93,12 +93,14 @@ def test_it_forgets_as_it_is_set() -> None:
 
 
 def test_what_a_cell_knew_before_counts_but_support_is_of_confirmed_optima() -> None:
-    table = CalibrationMap(AXES, -5.0, name="soc_cad", cells={"sd": 0.4, "support": 40.0, "source": "smoothed"})
+    cells = {"sd": 0.4, "support": 40.0, "source": "smoothed", "objective": 50.0}
+    table = CalibrationMap(AXES, -5.0, name="soc_cad", cells=cells)
     timing = TimingMap(table, prior_sd_cad=2.0, forgetting=1.0)
     timing.learn(CELL, -7.0, sd_cad=0.3)
     assert timing(CELL) == pytest.approx(-5.0 - 2.0 * 0.16 / (0.16 + 0.09))
     assert timing.table.cells["support"][1, 2] == 1.0
     assert timing.table.cells["support"][1, 1] == 40.0
+    assert np.isnan(timing.table.cells["objective"][1, 2])  # that of another timing
     assert timing.table.replaced(table.values, cells=table.cells) == table  # labels, task and provenance stay
     again = TimingMap(timing.table, prior_sd_cad=2.0, forgetting=1.0)
     again.learn(CELL, -7.0, sd_cad=0.3)

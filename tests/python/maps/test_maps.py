@@ -157,11 +157,12 @@ def test_cells_hold_further_inputs_and_whatever_has_a_unit(tmp_path: Path) -> No
     """As a search over a map leaves it: a second input with its deviation, the probability of a limit, visits."""
     cells = {
         "sd": 0.2, "egr_percent": 10.0 + FUEL * np.ones((3, 1)), "egr_percent_sd": np.nan, "p_max_risk": 0.01,
-        "visits": np.arange(15.0).reshape(3, 5),
+        "visits": np.arange(15.0).reshape(3, 5), "trim_cad": -1.5,
     }  # fmt: skip
     labels = {
         "egr_percent": ("%", "exhaust gas recirculation"), "egr_percent_sd": ("%", "standard deviation of EGR"),
         "p_max_risk": ("-", "probability of p_max above its limit"), "visits": ("-", "visits"),
+        "trim_cad": ("°CA", "trim"),
     }  # fmt: skip
     table = CalibrationMap(AXES, -5.0, name="soc_cad", cells=cells, labels=labels)
     assert float(table.lookup({"speed_rpm": 1000.0, "fuel_mg": 12.0}, column="egr_percent").values) == pytest.approx(22)
